@@ -1,0 +1,183 @@
+"""The LLVM library that Dr.Jit compiles with: found, proved in a child process, and named.
+
+Dr.Jit loads LLVM as a shared library. Too old a library is refused with an exception, but some (15 and 16 with
+Dr.Jit 1.5) abort the whole process at the first ``maximum``. No exception handler survives that, so the verdict
+comes from a child process and is cached by path, size and modification time.
+"""
+
+from __future__ import annotations
+
+import ctypes.util
+import glob
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+from typing import Literal
+
+__all__ = ["BackendError", "Llvm", "candidates", "find", "prove", "require"]
+
+Verdict = Literal["good", "missing", "too old", "aborts", "broken"]
+
+VARIABLE = "DRJIT_LIBLLVM_PATH"
+REMEDY = (
+    "install LLVM 17 or newer (Debian and Ubuntu: apt-get install libllvm19; Fedora: dnf install llvm-libs; "
+    f"macOS: brew install llvm), or point {VARIABLE} at libLLVM.so"
+)
+# float maximum/minimum is what LLVM 15 and 16 cannot select; the version comes last, as proof that all of it ran.
+PROBE = """
+import drjit as dr
+from drjit.llvm import Float
+x = dr.arange(Float, 8)
+y = dr.sum(dr.clip(dr.minimum(dr.maximum(dr.sin(x), 0), .5), 0, 1))
+assert 0 < y[0] < 8
+print("proved", ".".join(map(str, dr.detail.llvm_version())))
+"""
+LIBRARY_PATTERNS = (
+    os.path.join(sys.prefix, "lib", "llvm", "**", "libLLVM*.so*"),  # unpacked beside the virtual environment
+    "/usr/lib/*-linux-gnu*/libLLVM*.so*",
+    "/usr/lib/llvm-*/lib/libLLVM*.so*",
+    "/usr/lib64/libLLVM*.so*",
+    "/usr/lib/libLLVM*.so*",
+    "/usr/local/lib/libLLVM*.so*",
+    "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
+    "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
+)
+
+
+class BackendError(RuntimeError):
+    """Dr.Jit has no LLVM library it can use here; the message is one line with the remedy."""
+
+
+@dataclass(frozen=True)
+class Llvm:
+    """What a child process found out about one LLVM library."""
+
+    path: str
+    verdict: Verdict
+    version: str = ""
+    detail: str = ""
+
+    @property
+    def good(self) -> bool:
+        return self.verdict == "good"
+
+
+def candidates() -> Iterator[str]:
+    """LLVM libraries to try, in order: the one the user named (then no other), else the newest first."""
+    named = os.environ.get(VARIABLE)
+    if named:
+        yield named
+        return
+    found = {os.path.realpath(path) for pattern in LIBRARY_PATTERNS for path in glob.glob(pattern, recursive=True)}
+    yield from sorted(found, key=_version_in_name, reverse=True)
+    if not found and (name := ctypes.util.find_library("LLVM")):
+        yield name
+
+
+def _version_in_name(path: str) -> tuple[int, ...]:
+    """(19, 1) from libLLVM.so.19.1, (15,) from libLLVM-15.so.1; the soname's own ".1" is no version."""
+    match = re.search(r"libLLVM(?:-(\d+(?:\.\d+)*))?\.(?:so|dylib)(?:\.(\d+(?:\.\d+)*))?", os.path.basename(path))
+    digits = (match.group(1) or match.group(2) or "0") if match else "0"
+    return tuple(int(part) for part in digits.split("."))
+
+
+def prove(path: str) -> Llvm:
+    """Run Dr.Jit with this LLVM library in a child process (0.1-0.2 s)."""
+    if os.sep in path and not os.path.exists(path):
+        return Llvm(path, "missing", detail="no such file")
+    environment = {**os.environ, VARIABLE: path}
+    try:
+        child = subprocess.run(
+            [sys.executable, "-c", PROBE],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return Llvm(path, "broken", detail="no answer in 60 s")
+    if child.returncode == 0 and (match := re.search(r"^proved (\S+)$", child.stdout, re.MULTILINE)):
+        return Llvm(path, "good", match.group(1))
+    if child.returncode < 0:
+        return Llvm(path, "aborts", detail=f"the process died with signal {-child.returncode}")
+    last_line = (child.stderr.strip().splitlines() or ["no message"])[-1]
+    return Llvm(path, "too old" if "backend is inactive" in child.stderr else "broken", detail=last_line)
+
+
+def _cache_file() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(base) / "rhabdom" / "llvm.json"
+
+
+def _cache_key(path: str) -> str:
+    """A verdict holds for this very file and this Dr.Jit."""
+    stat = os.stat(path) if os.path.exists(path) else None
+    size, modified = (stat.st_size, stat.st_mtime_ns) if stat else (0, 0)
+    return f"{path}|{size}|{modified}|drjit {metadata.version('drjit')}|python {sys.version_info[:2]}"
+
+
+def _prove_cached(path: str) -> Llvm:
+    known = _read_cache()
+    key = _cache_key(path)
+    try:
+        return Llvm(**known[key])
+    except (KeyError, TypeError):
+        result = prove(path)
+    if result.verdict in ("good", "aborts"):  # the rest may be mended under the same path
+        _write_cache({**known, key: asdict(result)})
+    return result
+
+
+def _read_cache() -> dict[str, dict[str, str]]:
+    try:
+        known = json.loads(_cache_file().read_text())
+    except (OSError, ValueError):
+        return {}
+    return known if isinstance(known, dict) else {}
+
+
+def _write_cache(content: dict[str, dict[str, str]]) -> None:
+    """A cache that cannot be written costs 0.2 s a start, so it is no error."""
+    cache = _cache_file()
+    try:
+        cache.parent.mkdir(parents=True, exist_ok=True)
+        temporary = cache.with_suffix(f".{os.getpid()}.tmp")
+        temporary.write_text(json.dumps(content, indent=1))
+        temporary.replace(cache)
+    except OSError:
+        return
+
+
+def find(paths: Iterable[str] | None = None, cached: bool = True) -> tuple[Llvm | None, list[Llvm]]:
+    """First good LLVM library among `paths` (default: `candidates()`), and every verdict on the way to it."""
+    tried: list[Llvm] = []
+    for path in candidates() if paths is None else paths:
+        tried.append(_prove_cached(path) if cached else prove(path))
+        if tried[-1].good:
+            return tried[-1], tried
+    return None, tried
+
+
+@lru_cache(maxsize=1)
+def require() -> Llvm:
+    """Make sure that Dr.Jit can use LLVM in this process; call it before anything does.
+
+    Returns the library and points ``DRJIT_LIBLLVM_PATH`` at it.
+
+    Raises:
+        BackendError: no usable library; one line that says what was tried and what to do.
+    """
+    chosen, tried = find()
+    if chosen is None:
+        seen = "; ".join(f"{llvm.path}: {llvm.verdict} ({llvm.detail})" for llvm in tried) or "no libLLVM found"
+        raise BackendError(f"Dr.Jit has no usable LLVM library: {seen}. Remedy: {REMEDY}")
+    os.environ[VARIABLE] = chosen.path
+    return chosen
