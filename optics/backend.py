@@ -108,8 +108,9 @@ def prove(path: str) -> Llvm:
         return Llvm(path, "good", match.group(1))
     if child.returncode < 0:
         return Llvm(path, "aborts", detail=f"the process died with signal {-child.returncode}")
-    last_line = (child.stderr.strip().splitlines() or ["no message"])[-1]
-    return Llvm(path, "too old" if "backend is inactive" in child.stderr else "broken", detail=last_line)
+    if "backend is inactive" in child.stderr:
+        return Llvm(path, "too old", detail="Dr.Jit refuses it")
+    return Llvm(path, "broken", detail=(child.stderr.strip().splitlines() or ["no message"])[-1])
 
 
 def _cache_file() -> Path:

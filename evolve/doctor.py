@@ -1,0 +1,128 @@
+"""What this installation is made of and whether it works: versions, LLVM, Mitsuba variants, processor."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import subprocess
+import sys
+from importlib import metadata
+
+from optics import backend
+
+__all__ = ["examine", "main"]
+
+PACKAGES = (
+    "rhabdom",
+    "numpy",
+    "scipy",
+    "drjit",
+    "mitsuba",
+    "mujoco",
+    "torch",
+    "gymnasium",
+    "stable-baselines3",
+    "nevergrad",
+    "colour-science",
+    "OpenEXR",
+    "safetensors",
+)
+# One child process loads Mitsuba (its import alone can fail on a broken installation) and renders in each variant.
+RENDER = """
+import sys, mitsuba as mi, numpy as np
+for name in sys.argv[1:]:
+    try:
+        mi.set_variant(name)
+        film = {"type": "hdrfilm", "width": 2, "height": 2}
+        scene = mi.load_dict({"type": "scene", "light": {"type": "constant"}, "integrator": {"type": "direct"},
+                              "sensor": {"type": "perspective", "film": film}})
+        pixel = np.array(mi.render(scene, spp=1)).mean()
+        print(name, "works" if pixel > 0 else "renders black")
+    except Exception as error:
+        print(name, "fails:", str(error).strip().splitlines()[0])
+"""
+
+
+def examine() -> dict[str, object]:
+    """Findings as a dictionary: python, machine, packages, llvm (every library tried), variants, gpu, good."""
+    chosen, tried = backend.find(cached=False)
+    environment = {**os.environ, backend.VARIABLE: chosen.path} if chosen else dict(os.environ)
+    wanted = ["scalar_spectral"] + (["llvm_ad_spectral"] if chosen else [])
+    gpu = _gpu()
+    if gpu:
+        wanted.append("cuda_ad_spectral")
+    variants = _render(wanted, environment)
+    packages = {name: _version(name) for name in PACKAGES}
+    works = variants.get("scalar_spectral") == variants.get("llvm_ad_spectral") == "works"
+    return {
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}, {len(os.sched_getaffinity(0))} cores"
+        if hasattr(os, "sched_getaffinity")
+        else f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "gpu": gpu or "none",
+        "packages": packages,
+        "llvm": [vars(llvm) for llvm in tried],
+        "variants": variants,
+        "good": works and "not installed" not in packages.values(),
+    }
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def _gpu() -> str:
+    """Name of the first NVIDIA GPU, "" where there is none."""
+    try:
+        query = ["nvidia-smi", "--query-gpu=name", "--format=csv,noheader"]
+        child = subprocess.run(query, capture_output=True, text=True, timeout=20, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return child.stdout.strip().splitlines()[0] if child.stdout.strip() else ""
+
+
+def _render(variants: list[str], environment: dict[str, str]) -> dict[str, str]:
+    command = [sys.executable, "-c", RENDER, *variants]
+    child = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    seen = dict(line.split(" ", 1) for line in child.stdout.splitlines() if line.split(" ", 1)[0] in variants)
+    last_line = (child.stderr.strip().splitlines() or [f"exit status {child.returncode}"])[-1]
+    return {name: seen.get(name, f"fails: {last_line}") for name in variants}
+
+
+def main(as_json: bool = False) -> int:
+    """Print the findings; 0 when everything that `evolve run` needs works, else 2."""
+    findings = examine()
+    if as_json:
+        print(json.dumps(findings, indent=2))
+    else:
+        print("\n".join(_lines(findings)))
+    return 0 if findings["good"] else 2
+
+
+def _lines(findings: dict[str, object]) -> list[str]:
+    packages, variants, tried = findings["packages"], findings["variants"], findings["llvm"]
+    assert isinstance(packages, dict)
+    assert isinstance(variants, dict)
+    assert isinstance(tried, list)
+    lines = [
+        f"{'python':<20}{findings['python']}",
+        f"{'machine':<20}{findings['machine']}",
+        f"{'gpu':<20}{findings['gpu']}",
+    ]
+    lines += [f"{name:<20}{version}" for name, version in packages.items()]
+    for llvm in tried:
+        note = (
+            f"good, version {llvm['version']}, in use"
+            if llvm["verdict"] == "good"
+            else f"{llvm['verdict']}: {llvm['detail']}"
+        )
+        lines.append(f"{'llvm':<20}{llvm['path']}: {note}")
+    lines += [f"{'variant':<20}{name}: {state}" for name, state in variants.items()]
+    if not any(llvm["verdict"] == "good" for llvm in tried):
+        lines.append(f"remedy: {backend.REMEDY}")
+    lines.append("all good" if findings["good"] else "not good: see the lines above")
+    return lines
