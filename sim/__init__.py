@@ -1,0 +1,64 @@
+"""rhabdom.sim: a MuJoCo world, mirrored as a spectral Mitsuba scene, seen by the eyes of many agents at once.
+
+Eyes, build_world, World            what there is to see, and with which eyes
+mirror, Mirror                      any MuJoCo model as a Mitsuba scene
+BatchedRenderer                     all eyes of all worlds as one wavefront
+make_vec_env, make_env              the environments, natively batched or single
+View, write_exr, read_exr           what was seen, on disk
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sim.agent import Eyes
+    from sim.env import make_env
+    from sim.exr import View, read_exr, write_exr
+    from sim.render import BatchedRenderer
+    from sim.scene.mirror import Mirror, mirror
+    from sim.vec_env import make_vec_env
+    from sim.world import TASKS, World, build_world
+
+_HOME = {
+    "Eyes": "sim.agent",
+    "TASKS": "sim.world",
+    "World": "sim.world",
+    "build_world": "sim.world",
+    "Mirror": "sim.scene.mirror",
+    "mirror": "sim.scene.mirror",
+    "BatchedRenderer": "sim.render",
+    "make_env": "sim.env",
+    "make_vec_env": "sim.vec_env",
+    "View": "sim.exr",
+    "read_exr": "sim.exr",
+    "write_exr": "sim.exr",
+}
+
+__all__ = [
+    "TASKS",
+    "BatchedRenderer",
+    "Eyes",
+    "Mirror",
+    "View",
+    "World",
+    "build_world",
+    "make_env",
+    "make_vec_env",
+    "mirror",
+    "read_exr",
+    "write_exr",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'sim' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,111 @@
+"""The agent's eyes: how many, where on its body, and which optics.
+
+The body is a sphere that stands on the floor; the eyes sit on its equator and look outwards.
+Azimuths are measured in the agent's frame (x forward, y left, z up), positive to the left.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import optics
+
+BODY_RADIUS = 0.2  # [m]
+EYE_HEIGHT = BODY_RADIUS  # [m] above the floor: the equator of a sphere that stands on it
+
+
+@dataclass(frozen=True)
+class Eyes:
+    """The eyes of one agent, all alike but for their azimuth.
+
+    n_eyes               number of eyes, >= 1
+    resolution           receptors of one eye (height, width), each >= 1
+    fov_deg              horizontal field of view of one eye [deg], in (0, 180)
+    placement_range_deg  azimuth from the leftmost to the rightmost eye [deg], in [0, 360]
+    optics               pupil of every eye; None is the perfect lens
+    sensor_width         width of the retina [m]
+    noise_sigma          standard deviation of a receptor's noise, in units of its signal
+    bands                spectral bands
+
+    Raises ValueError for values outside these ranges.
+    """
+
+    n_eyes: int = 2
+    resolution: tuple[int, int] = (15, 15)
+    fov_deg: float = 45.0
+    placement_range_deg: float = 60.0
+    optics: optics.Pupil | None = None
+    sensor_width: float = 200e-6
+    noise_sigma: float = 0.05
+    bands: int = 4
+
+    def __post_init__(self) -> None:
+        def check(name: str, valid: bool, range_: str) -> None:
+            if not valid:
+                raise ValueError(f"Eyes: {name} = {getattr(self, name)!r}, must be {range_}")
+
+        check("n_eyes", self.n_eyes >= 1, "at least 1")
+        check("resolution", len(self.resolution) == 2 and min(self.resolution) >= 1, "(height, width), each >= 1")
+        check("fov_deg", 0.0 < self.fov_deg < 180.0, "in (0, 180)")
+        check("placement_range_deg", 0.0 <= self.placement_range_deg <= 360.0, "in [0, 360]")
+        check("sensor_width", 0.0 < self.sensor_width < math.inf, "positive and finite")
+        check("noise_sigma", 0.0 <= self.noise_sigma < math.inf, "non-negative and finite")
+        check("bands", self.bands >= 1, "at least 1")
+
+    def eye(self) -> optics.Eye:
+        """One eye's optics and retina."""
+        import optics
+
+        return optics.Eye(
+            pupil=self.optics,
+            resolution=self.resolution,
+            fov_deg=self.fov_deg,
+            sensor_width=self.sensor_width,
+            bands=self.bands,
+            noise_sigma=self.noise_sigma,
+        )
+
+    def azimuths(self) -> np.ndarray:
+        """Azimuth of each optical axis [rad], (n_eyes,), from left (+) to right (-), evenly over the placement
+        range: three eyes over 90° look to 45°, 0° and -45°; a single eye looks ahead."""
+        if self.n_eyes == 1:
+            return np.zeros(1)
+        half = math.radians(self.placement_range_deg) / 2
+        return np.linspace(half, -half, self.n_eyes)
+
+    def names(self) -> tuple[str, ...]:
+        """What a picture of each eye's view is called, left to right: ("left", "right") for two eyes."""
+        special = {1: ("center",), 2: ("left", "right"), 3: ("left", "center", "right")}
+        return special.get(self.n_eyes, tuple(f"eye_{i}" for i in range(self.n_eyes)))
+
+    def fov_vertical_deg(self) -> float:
+        """Vertical field of view [deg]: receptors are square on a flat retina."""
+        height, width = self.resolution
+        return math.degrees(2 * math.atan(math.tan(math.radians(self.fov_deg) / 2) * height / width))
+
+
+def eye_positions(azimuths: np.ndarray) -> np.ndarray:
+    """Pupil centres in the agent's frame [m], (n, 3): on the skin, at the equator."""
+    return BODY_RADIUS * np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros_like(azimuths)], axis=-1)
+
+
+def eye_rotations(azimuths: np.ndarray) -> np.ndarray:
+    """Eye frames in the agent's frame, (n, 3, 3), columns (x right, y up, z optical axis, outwards).
+
+    x × y = -z: these are image coordinates, so the determinant is -1 (docs/design.md, "Coordinates").
+    """
+    cos, sin, zero, one = np.cos(azimuths), np.sin(azimuths), np.zeros_like(azimuths), np.ones_like(azimuths)
+    right = np.stack([sin, -cos, zero], axis=-1)
+    up = np.stack([zero, zero, one], axis=-1)
+    axis = np.stack([cos, sin, zero], axis=-1)
+    return np.stack([right, up, axis], axis=-1)
+
+
+def camera_rotations(azimuths: np.ndarray) -> np.ndarray:
+    """MuJoCo camera frames of the same eyes, (n, 3, 3): x right, y up, looking along -z (determinant +1)."""
+    return eye_rotations(azimuths) * np.array([1.0, 1.0, -1.0])
