@@ -1,0 +1,68 @@
+"""Imports run one way, heavy libraries stay where they belong, and package imports are light."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("optics", "sim", "evolve")
+SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+
+
+def test_contracts_hold():
+    linter = Path(sys.executable).with_name("lint-imports")
+    child = subprocess.run([linter], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert child.returncode == 0, child.stdout + child.stderr
+
+
+def imported_at(path: Path) -> dict[str, bool]:
+    """Top-level packages that a file imports -> whether it does so when it is itself imported."""
+    tree = ast.parse(path.read_text())
+    nested = {id(node) for f in ast.walk(tree) if isinstance(f, ast.FunctionDef | ast.Lambda) for node in ast.walk(f)}
+    found: dict[str, bool] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names = [node.module]
+        else:
+            continue
+        for name in names:
+            top = name.split(".")[0]
+            found[top] = found.get(top, False) or id(node) not in nested
+    return found
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_importing_a_package_loads_nothing_heavy(package):
+    heavy = ("torch", "mitsuba", "drjit", "mujoco", "nevergrad", "stable_baselines3", "colour", "matplotlib", "scipy")
+    code = f"import sys, {package}; print([name for name in {heavy!r} if name in sys.modules])"
+    child = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert child.stdout.strip() == "[]"
+
+
+def test_no_variant_is_set_at_import():
+    """A library that sets Mitsuba's variant when imported changes its user's program."""
+    code = "import mitsuba as mi, optics, sim, evolve, sim.mirror, sim.render; print(mi.variant())"
+    child = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert child.stdout.strip() == "None"
+
+
+def test_nothing_reads_or_writes_pickles():
+    readers = {"pickle", "cloudpickle", "dill", "joblib", "shelve", "marshal"}
+    offenders = {path.name: readers & imported_at(path).keys() for path in SOURCES}
+    assert not any(offenders.values()), offenders
+
+
+def test_files_are_small():
+    """A file longer than 300 lines holds two nouns."""
+    long = {str(path.relative_to(ROOT)): n for path in SOURCES if (n := len(path.read_text().splitlines())) > 300}
+    assert not long
+
+
+def test_typed_marker_ships():
+    for package in PACKAGES:
+        assert (ROOT / package / "py.typed").exists()
