@@ -27,7 +27,7 @@ Verdict = Literal["good", "missing", "too old", "aborts", "broken"]
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
 REMEDY = (
-    "install LLVM 17 or newer (Debian and Ubuntu: apt-get install libllvm19; Fedora: dnf install llvm-libs; "
+    "install LLVM 17 or newer (Debian and Ubuntu: apt-get install libllvm19 libatomic1; Fedora: dnf install llvm-libs libatomic; "
     f"macOS: brew install llvm), or point {VARIABLE} at libLLVM.so"
 )
 # float maximum/minimum is what LLVM 15 and 16 cannot select; the version comes last, as proof that all of it ran.
@@ -110,7 +110,9 @@ def prove(path: str) -> Llvm:
         return Llvm(path, "aborts", detail=f"the process died with signal {-child.returncode}")
     if "backend is inactive" in child.stderr:
         return Llvm(path, "too old", detail="Dr.Jit refuses it")
-    return Llvm(path, "broken", detail=(child.stderr.strip().splitlines() or ["no message"])[-1])
+    lines = child.stderr.strip().splitlines() or ["no message"]
+    missing = [line for line in lines if "cannot open shared object file" in line]  # Dr.Jit's own needs, say libatomic
+    return Llvm(path, "broken", detail=(missing or lines)[-1])
 
 
 def _cache_file() -> Path:
