@@ -27,8 +27,8 @@ Verdict = Literal["good", "missing", "too old", "aborts", "broken"]
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
 REMEDY = (
-    "install LLVM 17 or newer (Debian and Ubuntu: apt-get install libllvm19 libatomic1; Fedora: dnf install llvm-libs libatomic; "
-    f"macOS: brew install llvm), or point {VARIABLE} at libLLVM.so"
+    "install LLVM 17 or newer (Debian and Ubuntu: apt-get install libllvm19 libatomic1; "
+    f"Fedora: dnf install llvm-libs libatomic; macOS: brew install llvm), or point {VARIABLE} at libLLVM.so"
 )
 # float maximum/minimum is what LLVM 15 and 16 cannot select; the version comes last, as proof that all of it ran.
 PROBE = """
