@@ -1,0 +1,36 @@
+"""evolve: eyes and brains that evolve in the worlds of `sim`.
+
+Table of contents; everything loads on first use.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_HOME = {
+    "RunConfig": "evolve.config",
+    "EyeConfig": "evolve.config",
+    "GeneConfig": "evolve.config",
+    "SearchConfig": "evolve.config",
+    "LearningConfig": "evolve.config",
+    "EvaluationConfig": "evolve.config",
+    "ConfigError": "evolve.config",
+    "GENES": "evolve.genotype",
+    "Gene": "evolve.genotype",
+    "Genotype": "evolve.genotype",
+    "Phenotype": "evolve.development",
+    "develop": "evolve.development",
+}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'evolve' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__
