@@ -1,0 +1,1 @@
+"""One module per task: its world's geometry (`add_layout`)."""

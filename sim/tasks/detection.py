@@ -1,0 +1,63 @@
+"""Detection: an open walled field with one goal and two adversaries that differ only in stripe orientation."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from sim import materials
+from sim.world import CELL, Layout, add_floor, add_wall, cell_centers
+
+FIELD = (9, 11)  # free cells (rows, columns)
+OBJECT_RADIUS = 0.5  # [m]
+OBJECTS = ("goal", "adversary_0", "adversary_1")
+STRIPES = 8  # across the visible side of an object
+OBJECT_MARGIN = 2  # cells between the wall and the nearest place of an object
+
+
+def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
+    """Add field and objects. The agent starts in the outermost ring of cells, objects in the field's middle."""
+    _add_field(spec)
+    _add_objects(spec)
+    rows, columns = (a.ravel() for a in np.indices(FIELD))
+    to_wall = np.minimum.reduce([rows, columns, FIELD[0] - 1 - rows, FIELD[1] - 1 - columns])
+    centers = cell_centers(columns, rows, FIELD)
+    return Layout(
+        objects=OBJECTS,
+        agent_spawn=centers[to_wall == 0],
+        object_spawn=centers[to_wall >= OBJECT_MARGIN],
+        goal_region=None,
+    )
+
+
+def _add_field(spec: mujoco.MjSpec) -> None:
+    length, width = FIELD[1] * CELL, FIELD[0] * CELL
+    add_floor(spec, (length + 2 * CELL, width + 2 * CELL))
+    x, y = (length + CELL) / 2, (width + CELL) / 2
+    add_wall(spec, "wall_east", np.array([x, 0]), (CELL, width + 2 * CELL), "wall")
+    add_wall(spec, "wall_west", np.array([-x, 0]), (CELL, width + 2 * CELL), "wall")
+    add_wall(spec, "wall_north", np.array([0, y]), (length, CELL), "wall")
+    add_wall(spec, "wall_south", np.array([0, -y]), (length, CELL), "wall")
+
+
+def _add_objects(spec: mujoco.MjSpec) -> None:
+    """Goal: stripes along meridians (upright); adversary: along parallels (level), the same pattern turned by 90°.
+
+    16 sectors of 22.5° around the vertical axis, of which a viewer sees 8, against 8 bands of 22.5° of latitude:
+    across its centre, an object looks the same along the horizontal as the other kind along the vertical. Either
+    has as much white as black, so that no single receptor tells them apart by brightness.
+    """
+    materials.add_texture(spec, "upright_stripes", materials.stripes((8, 512), 2 * STRIPES, axis=1))
+    materials.add_texture(spec, "level_stripes", materials.stripes((256, 8), STRIPES, axis=0))
+    materials.add_textured(spec, "goal", "upright_stripes")
+    materials.add_textured(spec, "adversary", "level_stripes")
+    for name, center in zip(OBJECTS, ((0, 0), (2 * CELL, 0), (-2 * CELL, 0)), strict=True):
+        body = spec.worldbody.add_body(name=name, mocap=True, pos=[*center, OBJECT_RADIUS])
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[OBJECT_RADIUS, 0, 0],
+            material=name.partition("_")[0],
+            contype=0,
+            conaffinity=0,
+        )

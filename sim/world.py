@@ -1,0 +1,220 @@
+"""A task's world: what stands where, as a MuJoCo model, and where agent and objects may start.
+
+`build_world` compiles one. What all worlds have in common is added here; what is special about one is in
+`sim.tasks.navigation`, `sim.tasks.detection`, `sim.tasks.tracking`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+
+import mujoco
+import numpy as np
+
+from sim import materials
+from sim.agent import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
+
+TASKS = ("detection", "navigation", "tracking")
+
+CELL = 2.0  # [m] side of a grid cell
+WALL_HEIGHT = 1.0  # [m]: as high as the objects; a receptor row of 11° sees nothing but wall up to 8 m away
+
+TIMESTEP = 0.02  # [s]
+TIME_CONSTANT = 0.35  # [s] lag of the agent's speed behind the commanded one
+SPEED_GAIN = 0.99  # speed reached per speed commanded
+MAX_SPEED = 10.0  # [m/s] commanded
+
+# The agent can move MAX_SPEED * TIMESTEP = 0.2 m in one substep. Its whiskers feel a wall that near, so that the
+# skin, and the eyes in it, never pass through a wall. See `_add_agent` for the contact's stiffness.
+WHISKER_LENGTH = MAX_SPEED * TIMESTEP  # [m]
+
+# Collision filter: only pairs of an agent geom and a wall are ever tested.
+AGENT_CONTYPE = 1
+WALL_CONAFFINITY = 1
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a task adds to a world: its mocap sphere bodies and the places to start from.
+
+    objects       names of mocap sphere bodies
+    agent_spawn   (n, 2) [m];  object_spawn (m, 2) [m]
+    goal_region   (x_min, y_min, x_max, y_max) [m] or None
+    """
+
+    objects: tuple[str, ...]
+    agent_spawn: np.ndarray
+    object_spawn: np.ndarray
+    goal_region: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class World:
+    """A compiled world.
+
+    model         static geoms; body "agent" with slide joints agent_x, agent_y and hinge agent_heading, actuators
+                  agent_x, agent_y (commanded velocity [m/s], world axes), sensor agent_touch (> 0: wall contact);
+                  mocap bodies for the objects; cameras eye_0 ... on the agent if it was built with eyes
+    objects       mocap sphere bodies: ("goal", "adversary_0", "adversary_1"), or () for navigation
+    agent_spawn   (n, 2) cell centres [m];  object_spawn (m, 2) cell centres [m]
+    goal_region   navigation: (x_min, y_min, x_max, y_max) [m]
+    """
+
+    task: str
+    model: mujoco.MjModel
+    objects: tuple[str, ...]
+    agent_spawn: np.ndarray
+    object_spawn: np.ndarray
+    goal_region: np.ndarray | None
+
+
+def build_world(task: str, *, seed: int = 0, eyes: Eyes | None = None) -> World:
+    """Build the world of a task.
+
+    task   "detection", "navigation" or "tracking"
+    seed   draws the maze of navigation; the field of the other two is always the same
+    eyes   if given, the agent carries cameras eye_0 ..., left to right
+
+    Raises ValueError for an unknown task or a negative seed.
+    """
+    if task not in TASKS:
+        near = difflib.get_close_matches(task, TASKS, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise ValueError(f"unknown task {task!r}, must be one of {', '.join(TASKS)}{hint}")
+    if seed < 0:
+        raise ValueError(f"build_world: seed = {seed}, must be at least 0")
+    spec = _empty_world()
+    add_layout: Callable[[mujoco.MjSpec, np.random.Generator], Layout]
+    add_layout = import_module(f"sim.tasks.{task}").add_layout
+    layout = add_layout(spec, np.random.default_rng(seed))
+    _add_agent(spec, layout.agent_spawn[0], eyes)
+    return World(
+        task=task,
+        model=spec.compile(),
+        objects=layout.objects,
+        agent_spawn=layout.agent_spawn,
+        object_spawn=layout.object_spawn,
+        goal_region=layout.goal_region,
+    )
+
+
+def cell_centers(columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Centres (n, 2) [m] of grid cells; the grid of `shape` (rows, columns) is centred on the origin, row 0 at the
+    smallest y."""
+    x = (np.asarray(columns) - (shape[1] - 1) / 2) * CELL
+    y = (np.asarray(rows) - (shape[0] - 1) / 2) * CELL
+    return np.stack([x, y], axis=-1).astype(float)
+
+
+def add_wall(spec: mujoco.MjSpec, name: str, center: np.ndarray, size: tuple[float, float], material: str) -> None:
+    """Add a wall: a box of `size` (length along x, along y) [m] that stands on the floor.
+
+    The geom's own x axis runs along the wall, because MuJoCo counts a uniform texture's repeats along it.
+    """
+    along_y = size[1] > size[0]
+    length, width = (size[1], size[0]) if along_y else size
+    half_turn = np.sqrt(0.5)
+    spec.worldbody.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=[center[0], center[1], WALL_HEIGHT / 2],
+        quat=[half_turn, 0, 0, half_turn] if along_y else [1, 0, 0, 0],
+        size=[length / 2, width / 2, WALL_HEIGHT / 2],
+        material=material,
+        contype=0,
+        conaffinity=WALL_CONAFFINITY,
+    )
+
+
+def add_floor(spec: mujoco.MjSpec, size: tuple[float, float]) -> None:
+    """Add the floor, `size` [m] along x and y. Nothing falls: it is only seen."""
+    spec.worldbody.add_geom(
+        name="floor",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[size[0] / 2, size[1] / 2, CELL],
+        material="floor",
+        contype=0,
+        conaffinity=0,
+    )
+
+
+def _empty_world() -> mujoco.MjSpec:
+    spec = mujoco.MjSpec()
+    spec.modelname = "rhabdom"
+    spec.option.timestep = TIMESTEP
+    spec.option.gravity = [0, 0, 0]  # the agent moves in a plane
+    # MuJoCo 4.0.0's sparse Newton Hessian is wrong (mended in 4.0.1).
+    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    spec.visual.map.znear = 1e-4
+    materials.add_daylight(spec)
+    materials.add_plain(spec, "floor", materials.FLOOR)
+    materials.add_plain(spec, "wall", materials.GREY)
+    materials.add_plain(spec, "agent", materials.BODY)
+    return spec
+
+
+def _add_agent(spec: mujoco.MjSpec, start: np.ndarray, eyes: Eyes | None) -> None:
+    """Add the agent: slide joints in world axes, then the heading (set by the simulation, no actuator turns it).
+
+    The contact is frictionless, and stiff in a discrete sense: damping 1/dt stops the approach within the substep
+    in which the wall is felt, stiffness 0.2/dt² pushes back a fifth of the depth per substep, without a bounce.
+    """
+    body = spec.worldbody.add_body(name="agent", pos=[float(start[0]), float(start[1]), EYE_HEIGHT])
+    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+    # With ref, qpos is the position in the world, and qpos0 is the start.
+    body.add_joint(name="agent_x", type=slide, axis=[1, 0, 0], ref=float(start[0]))
+    body.add_joint(name="agent_y", type=slide, axis=[0, 1, 0], ref=float(start[1]))
+    body.add_joint(name="agent_heading", type=hinge, axis=[0, 0, 1])
+    body.add_geom(
+        name="agent",
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[BODY_RADIUS, 0, 0],
+        material="agent",
+        mass=1.0,
+        contype=AGENT_CONTYPE,
+        conaffinity=0,
+        condim=1,
+        priority=1,
+        margin=WHISKER_LENGTH,
+        solref=[-0.2 / TIMESTEP**2, -1 / TIMESTEP],
+        solimp=[0.99, 0.99, 0.001, 0.5, 2],
+    )
+    body.add_site(
+        name="agent_skin", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[2 * (BODY_RADIUS + WHISKER_LENGTH), 0, 0], group=4
+    )
+    spec.add_sensor(
+        name="agent_touch",
+        type=mujoco.mjtSensor.mjSENS_TOUCH,
+        objtype=mujoco.mjtObj.mjOBJ_SITE,
+        objname="agent_skin",
+    )
+    for axis in ("agent_x", "agent_y"):
+        _add_velocity_servo(spec, axis)
+    if eyes is not None:
+        _add_eye_cameras(body, eyes)
+
+
+def _add_velocity_servo(spec: mujoco.MjSpec, joint: str) -> None:
+    """First-order lag, dv/dt = (SPEED_GAIN ctrl - v) / TIME_CONSTANT, for a body of 1 kg."""
+    spec.add_actuator(
+        name=joint,
+        target=joint,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        gainprm=[SPEED_GAIN / TIME_CONSTANT] + [0] * 9,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        biasprm=[0, 0, -1 / TIME_CONSTANT] + [0] * 7,
+        ctrllimited=True,
+        ctrlrange=[-MAX_SPEED, MAX_SPEED],
+    )
+
+
+def _add_eye_cameras(body: mujoco.MjsBody, eyes: Eyes) -> None:
+    azimuths = eyes.azimuths()
+    for i, (position, rotation) in enumerate(zip(eye_positions(azimuths), camera_rotations(azimuths), strict=True)):
+        quat = np.empty(4)
+        mujoco.mju_mat2Quat(quat, rotation.ravel())
+        body.add_camera(name=f"eye_{i}", pos=position.tolist(), quat=quat.tolist(), fovy=eyes.fov_vertical_deg())
