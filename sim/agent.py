@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    import optics
+    from optics import Eye, Pupil
 
 BODY_RADIUS = 0.2  # [m]
 EYE_HEIGHT = BODY_RADIUS  # [m] above the floor: the equator of a sphere that stands on it
@@ -39,7 +39,7 @@ class Eyes:
     resolution: tuple[int, int] = (15, 15)
     fov_deg: float = 45.0
     placement_range_deg: float = 60.0
-    optics: optics.Pupil | None = None
+    optics: Pupil | None = None
     sensor_width: float = 200e-6
     noise_sigma: float = 0.05
     bands: int = 4
@@ -57,11 +57,11 @@ class Eyes:
         check("noise_sigma", 0.0 <= self.noise_sigma < math.inf, "non-negative and finite")
         check("bands", self.bands >= 1, "at least 1")
 
-    def eye(self) -> optics.Eye:
+    def eye(self) -> Eye:
         """One eye's optics and retina."""
-        import optics
+        from optics import Eye
 
-        return optics.Eye(
+        return Eye(
             pupil=self.optics,
             resolution=self.resolution,
             fov_deg=self.fov_deg,

@@ -7,20 +7,22 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 
 import mujoco
 import numpy as np
 
 from sim import materials
 from sim.agent import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
+from sim.layout import WALL_CONAFFINITY
+from sim.tasks import detection, navigation, tracking
 
-TASKS = ("detection", "navigation", "tracking")
-
-CELL = 2.0  # [m] side of a grid cell
-WALL_HEIGHT = 1.0  # [m]: as high as the objects; a receptor row of 11° sees nothing but wall up to 8 m away
+_LAYOUTS = {
+    "detection": detection.add_layout,
+    "navigation": navigation.add_layout,
+    "tracking": tracking.add_layout,
+}
+TASKS = tuple(_LAYOUTS)
 
 TIMESTEP = 0.02  # [s]
 TIME_CONSTANT = 0.35  # [s] lag of the agent's speed behind the commanded one
@@ -30,25 +32,6 @@ MAX_SPEED = 10.0  # [m/s] commanded
 # The agent can move MAX_SPEED * TIMESTEP = 0.2 m in one substep. Its whiskers feel a wall that near, so that the
 # skin, and the eyes in it, never pass through a wall. See `_add_agent` for the contact's stiffness.
 WHISKER_LENGTH = MAX_SPEED * TIMESTEP  # [m]
-
-# Collision filter: only pairs of an agent geom and a wall are ever tested.
-AGENT_CONTYPE = 1
-WALL_CONAFFINITY = 1
-
-
-@dataclass(frozen=True)
-class Layout:
-    """What a task adds to a world: its mocap sphere bodies and the places to start from.
-
-    objects       names of mocap sphere bodies
-    agent_spawn   (n, 2) [m];  object_spawn (m, 2) [m]
-    goal_region   (x_min, y_min, x_max, y_max) [m] or None
-    """
-
-    objects: tuple[str, ...]
-    agent_spawn: np.ndarray
-    object_spawn: np.ndarray
-    goal_region: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -87,9 +70,7 @@ def build_world(task: str, *, seed: int = 0, eyes: Eyes | None = None) -> World:
     if seed < 0:
         raise ValueError(f"build_world: seed = {seed}, must be at least 0")
     spec = _empty_world()
-    add_layout: Callable[[mujoco.MjSpec, np.random.Generator], Layout]
-    add_layout = import_module(f"sim.tasks.{task}").add_layout
-    layout = add_layout(spec, np.random.default_rng(seed))
+    layout = _LAYOUTS[task](spec, np.random.default_rng(seed))
     _add_agent(spec, layout.agent_spawn[0], eyes)
     return World(
         task=task,
@@ -98,46 +79,6 @@ def build_world(task: str, *, seed: int = 0, eyes: Eyes | None = None) -> World:
         agent_spawn=layout.agent_spawn,
         object_spawn=layout.object_spawn,
         goal_region=layout.goal_region,
-    )
-
-
-def cell_centers(columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Centres (n, 2) [m] of grid cells; the grid of `shape` (rows, columns) is centred on the origin, row 0 at the
-    smallest y."""
-    x = (np.asarray(columns) - (shape[1] - 1) / 2) * CELL
-    y = (np.asarray(rows) - (shape[0] - 1) / 2) * CELL
-    return np.stack([x, y], axis=-1).astype(float)
-
-
-def add_wall(spec: mujoco.MjSpec, name: str, center: np.ndarray, size: tuple[float, float], material: str) -> None:
-    """Add a wall: a box of `size` (length along x, along y) [m] that stands on the floor.
-
-    The geom's own x axis runs along the wall, because MuJoCo counts a uniform texture's repeats along it.
-    """
-    along_y = size[1] > size[0]
-    length, width = (size[1], size[0]) if along_y else size
-    half_turn = np.sqrt(0.5)
-    spec.worldbody.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        pos=[center[0], center[1], WALL_HEIGHT / 2],
-        quat=[half_turn, 0, 0, half_turn] if along_y else [1, 0, 0, 0],
-        size=[length / 2, width / 2, WALL_HEIGHT / 2],
-        material=material,
-        contype=0,
-        conaffinity=WALL_CONAFFINITY,
-    )
-
-
-def add_floor(spec: mujoco.MjSpec, size: tuple[float, float]) -> None:
-    """Add the floor, `size` [m] along x and y. Nothing falls: it is only seen."""
-    spec.worldbody.add_geom(
-        name="floor",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[size[0] / 2, size[1] / 2, CELL],
-        material="floor",
-        contype=0,
-        conaffinity=0,
     )
 
 
@@ -174,7 +115,7 @@ def _add_agent(spec: mujoco.MjSpec, start: np.ndarray, eyes: Eyes | None) -> Non
         size=[BODY_RADIUS, 0, 0],
         material="agent",
         mass=1.0,
-        contype=AGENT_CONTYPE,
+        contype=WALL_CONAFFINITY,
         conaffinity=0,
         condim=1,
         priority=1,

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from sim import materials
-from sim.world import CELL, Layout, add_floor, add_wall, cell_centers
+from sim.layout import CELL, Layout, add_floor, add_wall, cell_centers
 
 FIELD = (9, 11)  # free cells (rows, columns)
 OBJECT_RADIUS = 0.5  # [m]

@@ -1,0 +1,70 @@
+"""What task worlds are laid out from: a grid of cells, walls, a floor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+CELL = 2.0  # [m] side of a grid cell
+WALL_HEIGHT = 1.0  # [m]: as high as the objects; a receptor row of 11° sees nothing but wall up to 8 m away
+
+# Collision filter: the agent's contype meets the walls' conaffinity, and nothing else meets anything, so that only
+# pairs of the agent and a wall are ever tested.
+WALL_CONAFFINITY = 1
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a task adds to a world: its mocap sphere bodies and the places to start from.
+
+    objects       names of mocap sphere bodies
+    agent_spawn   (n, 2) [m];  object_spawn (m, 2) [m]
+    goal_region   (x_min, y_min, x_max, y_max) [m] or None
+    """
+
+    objects: tuple[str, ...]
+    agent_spawn: np.ndarray
+    object_spawn: np.ndarray
+    goal_region: np.ndarray | None
+
+
+def cell_centers(columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Centres (n, 2) [m] of grid cells; the grid of `shape` (rows, columns) is centred on the origin, row 0 at the
+    smallest y."""
+    x = (np.asarray(columns) - (shape[1] - 1) / 2) * CELL
+    y = (np.asarray(rows) - (shape[0] - 1) / 2) * CELL
+    return np.stack([x, y], axis=-1).astype(float)
+
+
+def add_wall(spec: mujoco.MjSpec, name: str, center: np.ndarray, size: tuple[float, float], material: str) -> None:
+    """Add a wall: a box of `size` (length along x, along y) [m] that stands on the floor.
+
+    The geom's own x axis runs along the wall, because MuJoCo counts a uniform texture's repeats along it.
+    """
+    along_y = size[1] > size[0]
+    length, width = (size[1], size[0]) if along_y else size
+    half_turn = np.sqrt(0.5)
+    spec.worldbody.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=[center[0], center[1], WALL_HEIGHT / 2],
+        quat=[half_turn, 0, 0, half_turn] if along_y else [1, 0, 0, 0],
+        size=[length / 2, width / 2, WALL_HEIGHT / 2],
+        material=material,
+        contype=0,
+        conaffinity=WALL_CONAFFINITY,
+    )
+
+
+def add_floor(spec: mujoco.MjSpec, size: tuple[float, float]) -> None:
+    """Add the floor, `size` [m] along x and y. Nothing falls: it is only seen."""
+    spec.worldbody.add_geom(
+        name="floor",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[size[0] / 2, size[1] / 2, CELL],
+        material="floor",
+        contype=0,
+        conaffinity=0,
+    )
