@@ -1,0 +1,46 @@
+"""The doctor names what is installed and its exit code tells whether an evolution can run."""
+
+import json
+
+import pytest
+
+from evolve import doctor
+from optics import backend
+
+
+@pytest.fixture(scope="module")
+def findings():
+    return doctor.examine()
+
+
+def test_a_working_installation_is_good(findings, monkeypatch, capsys):
+    assert findings["good"], findings
+    assert findings["variants"] | {"scalar_spectral": "works", "llvm_ad_spectral": "works"} == findings["variants"]
+    monkeypatch.setattr(doctor, "examine", lambda: findings)
+    assert doctor.main() == 0
+    printed = capsys.readouterr().out
+    assert f"drjit               {findings['packages']['drjit']}" in printed
+    assert printed.endswith("all good\n")
+
+
+def test_json_is_the_same_findings(findings, monkeypatch, capsys):
+    monkeypatch.setattr(doctor, "examine", lambda: findings)
+    doctor.main(as_json=True)
+    assert json.loads(capsys.readouterr().out) == findings
+
+
+def test_bad_llvm_is_named_with_the_remedy(monkeypatch, capsys, tmp_path):
+    monkeypatch.setenv(backend.VARIABLE, str(tmp_path / "libLLVM.so"))
+    assert doctor.main() == 2
+    printed = capsys.readouterr().out
+    assert "missing: no such file" in printed
+    assert backend.REMEDY in printed
+    assert "llvm_ad_spectral" not in printed
+
+
+def test_missing_package_is_not_good(monkeypatch):
+    monkeypatch.setattr(doctor, "PACKAGES", ("no-such-package",))
+    monkeypatch.setattr(doctor, "_render", lambda variants, environment: dict.fromkeys(variants, "works"))
+    findings = doctor.examine()
+    assert findings["packages"] == {"no-such-package": "not installed"}
+    assert not findings["good"]
