@@ -145,10 +145,11 @@ def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
     return float(_checked(value, int if gene.kind == "integer" else float, gene.range, key))
 
 
-def _checked(value: Any, kind: type, valid: Interval | None, key: str) -> Any:
+def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> Any:
+    """`value`, if it is of this kind (a whole number may stand for a number) and in `valid`."""
     names = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
     shown = str(value).lower() if isinstance(value, bool) else repr(value)
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+    if kind is float and type(value) is int:
         value = float(value)
     if type(value) is not kind:
         raise ConfigError(f"{key} = {shown}: must be {names[kind]}")

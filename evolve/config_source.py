@@ -33,13 +33,13 @@ def assemble(
     Raises:
         ConfigError: unknown key, wrong type, value out of range, contradiction, unreadable file.
     """
-    layers = []
+    layers: list[Tree] = []
     if file is not None:
         layers.append(_checked_tree(read_toml(file), str(file)))
     layers += [_checked_tree(parse_assignment(text), "--set") for text in assignments]
     if task is not None:
         layers.append(_checked_tree({"task": task}, ""))
-    asked = reduce(_merge, layers, {})
+    asked: Tree = reduce(_merge, layers, {})
     if "task" not in asked:
         raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
     below = [_checked_tree(_preset_tree(preset), f"preset {preset}")] if preset else []

@@ -1,0 +1,172 @@
+"""The run directory: a run's only memory. Plain text and plain tensors; nothing in it is code.
+
+config.toml        every setting
+versions.json      with which software the run was started, and continued
+candidates.jsonl   one line per evaluated candidate, in the order in which they finished
+policies/          trained policies
+lock               held by the process that works on the run
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from evolve.candidate import Candidate
+from evolve.config import RunConfig
+from evolve.config_source import from_toml, to_toml
+from evolve.files import write_whole
+from evolve.genotype import Genotype
+from evolve.lock import RunLock
+from evolve.versions import record_start
+
+__all__ = ["Candidate", "Run", "RunError", "next_directory"]
+
+CONFIG = "config.toml"
+CANDIDATES = "candidates.jsonl"
+
+
+class RunError(ValueError):
+    """A run directory that cannot be used as asked; the message is one line that says why."""
+
+
+@dataclass
+class Run:
+    """A run directory; `candidates` are in order of their ids.
+
+    `notice` is one line on what had to be left out when reading (a line that was being written when the power went).
+    """
+
+    path: Path
+    config: RunConfig
+    candidates: tuple[Candidate, ...] = ()
+    notice: str | None = None
+    _whole_bytes: int = field(default=0, repr=False)
+
+    @classmethod
+    def create(cls, path: Path | str, config: RunConfig) -> Run:
+        """New run in a directory that does not exist or is empty.
+
+        Raises:
+            RunError: the directory holds something already, or cannot be written.
+        """
+        path = Path(path)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            if {entry.name for entry in path.iterdir()} - {RunLock.NAME}:
+                raise RunError(f"{path} is not empty: choose another name, or continue it with: evolve resume {path}")
+            (path / "policies").mkdir()
+            (path / CANDIDATES).touch()
+            record_start(path, 0)
+            write_whole(path / CONFIG, to_toml(config).encode())
+        except OSError as error:
+            raise RunError(f"{path} cannot be written: {error.strerror}") from error
+        return cls(path, config)
+
+    @classmethod
+    def open(cls, path: Path | str) -> Run:
+        """A run as it is on disk.
+
+        Raises:
+            RunError: no run there, or its candidates cannot be read; names file and line.
+            ConfigError: its config cannot be used.
+        """
+        path = Path(path)
+        if not path.is_dir():
+            raise RunError(f"{path} is no run: there is no such directory")
+        if not (path / CONFIG).is_file():
+            raise RunError(f"{path} is no run: it holds no {CONFIG}")
+        run = cls(path, from_toml(path / CONFIG))
+        run._read()
+        return run
+
+    def lock(self) -> RunLock:
+        """The right to write to this run, as a context manager; raises LockedError if another process has it."""
+        return RunLock(self.path)
+
+    def repair(self) -> None:
+        """Cut off a candidate's unfinished last line (after `lock`), and read the rest anew."""
+        self._read()
+        with (self.path / CANDIDATES).open("r+b") as file:
+            file.truncate(self._whole_bytes)
+            os.fsync(file.fileno())
+
+    def append(self, candidate: Candidate) -> None:
+        """Write a candidate down for good.
+
+        Raises:
+            RunError: the candidate is there already, or cannot be written; what was there before still is.
+        """
+        if any(known.id == candidate.id for known in self.candidates):
+            raise RunError(f"{self.path}: candidate {candidate.id} has been evaluated already")
+        line = candidate.to_line().encode()
+        try:
+            with (self.path / CANDIDATES).open("ab") as file:
+                file.write(line)
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise RunError(f"{self.path / CANDIDATES}: cannot be written: {error.strerror}") from error
+        self._whole_bytes += len(line)
+        self.candidates = tuple(sorted((*self.candidates, candidate), key=lambda known: known.id))
+
+    def policy_path(self, candidate_id: int) -> Path:
+        """Where a candidate's trained policy is kept."""
+        return self.path / "policies" / f"{candidate_id:06d}.safetensors"
+
+    @property
+    def best(self) -> Candidate | None:
+        """The candidate of highest fitness, the earliest where several have it; None before one has succeeded."""
+        done = [candidate for candidate in self.candidates if candidate.failure is None]
+        return max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
+
+    def generation(self, number: int) -> list[Candidate]:
+        """Candidates of one generation that have been evaluated."""
+        return [candidate for candidate in self.candidates if candidate.generation == number]
+
+    @property
+    def finished(self) -> bool:
+        return len(self.candidates) == self.config.candidates
+
+    def _read(self) -> None:
+        file = self.path / CANDIDATES
+        try:
+            content = file.read_bytes()
+        except OSError as error:
+            raise RunError(f"{file}: cannot be read: {error.strerror}") from error
+        self._whole_bytes = content.rfind(b"\n") + 1
+        lines = content[: self._whole_bytes].splitlines()
+        if len(content) > self._whole_bytes:
+            self.notice = (
+                f"{file}: line {len(lines) + 1} is unfinished and is left out; its candidate counts as unevaluated"
+            )
+        found: dict[int, Candidate] = {}
+        for number, line in enumerate(lines, start=1):
+            try:
+                candidate = Candidate.from_line(line.decode())
+                self._check(candidate, found)
+            except ValueError as error:
+                raise RunError(f"{file}, line {number}: is damaged: {error}") from error
+            found[candidate.id] = candidate
+        self.candidates = tuple(found[key] for key in sorted(found))
+
+    def _check(self, candidate: Candidate, found: dict[int, Candidate]) -> None:
+        population, dimension = self.config.search.population, Genotype(self.config.genome).dimension
+        if candidate.id in found:
+            raise ValueError(f"candidate {candidate.id} is there twice")
+        if candidate.id != candidate.generation * population + candidate.index or not 0 <= candidate.index < population:
+            raise ValueError(
+                f"candidate {candidate.id} can't be number {candidate.index} of generation {candidate.generation} "
+                f"with a population of {population}"
+            )
+        if len(candidate.genome) != dimension:
+            raise ValueError(f"genome has {len(candidate.genome)} values, {dimension} genes are open")
+
+
+def next_directory(task: str, preset: str, base: Path = Path("runs")) -> Path:
+    """runs/<task>-<preset>-<n>, n the first that is free."""
+    n = 1
+    while (base / f"{task}-{preset}-{n}").exists():
+        n += 1
+    return base / f"{task}-{preset}-{n}"

@@ -1,0 +1,83 @@
+"""Which software a run was started and continued with."""
+
+from __future__ import annotations
+
+import json
+import platform
+import subprocess
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from evolve.files import write_whole
+
+__all__ = ["present", "record_start", "recorded"]
+
+FILE = "versions.json"
+PACKAGES = (
+    "rhabdom",
+    "numpy",
+    "drjit",
+    "mitsuba",
+    "mujoco",
+    "torch",
+    "stable-baselines3",
+    "gymnasium",
+    "nevergrad",
+    "cma",
+)
+
+
+def present() -> dict[str, str]:
+    """Versions of what decides a run's numbers, as they are now."""
+    versions = {"python": platform.python_version(), "machine": platform.machine(), "commit": _commit()}
+    for package in PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            versions[package] = "not installed"
+    return versions
+
+
+def recorded(run: Path) -> dict[str, str]:
+    """Versions with which a run was begun; {} if they are not readable."""
+    starts = _starts(run)
+    return starts[0]["versions"] if starts else {}
+
+
+def record_start(run: Path, candidates: int) -> None:
+    """Write down that a run goes on from `candidates` evaluated ones with the present versions."""
+    start = {"time": datetime.now(UTC).isoformat(timespec="seconds"), "candidates": candidates, "versions": present()}
+    write_whole(run / FILE, json.dumps([*_starts(run), start], indent=1).encode())
+
+
+def _starts(run: Path) -> list[dict[str, Any]]:
+    """Earlier starts. The file informs and decides nothing, so one that is lost or damaged begins anew."""
+    try:
+        starts = json.loads((run / FILE).read_text())
+        return [start for start in starts if isinstance(start["versions"], dict)]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+
+
+def _commit() -> str:
+    """Commit of the checkout that runs, "+" where files differ from it; "" outside a checkout."""
+    here = Path(__file__).parent
+    try:
+        described = subprocess.run(
+            ["git", "-C", str(here), "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty=+"],
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=False,
+        )
+        tracked = subprocess.run(
+            ["git", "-C", str(here), "ls-files", "--error-unmatch", "versions.py"],
+            capture_output=True,
+            timeout=10,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return described.stdout.strip() if described.returncode == 0 and tracked.returncode == 0 else ""

@@ -1,0 +1,78 @@
+"""What a worker process does: evaluate one candidate after another, until its pipe closes or its parent is gone."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import threading
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any, Literal
+
+from evolve.evaluation import Evaluation
+
+__all__ = ["Message", "prepare_device", "work"]
+
+
+@dataclass(frozen=True)
+class Message:
+    """From a worker to its executor: steps trained, an evaluation, why it is unfit for work; "died" says the pipe."""
+
+    kind: Literal["progress", "done", "unfit", "died"]
+    content: Any = None
+
+
+def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: Callable[[], None] | None) -> None:
+    """Body of a worker process."""
+    threading.Thread(target=_die_with_parent, daemon=True).start()
+    try:
+        if prepare is not None:
+            prepare()
+    except Exception as error:
+        connection.send(Message("unfit", " ".join(str(error).split())))
+        return
+    while True:
+        try:
+            arguments = connection.recv()
+        except EOFError:
+            return
+        connection.send(Message("done", _evaluated(evaluate, arguments, connection)))
+
+
+def prepare_device() -> None:
+    """Make Dr.Jit ready for work beside other workers: a proven LLVM library, one thread.
+
+    Raises:
+        BackendError: Dr.Jit cannot work here.
+    """
+    from optics import backend
+
+    backend.require()
+    import drjit
+
+    drjit.set_thread_count(1)
+
+
+def _evaluated(evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], connection: Connection) -> Evaluation:
+    """The candidate's evaluation; whatever goes wrong in it becomes its failure."""
+    try:
+        return evaluate(*arguments, progress=lambda *steps: connection.send(Message("progress", steps)))
+    except Exception as error:
+        return Evaluation.failed(_one_line(error))
+
+
+def _one_line(error: Exception) -> str:
+    """ "ValueError: what it says (file.py:12)"."""
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
+
+
+def _die_with_parent() -> None:
+    """A parent that is killed cannot end its workers, and nobody would want what they are working on."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
