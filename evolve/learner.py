@@ -1,0 +1,148 @@
+"""Learning within a lifetime: PPO (stable-baselines3) on batched worlds, until it is solved, stuck or out of steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.vec_env import VecEnv
+
+from evolve.config import LearningConfig
+from evolve.policy import EyePolicy, TrainingDiverged
+from evolve.rollout import FrameRolloutBuffer
+
+Progress = Callable[[int, int], None]  # (steps trained, steps planned)
+
+
+@dataclass(frozen=True)
+class Training:
+    """What became of a training.
+
+    steps  environment steps taken, in whole rollouts
+    curve  (steps, mean return of the evaluation episodes), every `eval_interval` steps
+    """
+
+    policy: EyePolicy
+    steps: int
+    curve: tuple[tuple[int, float], ...]
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """One whole episode of each world: returns (world,), and successes (world,): the goal was reached, and before
+    any adversary."""
+
+    returns: np.ndarray
+    successes: np.ndarray
+
+
+class _CheckedPPO(PPO):
+    """PPO that stops at the first rollout or update that is not finite, instead of learning nonsense from it."""
+
+    def train(self) -> None:
+        for name in ("rewards", "values", "log_probs"):
+            _require_finite(name, getattr(self.rollout_buffer, name), self.num_timesteps)
+        super().train()
+        # A loss that overflows leaves the weights alone (SB3 clips its gradient to zero), and nothing is learnt.
+        _require_finite("loss", np.asarray(self.logger.name_to_value["train/value_loss"]), self.num_timesteps)
+        for name, parameter in self.policy.named_parameters():
+            _require_finite(f"policy's {name}", parameter.detach().numpy(), self.num_timesteps)
+
+
+def _require_finite(name: str, values: np.ndarray, steps: int) -> None:
+    if not np.isfinite(values).all():
+        raise TrainingDiverged(f"{name} not finite after {steps} steps")
+
+
+class _Report(BaseCallback):
+    """Tells how far the training is, after every rollout."""
+
+    def __init__(self, progress: Progress, planned: int) -> None:
+        super().__init__()
+        self.progress, self.planned = progress, planned
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        self.progress(self.num_timesteps, self.planned)
+
+
+def train(
+    worlds: VecEnv,
+    evaluation_worlds: VecEnv,
+    neurons: int,
+    config: LearningConfig,
+    seed: int,
+    progress: Progress | None = None,
+) -> Training:
+    """Learn to act in `worlds`: same arguments, same policy, bit for bit (on one machine).
+
+    After every `eval_interval` steps the policy plays one episode in each of the evaluation worlds; learning ends
+    after `patience` such evaluations without a better mean return, or after `total_steps`. The policy returned
+    is the last one.
+
+    Raises TrainingDiverged where rewards, loss, weights or actions stop being finite.
+    """
+    torch.set_num_threads(1)
+    seed = int(np.random.SeedSequence(seed).generate_state(1)[0])  # SB3 takes 32 bits
+    model = _CheckedPPO(
+        EyePolicy,
+        worlds,
+        n_steps=config.n_steps,
+        batch_size=config.batch_size,
+        n_epochs=config.n_epochs,
+        learning_rate=config.learning_rate,
+        gamma=config.gamma,
+        seed=seed,
+        device="cpu",
+        policy_kwargs={"neurons": neurons},
+        rollout_buffer_class=FrameRolloutBuffer,
+        rollout_buffer_kwargs={"seed": seed},
+    )
+    model.set_logger(Logger(None, []))
+    report = _Report(progress, config.total_steps) if progress else None
+    curve: list[tuple[int, float]] = []
+    while model.num_timesteps < config.total_steps and not stuck(curve, config.patience):
+        stretch = min(config.eval_interval, config.total_steps - model.num_timesteps)
+        model.learn(stretch, callback=report, reset_num_timesteps=False)
+        episodes = play(model.policy, evaluation_worlds, seed)
+        curve.append((model.num_timesteps, float(episodes.returns.mean())))
+    return Training(model.policy, model.num_timesteps, tuple(curve))
+
+
+def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
+    """Whether the last `patience` evaluations all failed to better the best one before them."""
+    returns = [value for _, value in curve]
+    return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
+
+
+def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
+    """One episode in each world, from a reset with this seed, the policy acting without exploration."""
+    worlds.seed(seed)
+    observation = worlds.reset()
+    returns = np.zeros(worlds.num_envs)
+    playing = np.ones(worlds.num_envs, bool)
+    first_event = np.zeros(worlds.num_envs)  # +1 goal, -1 adversary, 0 none yet
+    while playing.any():
+        action, _ = policy.predict(observation, deterministic=True)
+        observation, reward, done, infos = worlds.step(action)
+        returns[playing] += reward[playing]
+        events = np.array([np.sign(terms["goal"] + terms["adversary"]) for terms in map(_terms, infos)])
+        first_event = np.where(playing & (first_event == 0), events, first_event)
+        playing &= ~done
+    if not math.isfinite(returns.sum()):
+        raise TrainingDiverged("returns of the evaluation episodes not finite")
+    return Episodes(returns, first_event > 0)
+
+
+def _terms(info: dict[str, Any]) -> dict[str, float]:
+    terms: dict[str, float] = info["reward_terms"]
+    return terms

@@ -1,0 +1,189 @@
+"""What an agent does with what it sees: an MLP per eye, a memory of frames, and an actor and a critic.
+
+Every eye has weights of its own, and one encoder serves all its remembered frames: signals -> 4 -> 8 -> 16 per frame,
+then `memory` x 16 -> 16 over the frames. The eyes' features are joined with contact and previous action.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import safetensors
+import safetensors.torch
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.distributions import Distribution
+from stable_baselines3.common.policies import MultiInputActorCriticPolicy
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from torch import Tensor, nn
+
+from evolve.files import write_whole
+
+ENCODER_WIDTHS = (4, 8, 16)  # hidden, hidden, code of one frame
+EYE_FEATURES = 16  # what the temporal layer makes of an eye's remembered codes
+
+
+class TrainingDiverged(FloatingPointError):
+    """Learning produced numbers that are none; the message says which."""
+
+
+@dataclass(frozen=True)
+class PolicyConfig:
+    """The shape of a policy: all that is needed to build it again.
+
+    eyes is the shape of the observation's `eyes` (memory, eye, channel, height, width); neurons the width of both
+    hidden layers of actor and critic.
+    """
+
+    eyes: tuple[int, ...]
+    neurons: int
+
+    def observation_space(self) -> spaces.Dict:
+        """The observation that sim's environments give with these eyes."""
+        return spaces.Dict(
+            {
+                "eyes": spaces.Box(-np.inf, np.inf, self.eyes, np.float32),
+                "contact": spaces.Box(0.0, 1.0, (1,), np.float32),
+                "previous_action": spaces.Box(-1.0, 1.0, (2,), np.float32),
+            }
+        )
+
+
+class PerEyeLinear(nn.Module):
+    """A linear layer with weights per eye: (eye, inputs, sample) -> (eye, outputs, sample).
+
+    Samples come last because W x is then one batched GEMM with no copy; x Wᵀ with so few outputs took three
+    times as long, forward and backward.
+    """
+
+    def __init__(self, n_eyes: int, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self.weight = nn.Parameter(torch.empty(n_eyes, outputs, inputs))
+        self.bias = nn.Parameter(torch.zeros(n_eyes, outputs, 1))
+        for weight in self.weight.data:
+            nn.init.orthogonal_(weight, gain=math.sqrt(2))
+
+    def forward(self, x: Tensor) -> Tensor:
+        return torch.baddbmm(self.bias, self.weight, x)
+
+
+class EyeFeatures(BaseFeaturesExtractor):
+    """Features of an observation: 16 per eye, then contact and previous action.
+
+    Two forms are understood. Stacked, as environments give it: `eyes` (sample, memory, eye, channel, height, width).
+    Unstacked, as rollouts keep it, each frame once: `frames` (segment, memory - 1 + step, eye, channel, height, width)
+    and `age` (segment, step), the steps since the episode's first frame; samples are (segment, step) flattened.
+    Both give the same features: an episode's first frame stands in for those before it, as in sim's environments.
+    """
+
+    def __init__(self, observation_space: spaces.Dict) -> None:
+        self.memory, self.n_eyes, *retina = observation_space["eyes"].shape
+        others = observation_space["contact"].shape[0] + observation_space["previous_action"].shape[0]
+        super().__init__(observation_space, EYE_FEATURES * self.n_eyes + others)
+        widths = (math.prod(retina), *ENCODER_WIDTHS)
+        layers: list[nn.Module] = []
+        for inputs, outputs in itertools.pairwise(widths):
+            layers += [PerEyeLinear(self.n_eyes, inputs, outputs), nn.Tanh()]
+        self.encoder = nn.Sequential(*layers)
+        self.temporal = nn.Sequential(
+            PerEyeLinear(self.n_eyes, ENCODER_WIDTHS[-1] * self.memory, EYE_FEATURES), nn.Tanh()
+        )
+
+    def forward(self, observation: dict[str, Tensor]) -> Tensor:
+        if "frames" in observation:
+            codes = self._windows(self._encode(observation["frames"]), observation["age"])
+        else:
+            codes = self._encode(observation["eyes"]).permute(0, 1, 3, 2)
+        codes = codes.reshape(self.n_eyes, ENCODER_WIDTHS[-1] * self.memory, -1)
+        features = self.temporal(codes).permute(2, 0, 1).flatten(1)
+        return torch.cat([features, observation["contact"], observation["previous_action"]], dim=1)
+
+    def _encode(self, frames: Tensor) -> Tensor:
+        """(a, b, eye, channel, height, width) -> codes (eye, code, a, b)."""
+        a, b = frames.shape[:2]
+        return self.encoder(frames.reshape(a * b, self.n_eyes, -1).permute(1, 2, 0)).unflatten(2, (a, b))
+
+    def _windows(self, codes: Tensor, age: Tensor) -> Tensor:
+        """Codes (eye, code, segment, memory - 1 + step) -> of remembered frames (eye, code, memory, segment, step)."""
+        windows = codes.unfold(3, self.memory, 1).permute(0, 1, 4, 2, 3)
+        back = torch.arange(self.memory - 1, -1, -1)[:, None, None]
+        if not (back > age).any():
+            return windows
+        first = (self.memory - 1 + torch.arange(age.shape[1]) - age).clamp(min=0)
+        first_codes = codes.gather(3, first.expand(*codes.shape[:2], -1, -1))
+        return torch.where(back > age, first_codes[:, :, None], windows)
+
+
+class EyePolicy(MultiInputActorCriticPolicy):
+    """SB3's actor-critic over EyeFeatures, with two hidden layers of `neurons` each for actor and critic."""
+
+    def __init__(
+        self, observation_space: spaces.Dict, action_space: spaces.Box, lr_schedule: Any, *, neurons: int, **kwargs: Any
+    ) -> None:
+        kwargs |= {"features_extractor_class": EyeFeatures, "net_arch": [neurons, neurons]}
+        super().__init__(observation_space, action_space, lr_schedule, **kwargs)
+        self.config = PolicyConfig(tuple(observation_space["eyes"].shape), neurons)
+
+    def extract_features(
+        self, obs: dict[str, Tensor], features_extractor: BaseFeaturesExtractor | None = None
+    ) -> Tensor:
+        """As SB3's, without its preprocessing: signals are light, not 8-bit images, and rollouts come unstacked."""
+        return (features_extractor or self.features_extractor)(obs)
+
+    def _get_action_dist_from_latent(self, latent_pi: Tensor) -> Distribution:
+        if not torch.isfinite(latent_pi).all():
+            raise TrainingDiverged("policy's actions not finite")
+        return super()._get_action_dist_from_latent(latent_pi)
+
+
+def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy:
+    """An untrained policy, drawn from torch's random state."""
+    action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+    return EyePolicy(config.observation_space(), action_space, lambda _: learning_rate, neurons=config.neurons)
+
+
+def save_policy(policy: EyePolicy, path: Path | str) -> None:
+    """Write the policy's tensors as safetensors, its shape in the metadata; whole or not at all."""
+    tensors = {name: parameter.detach() for name, parameter in policy.named_parameters()}
+    metadata = {"format": "rhabdom policy 1", "config": json.dumps(asdict(policy.config))}
+    write_whole(Path(path), safetensors.torch.save(tensors, metadata))
+
+
+def load_policy(path: Path | str) -> EyePolicy:
+    """Build the policy a file holds. Nothing in the file is ever executed.
+
+    Raises ValueError, naming the file, if it is no policy written by `save_policy` (a pickle, say, or cut short).
+    """
+    try:
+        with safetensors.safe_open(str(path), framework="pt") as file:
+            metadata = file.metadata() or {}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no mapping)
+        stored = json.loads(metadata["config"])
+        config = PolicyConfig(tuple(int(n) for n in stored["eyes"]), int(stored["neurons"]))
+        policy = build_policy(config)
+        parameters = dict(policy.named_parameters())  # each once; the state dict names shared ones thrice
+        if tensors.keys() != parameters.keys():
+            raise ValueError(f"tensors missing or unknown: {sorted(tensors.keys() ^ parameters.keys())}")
+        for name, parameter in parameters.items():
+            _assign(parameter, tensors[name], name)
+    except FileNotFoundError:
+        raise ValueError(f"no policy at {path}") from None
+    except (safetensors.SafetensorError, KeyError, TypeError, ValueError, RuntimeError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise ValueError(f"{path} is not a rhabdom policy (safetensors expected): {reason}") from None
+    policy.set_training_mode(False)
+    return policy
+
+
+@torch.no_grad()
+def _assign(parameter: nn.Parameter, tensor: Tensor, name: str) -> None:
+    """Set a parameter, without torch's broadcasting of a wrong shape."""
+    if tensor.shape != parameter.shape:
+        raise ValueError(f"{name} has shape {tuple(tensor.shape)}, expected {tuple(parameter.shape)}")
+    parameter.copy_(tensor)
