@@ -1,7 +1,7 @@
 """What worlds are made of: reflectances, striped textures and daylight, put into an MjSpec.
 
 MuJoCo's colours are display-referred (sRGB), so reflectances are encoded here and decoded by the mirror
-(`sim.scene.color`). The MjModel is the one source of truth: the textures live in it.
+(`sim.color`). The MjModel is the one source of truth: the textures live in it.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ import math
 
 import mujoco
 import numpy as np
+
+from sim.color import encode_srgb
 
 WHITE = 0.9  # reflectance of a light stripe
 BLACK = 0.05  # reflectance of a dark stripe
@@ -21,18 +23,6 @@ BODY = 0.3  # reflectance of the agent's body
 # tells its direction; (azimuth [deg] and elevation [deg] of where the light comes from, level). There is no sky:
 # a constant environment would be the main source of noise in a render.
 LIGHTS = ((20.0, 40.0, 0.9), (140.0, 40.0, 0.6), (260.0, 40.0, 0.45))
-
-
-def encode_srgb(linear: np.ndarray | float) -> np.ndarray:
-    """Linear value in [0, 1] -> sRGB display value in [0, 1] (IEC 61966-2-1)."""
-    x = np.asarray(linear, dtype=float)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 0.0031308) ** (1 / 2.4) - 0.055)
-
-
-def decode_srgb(display: np.ndarray | float) -> np.ndarray:
-    """sRGB display value in [0, 1] -> linear value (IEC 61966-2-1)."""
-    x = np.asarray(display, dtype=float)
-    return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
 def stripes(shape: tuple[int, int], n: int, axis: int) -> np.ndarray:

@@ -1,0 +1,9 @@
+"""A MuJoCo model as a Mitsuba scene.
+
+mirror         Mirror: build, sync, render
+shapes         geoms -> Mitsuba shapes, and their poses
+tessellation   geoms -> triangles with MuJoCo's texture coordinates
+surfaces       materials and textures -> BSDFs
+lights         lights -> emitters, with daylight's spectrum
+cameras        cameras -> sensors
+"""

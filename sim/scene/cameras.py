@@ -1,0 +1,74 @@
+"""MuJoCo's cameras as Mitsuba sensors, and viewpoints of one's own.
+
+A MuJoCo camera looks along its -z with x to the right; a Mitsuba sensor looks along +z with x to the left: its
+to_world is the camera's rotation times diag(-1, 1, -1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Viewpoint:
+    """A pinhole camera: position (3,) [m], rotation (3, 3) in MuJoCo's camera frame (x right, y up, looking along
+    -z), vertical field of view."""
+
+    position: np.ndarray
+    rotation: np.ndarray
+    fovy_deg: float
+
+    @staticmethod
+    def looking_at(origin: np.ndarray, target: np.ndarray, fovy_deg: float = 45.0) -> Viewpoint:
+        """From `origin` to `target` [m], z up (y up where one looks straight up or down)."""
+        back = np.asarray(origin, float) - np.asarray(target, float)
+        back /= np.linalg.norm(back)
+        right = np.cross([0, 1.0, 0] if abs(back[2]) > 1 - 1e-9 else [0, 0, 1.0], back)
+        right /= np.linalg.norm(right)
+        rotation = np.column_stack([right, np.cross(back, right), back])
+        return Viewpoint(np.asarray(origin, float), rotation, fovy_deg)
+
+
+def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: str | int | Viewpoint) -> Viewpoint:
+    """Where a camera of the model is. Raises ValueError for an unknown one and for other than plain perspective."""
+    if isinstance(camera, Viewpoint):
+        return camera
+    index = _camera_id(model, camera)
+    if model.cam_projection[index] != mujoco.mjtProjection.mjPROJ_PERSPECTIVE or np.any(
+        model.cam_sensorsize[index] > 0
+    ):
+        raise ValueError(f"camera {camera!r}: only perspective cameras given by fovy are mirrored")
+    rotation = data.cam_xmat[index].reshape(3, 3).copy()
+    return Viewpoint(data.cam_xpos[index].copy(), rotation, float(model.cam_fovy[index]))
+
+
+def sensor(view: Viewpoint, width: int, height: int, near: float) -> Any:
+    """Mitsuba perspective sensor (of the variant in force) of width x height pixels."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = view.rotation @ np.diag([-1.0, 1.0, -1.0])
+    matrix[:3, 3] = view.position
+    return mi.load_dict(
+        {
+            "type": "perspective",
+            "fov": view.fovy_deg,
+            "fov_axis": "y",
+            "near_clip": near,
+            "far_clip": 1e7 * near,
+            "to_world": mi.ScalarTransform4f(matrix.tolist()),
+            "film": {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}},
+        }
+    )
+
+
+def _camera_id(model: mujoco.MjModel, camera: str | int) -> int:
+    names = [model.camera(i).name for i in range(model.ncam)]
+    if isinstance(camera, str) and camera in names:
+        return names.index(camera)
+    if not isinstance(camera, str) and 0 <= camera < model.ncam:
+        return int(camera)
+    raise ValueError(f"no camera {camera!r}; the model has {', '.join(map(repr, names)) or 'none'}")

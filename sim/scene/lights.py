@@ -1,0 +1,117 @@
+"""MuJoCo's lights as Mitsuba emitters with the spectrum of daylight.
+
+Units: a light of diffuse 1 lays the irradiance π · daylight(λ) on a surface that faces it, so that a white Lambertian
+there has radiance daylight(λ): D65, 1 at 560 nm. Mitsuba's own `d65` is scaled otherwise (1.0101 at 560 nm), and
+its `rgb` emitters inherit that; the tables here are optics' own.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from optics.spectrum import daylight
+
+WAVELENGTHS_NM = np.arange(360.0, 781.0, 5.0)
+HEADLIGHT = "headlight"
+_TYPES = mujoco.mjtLightType
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """A light as Mitsuba describes it; `position` and `direction` are where data puts it."""
+
+    name: str
+    light: int  # id in the model; -1: the camera's headlight
+    description: dict[str, Any]
+
+
+def emission(rgb: np.ndarray, scale: float) -> dict[str, Any]:
+    """Spectrum scale · rgb · daylight(λ) on 360-780 nm; a grey rgb is exactly that, a coloured one goes by the
+    reflectance spectrum of its hue (Jakob and Hanika 2019)."""
+    level = float(np.max(rgb))
+    values = scale * level * daylight(WAVELENGTHS_NM * 1e-9)
+    if level > 0 and np.ptp(rgb) > 0:
+        values = values * _hue(rgb / level)
+    return {
+        "type": "regular",
+        "wavelength_min": float(WAVELENGTHS_NM[0]),
+        "wavelength_max": float(WAVELENGTHS_NM[-1]),
+        "values": ",".join(f"{v:.9g}" for v in values),
+    }
+
+
+def _hue(rgb: np.ndarray) -> np.ndarray:
+    texture = mi.load_dict({"type": "rgb", "value": [float(c) for c in rgb]})
+    values = []
+    for nm in WAVELENGTHS_NM:
+        si: Any = dr.zeros(mi.SurfaceInteraction3f)
+        si.wavelengths = mi.Spectrum(float(nm))
+        values.append(float(np.array(texture.eval(si)).ravel()[0]))
+    return np.array(values)
+
+
+def emitters(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[Emitter], list[str]]:
+    """All active lights, and what of them could not be mirrored, in words."""
+    found, left_out = [], []
+    for light in range(model.nlight):
+        if not model.light_active[light]:
+            continue
+        name = model.light(light).name or f"light {light}"
+        if np.any(model.light_ambient[light] > 0):
+            left_out.append(f"ambient part of {name!r}")
+        if model.light_type[light] == _TYPES.mjLIGHT_IMAGE:
+            left_out.append(f"image-based {name!r}")
+        elif np.any(model.light_diffuse[light] > 0):
+            if model.light_type[light] != _TYPES.mjLIGHT_DIRECTIONAL:
+                left_out.append(f"absent attenuation of {name!r} (mirrored with 1/r², equal at the model's center)")
+            found.append(Emitter(f"light_{light}", light, _describe(model, data, light)))
+    headlight = model.vis.headlight
+    if headlight.active:
+        if np.any(headlight.ambient > 0):
+            left_out.append("ambient part of the headlight")
+        if np.any(headlight.diffuse > 0):
+            spectrum = emission(headlight.diffuse, math.pi)
+            found.append(Emitter(HEADLIGHT, -1, {"type": "directional", "irradiance": spectrum}))
+    return found, left_out
+
+
+def pose(data: mujoco.MjData, light: int) -> Any:
+    """Mitsuba's to_world of a light: at its position, +z along its direction."""
+    origin, direction = data.light_xpos[light], data.light_xdir[light]
+    return aimed(origin, direction)
+
+
+def aimed(origin: np.ndarray, direction: np.ndarray) -> Any:
+    """to_world with +z along `direction`; the turn about it does not matter to a light."""
+    z = direction / np.linalg.norm(direction)
+    x = np.cross([1.0, 0, 0] if abs(z[0]) < 0.9 else [0, 1.0, 0], z)
+    x /= np.linalg.norm(x)
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([x, np.cross(z, x), z, origin])
+    return mi.ScalarTransform4f(matrix.tolist())
+
+
+def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int) -> dict[str, Any]:
+    diffuse, kind = model.light_diffuse[light], model.light_type[light]
+    if kind == _TYPES.mjLIGHT_DIRECTIONAL:
+        spectrum = emission(diffuse, math.pi)
+        return {"type": "directional", "irradiance": spectrum, "to_world": pose(data, light)}
+    distance = max(float(np.linalg.norm(data.light_xpos[light] - model.stat.center)), 1e-3)
+    spectrum = emission(diffuse, math.pi * distance**2)
+    if kind == _TYPES.mjLIGHT_POINT or model.light_cutoff[light] >= 90:
+        return {"type": "point", "intensity": spectrum, "to_world": pose(data, light)}
+    cutoff = float(model.light_cutoff[light])
+    return {
+        "type": "spot",
+        "intensity": spectrum,
+        "to_world": pose(data, light),
+        "cutoff_angle": cutoff,
+        "beam_width": 0.95 * cutoff,
+    }

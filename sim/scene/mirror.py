@@ -1,0 +1,246 @@
+"""`mirror(model)`: any MuJoCo model as a spectral Mitsuba scene that follows mjData.
+
+Mirrored: all geoms but height fields and signed distance fields, colours and 2-D textures, lights, perspective
+cameras. Surfaces are Lambertian. What cannot be mirrored is named in one MirrorWarning.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from sim.scene import cameras, lights, rays, shapes, surfaces
+from sim.scene.cameras import Viewpoint
+from sim.variant import DEFAULT_VARIANT
+from sim.variant import variant as in_variant
+
+VISIBLE_GROUPS = (0, 1, 2)  # MuJoCo draws these unless told otherwise
+
+
+class MirrorWarning(UserWarning):
+    """Names what of a model is missing from its mirror."""
+
+
+def mirror(
+    model: mujoco.MjModel,
+    data: mujoco.MjData | None = None,
+    *,
+    bodies: Sequence[str] | None = None,
+    groups: Sequence[int] = VISIBLE_GROUPS,
+    variant: str = DEFAULT_VARIANT,
+) -> Mirror:
+    """Mirror a MuJoCo model.
+
+    data     poses to start from; None: the model's reference pose
+    bodies   names of the bodies whose geoms are wanted ("world" is the static one); None: all
+    groups   geom groups that are visible; a geom of alpha 0 never is
+    variant  a spectral Mitsuba variant; scalar_spectral runs without LLVM, slowly
+
+    Raises ValueError for an unknown body, a variant without spectra, or a model without visible geoms.
+    """
+    return Mirror(model, data, bodies=bodies, groups=groups, variant=variant)
+
+
+class Mirror:
+    """A Mitsuba scene that mirrors a MuJoCo model.
+
+    model, variant   as given
+    scene            mi.Scene; shape ids are "geom_<geom id>_<part>"
+    geoms            ids of the geoms in the scene, (n,)
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData | None,
+        *,
+        bodies: Sequence[str] | None,
+        groups: Sequence[int],
+        variant: str,
+    ) -> None:
+        if not variant.endswith("spectral"):
+            raise ValueError(f"mirror: variant = {variant!r}, must be a spectral one such as {DEFAULT_VARIANT!r}")
+        self.model, self.variant = model, variant
+        visible = _visible(model, bodies, groups)
+        self.geoms = np.array([g for g in visible if surfaces.geom_type(model, g) in shapes.MIRRORED], dtype=int)
+        if not len(self.geoms):
+            raise ValueError("mirror: the model has no visible geom of a kind that can be mirrored")
+        self._data = _reference_pose(model) if data is None else data
+        self._parts = {int(g): shapes.parts(model, g) for g in self.geoms}
+        self._poses = {g: shapes.pose(self._data, g) for g in self._parts}
+        self._bsdfs: dict[Any, Any] = {}
+        with in_variant(variant):
+            self._emitters, left_out = lights.emitters(model, self._data)
+            self.scene = self._build()
+            self._params = mi.traverse(self.scene)
+        left_out = _left_out(model, visible) + left_out
+        if left_out:
+            warnings.warn(f"not mirrored: {'; '.join(left_out)}", MirrorWarning, stacklevel=3)
+
+    def sync(self, data: mujoco.MjData) -> None:
+        """Move everything to where `data` has it (after mj_forward or mj_step). Only what moved is touched: a scene
+        in which nothing moved is not rebuilt."""
+        self._data = data
+        with in_variant(self.variant):
+            for geom, parts in self._parts.items():
+                pose = shapes.pose(data, geom)
+                if not np.array_equal(pose, self._poses[geom]):
+                    self._poses[geom] = pose
+                    self._move(geom, parts, pose)
+            for emitter in self._emitters:
+                if emitter.light >= 0:
+                    self._move_light(emitter.name, lights.pose(data, emitter.light))
+            self._params.update()
+
+    def bsdf(self, geom: str | int) -> Any:
+        """The BSDF of a geom, also of one that is not in the scene."""
+        index = self.model.geom(geom).id
+        with in_variant(self.variant):
+            return self._bsdf(index)
+
+    def render(
+        self,
+        camera: str | int | Viewpoint,
+        width: int,
+        height: int,
+        integrator: str = "direct",
+        spp: int = 16,
+        wavelengths: np.ndarray | Sequence[float] = (450e-9, 550e-9, 650e-9),
+        seed: int = 0,
+    ) -> np.ndarray:
+        """Spectral radiance at `wavelengths` [m], (band, y, x) float32, averaged over each pixel's square.
+
+        camera      name or id of a camera of the model, or a Viewpoint
+        integrator  a Mitsuba integrator: "direct", "path", ...
+        spp         samples per pixel
+        Units: a white Lambertian that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
+        """
+        view = cameras.viewpoint(self.model, self._data, camera)
+        rays.check_size(width, height, spp)
+        with in_variant(self.variant):
+            if any(e.name == lights.HEADLIGHT for e in self._emitters):
+                self._move_light(lights.HEADLIGHT, lights.aimed(view.position, -view.rotation[:, 2]))
+                self._params.update()
+            sensor = cameras.sensor(view, width, height, self._near())
+            return rays.radiance(self.scene, sensor, integrator, spp, np.asarray(wavelengths, float), seed)
+
+    def render_ids(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
+        """Geom id seen through the centre of each pixel, (y, x) int32, -1 for none."""
+        return self._first_hits(camera, width, height)[0]
+
+    def render_depth(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
+        """Depth along the camera's axis [m] at the centre of each pixel, (y, x) float32, inf for none."""
+        return self._first_hits(camera, width, height)[1]
+
+    def _first_hits(self, camera: str | int | Viewpoint, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+        view = cameras.viewpoint(self.model, self._data, camera)
+        rays.check_size(width, height, 1)
+        with in_variant(self.variant):
+            sensor = cameras.sensor(view, width, height, self._near())
+            names, points = rays.first_hits(self.scene, sensor)
+        ids = np.array([int(name.split("_")[1]) if name else -1 for name in names], dtype=np.int32)
+        depth = (points - view.position) @ -view.rotation[:, 2]
+        depth = np.where(ids >= 0, depth, np.inf).astype(np.float32)
+        return ids.reshape(height, width), depth.reshape(height, width)
+
+    def _near(self) -> float:
+        return max(float(self.model.vis.map.znear * self.model.stat.extent), 1e-6)
+
+    def _build(self) -> Any:
+        description: dict[str, Any] = {"type": "scene"}
+        for geom, parts in self._parts.items():
+            for k, part in enumerate(parts):
+                name = f"geom_{geom}_{k}"
+                glow = self._glow(geom)
+                description[name] = shapes.build(part, self._poses[geom], name, self._bsdf(geom), glow)
+        for emitter in self._emitters:
+            description[emitter.name] = emitter.description
+        # Mitsuba would merge meshes that share a BSDF, and then no hit tells its geom.
+        return mi.load_dict(description, optimize=False)
+
+    def _glow(self, geom: int) -> dict[str, Any] | None:
+        """Spectrum that a geom of an emissive material sends out."""
+        material = self.model.geom_matid[geom]
+        if material < 0 or self.model.mat_emission[material] <= 0:
+            return None
+        return lights.emission(surfaces.rgba(self.model, geom)[:3], float(self.model.mat_emission[material]))
+
+    def _bsdf(self, geom: int) -> Any:
+        """Geoms that look alike share one BSDF object."""
+        repeat = shapes.own_repeat(self.model, geom)
+        key = (
+            self.model.geom_matid[geom],
+            tuple(surfaces.rgba(self.model, geom)),
+            None if repeat is None else tuple(repeat),
+            surfaces.is_open(self.model, geom),
+        )
+        if key not in self._bsdfs:
+            self._bsdfs[key] = surfaces.bsdf(self.model, geom, repeat)
+        return self._bsdfs[key]
+
+    def _move(self, geom: int, parts: list[shapes.Part], pose: np.ndarray) -> None:
+        for k, part in enumerate(parts):
+            name = f"geom_{geom}_{k}"
+            if part.triangles is None:
+                self._params[f"{name}.to_world"] = mi.Transform4f(part.matrix(pose))
+                continue
+            self._params[f"{name}.vertex_positions"] = part.vertices(pose)
+            if part.triangles.normals is not None:
+                self._params[f"{name}.vertex_normals"] = part.normals(pose)
+
+    def _move_light(self, name: str, to_world: Any) -> None:
+        key = f"{name}.to_world"
+        if not np.array_equal(np.array(to_world.matrix), np.array(self._params[key].matrix).reshape(4, 4)):
+            self._params[key] = mi.Transform4f(np.array(to_world.matrix))
+
+
+def _visible(model: mujoco.MjModel, bodies: Sequence[str] | None, groups: Sequence[int]) -> list[int]:
+    wanted = list(range(model.nbody))
+    if bodies is not None:
+        names = [model.body(i).name for i in range(model.nbody)]
+        unknown = sorted(set(bodies) - set(names))
+        if unknown:
+            raise ValueError(f"mirror: no body {unknown[0]!r}; the model has {', '.join(map(repr, names))}")
+        wanted = [names.index(name) for name in bodies]
+    return [
+        g
+        for g in range(model.ngeom)
+        if model.geom_bodyid[g] in wanted and model.geom_group[g] in groups and surfaces.rgba(model, g)[3] > 0
+    ]
+
+
+def _reference_pose(model: mujoco.MjModel) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def _left_out(model: mujoco.MjModel, visible: list[int]) -> list[str]:
+    """What of the visible model has no counterpart in the scene, in words."""
+    words = []
+    for g in visible:
+        name = model.geom(g).name or f"geom {g}"
+        if surfaces.geom_type(model, g) not in shapes.MIRRORED:
+            kind = surfaces.geom_type(model, g).name.removeprefix("mjGEOM_").lower()
+            words.append(f"{kind} geom {name!r}")
+        elif surfaces.texture_id(model, g) >= 0 and not shapes.is_textured(model, g):
+            words.append(f"cube texture of geom {name!r}")
+        elif shapes.is_textured(model, g) and _lacks_uv(model, g):
+            words.append(f"texture of geom {name!r}, whose mesh has no texture coordinates")
+    if np.any(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX):
+        words.append("skybox")
+    if model.nflex:
+        words.append(f"{model.nflex} flexes")
+    if model.nskin:
+        words.append(f"{model.nskin} skins")
+    return words
+
+
+def _lacks_uv(model: mujoco.MjModel, geom: int) -> bool:
+    is_mesh = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH
+    return bool(is_mesh and model.mesh_texcoordadr[model.geom_dataid[geom]] < 0)

@@ -1,0 +1,155 @@
+"""Geoms as Mitsuba shapes. Curved geoms without a texture are exact (sphere, cylinder, disk); everything else, and
+everything whose texture coordinates Mitsuba would lay differently, is tessellated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from sim.scene import surfaces, tessellation
+from sim.scene.tessellation import Triangles
+
+_TYPES = mujoco.mjtGeom
+MIRRORED = (
+    _TYPES.mjGEOM_PLANE,
+    _TYPES.mjGEOM_SPHERE,
+    _TYPES.mjGEOM_CAPSULE,
+    _TYPES.mjGEOM_ELLIPSOID,
+    _TYPES.mjGEOM_CYLINDER,
+    _TYPES.mjGEOM_BOX,
+    _TYPES.mjGEOM_MESH,
+)
+
+# Half side of an "infinite" plane in units of the model's extent: the horizon is then 1e-3 rad low for an eye that is
+# one extent above it, and float32 still resolves texture coordinates to 1e-4 of an extent.
+INFINITY = 1e3
+
+
+@dataclass(frozen=True)
+class Part:
+    """One Mitsuba shape of a geom: a plugin placed by `local` (4, 4) in the geom's frame, or triangles."""
+
+    plugin: str = ""
+    local: np.ndarray | None = None
+    triangles: Triangles | None = None
+
+    def matrix(self, pose: np.ndarray) -> np.ndarray:
+        """to_world (4, 4) of a plugin for a geom's pose (4, 4)."""
+        return pose @ self.local
+
+    def vertices(self, pose: np.ndarray) -> np.ndarray:
+        """Vertices in the world, flat float32."""
+        assert self.triangles is not None
+        return (self.triangles.vertices @ pose[:3, :3].T + pose[:3, 3]).astype(np.float32).ravel()
+
+    def normals(self, pose: np.ndarray) -> np.ndarray:
+        assert self.triangles is not None
+        assert self.triangles.normals is not None
+        return (self.triangles.normals @ pose[:3, :3].T).astype(np.float32).ravel()
+
+
+def pose(data: mujoco.MjData, geom: int) -> np.ndarray:
+    """A geom's frame in the world, (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = data.geom_xmat[geom].reshape(3, 3)
+    matrix[:3, 3] = data.geom_xpos[geom]
+    return matrix
+
+
+def is_textured(model: mujoco.MjModel, geom: int) -> bool:
+    texture = surfaces.texture_id(model, geom)
+    return texture >= 0 and bool(model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D)
+
+
+def own_repeat(model: mujoco.MjModel, geom: int) -> np.ndarray | None:
+    """Texture repeats that the BSDF has to make, since the shape's texture coordinates are Mitsuba's own; None
+    where they are in the triangles already."""
+    if model.geom_type[geom] == _TYPES.mjGEOM_SPHERE and is_textured(model, geom):
+        return surfaces.texture_repeat(model, geom, np.repeat(model.geom_size[geom, :1], 2))
+    return None
+
+
+def parts(model: mujoco.MjModel, geom: int) -> list[Part]:
+    """The shapes that make up a geom."""
+    kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
+    if kind == _TYPES.mjGEOM_SPHERE:
+        return [Part("sphere", _placed(size[0], size[0], size[0]))]
+    if not is_textured(model, geom) and kind in (_TYPES.mjGEOM_CYLINDER, _TYPES.mjGEOM_CAPSULE):
+        return _exact_cylinder(kind, size[0], size[1])
+    return [Part(triangles=_triangles(model, geom))]
+
+
+def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
+    kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
+    if kind == _TYPES.mjGEOM_MESH:
+        triangles = tessellation.mesh(model, model.geom_dataid[geom])
+    elif kind == _TYPES.mjGEOM_BOX:
+        triangles = tessellation.box(size)
+    elif kind == _TYPES.mjGEOM_PLANE:
+        triangles = tessellation.plane(size[:2], INFINITY * max(1.0, model.stat.extent))
+    elif kind == _TYPES.mjGEOM_ELLIPSOID:
+        triangles = tessellation.ellipsoid(size)
+    elif kind == _TYPES.mjGEOM_CYLINDER:
+        triangles = tessellation.cylinder(size[0], size[1])
+    else:
+        triangles = tessellation.capsule(size[0], size[1])
+    if not is_textured(model, geom):
+        return triangles
+    if kind in (_TYPES.mjGEOM_CYLINDER, _TYPES.mjGEOM_CAPSULE):
+        size = np.array([size[0], size[0], size[1]])  # MuJoCo's renderer: half sizes along x, y, z
+    triangles = triangles.repeated(surfaces.texture_repeat(model, geom, size))
+    if kind == _TYPES.mjGEOM_PLANE:
+        repeat = model.mat_texrepeat[model.geom_matid[geom]]
+        triangles = tessellation.infinite_axes_uv(triangles, size[:2], repeat)
+    return triangles
+
+
+def _exact_cylinder(kind: mujoco.mjtGeom, radius: float, half_length: float) -> list[Part]:
+    side = Part("cylinder", _placed(radius, radius, 2 * half_length, z=-half_length))
+    if kind == _TYPES.mjGEOM_CAPSULE:
+        return [side] + [Part("sphere", _placed(radius, radius, radius, z=z)) for z in (half_length, -half_length)]
+    # Mitsuba's cylinder is open; its disk faces +z.
+    top = Part("disk", _placed(radius, radius, 1.0, z=half_length))
+    bottom = Part("disk", _placed(radius, -radius, -1.0, z=-half_length))
+    return [side, top, bottom]
+
+
+def _placed(sx: float, sy: float, sz: float, z: float = 0.0) -> np.ndarray:
+    matrix = np.diag([sx, sy, sz, 1.0])
+    matrix[2, 3] = z
+    return matrix
+
+
+def build(part: Part, pose: np.ndarray, name: str, bsdf: Any, radiance: dict[str, Any] | None) -> Any:
+    """The Mitsuba shape (of the variant in force) of a part, emitting where `radiance` is given."""
+    if part.triangles is None:
+        description = {"type": part.plugin, "to_world": mi.ScalarTransform4f(part.matrix(pose)), "bsdf": bsdf}
+        if radiance is not None:
+            description["emitter"] = {"type": "area", "radiance": radiance}
+        return mi.load_dict({**description, "id": name})
+    triangles = part.triangles
+    properties = mi.Properties()
+    properties["bsdf"] = bsdf
+    if radiance is not None:
+        properties["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
+    shape = mi.Mesh(
+        name,
+        len(triangles.vertices),
+        len(triangles.faces),
+        props=properties,
+        has_vertex_normals=triangles.normals is not None,
+        has_vertex_texcoords=triangles.uv is not None,
+    )
+    params = mi.traverse(shape)
+    params["vertex_positions"] = part.vertices(pose)
+    params["faces"] = triangles.faces.astype(np.uint32).ravel()
+    if triangles.normals is not None:
+        params["vertex_normals"] = part.normals(pose)
+    if triangles.uv is not None:
+        params["vertex_texcoords"] = triangles.uv.astype(np.float32).ravel()
+    params.update()
+    return shape

@@ -1,0 +1,93 @@
+"""Materials and textures as Mitsuba BSDFs: Lambertian, with the spectrum that Jakob and Hanika (2019) give an RGB
+reflectance. Colours of MuJoCo are display-referred and are linearised here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from sim.color import decode_srgb
+
+# MuJoCo's own sign that a geom's rgba was not set, and its material's counts.
+_UNSET_RGBA = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
+
+
+def geom_type(model: mujoco.MjModel, geom: int) -> mujoco.mjtGeom:
+    """A geom's kind as an enum: numpy's integers equal its members in one direction only."""
+    return mujoco.mjtGeom(int(model.geom_type[geom]))
+
+
+def rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """Display-referred colour (4,) of a geom, by MuJoCo's rule: its own unless unset, then its material's."""
+    own = model.geom_rgba[geom]
+    material = model.geom_matid[geom]
+    if material >= 0 and np.array_equal(own, _UNSET_RGBA):
+        return model.mat_rgba[material].astype(float)
+    return own.astype(float)
+
+
+def texture_id(model: mujoco.MjModel, geom: int) -> int:
+    """Colour texture of a geom's material, -1 for none."""
+    material = model.geom_matid[geom]
+    if material < 0:
+        return -1
+    roles = mujoco.mjtTextureRole
+    for role in (roles.mjTEXROLE_RGB, roles.mjTEXROLE_RGBA):
+        if model.mat_texid[material, role] >= 0:
+            return int(model.mat_texid[material, role])
+    return -1
+
+
+def texture_repeat(model: mujoco.MjModel, geom: int, size: np.ndarray) -> np.ndarray:
+    """Repeats (u, v) over a geom: the material's, times the size along x and y where it is uniform."""
+    material = model.geom_matid[geom]
+    repeat = model.mat_texrepeat[material].astype(float)
+    if model.mat_texuniform[material]:
+        repeat = repeat * np.where(size[:2] > 0, size[:2], 1.0)
+    return repeat
+
+
+def image(model: mujoco.MjModel, texture: int) -> np.ndarray:
+    """A texture's image (height, width, 3), as MuJoCo stores it, scaled to [0, 1], row 0 on top."""
+    shape = model.tex_height[texture], model.tex_width[texture], model.tex_nchannel[texture]
+    start = model.tex_adr[texture]
+    pixels = model.tex_data[start : start + int(np.prod(shape))].reshape(shape).astype(np.float32) / 255
+    return np.repeat(pixels, 3, axis=2) if shape[2] == 1 else pixels[..., :3]
+
+
+def reflectance(model: mujoco.MjModel, geom: int, repeat: np.ndarray | None = None) -> dict[str, Any]:
+    """Mitsuba texture of a geom's reflectance; `repeat` where the shape brings texture coordinates of its own."""
+    color = rgba(model, geom)[:3]
+    texture = texture_id(model, geom)
+    if texture < 0 or model.tex_type[texture] != mujoco.mjtTexture.mjTEXTURE_2D:
+        return {"type": "rgb", "value": [float(c) for c in np.clip(decode_srgb(color), 0, 1)]}
+    pixels = image(model, texture)
+    if model.tex_colorspace[texture] == mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR:
+        linear = pixels * decode_srgb(color)
+    else:
+        linear = decode_srgb(pixels * color)
+    # Mitsuba counts v upwards, MuJoCo downwards: the image is turned, so that texture coordinates need not be.
+    bitmap = mi.Bitmap(np.ascontiguousarray(linear[::-1], dtype=np.float32))
+    bitmap.set_srgb_gamma(False)
+    scale = mi.ScalarTransform3f().scale([1.0, 1.0] if repeat is None else [float(r) for r in repeat])
+    return {"type": "bitmap", "bitmap": bitmap, "wrap_mode": "repeat", "to_uv": scale}
+
+
+def is_open(model: mujoco.MjModel, geom: int) -> bool:
+    """Whether the inner side of a geom's surface can be seen."""
+    return geom_type(model, geom) in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_MESH)
+
+
+def bsdf(model: mujoco.MjModel, geom: int, repeat: np.ndarray | None = None) -> Any:
+    """A geom's BSDF (a Mitsuba object of the variant in force): Lambertian; both sides of planes and meshes, which
+    may be open; see-through by its rgba's alpha."""
+    description: dict[str, Any] = {"type": "diffuse", "reflectance": reflectance(model, geom, repeat)}
+    if is_open(model, geom):
+        description = {"type": "twosided", "inside": description}
+    alpha = float(rgba(model, geom)[3])
+    if alpha < 1:
+        description = {"type": "mask", "opacity": alpha, "inside": description}
+    return mi.load_dict(description)

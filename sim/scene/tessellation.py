@@ -1,0 +1,159 @@
+"""Geoms as triangles with MuJoCo's texture coordinates, in the geom's frame.
+
+Texture coordinates are MuJoCo's: u to the right, v downwards, (0, 0) the outer corner of the image's first texel.
+They were measured on MuJoCo 4.0.0's own renderer (tests/sim/scene/test_textures.py compares with it).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+# Chord error of a tessellated unit circle: (π/SLICES)²/2 = 3e-4 of the radius, below the 1e-3 asked of depths.
+SLICES = 128
+STACKS = 64
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """vertices (n, 3) [m] · normals (n, 3), unit, or None (flat) · uv (n, 2) or None · faces (m, 3), outward CCW."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray | None = None
+    normals: np.ndarray | None = None
+
+    def repeated(self, repeat: np.ndarray) -> Triangles:
+        """The same, the texture repeated (u, v) times."""
+        return self if self.uv is None else replace(self, uv=self.uv * repeat)
+
+
+def join(parts: list[Triangles]) -> Triangles:
+    """One mesh of several; all or none have texture coordinates, and all or none normals."""
+    offsets = np.cumsum([0] + [len(p.vertices) for p in parts[:-1]])
+    uvs = [p.uv for p in parts if p.uv is not None]
+    normals = [p.normals for p in parts if p.normals is not None]
+    return Triangles(
+        vertices=np.concatenate([p.vertices for p in parts]),
+        faces=np.concatenate([p.faces + o for p, o in zip(parts, offsets, strict=True)]),
+        uv=np.concatenate(uvs) if uvs else None,
+        normals=np.concatenate(normals) if normals else None,
+    )
+
+
+def plane(half_size: np.ndarray, extent: float) -> Triangles:
+    """z = 0, facing +z: u = (x/sx + 1)/2, v = 1 - (y/sy + 1)/2. A half size of 0 is infinite: the plane then ends at
+    ±`extent` [m], and u = x/2 + 1/2 per repeat is handled by `plane_uv`."""
+    half = np.where(half_size > 0, half_size, extent)
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
+    vertices = np.column_stack([corners * half, np.zeros(4)])
+    return Triangles(vertices, _QUAD, uv=np.column_stack([(corners[:, 0] + 1) / 2, (1 - corners[:, 1]) / 2]))
+
+
+def infinite_axes_uv(triangles: Triangles, half_size: np.ndarray, repeat: np.ndarray) -> Triangles:
+    """Texture coordinates of a plane's infinite axes: repeats count per 2 m, (x, -y) repeat/2 + 1/2."""
+    assert triangles.uv is not None
+    per_length = triangles.vertices[:, :2] * [0.5, -0.5] * repeat + 0.5
+    return replace(triangles, uv=np.where(half_size > 0, triangles.uv, per_length))
+
+
+_QUAD = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def box(half_size: np.ndarray) -> Triangles:
+    """Faces ±x carry (u, v) = (y, -z), faces ±y (x, -z), faces ±z (x, -y), each over [0, 1]: opposite faces show
+    mirror images of each other."""
+    parts = []
+    for axis, (u_axis, v_axis) in enumerate(((1, 2), (0, 2), (0, 1))):
+        for sign in (1.0, -1.0):
+            corners = np.zeros((4, 3))
+            corners[:, u_axis] = [-1, 1, 1, -1]
+            corners[:, v_axis] = [-1, -1, 1, 1]
+            corners[:, axis] = sign
+            outward = np.linalg.det(np.stack([corners[1] - corners[0], corners[2] - corners[1], corners[0]])) > 0
+            faces = _QUAD if outward else _QUAD[:, ::-1]
+            uv = np.column_stack([(corners[:, u_axis] + 1) / 2, (1 - corners[:, v_axis]) / 2])
+            parts.append(Triangles(corners * half_size, faces, uv=uv))
+    return join(parts)
+
+
+def ellipsoid(semi_axes: np.ndarray) -> Triangles:
+    """u = azimuth / 2π, v = polar angle / π from +z, both of the unit sphere that was scaled."""
+    return _revolved(*_arc(0, np.pi), scale=semi_axes, v=np.linspace(0, 1, STACKS + 1))
+
+
+def cylinder(radius: float, half_length: float) -> Triangles:
+    """Side: u = azimuth / 2π, v = (1 - z/h)/2. Ends: (u, v) = ((x/r + 1)/2, (y/r + 1)/2)."""
+    side = _revolved(
+        np.ones(2), np.array([1.0, -1.0]), scale=np.array([radius, radius, half_length]), v=np.array([0.0, 1.0])
+    )
+    azimuth = np.linspace(0, 2 * np.pi, SLICES, endpoint=False)
+    ring = np.column_stack([np.cos(azimuth), np.sin(azimuth)])
+    disk = np.concatenate([np.zeros((1, 2)), ring])
+    around = np.arange(SLICES)
+    fan = np.column_stack([np.zeros(SLICES, int), 1 + around, 1 + (around + 1) % SLICES])
+    ends = []
+    for sign in (1.0, -1.0):
+        vertices = np.column_stack([radius * disk, np.full(len(disk), sign * half_length)])
+        normals = np.broadcast_to([0, 0, sign], vertices.shape)
+        ends.append(Triangles(vertices, fan if sign > 0 else fan[:, ::-1], (disk + 1) / 2, normals))
+    return join([side, *ends])
+
+
+def capsule(radius: float, half_length: float) -> Triangles:
+    """Side as a cylinder's; each cap has v = 0 ... 1 of its own: from the pole to the side on top, from the side to
+    the pole below."""
+    side = _revolved(
+        np.ones(2), np.array([1.0, -1.0]), scale=np.array([radius, radius, half_length]), v=np.array([0.0, 1.0])
+    )
+    parts = [side]
+    for sign, start in ((1.0, 0.0), (-1.0, np.pi / 2)):
+        cap = _revolved(*_arc(start, start + np.pi / 2), scale=np.full(3, radius), v=np.linspace(0, 1, STACKS + 1))
+        parts.append(replace(cap, vertices=cap.vertices + np.array([0, 0, sign * half_length])))
+    return join(parts)
+
+
+def mesh(model: mujoco.MjModel, mesh_id: int) -> Triangles:
+    """A mesh asset, one vertex per corner of each face, since normals and texture coordinates have their own
+    indices. Like MuJoCo's renderer, an untextured corner whose normal departs from its face's is made flat."""
+    faces = slice(model.mesh_faceadr[mesh_id], model.mesh_faceadr[mesh_id] + model.mesh_facenum[mesh_id])
+    vertices = model.mesh_vert[model.mesh_face[faces].ravel() + model.mesh_vertadr[mesh_id]].astype(float)
+    normals = model.mesh_normal[model.mesh_facenormal[faces].ravel() + model.mesh_normaladr[mesh_id]].astype(float)
+    uv = None
+    if model.mesh_texcoordadr[mesh_id] >= 0:
+        uv = model.mesh_texcoord[model.mesh_facetexcoord[faces].ravel() + model.mesh_texcoordadr[mesh_id]].astype(float)
+    else:
+        corners = vertices.reshape(-1, 3, 3)
+        flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        flat = np.repeat(flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300), 3, axis=0)
+        normals = np.where(np.sum(normals * flat, axis=1, keepdims=True) < 0.8, flat, normals)
+    return Triangles(vertices, np.arange(len(vertices)).reshape(-1, 3), uv, normals)
+
+
+def _arc(start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
+    polar = np.linspace(start, stop, STACKS + 1)
+    return np.sin(polar), np.cos(polar)
+
+
+def _revolved(radius: np.ndarray, height: np.ndarray, scale: np.ndarray, v: np.ndarray) -> Triangles:
+    """Surface of revolution of the profile (radius, height), top to bottom, then scaled; the seam's vertices are
+    doubled, since u is 0 on one side of it and 1 on the other."""
+    azimuth = np.linspace(0, 2 * np.pi, SLICES + 1)
+    circle = np.column_stack([np.cos(azimuth), np.sin(azimuth)])
+    unit = np.concatenate(
+        [
+            radius[:, None, None] * circle[None],
+            np.broadcast_to(height[:, None, None], (len(height), SLICES + 1, 1)),
+        ],
+        axis=2,
+    )
+    # Normal of the unit shape: that of the sphere, or of the cylinder where the radius does not change.
+    normal = unit * [1, 1, 0 if np.ptp(radius) == 0 else 1] / scale
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    uv = np.stack(np.broadcast_arrays(azimuth[None, :] / (2 * np.pi), v[:, None]), axis=2)
+    index = np.arange(len(radius) * (SLICES + 1)).reshape(len(radius), SLICES + 1)
+    a, b, c, d = (i.ravel() for i in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    return Triangles((unit * scale).reshape(-1, 3), faces, uv.reshape(-1, 2), normal.reshape(-1, 3))

@@ -1,0 +1,33 @@
+"""Mitsuba's variant, chosen for the span of a call and given back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import mitsuba as mi
+
+from optics import backend
+
+DEFAULT_VARIANT = "llvm_ad_spectral"
+
+
+@contextmanager
+def variant(name: str = DEFAULT_VARIANT) -> Iterator[None]:
+    """Mitsuba's variant inside the block; afterwards the caller's own is in force again, if there was one.
+
+    (`mi.variant_context` fails where none was set before.) Raises optics.BackendError where LLVM is wanted and
+    cannot run.
+    """
+    before = mi.variant()
+    if before == name:
+        yield
+        return
+    if name.startswith("llvm"):
+        backend.require()
+    mi.set_variant(name)
+    try:
+        yield
+    finally:
+        if before is not None:
+            mi.set_variant(before)
