@@ -1,0 +1,70 @@
+"""Direct light from the scene's directional emitters, by hand: what Mitsuba's `direct` integrator converges to,
+without its noise, since each emitter has exactly one direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+LANES = 4  # wavelengths in one mi.Spectrum
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """direction: towards the light, unit (3,) · irradiance: on a surface facing it, per band (band,)."""
+
+    direction: np.ndarray
+    irradiance: np.ndarray
+
+
+def spectra(wavelengths: np.ndarray) -> list[Any]:
+    """The bands' wavelengths [m] as Mitsuba spectra [nm], LANES at a time; the last one is filled up by repetition."""
+    padded = np.pad(wavelengths * 1e9, (0, -len(wavelengths) % LANES), mode="edge")
+    return [mi.Spectrum(*map(float, chunk)) for chunk in padded.reshape(-1, LANES)]
+
+
+def directional_lights(scene: Any, wavelengths: np.ndarray) -> tuple[DirectionalLight, ...]:
+    """The scene's lights at the bands' wavelengths [m]. Raises ValueError for any other kind of emitter."""
+    lights = []
+    for emitter in scene.emitters():
+        if emitter.class_name() != "DirectionalEmitter":
+            raise ValueError(f"the batched renderer knows directional lights only, not {emitter.class_name()}")
+        irradiance = []
+        for spectrum in spectra(wavelengths):
+            si = dr.zeros(mi.SurfaceInteraction3f)
+            si.wavelengths = spectrum
+            sample, weight = emitter.sample_direction(si, mi.Point2f(0.5))
+            irradiance.append(np.array(weight).ravel())
+        direction = np.array(sample.d, dtype=np.float64).ravel()
+        lights.append(DirectionalLight(direction, np.concatenate(irradiance)[: len(wavelengths)]))
+    return tuple(lights)
+
+
+def direct_light(
+    si: Any,
+    bsdf: Any,
+    lights: tuple[DirectionalLight, ...],
+    bands: list[Any],
+    occluded: Callable[[Any, Any], Any],
+) -> list[Any]:
+    """Radiance [mi.Spectrum per chunk of bands] that leaves si towards si.wi.
+
+    occluded(ray, active) tells which rays towards a light are blocked.
+    """
+    radiance = [mi.Spectrum(0) for _ in bands]
+    context = mi.BSDFContext()
+    for light in lights:
+        towards = mi.Vector3f(*map(float, light.direction))
+        wo = si.to_local(towards)
+        lit = si.is_valid() & (dr.dot(si.n, towards) * dr.dot(si.n, si.to_world(si.wi)) > 0)
+        lit &= ~occluded(si.spawn_ray(towards), lit)
+        chunks = np.pad(light.irradiance, (0, -len(light.irradiance) % LANES)).reshape(-1, LANES)
+        for i, (wavelengths, irradiance) in enumerate(zip(bands, chunks, strict=True)):
+            si.wavelengths = wavelengths
+            radiance[i] += bsdf.eval(context, si, wo, lit) * mi.Spectrum(*map(float, irradiance))
+    return radiance

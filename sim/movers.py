@@ -1,0 +1,79 @@
+"""Spheres that move, intersected in closed form inside the renderer's kernel.
+
+Moving a shape of a Mitsuba scene rebuilds its acceleration structure; a few spheres per world are cheaper solved
+by hand. Their texture coordinates are Mitsuba's and MuJoCo's for a sphere: u = azimuth / 2π, v = polar angle / π
+from +z, both in the sphere's own frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Spheres:
+    """The movers of one world, alike in all worlds but for their positions.
+
+    radii     [m], (k,)
+    frames    rotation from the sphere's frame to the world's, (k, 3, 3)
+    offsets   of the sphere's centre from the body's origin, in the world's frame [m], (k, 3)
+    bsdfs     one Mitsuba BSDF each; kept here, since a BSDFPtr does not keep its objects alive
+    """
+
+    radii: np.ndarray
+    frames: np.ndarray
+    offsets: np.ndarray
+    bsdfs: tuple[Any, ...]
+
+    def __len__(self) -> int:
+        return len(self.radii)
+
+
+def nearest(spheres: Spheres, centres: list[Any], ray: Any, t: Any) -> tuple[Any, Any]:
+    """Distance [m] to the nearest of `t` and the spheres along the ray, and which sphere that is (k: none)."""
+    which = mi.UInt32(len(spheres))
+    for k, centre in enumerate(centres):
+        b, c = _quadratic(ray, centre, float(spheres.radii[k]))
+        discriminant = b * b - c
+        root = dr.sqrt(dr.maximum(discriminant, 0))
+        # From inside (c < 0) the far side is what one sees.
+        t_k = dr.select(c < 0, root - b, -b - root)
+        hit = (discriminant > 0) & (t_k > 0) & (t_k < t)
+        t = dr.select(hit, t_k, t)
+        which = dr.select(hit, k, which)
+    return t, which
+
+
+def blocks(radii: list[float], centres: list[Any], ray: Any) -> Any:
+    """Whether any sphere lies on the ray ahead of its origin."""
+    blocked = mi.Bool(False)
+    for radius, centre in zip(radii, centres, strict=True):
+        b, c = _quadratic(ray, centre, radius)
+        blocked |= (c < 0) | ((b < 0) & (b * b > c))
+    return blocked
+
+
+def normal_and_uv(spheres: Spheres, centres: list[Any], which: Any, point: Any) -> tuple[Any, Any]:
+    """Outward normal in the world's frame and texture coordinates at a point on sphere `which`."""
+    centre, local = mi.Point3f(0), mi.Vector3f(0)
+    for k in range(len(spheres)):
+        mine = which == k
+        centre = dr.select(mine, centres[k], centre)
+    normal = dr.normalize(point - centre)
+    for k in range(len(spheres)):
+        to_local = mi.Matrix3f(spheres.frames[k].T.tolist())
+        local = dr.select(which == k, to_local @ normal, local)
+    u = dr.atan2(local.y, local.x) * dr.inv_two_pi
+    v = dr.safe_acos(local.z) * dr.inv_pi
+    return mi.Normal3f(normal), mi.Point2f(dr.select(u < 0, u + 1, u), v)
+
+
+def _quadratic(ray: Any, centre: Any, radius: float) -> tuple[Any, Any]:
+    """Half the linear and the constant coefficient of |o + t d - centre|² = radius² (the ray's d is a unit vector)."""
+    from_centre = ray.o - centre
+    return dr.dot(from_centre, ray.d), dr.squared_norm(from_centre) - radius * radius

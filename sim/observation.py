@@ -1,0 +1,69 @@
+"""What an agent knows: its eyes' noisy signals over the past frames, touch, and its last action."""
+
+from __future__ import annotations
+
+import numpy as np
+from gymnasium import spaces
+
+from sim.agent import Eyes
+
+
+def observation_space(eyes: Eyes, channels: int, memory: int) -> spaces.Dict:
+    """Space of one world's observation; signals are unbounded, since noise is Gaussian."""
+    shape = (memory, eyes.n_eyes, channels, *eyes.resolution)
+    return spaces.Dict(
+        {
+            "eyes": spaces.Box(-np.inf, np.inf, shape, np.float32),
+            "contact": spaces.Box(0.0, 1.0, (1,), np.float32),
+            "previous_action": spaces.Box(-1.0, 1.0, (2,), np.float32),
+        }
+    )
+
+
+def action_space() -> spaces.Box:
+    """[0] forward speed: -1 = stop, +1 = full; [1] change of heading: ±1 = ±MAX_TURN, positive to the left."""
+    return spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+
+class Memory:
+    """The last `frames` frames of every world, newest last.
+
+    A world that starts anew has its first frame in every place: it has always seen what it sees now, rather than
+    having come out of darkness.
+    """
+
+    def __init__(self, frames: int) -> None:
+        if frames < 1:
+            raise ValueError(f"memory = {frames!r}, must be at least 1 frame")
+        self.frames = frames
+        self._past: list[np.ndarray] = []
+
+    def remember(self, frame: np.ndarray, fresh: np.ndarray) -> np.ndarray:
+        """Add a frame (env, ...); `fresh` (env,) bool: worlds that have just started.
+
+        Returns (env, memory, ...), the caller's own.
+        """
+        if not self._past:
+            self._past = [frame.copy() for _ in range(self.frames)]
+        self._past = [*self._past[1:], frame]
+        if fresh.any():
+            for past in self._past[:-1]:
+                past[fresh] = frame[fresh]
+        return np.stack(self._past, axis=1)
+
+    def preview(self, frame: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        """What these worlds' memory would hold with this frame (len(worlds), ...) added; nothing is remembered."""
+        return np.stack([*(past[worlds] for past in self._past[1:]), frame], axis=1)
+
+
+STANDING = (-1.0, 0.0)  # the "previous action" of an agent that has not moved yet: no speed, no turn
+
+
+def add_noise(signals: np.ndarray, sigma: float, rngs: list[np.random.Generator]) -> np.ndarray:
+    """Signals (env, ...) with every receptor's Gaussian noise, each world's from its own stream."""
+    if sigma == 0.0:
+        return signals
+    noise = np.empty_like(signals)
+    for world, rng in enumerate(rngs):
+        rng.standard_normal(dtype=np.float32, out=noise[world])
+    return signals + np.float32(sigma) * noise

@@ -1,0 +1,142 @@
+"""The batched MuJoCo step: every world one action further, on as many threads as this process owns.
+
+The agent is a heavy body on two slide joints driven by velocity actuators; its heading is set, not simulated.
+Objects are mocap bodies that collide with nothing, so that physics need not know where they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import mujoco.rollout
+import numpy as np
+
+from sim.state import WorldState
+from sim.world import MAX_SPEED, World
+
+SUBSTEPS = 10  # of the model's timestep per action
+UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s]: no actuator can do that
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One action's motion of the agents.
+
+    path      at the end of each substep [m], (n, substep, 2) · velocity at the last [m/s], (n, 2)
+    contact   touched anything in any substep, (n,) bool
+    unstable  the simulation broke down: path and velocity are the last good ones, (n,) bool
+    """
+
+    path: np.ndarray
+    velocity: np.ndarray
+    contact: np.ndarray
+    unstable: np.ndarray
+
+
+class Physics:
+    """Batched physics of one world's model.
+
+    Raises ValueError for a model without the agent's joints, actuators and touch sensor, and for objects that
+    could collide.
+    """
+
+    def __init__(self, world: World, threads: int) -> None:
+        model = world.model
+        self._model = model
+        self._data = [mujoco.MjData(model) for _ in range(max(threads, 1))]
+        self._rollout = mujoco.rollout.Rollout(nthread=threads if threads > 1 else 0)
+        self._columns = _Columns.of(model)
+        self._actuators = [_actuator(model, joint) for joint in ("agent_x", "agent_y")]
+        self._touch = _touch_columns(model)
+        _check_objects(model, world.objects)
+        self._start = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+        mujoco.mj_getState(model, self._data[0], self._start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        self.seconds = SUBSTEPS * model.opt.timestep
+
+    def step(self, state: WorldState, velocity: np.ndarray) -> Motion:
+        """One action: SUBSTEPS with the commanded velocity [m/s] (n, 2) held."""
+        columns = self._columns
+        initial = np.repeat(self._start[None], state.n, axis=0)
+        initial[:, columns.position] = state.position - columns.origin
+        initial[:, columns.heading] = state.heading
+        initial[:, columns.velocity] = state.velocity
+        control = np.zeros((state.n, SUBSTEPS, self._model.nu))
+        control[:, :, self._actuators] = velocity[:, None]
+        states, sensors = self._rollout.rollout(self._model, self._data, initial, control)
+        return self._motion(state, states, sensors)
+
+    def close(self) -> None:
+        """Stop the thread pool."""
+        self._rollout.close()
+
+    def _motion(self, state: WorldState, states: np.ndarray, sensors: np.ndarray) -> Motion:
+        path = states[:, :, self._columns.position] + self._columns.origin
+        velocity = states[:, -1, self._columns.velocity]
+        # MuJoCo resets a world that broke down, and its clock with it.
+        due = self._start[0] + self.seconds
+        unstable = ~np.isfinite(states).all(axis=(1, 2)) | (
+            np.abs(states[:, -1, 0] - due) > self._model.opt.timestep / 2
+        )
+        unstable |= ~(np.abs(velocity) < UNSTABLE_SPEED).all(axis=-1)
+        path[unstable] = np.nan_to_num(state.position)[unstable, None]
+        velocity = np.where(unstable[:, None], 0.0, velocity)
+        contact = (sensors[:, :, self._touch] > 0).any(axis=(1, 2)) & ~unstable
+        return Motion(path, velocity, contact, unstable)
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """Where the agent is in MuJoCo's full physics state, and where its slide joints are zero [m]."""
+
+    position: list[int]
+    heading: int
+    velocity: list[int]
+    origin: np.ndarray
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> _Columns:
+        qpos = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
+        qvel = qpos + mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_QPOS)
+        joints = [_joint(model, name) for name in ("agent_x", "agent_y", "agent_heading")]
+        body = model.jnt_bodyid[joints[0]]
+        return cls(
+            position=[qpos + int(model.jnt_qposadr[j]) for j in joints[:2]],
+            heading=qpos + int(model.jnt_qposadr[joints[2]]),
+            velocity=[qvel + int(model.jnt_dofadr[j]) for j in joints[:2]],
+            origin=model.body_pos[body, :2] - model.qpos0[[int(model.jnt_qposadr[j]) for j in joints[:2]]],
+        )
+
+
+def _joint(model: mujoco.MjModel, name: str) -> int:
+    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    if joint < 0:
+        raise ValueError(f"the model has no joint {name!r}, which every agent needs")
+    return joint
+
+
+def _actuator(model: mujoco.MjModel, joint_name: str) -> int:
+    joint = _joint(model, joint_name)
+    driving = np.flatnonzero(
+        (model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT) & (model.actuator_trnid[:, 0] == joint)
+    )
+    if len(driving) != 1:
+        raise ValueError(f"joint {joint_name!r} has {len(driving)} actuators, needs one (velocity)")
+    return int(driving[0])
+
+
+def _touch_columns(model: mujoco.MjModel) -> list[int]:
+    touch = np.flatnonzero(model.sensor_type == mujoco.mjtSensor.mjSENS_TOUCH)
+    if not len(touch):
+        raise ValueError("the model has no touch sensor on the agent")
+    return [int(model.sensor_adr[i]) for i in touch]
+
+
+def _check_objects(model: mujoco.MjModel, names: tuple[str, ...]) -> None:
+    for name in names:
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+        if body < 0 or model.body_mocapid[body] < 0:
+            raise ValueError(f"object {name!r} is not a mocap body of the model")
+        geoms = model.geom_bodyid == body
+        if (model.geom_contype[geoms] | model.geom_conaffinity[geoms]).any():
+            raise ValueError(f"object {name!r} collides; physics moves the agent alone")

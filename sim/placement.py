@@ -1,0 +1,45 @@
+"""Where an episode starts: the agent and the objects drawn at random, never within reach of each other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+REACH = 1.0  # [m] from the agent's centre to an object's: closer counts as reached
+SEPARATION = 2 * REACH  # [m] between objects: no place is within reach of two
+CLEARANCE = REACH + 0.5  # [m] between the agent's start and an object
+TRIES = 100
+
+
+def place(
+    rng: np.random.Generator, agent_spawn: np.ndarray, object_spawn: np.ndarray, n_objects: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """An agent position (2,) and object positions (k, 2), drawn from the cells' centres.
+
+    Raises ValueError when the cells cannot hold them SEPARATION and CLEARANCE apart.
+    """
+    for _ in range(TRIES):
+        agent = agent_spawn[rng.integers(len(agent_spawn))]
+        objects = np.empty((0, 2))
+        while len(objects) < n_objects:
+            spot = free_spot(rng, agent, objects, object_spawn)
+            if spot is None:
+                break
+            objects = np.concatenate([objects, spot[None]])
+        else:
+            return agent, objects
+    raise ValueError(
+        f"object_spawn: no way found to place {n_objects} objects {SEPARATION} m apart and {CLEARANCE} m from "
+        f"the agent on {len(object_spawn)} cells"
+    )
+
+
+def free_spot(
+    rng: np.random.Generator, agent: np.ndarray, others: np.ndarray, object_spawn: np.ndarray
+) -> np.ndarray | None:
+    """A cell's centre (2,) clear of the agent and of the other objects (k, 2); None where there is none."""
+    free = np.linalg.norm(object_spawn - agent, axis=-1) >= CLEARANCE
+    if len(others):
+        gaps = np.linalg.norm(object_spawn[:, None] - others[None], axis=-1)
+        free &= (gaps >= SEPARATION).all(axis=1)
+    spots = np.flatnonzero(free)
+    return object_spawn[rng.choice(spots)] if len(spots) else None

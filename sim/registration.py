@@ -1,0 +1,26 @@
+"""Gymnasium ids: `gymnasium.make("rhabdom/Detection-v0")`, Navigation-v0, Tracking-v0.
+
+Gymnasium loads this module through the entry point "gymnasium.envs" of an installed rhabdom; from a checkout,
+`import sim.registration` does the same.
+"""
+
+from __future__ import annotations
+
+import gymnasium
+
+# Spelled out rather than taken from sim.world, which would load MuJoCo whenever Gymnasium is imported.
+IDS = {
+    "rhabdom/Detection-v0": "detection",
+    "rhabdom/Navigation-v0": "navigation",
+    "rhabdom/Tracking-v0": "tracking",
+}
+
+
+def register() -> None:
+    """Make the ids known; twice is once. Episodes are truncated by the environment itself."""
+    for id_, task in IDS.items():
+        if id_ not in gymnasium.registry:
+            gymnasium.register(id_, entry_point="sim.env:EyesEnv", kwargs={"task": task})
+
+
+register()

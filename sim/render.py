@@ -1,0 +1,206 @@
+"""All eyes of all worlds as one Dr.Jit wavefront: one frozen kernel, one static scene, movers in closed form.
+
+Rays are traced in world-local coordinates, since all worlds share their static geometry. Directions and
+wavelengths are fixed, so a call does nothing but upload poses and launch the kernel that the first call recorded.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+import optics
+from sim import lighting, movers
+from sim.agent import BODY_RADIUS, EYE_HEIGHT, Eyes, eye_positions, eye_rotations
+from sim.sensor import build_sensor
+from sim.stage import Stage, build_stage, variant
+from sim.state import WorldState
+from sim.world import World
+
+ALIGNMENT = 16  # floats: rows of the pose buffer, and the buffer itself, start on 64 bytes
+
+
+class BatchedRenderer:
+    """Sees `n_envs` worlds with the same eyes.
+
+    world              geometry, materials and lights; shared by all worlds
+    eyes               of every agent
+    n_envs             number of worlds in a state
+    rays_per_receptor  samples of each receptor (perfect lens), or per receptor on average (behind a pupil)
+
+    Raises ValueError for less than one world or ray, and for lights other than directional ones.
+    """
+
+    def __init__(self, world: World, eyes: Eyes, n_envs: int, rays_per_receptor: int = 4) -> None:
+        self.world, self.eyes = world, eyes
+        self.eye = eyes.eye()
+        self.sensor = build_sensor(self.eye, rays_per_receptor)
+        self.bands: optics.SpectralBands = self.eye.spectral_bands
+        with variant():
+            self._stage = build_stage(world)
+        self._set_width(n_envs)
+
+    def resized(self, n_envs: int) -> BatchedRenderer:
+        """The same eyes and scene for another number of worlds; the scene is shared, not loaded again."""
+        other = copy.copy(self)
+        other._set_width(n_envs)
+        return other
+
+    def _set_width(self, n_envs: int) -> None:
+        if n_envs < 1:
+            raise ValueError(f"n_envs = {n_envs!r}, must be at least 1")
+        self.n_envs = n_envs
+        stage = self._stage
+        self._poses = _PoseBuffer(n_envs, len(stage.spheres))
+        with variant():
+            self._inputs = {
+                "directions": mi.Float(_in_agent_frame(self.eyes, self.sensor.directions)),
+                "origins": mi.Float(_eye_origins(self.eyes)),
+                # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.
+                "bsdfs": mi.BSDFPtr([*stage.spheres.bsdfs, stage.scene.shapes()[0].bsdf()]),
+            }
+            wavefront = _Wavefront(self, stage)
+            reduced = self.sensor.rays_per_receptor
+            self._rays: Any = dr.freeze(lambda scene, poses, inputs: wavefront(scene, poses, inputs, 1))
+            self._sums: Any = dr.freeze(lambda scene, poses, inputs: wavefront(scene, poses, inputs, reduced))
+
+    def radiance(self, state: WorldState) -> np.ndarray:
+        """Spectral radiance along every ray, (env, eye, ray, band) float32."""
+        rays = self._launch(self._rays, state).reshape(len(self.bands.wavelengths), self.n_envs, self.eyes.n_eyes, -1)
+        return np.ascontiguousarray(np.moveaxis(rays, 0, -1))
+
+    def receptor_radiance(self, state: WorldState) -> np.ndarray:
+        """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
+        bands, (height, width) = len(self.bands.wavelengths), self.eye.resolution
+        sums = self._launch(self._sums, state).reshape(bands, self.n_envs * self.eyes.n_eyes, -1)
+        return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, self.eyes.n_eyes, height, width)
+
+    def signals(self, state: WorldState) -> np.ndarray:
+        """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
+        a² sum_b weights[channel, b] radiance_b."""
+        radiance = self.receptor_radiance(state)
+        weights = (self.eye.throughput * self.bands.weights).astype(np.float32)
+        signals = np.zeros((*radiance.shape[1:3], len(weights), *radiance.shape[3:]), np.float32)
+        # One addition per band, in order: the same rounding for any number of worlds.
+        for band, plane in enumerate(radiance):
+            signals += weights[:, band, None, None] * plane[:, :, None]
+        return signals
+
+    @property
+    def recordings(self) -> int:
+        """How often the kernels were recorded: once per kernel in use."""
+        return int(self._rays.n_recordings + self._sums.n_recordings)
+
+    def _launch(self, frozen: Any, state: WorldState) -> np.ndarray:
+        if state.n != self.n_envs:
+            raise ValueError(f"state has {state.n} worlds, this renderer was built for n_envs = {self.n_envs}")
+        with variant():
+            poses = mi.Float(self._poses.pack(state, self._stage))
+            # numpy() waits for the kernel: only then may the buffer, whose memory Dr.Jit shares, be written again.
+            return np.array(frozen(self._stage.scene, poses, self._inputs).numpy())
+
+
+class _PoseBuffer:
+    """The kernel's only changing input: one aligned row of floats per world (x, y, cos, sin, objects' centres)."""
+
+    def __init__(self, n_envs: int, n_spheres: int) -> None:
+        self.stride = -(-(4 + 3 * n_spheres) // ALIGNMENT) * ALIGNMENT
+        raw = np.zeros(n_envs * self.stride + ALIGNMENT, np.float32)
+        first = (-raw.ctypes.data % 64) // 4
+        self._rows = raw[first : first + n_envs * self.stride].reshape(n_envs, self.stride)
+
+    def pack(self, state: WorldState, stage: Stage) -> np.ndarray:
+        rows = self._rows
+        rows[:, :2] = state.position
+        rows[:, 2], rows[:, 3] = np.cos(state.heading), np.sin(state.heading)
+        centres = state.objects + stage.spheres.offsets
+        rows[:, 4 : 4 + centres[0].size] = centres.reshape(len(rows), -1)
+        return rows.reshape(-1)
+
+
+class _Wavefront:
+    """The kernel's body. Everything here is traced once; only arrays passed as arguments may change."""
+
+    def __init__(self, renderer: BatchedRenderer, stage: Stage) -> None:
+        self.n_rays = len(renderer.sensor.directions)
+        self.n_eyes = renderer.eyes.n_eyes
+        self.lanes = renderer.n_envs * self.n_eyes * self.n_rays
+        self.stride = renderer._poses.stride
+        self.spheres = stage.spheres
+        self.lights = lighting.directional_lights(stage.scene, renderer.bands.wavelengths)
+        self.n_bands = len(renderer.bands.wavelengths)
+        self.bands = lighting.spectra(renderer.bands.wavelengths)
+
+    def __call__(self, scene: Any, poses: Any, inputs: dict[str, Any], reduced: int) -> Any:
+        lane = dr.arange(mi.UInt32, self.lanes)
+        view = lane // self.n_rays
+        world = view // self.n_eyes
+        ray, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, lane - view * self.n_rays)
+        si, bsdf = self._first_hit(scene, ray, centres, inputs)
+        radii = [BODY_RADIUS, *map(float, self.spheres.radii)]
+
+        def occluded(shadow: Any, active: Any) -> Any:
+            return scene.ray_test(shadow, active) | movers.blocks(radii, [agent, *centres], shadow)
+
+        radiance = lighting.direct_light(si, bsdf, self.lights, self.bands, occluded)
+        out = dr.zeros(mi.Float, self.lanes * self.n_bands)
+        for band in range(self.n_bands):
+            value = radiance[band // lighting.LANES][band % lighting.LANES]
+            dr.scatter(out, value, lane + band * self.lanes, mode=dr.ReduceMode.Permute)
+        # One reduction of one array: a reduction per band would trace the rays once per band.
+        return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
+
+    def _ray(self, poses: Any, inputs: dict[str, Any], world: Any, eye: Any, ray: Any) -> tuple[Any, Any, list[Any]]:
+        """The lane's ray, and the centres of the agent and of the spheres of its world."""
+
+        def pose(column: int) -> Any:
+            return dr.gather(mi.Float, poses, world * self.stride + column)
+
+        def table(name: str, row: Any) -> Any:
+            return dr.gather(mi.Vector3f, inputs[name], row)
+
+        cos, sin = pose(2), pose(3)
+
+        def turned(v: Any) -> Any:
+            return mi.Vector3f(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
+
+        agent = mi.Point3f(pose(0), pose(1), EYE_HEIGHT)
+        origin = agent + turned(table("origins", eye))
+        direction = turned(table("directions", eye * self.n_rays + ray))
+        centres = [mi.Point3f(*(pose(4 + 3 * k + axis) for axis in range(3))) for k in range(len(self.spheres))]
+        out = mi.Ray3f(origin, direction)
+        out.wavelengths = self.bands[0]
+        return out, agent, centres
+
+    def _first_hit(self, scene: Any, ray: Any, centres: list[Any], inputs: dict[str, Any]) -> tuple[Any, Any]:
+        """Where the ray meets the static scene or a sphere first, and the BSDF there."""
+        preliminary = scene.ray_intersect_preliminary(ray, coherent=True)
+        si = preliminary.compute_surface_interaction(ray, mi.RayFlags.All)
+        bsdf = si.bsdf()
+        if not centres:
+            return si, bsdf
+        t, which = movers.nearest(self.spheres, centres, ray, si.t)
+        on_sphere = which < len(centres)
+        point = ray(t)
+        normal, uv = movers.normal_and_uv(self.spheres, centres, which, point)
+        si.t = t
+        si.p = dr.select(on_sphere, point, si.p)
+        si.n = dr.select(on_sphere, normal, si.n)
+        si.uv = dr.select(on_sphere, uv, si.uv)
+        si.sh_frame = dr.select(on_sphere, mi.Frame3f(normal), si.sh_frame)
+        si.wi = si.to_local(-ray.d)
+        return si, dr.select(on_sphere, dr.gather(mi.BSDFPtr, inputs["bsdfs"], which, on_sphere), bsdf)
+
+
+def _in_agent_frame(eyes: Eyes, directions: np.ndarray) -> np.ndarray:
+    """Every eye's directions in the agent's frame, flat (eye, ray, 3)."""
+    turned = np.einsum("eij,rj->eri", eye_rotations(eyes.azimuths()), directions)
+    return np.ascontiguousarray(turned, np.float32).ravel()
+
+
+def _eye_origins(eyes: Eyes) -> np.ndarray:
+    return np.ascontiguousarray(eye_positions(eyes.azimuths()), np.float32).ravel()

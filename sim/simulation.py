@@ -1,0 +1,152 @@
+"""Worlds in motion, unseen: actions in, states and rewards out. What eyes make of it is added by the environments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sim.physics import Physics
+from sim.reward import MODES, reward_terms
+from sim.state import WorldState, concatenate, wrap_angle
+from sim.streams import Streams
+from sim.task import respawned, task_of
+from sim.world import MAX_SPEED, World
+
+EPISODE_STEPS = 256  # actions, then the episode is truncated
+MAX_TURN = np.pi / 4  # [rad] change of heading per action
+
+UNSTABLE = "unstable physics"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One action of all worlds, before any world is started anew.
+
+    state         after the action; where `failure` is set, the last good one
+    reward_terms  name -> (n,)
+    terminated, truncated, contact, success  (n,) bool; success: the goal was reached in this episode
+    failure       why the simulation of a world broke down, or None, per world
+    """
+
+    state: WorldState
+    reward_terms: dict[str, np.ndarray]
+    terminated: np.ndarray
+    truncated: np.ndarray
+    contact: np.ndarray
+    success: np.ndarray
+    failure: tuple[str | None, ...]
+
+    @property
+    def reward(self) -> np.ndarray:
+        """Sum of the terms, (n,)."""
+        return np.sum(list(self.reward_terms.values()), axis=0)
+
+    @property
+    def done(self) -> np.ndarray:
+        return self.terminated | self.truncated
+
+
+class Simulation:
+    """`n` independent worlds of one layout.
+
+    world    geometry and places to start from
+    n        number of worlds
+    seed     of all random streams; None draws one
+    mode     "training": reaching an object ends the episode; "evaluation": the object respawns, and rewards are
+             weighted as fitness
+    threads  of the physics
+
+    Raises ValueError for an unknown mode or less than one world.
+    """
+
+    def __init__(self, world: World, n: int, seed: int | None, mode: str, threads: int) -> None:
+        if mode not in MODES:
+            raise ValueError(f"mode = {mode!r}, must be one of {', '.join(map(repr, MODES))}")
+        if n < 1:
+            raise ValueError(f"n_envs = {n!r}, must be at least 1")
+        self.world, self.n, self.mode = world, n, mode
+        self.task = task_of(world)
+        self._physics = Physics(world, threads)
+        self._heights = np.array([world.model.body(name).pos[2] for name in world.objects])
+        self._state: WorldState | None = None
+        self.seed(seed)
+
+    @property
+    def state(self) -> WorldState:
+        """All worlds as they are now. Raises RuntimeError before the first reset."""
+        if self._state is None:
+            raise RuntimeError("the worlds have not begun: call reset first")
+        return self._state
+
+    def seed(self, seed: int | None) -> None:
+        """Start all random streams anew, from the next reset on."""
+        self.streams = Streams(seed, self.n)
+        self._state = None
+
+    def reset(self) -> WorldState:
+        """Start all episodes anew."""
+        self._state = self._begin(np.arange(self.n))
+        return self._state
+
+    def close(self) -> None:
+        """Stop the physics' threads."""
+        self._physics.close()
+
+    def restart(self, worlds: np.ndarray) -> WorldState:
+        """Start the episodes of these worlds anew."""
+        self._state = self.state.put(worlds, self._begin(worlds))
+        return self._state
+
+    def step(self, actions: np.ndarray) -> Step:
+        """Advance all worlds by one action; actions (n, 2) in [-1, 1]: forward speed, change of heading."""
+        before = self.state
+        moved, velocity = self._steer(before, actions)
+        motion = self._physics.step(moved, velocity)
+        after = replace(moved, position=motion.path[:, -1].copy(), velocity=motion.velocity, steps=before.steps + 1)
+        outcome = self.task.judge(before, after, motion.path, ends=self.mode == "training")
+        good = ~motion.unstable
+        goal, adversary = outcome.goal & good, outcome.adversary & good
+        after = replace(
+            after,
+            goals_reached=before.goals_reached + goal,
+            adversaries_reached=before.adversaries_reached + adversary,
+        )
+        self._state = final = respawned(self.task, after, outcome.respawn & good[:, None], self.streams.placement)
+        terminated = (outcome.terminated & good) | motion.unstable
+        return Step(
+            state=final,
+            reward_terms=reward_terms(MODES[self.mode], outcome.progress * good, goal, adversary, motion.contact),
+            terminated=terminated,
+            truncated=(final.steps >= EPISODE_STEPS) & ~terminated,
+            contact=motion.contact,
+            success=final.goals_reached > 0,
+            failure=tuple(UNSTABLE if bad else None for bad in motion.unstable),
+        )
+
+    def _steer(self, state: WorldState, actions: np.ndarray) -> tuple[WorldState, np.ndarray]:
+        """Turn the agents, move the objects; the state so far and the commanded velocities [m/s] (n, 2)."""
+        actions = np.clip(np.asarray(actions, np.float64), -1.0, 1.0)
+        heading = wrap_angle(state.heading + MAX_TURN * actions[:, 1])
+        forward = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+        objects, object_heading = self.task.move(state, self.streams.motion, self._physics.seconds)
+        velocity = forward * (MAX_SPEED * (actions[:, :1] + 1.0) / 2.0)
+        return replace(state, heading=heading, objects=objects, object_heading=object_heading), velocity
+
+    def _begin(self, worlds: np.ndarray) -> WorldState:
+        return concatenate([self._begin_one(self.streams.placement[i]) for i in worlds])
+
+    def _begin_one(self, rng: np.random.Generator) -> WorldState:
+        position, objects = self.task.begin(rng)
+        k = len(self.world.objects)
+        return WorldState(
+            position=position[None].astype(float),
+            heading=rng.uniform(-np.pi, np.pi, 1),
+            velocity=np.zeros((1, 2)),
+            objects=np.concatenate([objects, self._heights[:, None]], axis=1)[None],
+            object_heading=rng.uniform(-np.pi, np.pi, (1, k)),
+            start=position[None].astype(float),
+            steps=np.zeros(1, int),
+            goals_reached=np.zeros(1, int),
+            adversaries_reached=np.zeros(1, int),
+        )

@@ -1,0 +1,59 @@
+"""What a batch of worlds is, as plain arrays: the value that physics advances, eyes look at and recorders keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class WorldState:
+    """All worlds of a batch at one instant; first axis: world.
+
+    position           agent [m], (n, 2)
+    heading            agent [rad], in [-π, π), (n,)
+    velocity           agent [m/s], (n, 2)
+    objects            centres of the objects, in the order of World.objects [m], (n, k, 3)
+    object_heading     direction in which each object moves [rad], (n, k)
+    start              where the agent started its episode [m], (n, 2)
+    steps              actions taken in this episode, (n,) int
+    goals_reached      in this episode, (n,) int
+    adversaries_reached  in this episode, (n,) int
+    """
+
+    position: np.ndarray
+    heading: np.ndarray
+    velocity: np.ndarray
+    objects: np.ndarray
+    object_heading: np.ndarray
+    start: np.ndarray
+    steps: np.ndarray
+    goals_reached: np.ndarray
+    adversaries_reached: np.ndarray
+
+    @property
+    def n(self) -> int:
+        """Number of worlds."""
+        return len(self.position)
+
+    def take(self, worlds: np.ndarray) -> WorldState:
+        """These worlds alone (copies)."""
+        return WorldState(**{name: array[worlds] for name, array in vars(self).items()})
+
+    def put(self, worlds: np.ndarray, other: WorldState) -> WorldState:
+        """A new batch, with `other`'s worlds at these places."""
+        arrays = {name: array.copy() for name, array in vars(self).items()}
+        for name, array in arrays.items():
+            array[worlds] = getattr(other, name)
+        return WorldState(**arrays)
+
+
+def concatenate(states: list[WorldState]) -> WorldState:
+    """One batch of several."""
+    return WorldState(**{name: np.concatenate([getattr(s, name) for s in states]) for name in vars(states[0])})
+
+
+def wrap_angle(angle: np.ndarray) -> np.ndarray:
+    """The same angle in [-π, π)."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi

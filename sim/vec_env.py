@@ -1,0 +1,204 @@
+"""The natively batched stable-baselines3 VecEnv: one physics call and one kernel launch per step for all worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import drjit as dr
+import numpy as np
+from stable_baselines3.common.vec_env import VecEnv
+
+from sim.agent import Eyes
+from sim.observation import STANDING, Memory, action_space, add_noise, observation_space
+from sim.render import BatchedRenderer
+from sim.simulation import Simulation, Step
+from sim.state import WorldState
+from sim.world import build_world
+
+TERMINAL_WIDTH = 8  # worlds of the small renderer that looks at final states
+
+
+class EyesVecEnv(VecEnv):
+    """Many agents with eyes, each in its own world.
+
+    Observations, actions and `info` are in docs/design.md, "Seams". Worlds start anew by themselves; the
+    observation returned is then the first of the new episode, and info["terminal_observation"] the last of the
+    old one. World i's episodes depend on the seed and i alone, not on the number of worlds.
+    """
+
+    def __init__(self, simulation: Simulation, renderer: BatchedRenderer, memory: int) -> None:
+        self.simulation, self.renderer, self.eyes = simulation, renderer, renderer.eyes
+        self.render_mode: str | None = None
+        self._terminal_renderer: BatchedRenderer | None = None
+        self._memory = Memory(memory)
+        channels = len(renderer.bands.weights)
+        super().__init__(simulation.n, observation_space(self.eyes, channels, memory), action_space())
+        self._actions = np.zeros((self.num_envs, 2), np.float32)
+        self._returns, self._lengths = np.zeros(self.num_envs), np.zeros(self.num_envs, int)
+
+    @property
+    def state(self) -> WorldState:
+        """All worlds as they are now."""
+        return self.simulation.state
+
+    def reset(self) -> dict[str, np.ndarray]:
+        if self._seeds[0] is not None:
+            self.simulation.seed(self._seeds[0])
+        self.simulation.reset()
+        self._reset_seeds()
+        self._reset_options()
+        self._returns[:], self._lengths[:] = 0.0, 0
+        self.reset_infos = self._infos_of(self.state, {}, np.zeros(self.num_envs, bool))
+        everyone = np.ones(self.num_envs, bool)
+        return self._observe(everyone, ~everyone)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seed all random streams at the next reset. World i draws from streams derived from (seed, i)."""
+        self._seeds = [seed] * self.num_envs
+        return self._seeds
+
+    def step_async(self, actions: np.ndarray) -> None:
+        self._actions = np.clip(np.asarray(actions, np.float32).reshape(self.num_envs, 2), -1, 1)
+
+    def step_once(
+        self, actions: np.ndarray
+    ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """One action without starting ended worlds anew, as a single environment wants it: observation, reward,
+        terminated, truncated, info."""
+        self.step_async(actions)
+        step = self.simulation.step(self._actions)
+        reward = step.reward
+        infos = self._infos(step, reward)
+        observation = self._observe(np.zeros(self.num_envs, bool), step.contact)
+        return observation, reward, step.terminated, step.truncated, infos
+
+    def step_wait(self) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        step = self.simulation.step(self._actions)
+        reward = step.reward
+        infos = self._infos(step, reward)
+        done = step.done
+        ended = np.flatnonzero(done)
+        if len(ended):
+            self._add_terminal_observations(infos, step, ended)
+            self.simulation.restart(ended)
+            self._returns[ended], self._lengths[ended] = 0.0, 0
+        observation = self._observe(done, step.contact & ~done)
+        return observation, reward.astype(np.float32), done, infos
+
+    def close(self) -> None:
+        self.simulation.close()
+
+    # --- observations
+
+    def _observe(self, fresh: np.ndarray, contact: np.ndarray) -> dict[str, np.ndarray]:
+        frame = add_noise(self.renderer.signals(self.state), self.eyes.noise_sigma, self.simulation.streams.noise)
+        return {
+            "eyes": self._memory.remember(frame, fresh),
+            "contact": contact.astype(np.float32)[:, None],
+            "previous_action": np.where(fresh[:, None], np.array(STANDING, np.float32), self._actions),
+        }
+
+    def _add_terminal_observations(self, infos: list[dict[str, Any]], step: Step, ended: np.ndarray) -> None:
+        noise = self.simulation.streams.noise
+        signals = self._terminal_signals(step.state, ended)
+        frame = add_noise(signals, self.eyes.noise_sigma, [noise[i] for i in ended])
+        stacks = self._memory.preview(frame, ended)
+        for stack, world in zip(stacks, ended, strict=True):
+            infos[world]["terminal_observation"] = {
+                "eyes": stack,
+                "contact": step.contact[world : world + 1].astype(np.float32),
+                "previous_action": self._actions[world].copy(),
+            }
+
+    def _terminal_signals(self, state: WorldState, ended: np.ndarray) -> np.ndarray:
+        """Signals of these worlds alone. Few of them: a small renderer, its width filled up by repetition."""
+        if self.num_envs <= TERMINAL_WIDTH or len(ended) > TERMINAL_WIDTH:
+            return self.renderer.signals(state)[ended]
+        if self._terminal_renderer is None:
+            self._terminal_renderer = self.renderer.resized(TERMINAL_WIDTH)
+        padded = np.resize(ended, TERMINAL_WIDTH)
+        return self._terminal_renderer.signals(state.take(padded))[: len(ended)]
+
+    # --- info
+
+    def _infos(self, step: Step, reward: np.ndarray) -> list[dict[str, Any]]:
+        infos = self._infos_of(step.state, step.reward_terms, step.success)
+        self._returns += reward
+        self._lengths += 1
+        for world in np.flatnonzero(step.done):
+            infos[world]["TimeLimit.truncated"] = bool(step.truncated[world])
+            infos[world]["episode"] = {"r": float(self._returns[world]), "l": int(self._lengths[world])}
+        for world, reason in enumerate(step.failure):
+            if reason is not None:
+                infos[world]["failure"] = reason
+        return infos
+
+    def _infos_of(self, state: WorldState, terms: dict[str, np.ndarray], success: np.ndarray) -> list[dict[str, Any]]:
+        names = tuple(terms)
+        columns = zip(*(terms[name].tolist() for name in names), strict=True) if names else [()] * self.num_envs
+        return [
+            {
+                "reward_terms": dict(zip(names, values, strict=True)),
+                "is_success": reached,
+                "position": (x, y),
+                "heading": heading,
+            }
+            for values, reached, (x, y), heading in zip(
+                columns, success.tolist(), state.position.tolist(), state.heading.tolist(), strict=True
+            )
+        ]
+
+    # --- the rest of the VecEnv contract: there is one environment behind all indices
+
+    def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
+        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:
+        if len(list(self._get_indices(indices))) != self.num_envs:
+            raise ValueError("set_attr: the worlds share one environment; set an attribute for all of them")
+        setattr(self, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *args: Any, indices: int | Iterable[int] | None = None, **kwargs: Any
+    ) -> list[Any]:
+        if len(list(self._get_indices(indices))) != self.num_envs:
+            raise ValueError("env_method: the worlds share one environment; call a method for all of them")
+        result = getattr(self, method_name)(*args, **kwargs)
+        return [result] * self.num_envs
+
+    def env_is_wrapped(self, wrapper_class: type, indices: int | Iterable[int] | None = None) -> list[bool]:
+        return [False for _ in self._get_indices(indices)]
+
+
+def make_vec_env(
+    task: str,
+    eyes: Eyes | None = None,
+    n_envs: int = 64,
+    seed: int | None = 0,
+    *,
+    memory: int = 1,
+    mode: str = "training",
+    rays_per_receptor: int = 4,
+    world_seed: int = 0,
+) -> EyesVecEnv:
+    """A batched environment of one task.
+
+    task               "detection", "navigation" or "tracking"
+    eyes               of every agent; default Eyes()
+    n_envs             number of worlds
+    seed               of episodes and noise; None draws one
+    memory             frames in an observation
+    mode               "training", or "evaluation" (objects respawn; rewards weighted as fitness)
+    rays_per_receptor  samples of each receptor
+    world_seed         of the layout that all worlds share: navigation's maze
+
+    Physics takes as many threads as Dr.Jit has: limit both with drjit.set_thread_count.
+    Raises ValueError for a bad argument.
+    """
+    eyes = Eyes() if eyes is None else eyes
+    Memory(memory)  # complains before the scene is built
+    world = build_world(task, seed=world_seed)
+    simulation = Simulation(world, n_envs, seed, mode, threads=min(dr.thread_count(), n_envs))
+    renderer = BatchedRenderer(world, eyes, n_envs, rays_per_receptor)
+    return EyesVecEnv(simulation, renderer, memory)

@@ -1,0 +1,93 @@
+"""The batched step against the servo's closed form, single MjData stepping, walls and breakdowns."""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+
+from sim.physics import SUBSTEPS, Physics
+from sim.simulation import Simulation
+from sim.world import SPEED_GAIN, TIME_CONSTANT, build_world
+
+
+@pytest.fixture(scope="module")
+def world():
+    return build_world("detection")
+
+
+def begun(world, n, seed=0):
+    return Simulation(world, n, seed, "training", 1).reset()
+
+
+def test_speed_follows_the_servos_closed_form(world):
+    """dv/dt = (gain ctrl - v)/τ. The explicit-implicit scheme is of first order: error ~ dt/τ/2 = 3 %."""
+    state = dataclasses.replace(begun(world, 1), position=np.zeros((1, 2)))
+    motion = Physics(world, 1).step(state, np.array([[10.0, 0.0]]))
+    t = SUBSTEPS * world.model.opt.timestep
+    expected = SPEED_GAIN * 10.0 * (1 - np.exp(-t / TIME_CONSTANT))
+    assert motion.velocity[0, 0] == pytest.approx(expected, rel=0.04)
+    assert motion.velocity[0, 1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_batch_equals_single_data(world):
+    state = begun(world, 5, seed=3)
+    command = np.random.default_rng(1).uniform(-10, 10, (5, 2))
+    motion = Physics(world, 2).step(state, command)
+    for i in range(5):
+        data = mujoco.MjData(world.model)
+        data.qpos[:3] = [*state.position[i], state.heading[i]]
+        for substep in range(SUBSTEPS):
+            data.ctrl[:2] = command[i]
+            data.qacc_warmstart[:] = 0 if substep == 0 else data.qacc_warmstart
+            mujoco.mj_step(world.model, data)
+            np.testing.assert_allclose(motion.path[i, substep], data.qpos[:2], atol=1e-9)
+
+
+def test_walls_hold_and_are_felt(world):
+    state = begun(world, 1)
+    physics = Physics(world, 1)
+    contacts = []
+    for _ in range(20):
+        motion = physics.step(state, np.array([[10.0, 0.0]]))
+        contacts.append(bool(motion.contact[0]))
+        state = dataclasses.replace(state, position=motion.path[:, -1], velocity=motion.velocity)
+    assert contacts[-1]
+    assert not motion.unstable[0]
+    assert state.position[0, 0] < 11.0  # the wall's face: 11 cells of 2 m
+
+
+def test_one_broken_world_is_named_and_the_others_go_on(world):
+    state = begun(world, 4)
+    velocity = state.velocity.copy()
+    velocity[2, 0] = np.nan
+    motion = Physics(world, 2).step(dataclasses.replace(state, velocity=velocity), np.full((4, 2), 3.0))
+    assert motion.unstable.tolist() == [False, False, True, False]
+    assert np.isfinite(motion.path).all()
+    whole = Physics(world, 2).step(state, np.full((4, 2), 3.0))
+    others = [0, 1, 3]
+    np.testing.assert_array_equal(motion.path[others], whole.path[others])
+
+
+def test_a_broken_world_ends_its_episode_with_a_reason(world):
+    simulation = Simulation(world, 3, 0, "training", 1)
+    state = simulation.reset()
+    velocity = state.velocity.copy()
+    velocity[1] = 1e12
+    simulation._state = dataclasses.replace(state, velocity=velocity)
+    step = simulation.step(np.zeros((3, 2)))
+    assert step.failure == (None, "unstable physics", None)
+    assert step.terminated.tolist() == [False, True, False]
+    assert np.isfinite(step.reward).all()
+
+
+def test_objects_that_collide_are_refused(world):
+    spec = mujoco.MjSpec.from_string(
+        """<mujoco><worldbody><body name="agent"><joint name="agent_x" type="slide" axis="1 0 0"/>
+        <joint name="agent_y" type="slide" axis="0 1 0"/><joint name="agent_heading" axis="0 0 1"/><geom size=".2"/>
+        <site name="s" size=".3"/></body><body name="goal" mocap="true"><geom size=".5"/></body></worldbody>
+        <actuator><velocity joint="agent_x"/><velocity joint="agent_y"/></actuator>
+        <sensor><touch site="s"/></sensor></mujoco>"""
+    )
+    with pytest.raises(ValueError, match="'goal' collides"):
+        Physics(dataclasses.replace(world, model=spec.compile(), objects=("goal",)), 1)

@@ -1,0 +1,182 @@
+"""Rewards, events, endings, placement and motion, against their definitions."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from sim.placement import CLEARANCE, REACH, SEPARATION, place
+from sim.reward import EVALUATION, TRAINING
+from sim.simulation import EPISODE_STEPS, MAX_TURN, Simulation
+from sim.task import first_reached, task_of
+from sim.world import build_world
+
+
+@pytest.fixture(scope="module")
+def field():
+    return build_world("detection")
+
+
+@pytest.fixture(scope="module")
+def maze():
+    return build_world("navigation")
+
+
+def facing(simulation, targets, distance):
+    """Every agent `distance` in front of the object with that index, looking at it, at full speed."""
+    state = simulation.reset()
+    rows = np.arange(simulation.n)
+    spots = state.objects[rows, targets, :2]
+    return dataclasses.replace(
+        state,
+        position=spots - [distance, 0.0],
+        heading=np.zeros(simulation.n),
+        velocity=np.tile([9.9, 0.0], (simulation.n, 1)),
+    )
+
+
+AHEAD = np.array([1.0, 0.0])
+
+
+def test_weights_are_the_papers():
+    assert (TRAINING.progress, TRAINING.goal, TRAINING.adversary, TRAINING.contact) == (0.25, 1, -1, -1)
+    assert (EVALUATION.progress, EVALUATION.goal, EVALUATION.adversary, EVALUATION.contact) == (1.5, 10, -10, -2)
+
+
+def test_training_ends_at_goal_and_adversary(field):
+    simulation = Simulation(field, 3, 0, "training", 1)
+    simulation._state = facing(simulation, np.array([0, 1, 2]), 2.5)
+    step = simulation.step(np.tile(AHEAD, (3, 1)))
+    assert step.terminated.all()
+    assert not step.truncated.any()
+    assert step.success.tolist() == [True, False, False]
+    assert step.reward_terms["goal"].tolist() == [1, 0, 0]
+    assert step.reward_terms["adversary"].tolist() == [0, -1, -1]
+
+
+def test_passing_by_within_reach_counts_though_the_action_ends_beyond(field):
+    """2 m per action: at its end the agent is 1.05 m behind the goal, in between it went through it."""
+    simulation = Simulation(field, 1, 0, "training", 1)
+    state = facing(simulation, np.array([0]), 0.93)
+    simulation._state = dataclasses.replace(state, position=state.position + [[0.0, 0.6]])
+    step = simulation.step(AHEAD[None])
+    assert np.linalg.norm(step.state.position - step.state.objects[:, 0, :2]) > REACH
+    assert step.success[0]
+
+
+def test_evaluation_respawns_and_goes_on(field):
+    simulation = Simulation(field, 2, 0, "evaluation", 1)
+    simulation._state = before = facing(simulation, np.array([0, 1]), 2.5)
+    step = simulation.step(np.tile(AHEAD, (2, 1)))
+    assert not step.done.any()
+    assert step.reward_terms["goal"].tolist() == [10, 0]
+    assert step.reward_terms["adversary"].tolist() == [0, -10]
+    moved = np.any(step.state.objects != before.objects, axis=-1)
+    assert moved.tolist() == [[True, False, False], [False, True, False]]
+    gaps = np.linalg.norm(step.state.objects[:, :, :2] - step.state.position[:, None], axis=-1)
+    assert gaps[moved].min() >= CLEARANCE
+    assert step.state.goals_reached.tolist() == [1, 0]
+
+
+def test_progress_is_the_change_of_distance(field, maze):
+    simulation = Simulation(field, 4, 1, "training", 1)
+    before = simulation.reset()
+    step = simulation.step(np.random.default_rng(0).uniform(-1, 1, (4, 2)))
+    distances = [np.linalg.norm(s.objects[:, 0, :2] - s.position, axis=-1) for s in (before, step.state)]
+    np.testing.assert_allclose(step.reward_terms["progress"], -0.25 * (distances[1] - distances[0]))
+    simulation = Simulation(maze, 4, 1, "evaluation", 1)
+    simulation.reset()
+    total = np.zeros(4)
+    for _ in range(3):
+        step = simulation.step(np.random.default_rng(0).uniform(-1, 1, (4, 2)))
+        total += step.reward_terms["progress"]
+    away = np.linalg.norm(step.state.position - step.state.start, axis=-1)
+    np.testing.assert_allclose(total, 1.5 * away)
+
+
+def test_maze_is_left_through_its_goal_region(maze):
+    simulation = Simulation(maze, 1, 0, "training", 1)
+    state = simulation.reset()
+    x0, y0, x1, y1 = maze.goal_region
+    inside = np.array([[(x0 + x1) / 2, (y0 + y1) / 2]])
+    simulation._state = dataclasses.replace(state, position=inside)
+    assert simulation.step(np.array([[-1.0, 0.0]])).success[0]
+    simulation._state = state
+    assert not simulation.step(np.array([[-1.0, 0.0]])).success[0]
+
+
+def test_contact_is_penalised(field):
+    simulation = Simulation(field, 1, 0, "training", 1)
+    state = simulation.reset()
+    simulation._state = dataclasses.replace(state, position=np.array([[10.7, 0.0]]), heading=np.zeros(1))
+    step = simulation.step(AHEAD[None])
+    assert step.contact[0]
+    assert step.reward_terms["contact"][0] == -1
+
+
+def test_time_limit_truncates_and_does_not_terminate(field):
+    simulation = Simulation(field, 1, 0, "evaluation", 1)
+    simulation.reset()
+    for _ in range(EPISODE_STEPS):
+        step = simulation.step(np.array([[-1.0, 0.0]]))
+    assert step.truncated[0]
+    assert not step.terminated[0]
+
+
+def test_actions_steer(field):
+    simulation = Simulation(field, 2, 0, "training", 1)
+    before = simulation.reset()
+    step = simulation.step(np.array([[-1.0, 0.5], [-1.0, -1.0]]))
+    turned = (step.state.heading - before.heading + np.pi) % (2 * np.pi) - np.pi
+    np.testing.assert_allclose(turned, [0.5 * MAX_TURN, -MAX_TURN])
+    np.testing.assert_allclose(step.state.position, before.position, atol=1e-9)  # -1: stop
+
+
+def test_first_reached_follows_moving_objects():
+    path = np.zeros((1, 10, 2))
+    near = first_reached(path, np.array([[[2.0, 0, 0]]]), np.array([[[0.0, 0, 0]]]))
+    assert near.tolist() == [[5]]  # 2 - 0.2 s < 1 from the sixth substep on
+    assert first_reached(path, np.array([[[2.0, 0, 0]]]), np.array([[[1.5, 0, 0]]])).tolist() == [[10]]
+
+
+def test_starts_are_apart_and_varied(field):
+    rng = np.random.default_rng(0)
+    starts = [place(rng, field.agent_spawn, field.object_spawn, 3) for _ in range(200)]
+    for agent, objects in starts:
+        gaps = np.linalg.norm(objects[:, None] - objects[None], axis=-1)[np.triu_indices(3, 1)]
+        assert gaps.min() >= SEPARATION
+        assert np.linalg.norm(objects - agent, axis=-1).min() >= CLEARANCE
+    assert len({tuple(objects[0]) for _, objects in starts}) > 20
+    headings = Simulation(field, 64, 0, "training", 1).reset().heading
+    assert np.ptp(headings) > 5.0
+
+
+def test_too_small_a_field_is_refused(field):
+    with pytest.raises(ValueError, match="object_spawn"):
+        place(np.random.default_rng(0), field.agent_spawn, field.object_spawn[:1], 3)
+
+
+def test_tracked_objects_wander_inside_and_apart():
+    world = build_world("tracking")
+    simulation = Simulation(world, 16, 0, "evaluation", 1)
+    states = [simulation.reset()]
+    stay = np.tile([-1.0, 0.0], (16, 1))
+    for _ in range(100):
+        before = states[-1]
+        states.append(simulation.step(stay).state)
+        walked = np.linalg.norm(states[-1].objects - before.objects, axis=-1)
+        assert walked[walked < 0.5].max() <= 0.5 * 0.2 + 1e-9  # 0.5 m/s; farther only when respawned
+    paths = np.stack([s.objects[:, :, :2] for s in states])
+    low, high = world.object_spawn.min(axis=0), world.object_spawn.max(axis=0)
+    assert (paths >= low - 1e-9).all()
+    assert (paths <= high + 1e-9).all()
+    assert np.linalg.norm(paths[-1] - paths[0], axis=-1).mean() > 1.0
+    gaps = np.linalg.norm(paths[:, :, :, None] - paths[:, :, None], axis=-1)
+    assert gaps[..., *np.triu_indices(3, 1)].min() >= SEPARATION - 1e-9
+
+
+def test_unknown_mode_and_task_are_refused(field):
+    with pytest.raises(ValueError, match="mode"):
+        Simulation(field, 1, 0, "testing", 1)
+    with pytest.raises(ValueError, match="task"):
+        task_of(dataclasses.replace(field, task="chess"))
