@@ -1,0 +1,59 @@
+"""Fitness: a candidate's life. It learns, then plays the evaluation episodes, whose mean return is its fitness."""
+
+from __future__ import annotations
+
+import time
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+
+import sim
+from evolve.config import RunConfig
+from evolve.development import Phenotype
+from evolve.evaluation import Evaluation
+from evolve.learner import Episodes, Progress, Training, play, train
+from evolve.policy import TrainingDiverged, save_policy
+
+__all__ = ["evaluate"]
+
+
+def evaluate(
+    phenotype: Phenotype, config: RunConfig, seed: int, policy_path: Path, progress: Progress | None = None
+) -> Evaluation:
+    """Train one candidate, write its policy, and measure its fitness; same arguments, same outcome on one machine.
+
+    seed         of the policy's first weights, of all worlds and of all chance in learning
+    policy_path  where the trained policy is written (safetensors); nothing is written if learning diverged
+    progress     told (steps trained, steps planned) after every rollout
+
+    A training that diverges is a failed Evaluation, not an exception.
+    """
+    began = time.perf_counter()
+    try:
+        training, episodes = _live(phenotype, config, seed, progress)
+    except TrainingDiverged as error:
+        return Evaluation.failed(str(error), time.perf_counter() - began)
+    save_policy(training.policy, policy_path)
+    return Evaluation(
+        fitness=float(episodes.returns.mean()),
+        returns=tuple(episodes.returns.tolist()),
+        success_rate=float(episodes.successes.mean()),
+        steps=training.steps,
+        seconds=time.perf_counter() - began,
+        curve=training.curve,
+    )
+
+
+def _live(phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress | None) -> tuple[Training, Episodes]:
+    """Training, and the evaluation episodes after it, in worlds never seen before."""
+    weights, worlds, evaluation = (int(s) for s in np.random.SeedSequence(seed).generate_state(3))
+    eyes = phenotype.eyes(config.eye)
+    common = {"memory": phenotype.memory_frames, "rays_per_receptor": config.eye.rays_per_receptor}
+    training_worlds = sim.make_vec_env(config.task, eyes, config.learning.n_envs, worlds, mode="training", **common)
+    evaluation_worlds = sim.make_vec_env(
+        config.task, eyes, config.evaluation.episodes, evaluation, mode="evaluation", **common
+    )
+    with closing(training_worlds), closing(evaluation_worlds):
+        training = train(training_worlds, evaluation_worlds, phenotype.neurons, config.learning, weights, progress)
+        return training, play(training.policy, evaluation_worlds, evaluation)
