@@ -17,8 +17,9 @@ import optics
 from sim import lighting, movers
 from sim.agent import BODY_RADIUS, EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.sensor import build_sensor
-from sim.stage import Stage, build_stage, variant
+from sim.stage import Stage, build_stage
 from sim.state import WorldState
+from sim.variant import variant
 from sim.world import World
 
 ALIGNMENT = 16  # floats: rows of the pose buffer, and the buffer itself, start on 64 bytes
@@ -40,8 +41,7 @@ class BatchedRenderer:
         self.eye = eyes.eye()
         self.sensor = build_sensor(self.eye, rays_per_receptor)
         self.bands: optics.SpectralBands = self.eye.spectral_bands
-        with variant():
-            self._stage = build_stage(world)
+        self._stage = build_stage(world)
         self._set_width(n_envs)
 
     def resized(self, n_envs: int) -> BatchedRenderer:
@@ -56,7 +56,7 @@ class BatchedRenderer:
         self.n_envs = n_envs
         stage = self._stage
         self._poses = _PoseBuffer(n_envs, len(stage.spheres))
-        with variant():
+        with variant(self._stage.variant):
             self._inputs = {
                 "directions": mi.Float(_in_agent_frame(self.eyes, self.sensor.directions)),
                 "origins": mi.Float(_eye_origins(self.eyes)),
@@ -98,7 +98,7 @@ class BatchedRenderer:
     def _launch(self, frozen: Any, state: WorldState) -> np.ndarray:
         if state.n != self.n_envs:
             raise ValueError(f"state has {state.n} worlds, this renderer was built for n_envs = {self.n_envs}")
-        with variant():
+        with variant(self._stage.variant):
             poses = mi.Float(self._poses.pack(state, self._stage))
             # numpy() waits for the kernel: only then may the buffer, whose memory Dr.Jit shares, be written again.
             return np.array(frozen(self._stage.scene, poses, self._inputs).numpy())

@@ -213,4 +213,4 @@ def _weights(
 
 
 def _dense(weights: np.ndarray | scipy.sparse.csr_array) -> np.ndarray:
-    return weights.toarray() if scipy.sparse.issparse(weights) else weights
+    return weights if isinstance(weights, np.ndarray) else weights.toarray()

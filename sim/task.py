@@ -111,7 +111,8 @@ class LeaveMaze:
         region = self.world.goal_region
         if region is None:
             raise ValueError(f"world {self.world.task!r} has no goal_region")
-        goal = ((path >= region[:2]) & (path <= region[2:])).all(axis=-1).any(axis=1)
+        inside = np.logical_and(path >= region[:2], path <= region[2:]).all(axis=-1)
+        goal = np.any(inside, axis=1)
         away = [np.linalg.norm(s.position - before.start, axis=-1) for s in (before, after)]
         return Outcome(
             progress=away[1] - away[0],

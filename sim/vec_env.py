@@ -129,9 +129,9 @@ class EyesVecEnv(VecEnv):
         for world in np.flatnonzero(step.done):
             infos[world]["TimeLimit.truncated"] = bool(step.truncated[world])
             infos[world]["episode"] = {"r": float(self._returns[world]), "l": int(self._lengths[world])}
-        for world, reason in enumerate(step.failure):
+        for index, reason in enumerate(step.failure):
             if reason is not None:
-                infos[world]["failure"] = reason
+                infos[index]["failure"] = reason
         return infos
 
     def _infos_of(self, state: WorldState, terms: dict[str, np.ndarray], success: np.ndarray) -> list[dict[str, Any]]:
