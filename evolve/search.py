@@ -7,7 +7,9 @@ what was asked and told before; no state is stored. nevergrad is imported here a
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -38,7 +40,8 @@ class Search:
         """Genomes of the next generation, (population, dimension) in [0, 1]."""
         if self._asked:
             raise RuntimeError("ask: the fitness of the last generation has not been told yet")
-        self._asked = [self._optimizer.ask() for _ in range(self._population)]
+        with _reflected_mirrors():
+            self._asked = [self._optimizer.ask() for _ in range(self._population)]
         return np.array([candidate.value[: self._dimension] for candidate in self._asked])
 
     def tell(self, fitness: Sequence[float]) -> None:
@@ -47,8 +50,9 @@ class Search:
             raise ValueError(f"tell: {len(self._asked)} genomes were asked for, {len(fitness)} fitness values told")
         self._told += [value for value in fitness if math.isfinite(value)]
         worst = min(self._told, default=0.0)
-        for candidate, value in zip(self._asked, fitness, strict=True):
-            self._optimizer.tell(candidate, -value if math.isfinite(value) else -worst)
+        with _reflected_mirrors():
+            for candidate, value in zip(self._asked, fitness, strict=True):
+                self._optimizer.tell(candidate, -value if math.isfinite(value) else -worst)
         self._asked = []
 
 
@@ -73,3 +77,12 @@ def _cma(start: NDArray[np.float64], sigma: float, population: int, seed: int) -
 
     # nevergrad shrinks the step in bounded spaces by a factor of its own choosing; it is divided out.
     return build(sigma / build(1.0).es.sigma)
+
+
+@contextmanager
+def _reflected_mirrors() -> Iterator[None]:
+    """pycma misses the mirrored samples it planted in a small population when nevergrad tells them as reflected at the
+    bounds, and warns; the samples told are those that were evaluated, which is what counts."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="orphanated injected solution")
+        yield

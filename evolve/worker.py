@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from evolve.evaluation import Evaluation
 
-__all__ = ["Message", "prepare_device", "work"]
+__all__ = ["Message", "evaluate_candidate", "prepare_device", "work"]
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,13 @@ def prepare_device() -> None:
     import drjit
 
     drjit.set_thread_count(1)
+
+
+def evaluate_candidate(*arguments: Any, progress: Callable[[int, int], None]) -> Evaluation:
+    """`evolve.fitness.evaluate`, whose libraries are loaded in workers alone."""
+    from evolve.fitness import evaluate
+
+    return evaluate(*arguments, progress=progress)
 
 
 def _evaluated(evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], connection: Connection) -> Evaluation:

@@ -1,0 +1,100 @@
+"""The command `evolve`: reads arguments, calls the command, turns what is the user's to mend into one line and a code.
+
+Exit codes: 0 done, 1 done but not as hoped, 2 wrong input or environment, 130 interrupted.
+Commands load on use, so that help comes at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import NoReturn
+
+__all__ = ["main"]
+
+INTERRUPTED = 130
+
+
+class _Parser(argparse.ArgumentParser):
+    """argparse, with errors of one line."""
+
+    def error(self, message: str) -> NoReturn:
+        print(f"{self.prog}: error: {message} (see {self.prog} --help)", file=sys.stderr)
+        raise SystemExit(2)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit code."""
+    parsed = _parser().parse_args(arguments)
+    command = import_module(f"evolve.commands.{parsed.module}")
+    try:
+        return int(getattr(command, parsed.function)(parsed))
+    except KeyboardInterrupt:
+        print("evolve: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        return 0  # `evolve genes | head`
+    except Exception as error:
+        if not _is_users(error):
+            raise
+        print(f"evolve: error: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+
+
+def _is_users(error: Exception) -> bool:
+    """Errors whose message is one line for the user; anything else is a bug of ours and keeps its traceback."""
+    from evolve.config import ConfigError
+    from evolve.executors import ExecutorError
+    from evolve.lock import LockedError
+    from evolve.store import RunError
+    from optics.backend import BackendError
+
+    return isinstance(error, ConfigError | RunError | LockedError | ExecutorError | BackendError | OSError)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="evolve", description="Evolve eyes that see through wave optics.")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", parser_class=_Parser)
+
+    run = _command(commands, "run", "run.start", "begin a run: evolve eyes and brains for a task")
+    run.add_argument("task", metavar="TASK", help="navigation, detection or tracking (see: evolve tasks)")
+    run.add_argument("--preset", default="paper", help="settings to begin with: quick (minutes) or paper (a day; default)")
+    run.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings; wins over the preset")
+    run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="one setting; wins over the file")
+    run.add_argument("--seed", type=int, help="same as --set seed=N")
+    run.add_argument("--workers", type=int, metavar="N", help="same as --set workers=N (0: one per core)")
+    run.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/TASK-PRESET-N)")
+
+    _command(commands, "resume", "run.resume", "continue a run that was interrupted", directory=True)
+    status = _command(commands, "status", "status.status", "how a run stands", directory=True)
+    status.add_argument("--json", action="store_true", help="for machines")
+    for name, meaning in (
+        ("replay", "play the best agent once more, and say how it fared"),
+        ("report", "write the HTML report"),
+        ("export", "write what the best agent saw as spectral EXR files"),
+    ):
+        product = _command(commands, name, f"products.{name}", meaning, directory=True)
+        if name != "report":
+            product.add_argument("--candidate", type=int, metavar="ID", help="which candidate (default: the best)")
+            product.add_argument("--seed", type=int, default=0, help="seed of the episode (default: 0)")
+    _command(commands, "validate", "checks.validate", "compare the optics with closed forms (needs a checkout)")
+    doctor = _command(commands, "doctor", "checks.doctor", "what is installed, and whether it works")
+    doctor.add_argument("--json", action="store_true", help="for machines")
+    _command(commands, "tasks", "tables.tasks", "list the tasks")
+    _command(commands, "genes", "tables.genes", "list the genes")
+    return parser
+
+
+def _command(
+    commands: argparse._SubParsersAction[_Parser], name: str, home: str, meaning: str, directory: bool = False
+) -> argparse.ArgumentParser:
+    """A command that lives in evolve.commands.<home>."""
+    parser = commands.add_parser(name, help=meaning, description=f"{meaning[0].upper()}{meaning[1:]}.")
+    module, function = home.split(".")
+    parser.set_defaults(module=module, function=function)
+    if directory:
+        parser.add_argument("directory", type=Path, metavar="DIR", help="run directory")
+    return parser

@@ -1,0 +1,1 @@
+"""What the commands of `evolve` do; one module per kind, loaded by `evolve.cli` on use."""

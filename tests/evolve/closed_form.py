@@ -1,0 +1,76 @@
+"""Evaluations of known outcome, for what surrounds the evaluation: executor, record, search and loop.
+
+They run in worker processes, so they live in a module of their own.
+"""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from evolve.config_source import assemble
+from evolve.evaluation import Evaluation
+
+TINY = ("search.population=4", "search.generations=3", "genome.optical.open=false", "learning.total_steps=4096")
+BEST_FOV_DEG = 70.0
+
+
+def tiny(*assignments, task="detection"):
+    """A config of few candidates and genes."""
+    return assemble(task, assignments=[*TINY, *assignments])
+
+
+def bowl(phenotype, config, seed, policy_path, progress):
+    """Fitness known in closed form; leaves a line in calls.log beside the policies for every call."""
+    with (policy_path.parent / "calls.log").open("a") as log:
+        log.write(f"{policy_path.stem} {os.getpid()}\n")
+    progress(config.learning.total_steps // 2, config.learning.total_steps)
+    fitness = -abs(phenotype.fov_deg - BEST_FOV_DEG) + 1e-9 * (seed % 1000)
+    return Evaluation(fitness, (fitness,) * config.evaluation.episodes, 0.5, config.learning.total_steps, 0.01)
+
+
+def slow_for_some(phenotype, config, seed, policy_path, progress):
+    """As `bowl`, but candidates finish in another order than they are handed out."""
+    time.sleep(0.2 * (int(policy_path.stem) % 2 == 0))
+    return bowl(phenotype, config, seed, policy_path, progress)
+
+
+def fails_for_some(phenotype, config, seed, policy_path, progress):
+    """Every other candidate raises."""
+    if int(policy_path.stem) % 2:
+        raise ValueError("no such\nluck")
+    return bowl(phenotype, config, seed, policy_path, progress)
+
+
+def killed_once(phenotype, config, seed, policy_path, progress):
+    """The process is killed the first time candidate 2 is evaluated."""
+    mark = policy_path.parent / "killed"
+    if int(policy_path.stem) == 2 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return bowl(phenotype, config, seed, policy_path, progress)
+
+
+def killed_always(phenotype, config, seed, policy_path, progress):
+    """The process is killed whenever candidate 1 is evaluated."""
+    outcome = bowl(phenotype, config, seed, policy_path, progress)
+    if int(policy_path.stem) == 1:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return outcome
+
+
+def threads(phenotype, config, seed, policy_path, progress):
+    """Threads that numerical libraries may use in a worker, as its fitness."""
+    return Evaluation(float(os.environ["OMP_NUM_THREADS"]))
+
+
+def unfit():
+    """A preparation that fails."""
+    raise RuntimeError("no LLVM\nhere")
+
+
+def calls(run_path):
+    """How often each candidate has been evaluated."""
+    lines = (Path(run_path) / "policies" / "calls.log").read_text().splitlines()
+    names = [int(line.split()[0]) for line in lines]
+    return {name: names.count(name) for name in names}

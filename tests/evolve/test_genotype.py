@@ -1,0 +1,94 @@
+"""Genes and genomes: every genome is an animal, and the encoding loses nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evolve.config_source import assemble
+from evolve.development import Phenotype, develop
+from evolve.genotype import CLUSTERS, GENES, Genotype, group_members
+
+CONFIG = assemble("detection")
+GENOTYPE = Genotype(CONFIG.genome)
+
+
+def test_start_is_one_eye_with_one_photoreceptor_behind_45_degrees():
+    animal = develop(GENOTYPE.start, CONFIG)
+    assert (animal.n_eyes, animal.resolution, animal.fov_deg) == (1, (1, 1), 45.0)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.floats(-0.5, 1.5), min_size=GENOTYPE.dimension, max_size=GENOTYPE.dimension))
+def test_every_genome_decodes_into_the_genes_ranges(genome):
+    for name, value in GENOTYPE.decode(np.array(genome)).items():
+        assert value in GENES[name].range
+        assert CONFIG.genome[name].low <= value <= CONFIG.genome[name].high
+        if GENES[name].kind == "integer":
+            assert value == int(value)
+
+
+def test_integers_share_the_unit_interval_equally():
+    """Rounding low + u (high - low) would give the ends half of what the others get."""
+    gene, use = GENES["n_eyes"], CONFIG.genome["n_eyes"]
+    u = (np.arange(16_000) + 0.5) / 16_000
+    values, counts = np.unique([gene.decode(x, use) for x in u], return_counts=True)
+    assert values.tolist() == list(range(1, 17))
+    assert set(counts) == {1000}
+    assert gene.decode(1.0, use) == 16
+
+
+@pytest.mark.parametrize("name", GENES)
+def test_encoding_inverts_decoding(name):
+    gene, use = GENES[name], CONFIG.genome[name]
+    values = range(int(use.low), int(use.high) + 1) if gene.kind == "integer" else np.linspace(use.low, use.high, 7)
+    for value in values:
+        assert gene.decode(gene.encode(value, use), use) == pytest.approx(value, rel=1e-12)
+
+
+def test_frozen_genes_hold_their_start_and_leave_the_genome():
+    config = assemble("detection", assignments=["genome.doe.open=false", "genome.fov_deg.open=false"])
+    genotype = Genotype(config.genome)
+    assert genotype.dimension == GENOTYPE.dimension - 17
+    for corner in (0.0, 1.0):
+        animal = develop(np.full(genotype.dimension, corner), config)
+        assert animal.fov_deg == 45.0
+        assert animal.relief == (0.5,) * 16
+        assert animal.n_eyes == (1 if corner == 0 else 16)
+
+
+def test_relief_is_in_row_major_order():
+    config = assemble("detection", assignments=["genome.doe_12.start=0.9"])
+    relief = np.reshape(develop(Genotype(config.genome).start, config).relief, (4, 4))
+    assert relief[1, 2] == pytest.approx(0.9)
+    assert np.count_nonzero(relief != 0.5) == 1
+
+
+def test_genome_of_wrong_length_or_content_is_refused():
+    with pytest.raises(ValueError, match=f"must be {GENOTYPE.dimension} finite numbers"):
+        GENOTYPE.decode(np.zeros(GENOTYPE.dimension + 1))
+    with pytest.raises(ValueError, match="finite"):
+        GENOTYPE.decode(np.full(GENOTYPE.dimension, np.nan))
+
+
+def test_optics_off_is_the_perfect_lens():
+    config = assemble("detection", assignments=["eye.optics=false"])
+    animal = develop(Genotype(config.genome).start, config)
+    assert (animal.relative_aperture, animal.relief, animal.refractive_index) == (None, None, None)
+    assert animal.eyes(config.eye).optics is None
+
+
+def test_groups_cover_all_genes_once():
+    members = [name for cluster in CLUSTERS for name in group_members(cluster)]
+    assert sorted(members) == sorted(GENES)
+    assert len(group_members("doe")) == 16
+    assert group_members("nonsense") == ()
+
+
+def test_phenotype_survives_being_written():
+    animal = develop(np.linspace(0, 1, GENOTYPE.dimension), CONFIG)
+    assert Phenotype.from_json(animal.to_json()) == animal
+    perfect = replace(animal, relative_aperture=None, relief=None, refractive_index=None)
+    assert Phenotype.from_json(perfect.to_json()) == perfect

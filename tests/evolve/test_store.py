@@ -1,0 +1,212 @@
+"""The record: read back bit for bit, never overwritten, whole after any crash, and damage named by file and line."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from closed_form import tiny
+
+from evolve.candidate import Candidate
+from evolve.config import ConfigError
+from evolve.development import develop
+from evolve.evaluation import Evaluation
+from evolve.genotype import Genotype
+from evolve.lock import LockedError, RunLock, holder
+from evolve.store import Run, RunError, next_directory
+from evolve.versions import present, record_start, recorded
+
+CONFIG = tiny()
+DIMENSION = Genotype(CONFIG.genome).dimension
+
+
+def candidate(identity, fitness=1.0, failure=None):
+    genome = np.random.default_rng(identity).random(DIMENSION)
+    outcome = Evaluation(fitness, (fitness, 1 / 3), 0.5, 4096, 0.1, ((2048, 0.1), (4096, math.pi)), failure)
+    place = (identity, identity // 4, identity % 4)
+    return Candidate.of(place, tuple(genome.tolist()), develop(genome, CONFIG), 2**32 - 1 - identity, outcome)
+
+
+@pytest.fixture
+def run(tmp_path):
+    return Run.create(tmp_path / "run", CONFIG)
+
+
+def test_record_reads_back_bit_for_bit(run):
+    written = [candidate(2, 0.1 + 0.2), candidate(0, -1e-300), candidate(1)]
+    for entry in written:
+        run.append(entry)
+    again = Run.open(run.path)
+    assert again.candidates == (written[1], written[2], written[0]) == run.candidates
+    assert again.config == CONFIG
+
+
+def test_failures_have_the_worst_fitness_and_valid_json(run):
+    run.append(candidate(0, -5.0))
+    run.append(candidate(1, math.nan))
+    run.append(
+        Candidate.of((2, 0, 2), (0.5,) * DIMENSION, run.candidates[0].phenotype, 1, Evaluation.failed("it\nbroke"))
+    )
+    lines = (run.path / "candidates.jsonl").read_text().splitlines()
+    assert [json.loads(line, parse_constant=pytest.fail)["fitness"] for line in lines] == [-5.0, None, None]
+    _, nan, broken = Run.open(run.path).candidates
+    assert nan.fitness == broken.fitness == -math.inf
+    assert (nan.failure, broken.failure) == ("fitness is nan", "it broke")
+    assert Run.open(run.path).best.id == 0
+
+
+def test_best_is_the_earliest_of_the_fittest(run):
+    assert run.best is None
+    for identity, fitness in ((3, 2.0), (1, 2.0), (0, 1.0)):
+        run.append(candidate(identity, fitness))
+    assert run.best.id == 1
+
+
+def test_candidate_is_written_once(run):
+    run.append(candidate(0))
+    with pytest.raises(RunError, match="candidate 0 has been evaluated already"):
+        run.append(candidate(0, 9.0))
+
+
+@pytest.mark.parametrize("kept", [1, 40, -2, -1])
+def test_unfinished_last_line_is_dropped_with_a_notice_and_cut_off_on_repair(run, kept):
+    """At any byte but the newline, which makes a line whole."""
+    run.append(candidate(0))
+    whole = (run.path / "candidates.jsonl").read_bytes()
+    torn = candidate(1).to_line().encode()[:kept]
+    (run.path / "candidates.jsonl").write_bytes(whole + torn)
+    again = Run.open(run.path)
+    assert [c.id for c in again.candidates] == [0]
+    assert "line 2 is unfinished" in again.notice
+    assert (run.path / "candidates.jsonl").read_bytes() == whole + torn, "reading must not write"
+    again.repair()
+    again.append(candidate(1))
+    assert [c.id for c in Run.open(run.path).candidates] == [0, 1]
+    assert Run.open(run.path).notice is None
+
+
+def damaged(change):
+    record = json.loads(candidate(1).to_line())
+    change(record)
+    return json.dumps(record) + "\n"
+
+
+DAMAGE = {
+    "no JSON": ("{]\n", "Expecting"),
+    "not UTF-8": (b"\xff\xfe\n", "utf-8"),
+    "zeros": (b"\0" * 64 + b"\n", "Expecting"),
+    "no record": ("[1]\n", "must hold exactly"),
+    "missing": (damaged(lambda r: r.pop("genome")), "must hold exactly"),
+    "wrong type": (damaged(lambda r: r.update(genome=None)), "wrong type"),
+    "wrong phenotype": (damaged(lambda r: r["phenotype"].pop("n_eyes")), "n_eyes"),
+    "wrong genome": (damaged(lambda r: r["genome"].pop()), f"{DIMENSION} genes are open"),
+    "wrong place": (damaged(lambda r: r.update(index=3)), "can't be number 3 of generation 0"),
+    "twice": (candidate(0).to_line(), "candidate 0 is there twice"),
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGE)
+def test_damage_is_named_by_file_and_line(run, kind):
+    line, reason = DAMAGE[kind]
+    run.append(candidate(0))
+    with (run.path / "candidates.jsonl").open("ab") as file:
+        file.write(line if isinstance(line, bytes) else line.encode())
+    with pytest.raises(RunError, match=r"candidates\.jsonl, line 2: is damaged") as caught:
+        Run.open(run.path)
+    assert reason in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_directory_with_something_in_it_is_refused(tmp_path):
+    (tmp_path / "thesis.tex").write_text("all of it")
+    with pytest.raises(RunError, match=r"is not empty: choose another name, or continue it with: evolve resume"):
+        Run.create(tmp_path, CONFIG)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_file_in_the_way_and_unwritable_place_are_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    for path in (tmp_path / "file", tmp_path / "file" / "run", "/proc/run"):
+        with pytest.raises(RunError, match="cannot be written: "):
+            Run.create(path, CONFIG)
+
+
+def test_what_is_no_run_is_named(tmp_path):
+    with pytest.raises(RunError, match="there is no such directory"):
+        Run.open(tmp_path / "absent")
+    with pytest.raises(RunError, match=r"it holds no config\.toml"):
+        Run.open(tmp_path)
+
+
+def test_damaged_config_is_named(run):
+    (run.path / "config.toml").write_text("task = 'detection'\n[serch]\n")
+    with pytest.raises(ConfigError, match=r"config\.toml: unknown key 'serch'"):
+        Run.open(run.path)
+    (run.path / "candidates.jsonl").unlink()
+    (run.path / "config.toml").write_text("task = 'detection'\n")
+    with pytest.raises(RunError, match=r"candidates\.jsonl: cannot be read"):
+        Run.open(run.path)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
+def test_full_disk_is_named_and_loses_nothing(run):
+    run.append(candidate(0))
+    kept = (run.path / "candidates.jsonl").read_bytes()
+    (run.path / "candidates.jsonl").rename(run.path / "aside")
+    (run.path / "candidates.jsonl").symlink_to("/dev/full")
+    with pytest.raises(RunError, match=r"candidates\.jsonl: cannot be written: No space left"):
+        run.append(candidate(1))
+    assert (run.path / "aside").read_bytes() == kept
+    assert [c.id for c in run.candidates] == [0], "what is not on disk is not on record"
+
+
+HOLD = """
+import sys, time
+from evolve.lock import RunLock
+from pathlib import Path
+with RunLock(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_second_process_is_refused_by_name_and_the_lock_dies_with_its_process(run):
+    child = subprocess.Popen([sys.executable, "-c", HOLD, run.path], stdout=subprocess.PIPE)
+    try:
+        assert child.stdout.readline() == b"held\n"
+        assert holder(run.path).startswith(str(child.pid))
+        with pytest.raises(LockedError, match=f"in use by process {child.pid}"), run.lock():
+            pass
+        child.kill()
+        child.wait()
+        assert holder(run.path) is None
+        with run.lock():
+            assert holder(run.path).startswith(str(os.getpid()))
+        assert holder(run.path) is None
+    finally:
+        child.kill()
+        child.wait()
+        child.stdout.close()
+
+
+def test_lock_alone_does_not_make_a_directory_full(tmp_path):
+    with RunLock(tmp_path):
+        Run.create(tmp_path, CONFIG)
+
+
+def test_versions_are_recorded_at_each_start(run):
+    assert recorded(run.path) == present()
+    assert {"nevergrad", "cma", "torch", "drjit", "python"} <= present().keys()
+    record_start(run.path, 7)
+    starts = json.loads((run.path / "versions.json").read_text())
+    assert [start["candidates"] for start in starts] == [0, 7]
+
+
+def test_default_directory_is_the_first_that_is_free(tmp_path):
+    assert next_directory("detection", "quick", tmp_path).name == "detection-quick-1"
+    (tmp_path / "detection-quick-1").mkdir()
+    (tmp_path / "detection-quick-3").mkdir()
+    assert next_directory("detection", "quick", tmp_path).name == "detection-quick-2"
