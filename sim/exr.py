@@ -1,0 +1,227 @@
+"""What eyes saw, as OpenEXR files in the spectral layout of Fichet, Pacanowski and Wilkie (2021), "An OpenEXR Layout
+for Spectral Images", JCGT 10(3).
+
+One part per eye and view: `left.spectral` (spectral radiance, channels `S0.450,000000nm`), `left.receptors`
+(photoreceptor signals, channels `receptor_0` ...), each with an sRGB preview R, G, B (linear, as EXR wants it). Plain
+viewers show the preview; readers of the layout that know only one part (colour-science's) read the first, which is
+spectral if any is. 32-bit floats, ZIP.
+
+Files are written whole or not at all, and each part carries a SHA-256 of what it holds.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+LAYOUT_VERSION = "1.0"
+UNITS = "W.m^-2.sr^-1"
+SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 at 560 nm"
+_HELD = "rhabdom"  # attribute: JSON of what the channels cannot hold
+_HASH = "sha256"
+_PREVIEW = ("R", "G", "B")
+
+
+class ExrError(ValueError):
+    """A file that is no whole, undamaged file of `write_exr`."""
+
+
+@dataclass(frozen=True)
+class View:
+    """What one eye saw.
+
+    name            of the eye: "left"
+    wavelengths_nm  (band,), the radiance's
+    radiance        (band, y, x) float32, or None
+    receptors       (channel, y, x) float32, or None
+    rgb             (y, x, 3) float32 linear sRGB preview of the radiance; None: made when written
+    attributes      whatever JSON can hold: seed, time step, position, ...
+    """
+
+    name: str
+    wavelengths_nm: np.ndarray = field(default_factory=lambda: np.empty(0))
+    radiance: np.ndarray | None = None
+    receptors: np.ndarray | None = None
+    rgb: np.ndarray | None = None
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        where = f"View {self.name!r}"
+        if not self.name or not self.name.isprintable():
+            raise ValueError(f"{where}: name must be printable and not empty")
+        if self.radiance is None and self.receptors is None:
+            raise ValueError(f"{where}: has neither radiance nor receptors")
+        for label, image in (("radiance", self.radiance), ("receptors", self.receptors)):
+            if image is not None and (image.ndim != 3 or 0 in image.shape):
+                raise ValueError(f"{where}: {label} has shape {image.shape}, must be (band, y, x)")
+        if self.radiance is not None:
+            names = {_channel(nm) for nm in self.wavelengths_nm}
+            if len(self.radiance) != len(self.wavelengths_nm) or len(names) != len(self.radiance):
+                raise ValueError(f"{where}: needs one distinct wavelength per band of {self.radiance.shape}")
+            if self.rgb is not None and self.rgb.shape != (*self.radiance.shape[1:], 3):
+                raise ValueError(f"{where}: rgb has shape {self.rgb.shape}, must be (y, x, 3) like the radiance")
+
+
+def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
+    """Write views to an OpenEXR file, whole or not at all; an existing file is replaced.
+
+    Raises ValueError for no views, a name twice, or attributes that JSON cannot hold; OSError where the file cannot
+    be written.
+    """
+    import OpenEXR
+
+    names = [view.name for view in views]
+    if not views or len(set(names)) != len(names):
+        raise ValueError(f"write_exr: views = {names}, must be at least one, and no name twice")
+    spectral = [_part(view, "spectral") for view in views if view.radiance is not None]
+    receptors = [_part(view, "receptors") for view in views if view.receptors is not None]
+    # One display window for all parts: OpenEXR demands it, and the images differ in size.
+    shapes = [channels["R"].shape for _, channels, _ in spectral + receptors]
+    corner = np.array([max(width for _, width in shapes) - 1, max(height for height, _ in shapes) - 1], np.int32)
+    header = {
+        "type": OpenEXR.scanlineimage,
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "displayWindow": (np.zeros(2, np.int32), corner),
+    }
+    parts = []
+    for name, channels, attributes in spectral + receptors:
+        attributes["parts"] = str(len(spectral) + len(receptors))
+        attributes[_HASH] = _digest(name, channels, attributes)
+        # OpenEXR writes arrays that are not contiguous wrong, without a word: _part makes them so.
+        parts.append(OpenEXR.Part({**header, **attributes}, channels, name))
+    _write_whole(Path(path), lambda name: OpenEXR.File(parts).write(name))
+
+
+def read_exr(path: str | os.PathLike[str]) -> list[View]:
+    """Read what `write_exr` wrote. Raises ExrError, one line, for a truncated, damaged or foreign file, and
+    FileNotFoundError where there is none."""
+    import OpenEXR
+
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"no such file: {path}")
+    try:
+        expected = len(OpenEXR.File(str(path), header_only=True).parts)
+        parts = OpenEXR.File(str(path), separate_channels=True).parts
+        held = [_checked(part, expected) for part in parts]
+    except ExrError as error:
+        raise ExrError(f"{path}: {error}") from None
+    except Exception as error:  # OpenEXR raises whatever its C++ throws
+        raise ExrError(f"{path}: no readable OpenEXR file ({str(error).splitlines()[0]})") from None
+    if len(parts) != expected:
+        raise ExrError(f"{path}: truncated ({len(parts)} of {expected} parts are whole)")
+    return _views(held)
+
+
+def preview(radiance: np.ndarray, wavelengths_nm: np.ndarray) -> np.ndarray:
+    """Linear sRGB (y, x, 3) of spectral radiance (band, y, x): CIE 1931, scaled such that radiance D65 is white.
+
+    A band counts for the wavelengths nearer to it than to the next; with few bands the colours are rough.
+    """
+    from optics.spectrum import cie_1931, daylight
+
+    order = np.argsort(wavelengths_nm)
+    nm = np.clip(np.asarray(wavelengths_nm, float)[order], 360.0, 780.0)
+    matching = cie_1931(nm * 1e-9)  # (band, 3)
+    weights = matching * (np.gradient(nm)[:, None] if len(nm) > 1 else 1.0)
+    light = daylight(nm * 1e-9)
+    rgb_weights = weights @ _XYZ_TO_SRGB.T
+    white = light @ rgb_weights
+    balanced = rgb_weights / np.where(np.abs(white) > 1e-9, white, np.inf)
+    return np.einsum("byx,bc->yxc", np.asarray(radiance, float)[order], balanced).astype(np.float32)
+
+
+# IEC 61966-2-1
+_XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+
+
+def _channel(nm: float) -> str:
+    return f"S0.{nm:.6f}nm".replace(".", ",").replace("S0,", "S0.", 1)
+
+
+def _part(view: View, kind: str) -> tuple[str, dict[str, np.ndarray], dict[str, str]]:
+    """Name, channels and attributes of one part."""
+    held: dict[str, Any] = {"attributes": dict(view.attributes)}
+    attributes: dict[str, str] = {}
+    if kind == "spectral":
+        assert view.radiance is not None
+        image, names = view.radiance, [_channel(nm) for nm in view.wavelengths_nm]
+        held["wavelengths_nm"] = [float(nm) for nm in view.wavelengths_nm]
+        rgb = preview(image, view.wavelengths_nm) if view.rgb is None else view.rgb
+        attributes = {"spectralLayoutVersion": LAYOUT_VERSION, "emissiveUnits": UNITS, "radianceScale": SCALE}
+    else:
+        assert view.receptors is not None
+        image, names = view.receptors, [f"receptor_{c}" for c in range(len(view.receptors))]
+        # Channels are ordered from long to short wavelengths: red, green, blue; one channel is grey.
+        rgb = np.moveaxis(np.asarray(image)[np.minimum(range(3), len(image) - 1)], 0, -1)
+    try:
+        attributes[_HELD] = json.dumps(held, sort_keys=True)
+    except TypeError as error:
+        raise ValueError(f"View {view.name!r}: attributes cannot be written as JSON ({error})") from None
+    planes = dict(zip(names, image, strict=True)) | dict(zip(_PREVIEW, np.moveaxis(rgb, -1, 0), strict=True))
+    channels = {name: np.ascontiguousarray(plane, dtype=np.float32) for name, plane in planes.items()}
+    return f"{view.name}.{kind}", channels, attributes
+
+
+def _digest(name: str, channels: Mapping[str, np.ndarray], attributes: Mapping[str, str]) -> str:
+    digest = hashlib.sha256(name.encode())
+    for key in sorted(attributes):
+        digest.update(f"{key}={attributes[key]}\n".encode())
+    for key in sorted(channels):
+        digest.update(f"{key}:{channels[key].shape}\n".encode())
+        digest.update(np.ascontiguousarray(channels[key], dtype=np.float32).tobytes())
+    return digest.hexdigest()
+
+
+_OWN_ATTRIBUTES = ("spectralLayoutVersion", "emissiveUnits", "radianceScale", _HELD, "parts")
+
+
+def _checked(part: Any, expected: int) -> tuple[str, dict[str, np.ndarray], dict[str, Any]]:
+    """A part's name, channels and held values, if they are what was written."""
+    name, header = part.name(), part.header
+    if _HASH not in header or _HELD not in header:
+        raise ExrError(f"part {name!r} was not written by rhabdom")
+    channels = {key: channel.pixels for key, channel in part.channels.items()}
+    attributes = {key: header[key] for key in _OWN_ATTRIBUTES if key in header}
+    if header[_HASH] != _digest(name, channels, attributes):
+        raise ExrError(f"part {name!r} is damaged (its SHA-256 does not match)")
+    if attributes.get("parts") != str(expected):
+        raise ExrError(f"parts are missing ({expected} of {attributes.get('parts')})")
+    return name, channels, json.loads(header[_HELD])
+
+
+def _views(parts: list[tuple[str, dict[str, np.ndarray], dict[str, Any]]]) -> list[View]:
+    fields: dict[str, dict[str, Any]] = {}
+    for part_name, channels, held in parts:
+        name, _, kind = part_name.rpartition(".")
+        view = fields.setdefault(name, {"name": name, "attributes": held["attributes"]})
+        if kind == "spectral":
+            nm = np.array(held["wavelengths_nm"])
+            view["wavelengths_nm"] = nm
+            view["radiance"] = np.stack([channels[_channel(x)] for x in nm])
+            view["rgb"] = np.stack([channels[c] for c in _PREVIEW], axis=-1)
+        else:
+            count = sum(c.startswith("receptor_") for c in channels)
+            view["receptors"] = np.stack([channels[f"receptor_{c}"] for c in range(count)])
+    return [View(**view) for view in fields.values()]
+
+
+def _write_whole(path: Path, write: Any) -> None:
+    """Write to a neighbouring temporary file, flush it to the disk, and give it its name."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent or Path("."), prefix=f".{path.name}.", suffix=".tmp")
+    os.close(handle)
+    try:
+        write(temporary)
+        with open(temporary, "rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,175 @@
+"""EXR files: what goes in comes out, others can read it, and damage never passes for data."""
+
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from optics.spectrum import daylight
+from sim.exr import ExrError, View, preview, read_exr, write_exr
+
+NM = np.array([410.0, 450.125, 1640 / 3, 690.0])
+
+
+def views(seed=0):
+    rng = np.random.default_rng(seed)
+    left = rng.random((4, 7, 5), dtype=np.float32)
+    left[0, 0, 0], left[1, 2, 3], left[2, 0, 1] = np.inf, -0.0, 1e-40
+    return [
+        View(
+            "left", NM, left, rng.random((3, 4, 6), dtype=np.float32), attributes={"seed": 2**63, "t": 0.1, "a": [1, 2]}
+        ),
+        View("right", NM, rng.random((4, 7, 5), dtype=np.float32), rgb=rng.random((7, 5, 3), dtype=np.float32)),
+        View("signals", receptors=rng.random((1, 2, 9), dtype=np.float32)),
+    ]
+
+
+def same_bits(a, b):
+    return (a is None) == (b is None) and (a is None or (a.dtype == b.dtype and a.tobytes() == b.tobytes()))
+
+
+def test_round_trip_is_bit_exact(tmp_path):
+    written = views()
+    write_exr(tmp_path / "a.exr", written)
+    got = {view.name: view for view in read_exr(tmp_path / "a.exr")}
+    assert list(got) == ["left", "right", "signals"]
+    for view in written:
+        back = got[view.name]
+        assert same_bits(view.radiance, back.radiance)
+        assert same_bits(view.receptors, back.receptors)
+        assert np.array_equal(view.wavelengths_nm, back.wavelengths_nm)
+        assert back.attributes == view.attributes
+    assert same_bits(got["right"].rgb, written[1].rgb)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.exr"]
+
+
+@pytest.mark.parametrize("turn", [lambda a: np.asfortranarray(a), lambda a: a[:, ::-1, ::2]])
+def test_non_contiguous_arrays_are_written_right(tmp_path, turn):
+    """OpenEXR itself writes these wrong in silence."""
+    image = turn(np.random.default_rng(1).random((4, 8, 6), dtype=np.float32))
+    assert not image[0].flags.c_contiguous
+    write_exr(tmp_path / "a.exr", [View("left", NM, image, image)])
+    (back,) = read_exr(tmp_path / "a.exr")
+    assert np.array_equal(back.radiance, image)
+    assert np.array_equal(back.receptors, image)
+
+
+def test_parts_and_channels_have_the_names_of_the_layout(tmp_path):
+    import OpenEXR
+
+    write_exr(tmp_path / "a.exr", views())
+    parts = OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True).parts
+    assert [p.name() for p in parts] == ["left.spectral", "right.spectral", "left.receptors", "signals.receptors"]
+    header = parts[0].header
+    assert header["spectralLayoutVersion"] == "1.0"
+    assert header["emissiveUnits"] == "W.m^-2.sr^-1"
+    assert header["compression"] == OpenEXR.ZIP_COMPRESSION
+    assert set(parts[0].channels) == {
+        "S0.410,000000nm", "S0.450,125000nm", "S0.546,666667nm", "S0.690,000000nm", "R", "G", "B"
+    }  # fmt: skip
+    assert all(c.pixels.dtype == np.float32 for p in parts for c in p.channels.values())
+
+
+def test_colour_reads_the_spectral_layout(tmp_path):
+    """colour-science reads the first part of a file: the first eye's radiance."""
+    pytest.importorskip("OpenImageIO")
+    from colour import read_spectral_image_Fichet2021
+
+    written = views()
+    write_exr(tmp_path / "a.exr", written)
+    components, specification = read_spectral_image_Fichet2021(str(tmp_path / "a.exr"), additional_data=True)
+    wavelengths, values = components["S0"]
+    assert specification.is_emissive
+    np.testing.assert_allclose(wavelengths, NM, atol=1e-6)
+    assert np.array_equal(values, np.moveaxis(written[0].radiance, 0, -1))
+
+
+def test_exrheader_lists_the_parts(tmp_path):
+    if shutil.which("exrheader") is None:
+        pytest.skip("exrheader (Debian: openexr) is not installed")
+    write_exr(tmp_path / "a.exr", views())
+    text = subprocess.run(["exrheader", tmp_path / "a.exr"], capture_output=True, text=True, check=True).stdout
+    assert "left.receptors" in text
+    assert "S0.450,125000nm, 32-bit floating-point" in text
+
+
+def test_a_truncated_file_raises_one_clear_error(tmp_path):
+    write_exr(tmp_path / "a.exr", views())
+    whole = (tmp_path / "a.exr").read_bytes()
+    cut = tmp_path / "cut.exr"
+    for length in [0, 3, 100, *range(200, len(whole), 97), len(whole) - 1]:
+        cut.write_bytes(whole[:length])
+        with pytest.raises(ExrError, match=r"cut\.exr: ") as caught:
+            read_exr(cut)
+        assert "\n" not in str(caught.value)
+
+
+def test_flipped_bits_never_pass_for_data(tmp_path):
+    """Each flip is either reported or harmless (in a byte that holds nothing of ours): never other data."""
+    write_exr(tmp_path / "a.exr", views())
+    whole = (tmp_path / "a.exr").read_bytes()
+    rng, flipped, reported = np.random.default_rng(2), tmp_path / "flipped.exr", 0
+    for position in rng.integers(8, len(whole), 150):
+        damaged = bytearray(whole)
+        damaged[position] ^= 1 << rng.integers(8)
+        flipped.write_bytes(damaged)
+        try:
+            got = {view.name: view for view in read_exr(flipped)}
+        except ExrError:
+            reported += 1
+            continue
+        for view in views():
+            assert same_bits(view.radiance, got[view.name].radiance)
+            assert same_bits(view.receptors, got[view.name].receptors)
+            assert view.attributes == got[view.name].attributes
+    assert reported > 100  # nearly all of the file is data that counts
+
+
+def test_foreign_and_missing_files(tmp_path):
+    (tmp_path / "text.exr").write_text("no image")
+    with pytest.raises(ExrError, match="no readable OpenEXR"):
+        read_exr(tmp_path / "text.exr")
+    with pytest.raises(FileNotFoundError, match="no such file"):
+        read_exr(tmp_path / "none.exr")
+
+
+def test_a_failed_write_leaves_the_old_file_alone(tmp_path):
+    write_exr(tmp_path / "a.exr", views())
+    before = (tmp_path / "a.exr").read_bytes()
+    with pytest.raises(ValueError, match="attributes"):
+        write_exr(tmp_path / "a.exr", [View("left", NM, views()[0].radiance, attributes={"x": object()})])
+    assert (tmp_path / "a.exr").read_bytes() == before
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_preview_of_daylight_is_white():
+    nm = np.linspace(400, 700, 8)
+    radiance = 0.5 * daylight(nm * 1e-9)[:, None, None] * np.ones((8, 2, 3))
+    np.testing.assert_allclose(preview(radiance, nm), 0.5, atol=1e-6)
+    red = np.where(nm > 600, 1.0, 0.0)[:, None, None] * np.ones((8, 1, 1))
+    r, g, b = preview(red, nm)[0, 0]
+    assert r > 5 * max(g, b)
+    # Bands in any order mean the same.
+    np.testing.assert_allclose(preview(red[::-1], nm[::-1]), preview(red, nm))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ({"name": ""}, "name"),
+        ({}, "neither"),
+        ({"radiance": np.ones((2, 3, 3))}, "wavelength"),
+        ({"radiance": np.ones((2, 3, 3)), "wavelengths_nm": np.array([500.0, 500.0])}, "distinct"),
+        ({"receptors": np.ones((3, 3))}, "receptors has shape"),
+    ],
+)
+def test_bad_views_are_refused(arguments, named):
+    with pytest.raises(ValueError, match=named):
+        View(**{"name": "left", **arguments})
+
+
+def test_a_name_twice_is_refused(tmp_path):
+    view = views()[1]
+    with pytest.raises(ValueError, match="no name twice"):
+        write_exr(tmp_path / "a.exr", [view, view])
