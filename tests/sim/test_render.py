@@ -1,0 +1,210 @@
+"""The batched renderer against Mitsuba's stock `direct` integrator on the mirror of the same world."""
+
+import dataclasses
+
+import drjit as dr
+import mujoco
+import numpy as np
+import pytest
+
+import sim
+from sim import lighting, movers
+from sim.simulation import Simulation
+from sim.world import build_world
+
+EYES = sim.Eyes(n_eyes=2, resolution=(9, 15), fov_deg=60, placement_range_deg=50, bands=6, noise_sigma=0)
+BATCHES = 12  # independent renderings by Mitsuba, for their standard error
+SPP = 96
+RAYS = 1024
+
+
+# Objects as the two agents see them: at arm's length, one in each eye's axis, shading floor, wall and each other.
+CLOSE_BY = np.array([[[1.5, 0.7], [1.5, -0.7], [2.6, 0.0]], [[1.8, -0.8], [1.4, 0.7], [2.9, 0.3]]])
+
+
+def begun(task, n, seed=0):
+    """A world and a state in which the agents look at what there is."""
+    world = build_world(task, seed=seed, eyes=EYES)
+    state = Simulation(world, n, seed, "training", 1).reset()
+    if not world.objects:
+        return world, state
+    objects = state.objects.copy()
+    objects[:, :, :2] = CLOSE_BY + [[[-8.0, 2.0]]]
+    return world, dataclasses.replace(
+        state, objects=objects, position=np.array([[-8.0, 2.0], [-8.0, 2.0]]), heading=np.zeros(2)
+    )
+
+
+def placed(world, state, index):
+    """MuJoCo's data of one world of a state."""
+    data = mujoco.MjData(world.model)
+    data.qpos[:3] = [*state.position[index], state.heading[index]]
+    for name, centre in zip(world.objects, state.objects[index], strict=True):
+        data.mocap_pos[world.model.body(name).mocapid[0]] = centre
+    mujoco.mj_forward(world.model, data)
+    return data
+
+
+@pytest.fixture(scope="module")
+def references():
+    """Per task: world, state, and Mitsuba's renderings (batch, env, eye, band, y, x)."""
+    found = {}
+    for task in ("detection", "navigation"):
+        world, state = begun(task, 2)
+        wavelengths = EYES.eye().spectral_bands.wavelengths
+        mirror = sim.mirror(world.model)
+        images = np.empty((BATCHES, state.n, EYES.n_eyes, len(wavelengths), *EYES.resolution))
+        for env in range(state.n):
+            mirror.sync(placed(world, state, env))
+            for eye in range(EYES.n_eyes):
+                for batch in range(BATCHES):
+                    images[batch, env, eye] = mirror.render(
+                        f"eye_{eye}", EYES.resolution[1], EYES.resolution[0], "direct", SPP, wavelengths, seed=batch
+                    )
+        found[task] = world, state, images
+    return found
+
+
+@dataclasses.dataclass(frozen=True)
+class Disagreement:
+    """Largest |z| of an eye's mean over its image; share of receptors beyond 3 standard errors; largest relative
+    error of a band's share in an image's light (here Mitsuba has next to no noise: its bands share their rays)."""
+
+    mean: float
+    beyond: float
+    spectrum: float
+
+    @property
+    def significant(self):
+        return self.mean > LARGEST_MEAN_Z or self.beyond > SHARE_BEYOND_3 or self.spectrum > SPECTRUM
+
+
+def disagreement(world, state, images):
+    renderer = sim.BatchedRenderer(world, EYES, state.n, rays_per_receptor=RAYS)
+    ours = np.moveaxis(renderer.receptor_radiance(state), 0, 2)
+    means, theirs = ours.mean(axis=(3, 4)), images.mean(axis=(4, 5))
+    shares = [m / m.sum(axis=-1, keepdims=True) for m in (means, theirs.mean(axis=0))]
+    return Disagreement(
+        mean=np.abs(_z(means, theirs)).max(),
+        beyond=np.mean(np.abs(_z(ours, images)) > 3),
+        spectrum=np.abs(shares[0] / shares[1] - 1).max(),
+    )
+
+
+def _z(ours, batches):
+    error = batches.std(axis=0, ddof=1) / np.sqrt(len(batches))
+    # 1e-5: float32 rounding of a uniformly lit receptor, where the reference has no variance either.
+    return (ours - batches.mean(axis=0)) / (error + 1e-5)
+
+
+# Four image means per task, whose bands share their noise: one |t| of 11 degrees of freedom beyond 4.5 has p = 4e-3.
+LARGEST_MEAN_Z = 4.5
+# P(|t_11| > 3) = 1.2 %; receptors that an edge crosses add our own sampling error.
+SHARE_BEYOND_3 = 0.04
+# float32, and what little the noise leaves where materials are not grey.
+SPECTRUM = 1e-4
+
+
+@pytest.mark.parametrize("task", ["detection", "navigation"])
+def test_agrees_with_mitsubas_direct_integrator(references, task):
+    found = disagreement(*references[task])
+    assert not found.significant, found
+
+
+def turned_light(original):
+    def lights(scene, wavelengths):
+        return tuple(
+            dataclasses.replace(light, direction=light.direction * [-1, 1, 1]) for light in original(scene, wavelengths)
+        )
+
+    return lights
+
+
+def flipped_uv(original):
+    def normal_and_uv(*args):
+        normal, uv = original(*args)
+        uv.y = 1 - uv.y
+        return normal, uv
+
+    return normal_and_uv
+
+
+def mirrored_uv(original):
+    def normal_and_uv(*args):
+        normal, uv = original(*args)
+        uv.x = 1 - uv.x
+        return normal, uv
+
+    return normal_and_uv
+
+
+def misweighted_band(original):
+    def lights(scene, wavelengths):
+        factor = np.ones(len(wavelengths))
+        factor[2] = 1.02
+        return tuple(
+            dataclasses.replace(light, irradiance=light.irradiance * factor) for light in original(scene, wavelengths)
+        )
+
+    return lights
+
+
+def no_mover_shadows(original):
+    return lambda radii, centres, ray: dr.zeros(type(original(radii, centres, ray)))
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "sabotage"),
+    [
+        (lighting, "directional_lights", turned_light),
+        (lighting, "directional_lights", misweighted_band),
+        (movers, "normal_and_uv", flipped_uv),
+        (movers, "normal_and_uv", mirrored_uv),
+        (movers, "blocks", no_mover_shadows),
+    ],
+    ids=lambda value: getattr(value, "__name__", None),
+)
+def test_parity_is_lost_when_something_is_wrong(references, monkeypatch, module, name, sabotage):
+    monkeypatch.setattr(module, name, sabotage(getattr(module, name)))
+    assert disagreement(*references["detection"]).significant
+
+
+def test_signals_weight_the_bands(references):
+    world, state, _ = references["detection"]
+    renderer = sim.BatchedRenderer(world, EYES, state.n, rays_per_receptor=3)
+    rays = renderer.radiance(state)
+    assert rays.shape == (2, 2, 9 * 15 * 3, 6)
+    receptors = rays.reshape(2, 2, 9, 15, 3, 6).mean(axis=4)
+    expected = np.einsum("neyxb,cb->necyx", receptors, EYES.eye().spectral_bands.weights)
+    np.testing.assert_allclose(renderer.signals(state), expected, rtol=1e-5, atol=1e-7)
+
+
+def test_kernels_are_recorded_once_and_results_do_not_alias(references):
+    world, state, _ = references["detection"]
+    renderer = sim.BatchedRenderer(world, EYES, state.n)
+    first = renderer.signals(state)
+    kept = first.copy()
+    for step in range(20):
+        moved = dataclasses.replace(state, heading=state.heading + 0.1 * (step + 1))
+        assert not np.array_equal(renderer.signals(moved), kept)
+    np.testing.assert_array_equal(first, kept)
+    np.testing.assert_array_equal(renderer.signals(state), kept)
+    assert renderer.recordings == 1
+
+
+def test_a_world_looks_the_same_among_any_number_of_neighbours(references):
+    world, state, _ = references["detection"]
+    alone = sim.BatchedRenderer(world, EYES, 1)
+    many = alone.resized(16)
+    crowd = state.take(np.arange(16) % 2)
+    np.testing.assert_array_equal(many.signals(crowd)[3], alone.signals(state.take(np.array([1])))[0])
+
+
+def test_bad_arguments_are_named(references):
+    world, state, _ = references["detection"]
+    with pytest.raises(ValueError, match="n_envs"):
+        sim.BatchedRenderer(world, EYES, 0)
+    with pytest.raises(ValueError, match="rays_per_receptor"):
+        sim.BatchedRenderer(world, EYES, 1, rays_per_receptor=0)
+    with pytest.raises(ValueError, match="state has 2 worlds"):
+        sim.BatchedRenderer(world, EYES, 1).signals(state)
