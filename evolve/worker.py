@@ -60,7 +60,7 @@ def evaluate_candidate(*arguments: Any, progress: Callable[[int, int], None]) ->
     """`evolve.fitness.evaluate`, whose libraries are loaded in workers alone."""
     from evolve.fitness import evaluate
 
-    return evaluate(*arguments, progress=progress)
+    return evaluate(*arguments, progress)
 
 
 def _evaluated(evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], connection: Connection) -> Evaluation:

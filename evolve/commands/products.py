@@ -3,10 +3,43 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from pathlib import Path
 
-from evolve.config import ConfigError
-from evolve.store import Run, RunError
+from evolve.store import Run
 from optics import backend
 
-__all__ = ["export", "replay", "report", "write_export", "write_report"]
+__all__ = ["export", "replay", "report"]
+
+
+def replay(arguments: Namespace) -> int:
+    """Let an agent play one episode again: a table here, and a page that plays it."""
+    run = _open(arguments)
+    from evolve.replay import main
+
+    print(f"replay: {main(run, arguments.candidate, arguments.seed)}")
+    return 0
+
+
+def report(arguments: Namespace) -> int:
+    """Write the report."""
+    run = _open(arguments)
+    from evolve.report import write
+
+    print(f"report: {write(run)}")
+    return 0
+
+
+def export(arguments: Namespace) -> int:
+    """Write what an agent saw, one EXR file per frame."""
+    run = _open(arguments)
+    from evolve.export import main
+
+    files = main(run, arguments.candidate, arguments.seed)
+    print(f"EXR files: {len(files)} in {files[0].parent}, the first: {files[0].name}")
+    return 0
+
+
+def _open(arguments: Namespace) -> Run:
+    """The run, on a machine that can see."""
+    run = Run.open(arguments.directory)
+    backend.require()
+    return run

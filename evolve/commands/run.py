@@ -65,8 +65,6 @@ def _carry(run: Run) -> int:
 
 def _finish(run: Run) -> int:
     """Write report and EXR files, and name them; 1 if no candidate could be evaluated."""
-    from evolve.commands.products import write_export, write_report
-
     failures = [candidate for candidate in run.candidates if candidate.failure]
     if run.best is None:
         print(f"evolve: every candidate failed; the last: {failures[-1].failure}", file=sys.stderr)
@@ -74,11 +72,13 @@ def _finish(run: Run) -> int:
     print(f"best: candidate {run.best.id}, fitness {run.best.fitness:.4g}, success rate {run.best.success_rate:.0%}")
     if failures:
         print(f"failed: {len(failures)} of {len(run.candidates)} candidates; the last: {failures[-1].failure}")
-    frames = write_export(run)
-    report = write_report(run)
+    print("writing report and EXR files ...", flush=True)
+    from evolve import export, report
+
+    page, frames = report.write(run), export.main(run)
     print(f"run directory: {run.path}")
-    print(f"report: {report}")
-    print(f"EXR files: {frames[0].parent} ({len(frames)} files, the first: {frames[0].name})")
+    print(f"report: {page}")
+    print(f"EXR files: {len(frames)} in {frames[0].parent}, the first: {frames[0].name}")
     return 0
 
 
