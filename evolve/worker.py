@@ -12,6 +12,8 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, Literal
 
+from evolve.config import RunConfig
+from evolve.development import Phenotype
 from evolve.evaluation import Evaluation
 
 __all__ = ["Message", "evaluate_candidate", "prepare_device", "work"]
@@ -56,11 +58,13 @@ def prepare_device() -> None:
     drjit.set_thread_count(1)
 
 
-def evaluate_candidate(*arguments: Any, progress: Callable[[int, int], None]) -> Evaluation:
+def evaluate_candidate(
+    phenotype: Phenotype, config: RunConfig, seed: int, policy_path: Path, progress: Callable[[int, int], None]
+) -> Evaluation:
     """`evolve.fitness.evaluate`, whose libraries are loaded in workers alone."""
     from evolve.fitness import evaluate
 
-    return evaluate(*arguments, progress)
+    return evaluate(phenotype, config, seed, policy_path, progress)
 
 
 def _evaluated(evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], connection: Connection) -> Evaluation:
