@@ -49,12 +49,15 @@ def emission(rgb: np.ndarray, scale: float) -> dict[str, Any]:
 
 def _hue(rgb: np.ndarray) -> np.ndarray:
     texture = mi.load_dict({"type": "rgb", "value": [float(c) for c in rgb]})
-    values = []
-    for nm in WAVELENGTHS_NM:
-        si: Any = dr.zeros(mi.SurfaceInteraction3f)
-        si.wavelengths = mi.Spectrum(float(nm))
-        values.append(float(np.array(texture.eval(si)).ravel()[0]))
-    return np.array(values)
+    if str(mi.variant()).startswith("scalar"):
+        return np.array([_evaluate(texture, float(nm))[0] for nm in WAVELENGTHS_NM])
+    return _evaluate(texture, mi.Float(WAVELENGTHS_NM.astype(np.float32)))
+
+
+def _evaluate(texture: Any, nm: Any) -> np.ndarray:
+    si: Any = dr.zeros(mi.SurfaceInteraction3f, dr.width(nm))
+    si.wavelengths = mi.Spectrum(nm)
+    return np.atleast_1d(np.array(texture.eval(si)[0]))
 
 
 def emitters(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[Emitter], list[str]]:

@@ -185,13 +185,8 @@ class Mirror:
 
     def _move(self, geom: int, parts: list[shapes.Part], pose: np.ndarray) -> None:
         for k, part in enumerate(parts):
-            name = f"geom_{geom}_{k}"
-            if part.triangles is None:
-                self._params[f"{name}.to_world"] = mi.Transform4f(part.matrix(pose))
-                continue
-            self._params[f"{name}.vertex_positions"] = part.vertices(pose)
-            if part.triangles.normals is not None:
-                self._params[f"{name}.vertex_normals"] = part.normals(pose)
+            for key, value in part.placement(pose).items():
+                self._params[f"geom_{geom}_{k}.{key}"] = value
 
     def _move_light(self, name: str, to_world: Any) -> None:
         key = f"{name}.to_world"

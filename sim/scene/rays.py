@@ -49,6 +49,7 @@ def first_hits(scene: Any, sensor: Any) -> tuple[list[str], np.ndarray]:
         hits = [_scalar_hit(scene, sensor, position) for position in positions.T]
         return [name for name, _ in hits], np.array([point for _, point in hits])
     ray, _ = sensor.sample_ray(0.0, 0.5, mi.Point2f(positions), mi.Point2f(0.5))
+    ray.maxt = dr.inf  # nothing is too far away to be seen
     si = scene.ray_intersect(ray)
     names = {_registry_id(shape): shape.id() for shape in scene.shapes()}
     shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
@@ -63,6 +64,7 @@ def _registry_id(shape: Any) -> int:
 
 def _scalar_hit(scene: Any, sensor: Any, position: np.ndarray) -> tuple[str, np.ndarray]:
     ray, _ = sensor.sample_ray(0.0, 0.5, [float(p) for p in position], [0.5, 0.5])
+    ray.maxt = dr.inf
     si = scene.ray_intersect(ray)
     if not si.is_valid():
         return "", np.full(3, np.nan)
@@ -106,7 +108,9 @@ def _sample(
     jitter = sampler.next_2d()
     position = mi.Point2f(x + jitter.x / width, y + jitter.y / height)
     ray, _ = sensor.sample_ray_differential(0.0, 0.5, position, mi.Point2f(0.5))
-    ray.wavelengths = mi.Spectrum(*spectrum)
+    ray.maxt = dr.inf
+    # Opaque to the compiler: other wavelengths are the same kernel.
+    ray.wavelengths = mi.Spectrum(*(x if _is_scalar() else dr.opaque(mi.Float, x) for x in spectrum))
     value = method.sample(scene, sampler, ray)[0]
     return np.array(value) if _is_scalar() else np.array(value.numpy(), dtype=float)
 

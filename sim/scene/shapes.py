@@ -1,5 +1,5 @@
-"""Geoms as Mitsuba shapes. Curved geoms without a texture are exact (sphere, cylinder, disk); everything else, and
-everything whose texture coordinates Mitsuba would lay differently, is tessellated."""
+"""Geoms as Mitsuba shapes. Spheres, and other curved geoms without a texture, are exact (sphere, cylinder, disk,
+ellipsoids); everything whose texture coordinates Mitsuba would lay differently is tessellated."""
 
 from __future__ import annotations
 
@@ -24,10 +24,6 @@ MIRRORED = (
     _TYPES.mjGEOM_MESH,
 )
 
-# Half side of an "infinite" plane in units of the model's extent: the horizon is then 1e-3 rad low for an eye that is
-# one extent above it, and float32 still resolves texture coordinates to 1e-4 of an extent.
-INFINITY = 1e3
-
 
 @dataclass(frozen=True)
 class Part:
@@ -37,9 +33,18 @@ class Part:
     local: np.ndarray | None = None
     triangles: Triangles | None = None
 
-    def matrix(self, pose: np.ndarray) -> np.ndarray:
-        """to_world (4, 4) of a plugin for a geom's pose (4, 4)."""
-        return pose @ self.local
+    def placement(self, pose: np.ndarray) -> dict[str, Any]:
+        """What puts the shape where a geom's pose (4, 4) says: names and values of Mitsuba's parameters."""
+        if self.triangles is not None:
+            placed = {"vertex_positions": self.vertices(pose)}
+            return placed if self.triangles.normals is None else {**placed, "vertex_normals": self.normals(pose)}
+        assert self.local is not None
+        if self.plugin != "ellipsoids":
+            return {"to_world": mi.Transform4f((pose @ self.local).tolist())}
+        quat = np.empty(4)
+        mujoco.mju_mat2Quat(quat, pose[:3, :3].ravel())
+        # Centre, semi-axes, quaternion with its real part last.
+        return {"data": np.concatenate([pose[:3, 3], np.diag(self.local)[:3], np.roll(quat, -1)]).astype(np.float32)}
 
     def vertices(self, pose: np.ndarray) -> np.ndarray:
         """Vertices in the world, flat float32."""
@@ -78,6 +83,8 @@ def parts(model: mujoco.MjModel, geom: int) -> list[Part]:
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if kind == _TYPES.mjGEOM_SPHERE:
         return [Part("sphere", _placed(size[0], size[0], size[0]))]
+    if not is_textured(model, geom) and kind == _TYPES.mjGEOM_ELLIPSOID:
+        return [Part("ellipsoids", _placed(*size))]
     if not is_textured(model, geom) and kind in (_TYPES.mjGEOM_CYLINDER, _TYPES.mjGEOM_CAPSULE):
         return _exact_cylinder(kind, size[0], size[1])
     return [Part(triangles=_triangles(model, geom))]
@@ -90,7 +97,7 @@ def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
     elif kind == _TYPES.mjGEOM_BOX:
         triangles = tessellation.box(size)
     elif kind == _TYPES.mjGEOM_PLANE:
-        triangles = tessellation.plane(size[:2], INFINITY * max(1.0, model.stat.extent))
+        triangles = tessellation.plane(size[:2], max(1.0, model.stat.extent))
     elif kind == _TYPES.mjGEOM_ELLIPSOID:
         triangles = tessellation.ellipsoid(size)
     elif kind == _TYPES.mjGEOM_CYLINDER:
@@ -127,10 +134,14 @@ def _placed(sx: float, sy: float, sz: float, z: float = 0.0) -> np.ndarray:
 def build(part: Part, pose: np.ndarray, name: str, bsdf: Any, radiance: dict[str, Any] | None) -> Any:
     """The Mitsuba shape (of the variant in force) of a part, emitting where `radiance` is given."""
     if part.triangles is None:
-        description = {"type": part.plugin, "to_world": mi.ScalarTransform4f(part.matrix(pose)), "bsdf": bsdf}
+        description: dict[str, Any] = {"type": part.plugin, "bsdf": bsdf, "id": name}
+        if part.plugin == "ellipsoids":
+            description |= {"data": mi.TensorXf(part.placement(pose)["data"][None]), "extent": 1.0}
+        else:
+            description["to_world"] = mi.ScalarTransform4f((pose @ part.local).tolist())
         if radiance is not None:
             description["emitter"] = {"type": "area", "radiance": radiance}
-        return mi.load_dict({**description, "id": name})
+        return mi.load_dict(description)
     triangles = part.triangles
     properties = mi.Properties()
     properties["bsdf"] = bsdf
@@ -145,10 +156,9 @@ def build(part: Part, pose: np.ndarray, name: str, bsdf: Any, radiance: dict[str
         has_vertex_texcoords=triangles.uv is not None,
     )
     params = mi.traverse(shape)
-    params["vertex_positions"] = part.vertices(pose)
     params["faces"] = triangles.faces.astype(np.uint32).ravel()
-    if triangles.normals is not None:
-        params["vertex_normals"] = part.normals(pose)
+    for key, value in part.placement(pose).items():
+        params[key] = value
     if triangles.uv is not None:
         params["vertex_texcoords"] = triangles.uv.astype(np.float32).ravel()
     params.update()

@@ -1,0 +1,270 @@
+"""The mirror's geometry against MuJoCo's own ray casting, and its light against closed forms.
+
+Tried and seen to fail, one at a time: camera mirrored (diag(1, 1, -1)), fov taken as horizontal, quaternion order
+(transposed rotation), open cylinders, capsule's caps at the wrong end, mesh vertices not posed, light direction
+reversed, colours not linearised.
+"""
+
+import mujoco
+import numpy as np
+import pytest
+
+import sim
+from optics.spectrum import daylight
+from sim.color import decode_srgb
+from sim.scene.cameras import Viewpoint
+from sim.scene.mirror import MirrorWarning
+
+from . import models
+from .oracle import assert_agrees, camera_hits, first_hits
+
+NM = np.array([420.0, 505.0, 560.0, 631.0, 700.0])
+
+
+@pytest.mark.parametrize("textured", [False, True], ids=["exact", "tessellated"])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_every_kind_of_geom_agrees_with_mujoco(seed, textured):
+    model = models.every_kind(seed, textured)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    ids = assert_agrees(sim.mirror(model, data), model, data, "camera", 200, 150, limb_share=1e-3 * textured)
+    assert len(np.unique(ids)) >= 13  # nearly all geoms are in view, or the test shows little
+
+
+def test_scalar_variant_sees_the_same():
+    model = models.every_kind(3)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    scalar, llvm = sim.mirror(model, data, variant="scalar_spectral"), sim.mirror(model, data)
+    assert_agrees(scalar, model, data, "camera", 48, 36)
+    lit = every_kind_in_the_light(3)
+    scalar, llvm = sim.mirror(lit, variant="scalar_spectral"), sim.mirror(lit)
+    pictures = [m.render("camera", 16, 12, spp=64, wavelengths=NM * 1e-9) for m in (scalar, llvm)]
+    # Two independent sets of 64 jittered samples of a picture with edges.
+    assert np.sqrt(np.mean((pictures[0] - pictures[1]) ** 2)) < 0.05 * pictures[1].max()
+    np.testing.assert_allclose(pictures[0].mean((1, 2)), pictures[1].mean((1, 2)), rtol=0.02)
+
+
+def every_kind_in_the_light(seed):
+    spec = mujoco.MjSpec.from_string(_xml(LIGHT, '<geom type="plane" size="0 0 1" rgba="1 1 1 1"/>'))
+    models.add_camera(spec, [0, -4.0, 2.0], np.zeros(3))
+    spec.worldbody.add_geom(type=models.GEOM.mjGEOM_SPHERE, size=[0.5, 0, 0], pos=[0, 0, 0.5], rgba=[0.9, 0.2, 0.1, 1])
+    return spec.compile()
+
+
+@pytest.mark.parametrize("task", sim.TASKS)
+def test_task_worlds_agree_from_the_eyes(task):
+    world = sim.build_world(
+        task, seed=1, eyes=sim.Eyes(n_eyes=3, resolution=(60, 80), fov_deg=70, placement_range_deg=200)
+    )
+    model, data = world.model, mujoco.MjData(world.model)
+    # MuJoCo's rays would hit the skin that they start on; Mitsuba's, like the eyes', look outwards from it.
+    mirror, rng, kinds = sim.mirror(model), np.random.default_rng(0), set()
+    for _ in range(3):
+        data.qpos[:2] = world.agent_spawn[rng.integers(len(world.agent_spawn))]
+        data.qpos[2] = rng.uniform(-np.pi, np.pi)
+        for i in range(len(world.objects)):
+            data.mocap_pos[i, :2] = world.object_spawn[rng.integers(len(world.object_spawn))]
+        mujoco.mj_forward(model, data)
+        mirror.sync(data)
+        for i in range(3):
+            kinds |= set(np.unique(assert_agrees(mirror, model, data, f"eye_{i}", 80, 60, model.body("agent").id)))
+    assert model.geom("floor").id in kinds
+
+
+def test_sync_moves_geoms_camera_and_light():
+    model = models.every_kind(4, mocap=True)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    mirror = sim.mirror(model, data)
+    before = assert_agrees(mirror, model, data, "camera", 120, 90)
+    rng = np.random.default_rng(5)
+    data.mocap_pos += rng.uniform(-0.3, 0.3, data.mocap_pos.shape)
+    planes = np.isin(np.arange(model.nmocap), [2, 9])
+    data.mocap_quat[~planes] = [models.random_quat(rng) for _ in range(int(np.sum(~planes)))]
+    mujoco.mj_forward(model, data)
+    mirror.sync(data)
+    after = assert_agrees(mirror, model, data, "camera", 120, 90)
+    assert np.mean(before != after) > 0.05
+
+
+LIGHT = '<light name="sun" type="directional" dir="0 0 -1" diffuse="1 1 1"/>'
+
+
+def _xml(lights, geoms, headlight=False):
+    return f"""<mujoco><visual><headlight active="{int(headlight)}" ambient="0 0 0"/></visual>
+    <worldbody>{lights}{geoms}</worldbody></mujoco>"""
+
+
+def radiance(xml, origin=(0, 0, 5.0), target=(0, 0, 0), spp=4):
+    """Radiance at NM of what lies around `target`."""
+    mirror = sim.mirror(mujoco.MjModel.from_xml_string(xml))
+    view = Viewpoint.looking_at(np.array(origin), np.array(target), fovy_deg=1.0)
+    return mirror.render(view, 2, 2, spp=spp, wavelengths=NM * 1e-9).mean((1, 2))
+
+
+WHITE = '<geom type="plane" size="5 5 1" rgba="1 1 1 1"/>'
+
+
+def test_white_lambertian_facing_unit_light_has_the_radiance_of_daylight():
+    np.testing.assert_allclose(radiance(_xml(LIGHT, WHITE)), daylight(NM * 1e-9), rtol=1e-4)
+    assert daylight(np.array([560e-9])) == pytest.approx(1.0)
+
+
+def test_radiance_is_the_same_from_everywhere_and_falls_with_the_cosine():
+    np.testing.assert_allclose(radiance(_xml(LIGHT, WHITE), origin=(4.0, 1, 2)), daylight(NM * 1e-9), rtol=1e-4)
+    # Two lights add; Mitsuba draws one of them per sample: 16384 samples, standard error 1 %.
+    other = LIGHT.replace("sun", "moon").replace("0 0 -1", "0 0.6 -0.8").replace("1 1 1", "0.5 0.5 0.5")
+    slanted = LIGHT.replace("0 0 -1", "0.6 0 -0.8").replace("1 1 1", "0.5 0.5 0.5")
+    np.testing.assert_allclose(radiance(_xml(slanted, WHITE)), 0.4 * daylight(NM * 1e-9), rtol=1e-4)
+    np.testing.assert_allclose(radiance(_xml(slanted + other, WHITE), spp=4096), 0.8 * daylight(NM * 1e-9), rtol=0.02)
+
+
+def test_light_shines_along_its_direction():
+    """A wall that faces -x is lit by a light that travels towards +x, and not by one towards -x."""
+    wall = '<geom type="box" size="0.1 5 5" rgba="1 1 1 1"/>'
+    for sign in (1, -1):
+        light = LIGHT.replace("0 0 -1", f"{sign * 0.6} 0 -0.8")
+        seen = radiance(_xml(light, wall), origin=(-5.0, 0, 0))
+        np.testing.assert_allclose(seen, (0.6 if sign > 0 else 0.0) * daylight(NM * 1e-9), rtol=1e-4)
+
+
+def test_shadows():
+    blocker = '<geom type="sphere" size="0.5" pos="0 0 2"/>'
+    assert np.all(radiance(_xml(LIGHT, WHITE + blocker), origin=(3.0, 0, 3)) == 0)
+
+
+def test_display_colors_are_linearised():
+    grey = WHITE.replace("1 1 1 1", "0.6 0.6 0.6 1")
+    np.testing.assert_allclose(radiance(_xml(LIGHT, grey)), decode_srgb(0.6) * daylight(NM * 1e-9), rtol=2e-3)
+    red = radiance(_xml(LIGHT, WHITE.replace("1 1 1 1", "0.8 0.1 0.1 1"))) / daylight(NM * 1e-9)
+    assert red[3] > 10 * red[1]
+
+
+def test_material_color_counts_where_the_geom_has_none():
+    """MuJoCo's rule: a geom's rgba other than its default overrides its material's."""
+    material = '<asset><material name="m" rgba="0.8 0.8 0.8 1"/></asset><worldbody>'
+    geom = '<geom type="plane" size="5 5 1" material="m"{}/>'
+    for rgba, value in (("", 0.8), (' rgba="0.3 0.3 0.3 1"', 0.3)):
+        xml = _xml(LIGHT, geom.format(rgba)).replace("<worldbody>", material)
+        np.testing.assert_allclose(radiance(xml), decode_srgb(value) * daylight(NM * 1e-9), rtol=2e-3)
+
+
+def test_colored_light():
+    """White under a light of linear RGB (1, 0.3, 0.3) looks like that light."""
+    from sim.exr import preview
+
+    red = LIGHT.replace("1 1 1", "1 0.3 0.3")
+    mirror = sim.mirror(mujoco.MjModel.from_xml_string(_xml(red, WHITE)))
+    nm = np.arange(365.0, 776.0, 10.0)
+    view = Viewpoint.looking_at(np.array([0, 0, 5.0]), np.zeros(3), 1.0)
+    seen = mirror.render(view, 1, 1, spp=1, wavelengths=nm * 1e-9)
+    np.testing.assert_allclose(preview(seen, nm)[0, 0], [1, 0.3, 0.3], atol=0.02)
+
+
+def test_headlight_shines_from_the_camera():
+    for origin in ((0, 0, 5.0), (0, 0, 2.0)):
+        seen = radiance(_xml("", WHITE, headlight=True), origin=origin)
+        np.testing.assert_allclose(seen, 0.4 * daylight(NM * 1e-9), rtol=1e-3)
+
+
+def test_point_light_obeys_the_inverse_square_law():
+    xml = _xml('<light type="point" pos="0 0 {}" diffuse="1 1 1" castshadow="false"/>', WHITE)
+    with pytest.warns(MirrorWarning, match="attenuation"):
+        near = radiance(xml.format(3), origin=(4.0, 0, 1))
+    # stat.center is the plane's centre, so that right below the light it is as bright as MuJoCo draws it.
+    np.testing.assert_allclose(near, daylight(NM * 1e-9), rtol=2e-3)
+
+
+def test_emissive_material_glows():
+    xml = _xml("", '<geom type="sphere" size="1" material="m"/>').replace(
+        "<worldbody>", '<asset><material name="m" rgba="1 1 1 1" emission="0.7"/></asset><worldbody>'
+    )
+    np.testing.assert_allclose(radiance(xml), 0.7 * daylight(NM * 1e-9), rtol=1e-4)
+
+
+def test_what_cannot_be_mirrored_is_named_once():
+    spec = mujoco.MjSpec()
+    field = spec.add_hfield(name="hills", nrow=2, ncol=2, size=[1, 1, 1, 0.1])
+    field.userdata = [0.0, 1.0, 0.0, 1.0]
+    spec.worldbody.add_geom(name="ground", type=models.GEOM.mjGEOM_HFIELD, hfieldname="hills")
+    spec.worldbody.add_geom(type=models.GEOM.mjGEOM_SPHERE, size=[1, 0, 0])
+    sky = mujoco.mjtTexture.mjTEXTURE_SKYBOX
+    spec.add_texture(name="sky", type=sky, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, width=8, height=48)
+    with pytest.warns(MirrorWarning) as caught:
+        mirror = sim.mirror(spec.compile())
+    (message,) = (str(w.message) for w in caught)
+    assert "hfield geom 'ground'" in message
+    assert "skybox" in message
+    assert list(mirror.geoms) == [1]
+
+
+def test_invisible_geoms_and_other_bodies_are_left_out():
+    xml = """<mujoco><worldbody><geom name="a" type="sphere" size="1"/>
+    <geom name="b" type="sphere" size="1" rgba="1 1 1 0"/><geom name="c" type="sphere" size="1" group="3"/>
+    <body name="box"><geom name="d" type="box" size="1 1 1"/></body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(
+        xml.replace("<worldbody>", "<visual><headlight active='0'/></visual><worldbody>")
+    )
+    assert list(sim.mirror(model).geoms) == [0, 3]
+    assert list(sim.mirror(model, groups=(3,)).geoms) == [2]
+    assert list(sim.mirror(model, bodies=["box"]).geoms) == [3]
+
+
+def test_bad_input_is_named():
+    model = mujoco.MjModel.from_xml_string(_xml(LIGHT, WHITE))
+    mirror = sim.mirror(model)
+    with pytest.raises(ValueError, match="no camera 'eye_9'"):
+        mirror.render("eye_9", 4, 4)
+    with pytest.raises(ValueError, match="width = 0"):
+        mirror.render_ids(Viewpoint(np.zeros(3), np.eye(3), 45.0), 0, 4)
+    with pytest.raises(ValueError, match="no body 'arm'"):
+        sim.mirror(model, bodies=["arm"])
+    with pytest.raises(ValueError, match="llvm_ad_rgb"):
+        sim.mirror(model, variant="llvm_ad_rgb")
+    with pytest.raises(ValueError, match="no visible geom"):
+        sim.mirror(model, groups=(5,))
+
+
+def test_the_callers_variant_stays_in_force():
+    import mitsuba as mi
+
+    mi.set_variant("scalar_rgb")
+    try:
+        sim.mirror(mujoco.MjModel.from_xml_string(_xml(LIGHT, WHITE)))
+        assert mi.variant() == "scalar_rgb"
+    finally:
+        mi.set_variant("llvm_ad_spectral")
+
+
+def _has_graphics():
+    try:
+        mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 8, 8).close()
+    except Exception:
+        return False
+    return True
+
+
+@pytest.mark.skipif(not _has_graphics(), reason="no OpenGL context: compared with MuJoCo's ray casting alone")
+def test_geom_ids_agree_with_mujocos_renderer():
+    """The rays of the oracle, and the mirror, against pixels that MuJoCo draws."""
+    model = models.every_kind(0)
+    model.vis.quality.numslices = model.vis.quality.numstacks = 100
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with mujoco.Renderer(model, 150, 200) as renderer:
+        renderer.update_scene(data, "camera")
+        renderer.enable_segmentation_rendering()
+        drawn = renderer.render()[..., 0]
+    ids, _ = camera_hits(model, data, "camera", 200, 150)
+    assert np.mean(drawn == ids) >= 0.995
+    assert np.mean(drawn == sim.mirror(model, data).render_ids("camera", 200, 150)) >= 0.995
+
+
+def test_viewpoint_looks_where_it_is_told():
+    model = models.every_kind(0)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    view = Viewpoint.looking_at(np.array([3.0, 2.0, 2.5]), np.array([0, 0, 0.7]), 40.0)
+    ids, _ = first_hits(model, data, view.position, view.rotation, 40.0, 80, 60)
+    assert np.mean(sim.mirror(model, data).render_ids(view, 80, 60) == ids) >= 0.995
