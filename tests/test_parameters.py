@@ -1,0 +1,216 @@
+"""Every setting and every gene moves an output: an option that changes nothing is a lie.
+
+The tables name each field of each config dataclass, and each gene, with a change to it and the output that must move.
+A field or gene that is missing here fails the test, so whoever adds one says what it does.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from unittest import mock
+
+import numpy as np
+import pytest
+
+import evolve.commands.run
+import sim
+from evolve.config import SECTIONS, GeneConfig, RunConfig
+from evolve.config_source import assemble
+from evolve.development import develop
+from evolve.evaluation import Evaluation
+from evolve.fitness import evaluate
+from evolve.genotype import GENES, Genotype
+from evolve.loop import evolve as carry
+from evolve.store import Run
+from optics import backend
+
+# One training of two updates and one evaluation episode, through a perfect lens: about a second.
+SMALL = (
+    "learning.n_envs=4",
+    "learning.n_steps=8",
+    "learning.total_steps=64",
+    "learning.batch_size=16",
+    "learning.n_epochs=2",
+    "learning.eval_interval=1000",
+    "evaluation.episodes=1",
+    "search.population=3",
+    "search.generations=2",
+    "genome.resolution_height.start=4",
+    "genome.resolution_width.start=4",
+)
+PERFECT = ("eye.optics=false",)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _device():
+    backend.require()
+
+
+# --- outputs, each of a config and the animal that starts it
+
+
+def life(config, animal):
+    """What becomes of a candidate: training, and the returns of its evaluation episodes."""
+    with TemporaryDirectory() as folder:
+        outcome = evaluate(animal, config, 7, Path(folder) / "policy")
+    assert outcome.failure is None
+    return outcome.returns, outcome.steps, outcome.curve
+
+
+def sight(config, animal):
+    """What the animal sees when it comes into its world."""
+    worlds = sim.make_vec_env(config.task, animal.eyes(config.eye), 1, 7, memory=animal.memory_frames)
+    try:
+        return worlds.reset()["eyes"].tobytes()
+    finally:
+        worlds.close()
+
+
+def point_image(config, animal):
+    """Image of a point on the retina, through pupil and relief."""
+    return animal.eyes(config.eye).eye().kernel(3).tobytes()
+
+
+def throughput(config, animal):
+    """Part of the light that a pupil lets in."""
+    return animal.eyes(config.eye).eye().throughput
+
+
+def history(config, animal):
+    """Candidates of the whole run, each with its training's seed; evaluated in closed form."""
+    with TemporaryDirectory() as folder:
+        run = Run.create(Path(folder) / "run", config)
+        carry(run, _ClosedForm(), mock.Mock())
+        return [(candidate.genome, candidate.phenotype, candidate.seed) for candidate in run.candidates]
+
+
+def hired(config, animal):
+    """Workers that a run starts."""
+    with TemporaryDirectory() as folder, mock.patch.object(evolve.commands.run, "LocalExecutor") as executor:
+        executor.side_effect = KeyboardInterrupt
+        evolve.commands.run._carry(Run.create(Path(folder) / "run", config))
+        return executor.call_args.args[1]
+
+
+class _ClosedForm:
+    """An executor that knows every candidate's fitness."""
+
+    def run(self, jobs, progress) -> Iterator:
+        for job in jobs:
+            yield job, Evaluation(fitness=-abs(job.phenotype.fov_deg - 70))
+
+
+# --- what moves what
+
+
+@dataclass(frozen=True)
+class Case:
+    """`change`, made to a small run with settings `given`, moves `output`."""
+
+    change: str
+    output: Callable
+    given: tuple[str, ...] = PERFECT
+
+
+# Steps too small to move a weight: every evaluation plays the same, so none improves.
+STAGNANT = ("learning.learning_rate=1e-30", "learning.total_steps=128", "learning.eval_interval=32", *PERFECT)
+FIELDS = {
+    "task": Case("task=tracking", life),
+    "seed": Case("seed=1", history),
+    "workers": Case("workers=2", hired),
+    "eye.optics": Case("eye.optics=false", sight, ()),
+    "eye.sensor_width": Case("eye.sensor_width=100e-6", point_image, ()),
+    "eye.noise_sigma": Case("eye.noise_sigma=0.1", sight),
+    "eye.bands": Case("eye.bands=3", sight),
+    "eye.relief_height": Case("eye.relief_height=80e-6", point_image, ()),
+    "eye.rays_per_receptor": Case("eye.rays_per_receptor=2", life),
+    "search.population": Case("search.population=4", history),
+    "search.generations": Case("search.generations=3", history),
+    "search.sigma": Case("search.sigma=0.1", history),
+    "learning.total_steps": Case("learning.total_steps=96", life),
+    "learning.n_envs": Case("learning.n_envs=2", life),
+    "learning.n_steps": Case("learning.n_steps=16", life),
+    "learning.batch_size": Case("learning.batch_size=32", life),
+    "learning.n_epochs": Case("learning.n_epochs=3", life),
+    "learning.learning_rate": Case("learning.learning_rate=1e-2", life),
+    "learning.gamma": Case("learning.gamma=0.5", life),
+    "learning.eval_interval": Case("learning.eval_interval=32", life),
+    "learning.patience": Case("learning.patience=1", life, STAGNANT),
+    "evaluation.episodes": Case("evaluation.episodes=2", life),
+    "genome.GENE.open": Case("genome.fov_deg.open=false", history),
+    "genome.GENE.low": Case("genome.fov_deg.low=20", history),
+    "genome.GENE.high": Case("genome.fov_deg.high=90", history),
+    "genome.GENE.start": Case("genome.fov_deg.start=50", history),
+}
+DOE = {name: point_image for name in GENES if name.startswith("doe_")}
+GENE_OUTPUTS = {
+    "n_eyes": sight,
+    "placement_range_deg": sight,
+    "fov_deg": sight,
+    "resolution_height": sight,
+    "resolution_width": sight,
+    "relative_aperture": point_image,
+    **DOE,
+    "refractive_index": point_image,
+    "memory_frames": life,
+    "neurons": life,
+}
+
+
+@cache
+def _settled(output, task, given):
+    """The output before the change. Computed twice: one that moves by itself could not show anything."""
+    config = assemble(task, "quick", assignments=(*SMALL, *given))
+    animal = develop(Genotype(config.genome).start, config)
+    first = output(config, animal)
+    assert output(config, animal) == first, "the output does not repeat"
+    return first
+
+
+def _names(cls, prefix=""):
+    """Dotted names of all settings below a config dataclass."""
+    for f in fields(cls):
+        if f.name == "genome":
+            yield from (f"genome.GENE.{part.name}" for part in fields(GeneConfig))
+        elif f.name in SECTIONS:
+            yield from _names(SECTIONS[f.name], f"{f.name}.")
+        else:
+            yield f"{prefix}{f.name}"
+
+
+def test_tables_name_every_setting_and_every_gene():
+    assert set(FIELDS) == set(_names(RunConfig))
+    assert set(GENE_OUTPUTS) == set(GENES)
+    assert all(is_dataclass(section) for section in SECTIONS.values())
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_every_setting_moves_its_output(name):
+    case = FIELDS[name]
+    before = _settled(case.output, "detection", case.given)
+    task = case.change.removeprefix("task=") if name == "task" else "detection"
+    change = () if name == "task" else (case.change,)
+    config = assemble(task, "quick", assignments=(*SMALL, *case.given, *change))
+    assert case.output(config, develop(Genotype(config.genome).start, config)) != before
+
+
+@pytest.mark.parametrize("name", GENE_OUTPUTS)
+def test_every_gene_moves_its_output(name):
+    output = GENE_OUTPUTS[name]
+    given = () if output is point_image else PERFECT
+    before = _settled(output, "detection", given)
+    config = assemble("detection", "quick", assignments=(*SMALL, *given))
+    genotype = Genotype(config.genome)
+    genome = genotype.start
+    place = [gene.name for gene in genotype.open_genes].index(name)
+    genome[place] += 0.3 if genome[place] < 0.5 else -0.3
+    assert output(config, develop(genome, config)) != before
+
+
+def test_pupil_lets_light_in_by_its_area():
+    """A wider pupil not only sharpens or blurs: throughput goes with the square of the relative aperture."""
+    config = assemble("detection", "quick", assignments=SMALL)
+    animal = develop(Genotype(config.genome).start, config)
+    assert np.isclose(throughput(config, animal), animal.relative_aperture**2)
