@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 
 from sim.agent import Eyes
+from sim.picture import Onlooker
 from sim.state import WorldState
 from sim.vec_env import make_vec_env
 
@@ -16,7 +17,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     """One agent with eyes in one world. Spaces, action and `info` are in docs/design.md, "Seams".
 
     task, eyes, memory, mode, rays_per_receptor, world_seed as in `sim.make_vec_env`
-    render_mode  "rgb_array": a picture from above; None
+    render_mode  "rgb_array": the agent seen from behind; None
 
     Raises ValueError for a bad argument.
     """
@@ -27,6 +28,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode = {render_mode!r}, must be 'rgb_array' or None")
         self.render_mode = render_mode
+        self._onlooker: Onlooker | None = None
         self._batch = make_vec_env(task, eyes, n_envs=1, seed=None, **options)
         self.observation_space = self._batch.observation_space
         self.action_space = self._batch.action_space
@@ -52,9 +54,9 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     def render(self) -> np.ndarray | None:
         if self.render_mode is None:
             return None
-        from sim.picture import from_above
-
-        return from_above(self._batch.simulation.world, self.state)
+        if self._onlooker is None:
+            self._onlooker = Onlooker(self._batch.simulation.world)
+        return self._onlooker.picture(self.state)
 
     def close(self) -> None:
         self._batch.close()

@@ -9,6 +9,7 @@ import pytest
 
 import sim
 from sim import lighting, movers
+from sim.picture import pose
 from sim.simulation import Simulation
 from sim.world import build_world
 
@@ -29,7 +30,7 @@ def begun(task, n, seed=0):
     if not world.objects:
         return world, state
     objects = state.objects.copy()
-    objects[:, :, :2] = CLOSE_BY + [[[-8.0, 2.0]]]
+    objects[:, :, :2] = CLOSE_BY + np.array([-8.0, 2.0])
     return world, dataclasses.replace(
         state, objects=objects, position=np.array([[-8.0, 2.0], [-8.0, 2.0]]), heading=np.zeros(2)
     )
@@ -38,10 +39,7 @@ def begun(task, n, seed=0):
 def placed(world, state, index):
     """MuJoCo's data of one world of a state."""
     data = mujoco.MjData(world.model)
-    data.qpos[:3] = [*state.position[index], state.heading[index]]
-    for name, centre in zip(world.objects, state.objects[index], strict=True):
-        data.mocap_pos[world.model.body(name).mocapid[0]] = centre
-    mujoco.mj_forward(world.model, data)
+    pose(data, world, state, index)
     return data
 
 

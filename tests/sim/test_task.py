@@ -58,7 +58,7 @@ def test_passing_by_within_reach_counts_though_the_action_ends_beyond(field):
     """2 m per action: at its end the agent is 1.05 m behind the goal, in between it went through it."""
     simulation = Simulation(field, 1, 0, "training", 1)
     state = facing(simulation, np.array([0]), 0.93)
-    simulation._state = dataclasses.replace(state, position=state.position + [[0.0, 0.6]])
+    simulation._state = dataclasses.replace(state, position=state.position + np.array([0.0, 0.6]))
     step = simulation.step(AHEAD[None])
     assert np.linalg.norm(step.state.position - step.state.objects[:, 0, :2]) > REACH
     assert step.success[0]

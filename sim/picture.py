@@ -1,0 +1,53 @@
+"""Pictures for people: the agent seen from behind, in the mirror of its world."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from sim.color import encode_srgb
+from sim.exr import preview
+from sim.scene.cameras import Viewpoint
+from sim.scene.mirror import mirror
+from sim.state import WorldState
+from sim.world import World
+
+# [m] of the camera from the agent, and of its target ahead of it; steep enough to look over a wall behind.
+BEHIND, ABOVE, AHEAD = 4.0, 5.0, 3.0
+FOVY_DEG = 50.0
+WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m]
+SPP = 16
+
+
+class Onlooker:
+    """A camera that follows the agent; it holds its own mirror of the world."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self._data = mujoco.MjData(world.model)
+        self._mirror = mirror(world.model)
+
+    def picture(self, state: WorldState, index: int = 0, size: tuple[int, int] = (240, 320)) -> np.ndarray:
+        """sRGB picture (height, width, 3) uint8 of one world of a state."""
+        pose(self._data, self.world, state, index)
+        self._mirror.sync(self._data)
+        height, width = size
+        radiance = self._mirror.render(_follow(state, index), width, height, spp=SPP, wavelengths=WAVELENGTHS)
+        linear = np.clip(preview(radiance, WAVELENGTHS * 1e9), 0.0, 1.0)
+        return np.rint(255 * encode_srgb(linear)).astype(np.uint8)
+
+
+def pose(data: mujoco.MjData, world: World, state: WorldState, index: int = 0) -> None:
+    """Put MuJoCo's data where one world of a state is."""
+    data.joint("agent_x").qpos[0], data.joint("agent_y").qpos[0] = state.position[index]
+    data.joint("agent_heading").qpos[0] = state.heading[index]
+    for name, centre in zip(world.objects, state.objects[index], strict=True):
+        data.mocap_pos[world.model.body(name).mocapid[0]] = centre
+    mujoco.mj_forward(world.model, data)
+
+
+def _follow(state: WorldState, index: int) -> Viewpoint:
+    x, y = state.position[index]
+    cos, sin = np.cos(state.heading[index]), np.sin(state.heading[index])
+    origin = np.array([x - BEHIND * cos, y - BEHIND * sin, ABOVE])
+    return Viewpoint.looking_at(origin, np.array([x + AHEAD * cos, y + AHEAD * sin, 0.0]), FOVY_DEG)
