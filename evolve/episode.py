@@ -82,7 +82,7 @@ class Episode:
         }
         terms = {f"term_{name}": term for name, term in self.reward_terms.items()}
         content = io.BytesIO()
-        np.savez_compressed(content, rest=np.array(json.dumps(rest)), **terms, **arrays)
+        np.savez_compressed(content, allow_pickle=False, **arrays, **terms, rest=np.array(json.dumps(rest)))
         write_whole(Path(path), content.getvalue())
 
     @classmethod
@@ -95,7 +95,7 @@ class Episode:
             rest |= {"phenotype": Phenotype.from_json(rest["phenotype"]), "eye": EyeConfig(**rest["eye"])}
             terms = {name: arrays.pop(f"term_{name}") for name in rest.pop("terms")}
             return cls(**rest, reward_terms=terms, **arrays)
-        except (OSError, KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile) as error:
+        except (OSError, EOFError, KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile) as error:
             raise ValueError(f"{path} holds no episode: {error}") from error
 
 
@@ -173,7 +173,7 @@ def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any]]:
     }
 
 
-def _perfect_views(world: sim.World, eyes: sim.Eyes, states: WorldState, every: int) -> dict[str, np.ndarray]:
+def _perfect_views(world: sim.World, eyes: sim.Eyes, states: WorldState, every: int) -> dict[str, Any]:
     """The same scenes through a perfect lens: by the same receptors, and as radiance on a finer grid."""
     perfect = replace(eyes, optics=None)
     factor = max(1, -(-FINE_PIXELS // max(eyes.resolution)))

@@ -1,0 +1,39 @@
+"""A run small enough for a test: one candidate, hardly trained, with everything real."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from evolve.candidate import Candidate
+from evolve.config import EyeConfig, LearningConfig, RunConfig
+from evolve.development import Phenotype
+from evolve.fitness import evaluate
+from evolve.genotype import GENES, Genotype
+from evolve.store import Run
+
+LEARNING = LearningConfig(total_steps=512, n_envs=16, n_steps=16, batch_size=128, eval_interval=512)
+PHENOTYPE = Phenotype(
+    n_eyes=2,
+    placement_range_deg=60.0,
+    fov_deg=45.0,
+    resolution=(4, 5),
+    relative_aperture=None,
+    relief=None,
+    refractive_index=None,
+    memory_frames=3,
+    neurons=16,
+)
+
+
+def small_config(task="detection", learning=LEARNING, **eye):
+    genome = {name: replace(gene.default, open=gene.cluster == "neural") for name, gene in GENES.items()}
+    return RunConfig(task, eye=EyeConfig(optics=False, rays_per_receptor=1, **eye), genome=genome, learning=learning)
+
+
+def small_run(path, seed=5):
+    """A run directory with one evaluated candidate, and that candidate's evaluation."""
+    run = Run.create(path, small_config())
+    outcome = evaluate(PHENOTYPE, run.config, seed, run.policy_path(0))
+    genome = (0.5,) * Genotype(run.config.genome).dimension
+    run.append(Candidate.of((0, 0, 0), genome, PHENOTYPE, seed, outcome))
+    return run

@@ -1,0 +1,115 @@
+"""A recorded episode: what it holds agrees with the worlds it was played in, and with its file."""
+
+import pickle
+
+import numpy as np
+import pytest
+from small_run import small_run
+
+import sim
+from evolve import export, replay
+from evolve.episode import Episode, record
+from evolve.store import RunError
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return small_run(tmp_path_factory.mktemp("run") / "run")
+
+
+@pytest.fixture(scope="module")
+def episode(run):
+    return record(run, seed=3, radiance_every=64)
+
+
+def test_shapes(episode):
+    t = len(episode)
+    assert t == 256
+    assert episode.signals.shape == episode.perfect_signals.shape == (t, 2, 3, 4, 5)
+    assert episode.radiance_frames.tolist() == [0, 64, 128, 192]
+    assert episode.radiance.shape == (4, 2, len(episode.wavelengths_nm), 48, 60)
+    assert episode.position.shape == (t, 2)
+    assert episode.objects.shape == (t, 3, 3)
+
+
+def test_what_happens_in_it_is_consistent(episode):
+    np.testing.assert_allclose(sum(episode.reward_terms.values()), episode.reward, rtol=1e-6)
+    np.testing.assert_array_equal(episode.contact, episode.reward_terms["contact"] < 0)
+    turns = np.diff(np.unwrap(episode.heading))
+    np.testing.assert_allclose(turns, np.pi / 4 * episode.action[:-1, 1], atol=1e-6)
+    calm = (episode.reward_terms["goal"] == 0)[:-1]  # where the goal stays where it is
+    distance = np.linalg.norm(episode.objects[:, 0, :2] - episode.position, axis=1)
+    progress = -1.5 * np.diff(distance)
+    np.testing.assert_allclose(episode.reward_terms["progress"][:-1][calm], progress[calm], atol=1e-6)
+
+
+def test_signals_are_the_scene_at_the_recorded_pose_plus_noise(episode):
+    """Receptors see the mean of the radiance before them; noise has the spread the eye says (0.05), and no other."""
+    residual = episode.signals - episode.perfect_signals
+    assert abs(residual.mean()) < 0.01
+    # one ray per receptor against sixteen: aliasing at edges adds to the noise, but a wrong pose adds 0.1 and more
+    assert np.sqrt((residual**2).mean()) < 0.08
+    weights = episode.eyes.eye().spectral_bands.weights
+    fine = np.einsum("cb,febyx->fecyx", weights, episode.radiance)
+    coarse = fine.reshape(4, 2, 3, 4, 12, 5, 12).mean(axis=(4, 6))
+    np.testing.assert_allclose(coarse, episode.perfect_signals[episode.radiance_frames], atol=0.05)
+
+
+def test_same_seed_same_episode(run, episode):
+    again, other = record(run, 0, seed=3, radiance_every=64), record(run, 0, seed=4, radiance_every=64)
+    np.testing.assert_equal(vars(again), vars(episode))
+    assert not np.array_equal(episode.position, other.position)
+
+
+def test_file_holds_the_episode(episode, tmp_path):
+    episode.save(tmp_path / "episode.npz")
+    stored = Episode.load(tmp_path / "episode.npz")
+    np.testing.assert_equal(vars(stored), vars(episode))
+    assert [path.name for path in tmp_path.iterdir()] == ["episode.npz"]
+
+
+def test_a_file_that_is_no_episode_is_refused(episode, tmp_path):
+    path = tmp_path / "episode.npz"
+    episode.save(path)
+    whole = path.read_bytes()
+    np.savez(tmp_path / "pickled.npz", rest=np.array([{}], dtype=object))
+    for content in (b"", whole[: len(whole) // 2], pickle.dumps({}), (tmp_path / "pickled.npz").read_bytes()):
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match=r"episode\.npz holds no episode"):
+            Episode.load(path)
+
+
+def test_candidates_that_are_not_there_are_named(run, tmp_path):
+    with pytest.raises(RunError, match="there is no candidate 7"):
+        record(run, 7)
+    policy = run.policy_path(0)
+    whole = policy.read_bytes()
+    try:
+        policy.write_bytes(pickle.dumps({}))
+        with pytest.raises(RunError, match=f"{policy.name} is not a rhabdom policy"):
+            record(run)
+    finally:
+        policy.write_bytes(whole)
+
+
+def test_exr_files_hold_what_the_eyes_saw(episode, tmp_path):
+    files = export.export_episode(episode, tmp_path / "exr")
+    assert [path.name for path in files] == [f"candidate000000_seed3_t{t:04}.exr" for t in (0, 64, 128, 192)]
+    left, right = sim.read_exr(files[1])
+    assert (left.name, right.name) == ("left", "right")
+    np.testing.assert_array_equal(left.radiance, episode.radiance[1, 0])
+    np.testing.assert_array_equal(right.receptors, episode.signals[64, 1])
+    assert left.attributes["position_m"] == episode.position[64].tolist()
+    assert left.attributes["eye_azimuth_deg"] == pytest.approx(30)
+
+
+def test_replay_sums_up_and_writes_a_page(run, episode, capsys):
+    page = replay.main(run, seed=3)
+    printed = dict(line.split(None, 1) for line in capsys.readouterr().out.splitlines() if len(line.split()) == 2)
+    assert float(printed["return"]) == pytest.approx(episode.reward.sum(), abs=0.01)
+    assert sum(float(printed[name]) for name in ("progress", "goal", "adversary", "contact")) == pytest.approx(
+        episode.reward.sum(), abs=0.03
+    )
+    assert printed["actions"] == "256"
+    assert page.parent == run.path
+    assert page.read_text().startswith("<!doctype html>")

@@ -1,0 +1,63 @@
+"""A candidate's life in sim's worlds."""
+
+import math
+
+import numpy as np
+import pytest
+from small_run import LEARNING, PHENOTYPE, small_config
+
+import sim
+from evolve.fitness import evaluate
+from evolve.learner import play
+from evolve.policy import load_policy
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory):
+    path = tmp_path_factory.mktemp("policy") / "0.safetensors"
+    told = []
+    return evaluate(PHENOTYPE, small_config(), 5, path, lambda *steps: told.append(steps)), path, told
+
+
+def test_fitness_is_the_mean_return_of_the_evaluation_episodes(outcome):
+    evaluation, _, _ = outcome
+    assert len(evaluation.returns) == 6
+    assert evaluation.fitness == pytest.approx(np.mean(evaluation.returns))
+    assert evaluation.failure is None
+    assert evaluation.steps == LEARNING.total_steps
+    assert [steps for steps, _ in evaluation.curve] == [512]
+
+
+def test_progress_is_told(outcome):
+    assert outcome[2] == [(256, 512), (512, 512)]
+
+
+def test_the_stored_policy_earns_the_same_returns(outcome):
+    """The file holds the policy that was evaluated: in the same worlds it plays the same episodes."""
+    evaluation, path, _ = outcome
+    config = small_config()
+    seed = int(np.random.SeedSequence(5).generate_state(3)[2])
+    worlds = sim.make_vec_env(
+        "detection", PHENOTYPE.eyes(config.eye), 6, seed, memory=3, mode="evaluation", rays_per_receptor=1
+    )
+    assert play(load_policy(path), worlds, seed).returns.tolist() == list(evaluation.returns)
+
+
+def test_same_seed_same_life(outcome, tmp_path):
+    evaluation, path, _ = outcome
+    again = evaluate(PHENOTYPE, small_config(), 5, tmp_path / "again.safetensors")
+    other = evaluate(PHENOTYPE, small_config(), 6, tmp_path / "other.safetensors")
+    assert again.returns == evaluation.returns
+    assert again.curve == evaluation.curve
+    assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
+    assert other.returns != evaluation.returns
+
+
+def test_a_training_that_diverges_is_a_failure_with_a_reason(tmp_path, monkeypatch):
+    """Signals that are no numbers: no exception leaves, no policy is written."""
+    monkeypatch.setattr("sim.vec_env.add_noise", lambda signals, *_: np.full_like(signals, np.nan))
+    evaluation = evaluate(PHENOTYPE, small_config(), 5, tmp_path / "0.safetensors")
+    assert evaluation.fitness == -math.inf
+    assert evaluation.failure is not None
+    assert "not finite" in evaluation.failure
+    assert not list(tmp_path.iterdir())
