@@ -3,7 +3,8 @@
 Eyes, build_world, World            what there is to see, and with which eyes
 mirror, Mirror                      any MuJoCo model as a Mitsuba scene
 BatchedRenderer                     all eyes of all worlds as one wavefront
-make_vec_env, make_env              the environments, natively batched or single
+make_vec_env, make_env              the environments, natively batched or single; gymnasium.make("rhabdom/Detection-v0"),
+                                    Navigation-v0 and Tracking-v0 make the latter
 View, write_exr, read_exr           what was seen, on disk
 """
 
@@ -11,6 +12,8 @@ from __future__ import annotations
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from sim.registration import register as register_environments
 
 if TYPE_CHECKING:
     from sim.agent import Eyes
@@ -50,6 +53,8 @@ __all__ = [
     "read_exr",
     "write_exr",
 ]
+
+register_environments()
 
 
 def __getattr__(name: str) -> Any:

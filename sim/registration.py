@@ -1,8 +1,4 @@
-"""Gymnasium ids: `gymnasium.make("rhabdom/Detection-v0")`, Navigation-v0, Tracking-v0.
-
-Gymnasium loads this module through the entry point "gymnasium.envs" of an installed rhabdom; from a checkout,
-`import sim.registration` does the same.
-"""
+"""Gymnasium ids: `gymnasium.make("rhabdom/Detection-v0")`, Navigation-v0, Tracking-v0. `import sim` registers them."""
 
 from __future__ import annotations
 
@@ -21,6 +17,3 @@ def register() -> None:
     for id_, task in IDS.items():
         if id_ not in gymnasium.registry:
             gymnasium.register(id_, entry_point="sim.env:EyesEnv", kwargs={"task": task})
-
-
-register()

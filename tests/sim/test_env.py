@@ -1,5 +1,7 @@
 """The single environment: Gymnasium's and stable-baselines3's own checkers, and agreement with the batch."""
 
+import subprocess
+import sys
 import warnings
 
 import gymnasium
@@ -29,6 +31,12 @@ def test_checkers_are_content(id_):
     env.close()
 
 
+def test_ids_are_known_after_importing_sim():
+    code = "import gymnasium, sim; print([i for i in gymnasium.registry if i.startswith('rhabdom/')])"
+    child = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert child.stdout.strip() == str(list(IDS))
+
+
 def test_it_is_world_0_of_the_batch():
     env = sim.make_env("detection", EYES, memory=2)
     venv = sim.make_vec_env("detection", EYES, 3, seed=5, memory=2)
@@ -41,7 +49,8 @@ def test_it_is_world_0_of_the_batch():
         many, rewards, _, infos = venv.step(np.tile(action, (3, 1)))
         assert reward == pytest.approx(rewards[0], abs=1e-6)
         assert info["position"] == infos[0]["position"]
-        assert not (terminated or truncated)
+        assert not terminated
+        assert not truncated
 
 
 def test_picture_follows_the_agent():
