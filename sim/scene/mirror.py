@@ -172,15 +172,15 @@ class Mirror:
 
     def _bsdf(self, geom: int) -> Any:
         """Geoms that look alike share one BSDF object."""
-        repeat = shapes.own_repeat(self.model, geom)
+        to_uv = shapes.uv_transform(self.model, geom)
         key = (
             self.model.geom_matid[geom],
             tuple(surfaces.rgba(self.model, geom)),
-            None if repeat is None else tuple(repeat),
+            None if to_uv is None else tuple(to_uv.ravel()),
             surfaces.is_open(self.model, geom),
         )
         if key not in self._bsdfs:
-            self._bsdfs[key] = surfaces.bsdf(self.model, geom, repeat)
+            self._bsdfs[key] = surfaces.bsdf(self.model, geom, to_uv)
         return self._bsdfs[key]
 
     def _move(self, geom: int, parts: list[shapes.Part], pose: np.ndarray) -> None:

@@ -54,7 +54,8 @@ def first_hits(scene: Any, sensor: Any) -> tuple[list[str], np.ndarray]:
     names = {_registry_id(shape): shape.id() for shape in scene.shapes()}
     shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
     found = dr.select(si.is_valid(), shape, 0).numpy()
-    return [names[i] if i else "" for i in found], np.array(si.p.numpy(), dtype=float).T
+    # Of the hit, its distance is exact; its point suffers on shapes as large as a world.
+    return [names[i] if i else "" for i in found], np.array(ray(si.t).numpy(), dtype=float).T
 
 
 def _registry_id(shape: Any) -> int:
@@ -68,7 +69,7 @@ def _scalar_hit(scene: Any, sensor: Any, position: np.ndarray) -> tuple[str, np.
     si = scene.ray_intersect(ray)
     if not si.is_valid():
         return "", np.full(3, np.nan)
-    return si.shape.id(), np.array(si.p, dtype=float)
+    return si.shape.id(), np.array(ray(si.t), dtype=float)
 
 
 def _sum_of_samples(scene: Any, sensor: Any, method: Any, spectrum: list[float], n: int, seed: int) -> np.ndarray:

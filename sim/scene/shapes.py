@@ -1,8 +1,9 @@
-"""Geoms as Mitsuba shapes. Spheres, and other curved geoms without a texture, are exact (sphere, cylinder, disk,
-ellipsoids); everything whose texture coordinates Mitsuba would lay differently is tessellated."""
+"""Geoms as Mitsuba shapes. Planes and spheres, and other curved geoms without a texture, are exact (rectangle, sphere,
+cylinder, disk, ellipsoids); everything whose texture coordinates Mitsuba would lay differently is tessellated."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +24,12 @@ MIRRORED = (
     _TYPES.mjGEOM_BOX,
     _TYPES.mjGEOM_MESH,
 )
+
+
+# Half side of an infinite plane in units of the model's extent: an eye one extent above it sees its end 1e-4 rad below
+# the horizon, and float32 lays texture and shadows on it to 1e-3 of an extent. (Triangles of that size would be hit in
+# the wrong places; Mitsuba's rectangle is solved in closed form.)
+INFINITY = 1e4
 
 
 @dataclass(frozen=True)
@@ -70,12 +77,28 @@ def is_textured(model: mujoco.MjModel, geom: int) -> bool:
     return texture >= 0 and bool(model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D)
 
 
-def own_repeat(model: mujoco.MjModel, geom: int) -> np.ndarray | None:
-    """Texture repeats that the BSDF has to make, since the shape's texture coordinates are Mitsuba's own; None
-    where they are in the triangles already."""
-    if model.geom_type[geom] == _TYPES.mjGEOM_SPHERE and is_textured(model, geom):
-        return surfaces.texture_repeat(model, geom, np.repeat(model.geom_size[geom, :1], 2))
-    return None
+def uv_transform(model: mujoco.MjModel, geom: int) -> np.ndarray | None:
+    """(3, 3) from Mitsuba's own texture coordinates of a shape to MuJoCo's, repeats included; None where the
+    triangles carry MuJoCo's already, or nothing asks for them."""
+    kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
+    if not is_textured(model, geom) or kind not in (_TYPES.mjGEOM_SPHERE, _TYPES.mjGEOM_PLANE):
+        return None
+    if kind == _TYPES.mjGEOM_SPHERE:
+        # Both have u = azimuth / 2π, v = polar angle / π from +z.
+        return np.diag([*surfaces.texture_repeat(model, geom, size[[0, 0]]), 1.0])
+    # MuJoCo: u = (x/sx + 1)/2, v = 1 - (y/sy + 1)/2, and (x, -y) repeat/2 + 1/2 along an infinite axis; Mitsuba's v
+    # points upwards.
+    repeat = surfaces.texture_repeat(model, geom, size)
+    per_length = model.mat_texrepeat[model.geom_matid[geom]] * _half_sides(model, geom)
+    scale = np.where(size[:2] > 0, repeat, per_length) * [1, -1]
+    offset = np.where(size[:2] > 0, [0.0, repeat[1]], 0.5 - scale / 2)
+    return np.array([[scale[0], 0, offset[0]], [0, scale[1], offset[1]], [0, 0, 1.0]])
+
+
+def _half_sides(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """Half sides of a plane [m], (2,)."""
+    size = model.geom_size[geom, :2]
+    return np.where(size > 0, size, INFINITY * max(1.0, model.stat.extent))
 
 
 def parts(model: mujoco.MjModel, geom: int) -> list[Part]:
@@ -83,8 +106,10 @@ def parts(model: mujoco.MjModel, geom: int) -> list[Part]:
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if kind == _TYPES.mjGEOM_SPHERE:
         return [Part("sphere", _placed(size[0], size[0], size[0]))]
+    if kind == _TYPES.mjGEOM_PLANE:
+        return [Part("rectangle", _scaled([*_half_sides(model, geom), 1.0]))]
     if not is_textured(model, geom) and kind == _TYPES.mjGEOM_ELLIPSOID:
-        return [Part("ellipsoids", _placed(*size))]
+        return [Part("ellipsoids", _scaled(size))]
     if not is_textured(model, geom) and kind in (_TYPES.mjGEOM_CYLINDER, _TYPES.mjGEOM_CAPSULE):
         return _exact_cylinder(kind, size[0], size[1])
     return [Part(triangles=_triangles(model, geom))]
@@ -96,8 +121,6 @@ def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
         triangles = tessellation.mesh(model, model.geom_dataid[geom])
     elif kind == _TYPES.mjGEOM_BOX:
         triangles = tessellation.box(size)
-    elif kind == _TYPES.mjGEOM_PLANE:
-        triangles = tessellation.plane(size[:2], max(1.0, model.stat.extent))
     elif kind == _TYPES.mjGEOM_ELLIPSOID:
         triangles = tessellation.ellipsoid(size)
     elif kind == _TYPES.mjGEOM_CYLINDER:
@@ -108,11 +131,7 @@ def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
         return triangles
     if kind in (_TYPES.mjGEOM_CYLINDER, _TYPES.mjGEOM_CAPSULE):
         size = np.array([size[0], size[0], size[1]])  # MuJoCo's renderer: half sizes along x, y, z
-    triangles = triangles.repeated(surfaces.texture_repeat(model, geom, size))
-    if kind == _TYPES.mjGEOM_PLANE:
-        repeat = model.mat_texrepeat[model.geom_matid[geom]]
-        triangles = tessellation.infinite_axes_uv(triangles, size[:2], repeat)
-    return triangles
+    return triangles.repeated(surfaces.texture_repeat(model, geom, size))
 
 
 def _exact_cylinder(kind: mujoco.mjtGeom, radius: float, half_length: float) -> list[Part]:
@@ -123,6 +142,10 @@ def _exact_cylinder(kind: mujoco.mjtGeom, radius: float, half_length: float) -> 
     top = Part("disk", _placed(radius, radius, 1.0, z=half_length))
     bottom = Part("disk", _placed(radius, -radius, -1.0, z=-half_length))
     return [side, top, bottom]
+
+
+def _scaled(half_sizes: Sequence[float] | np.ndarray) -> np.ndarray:
+    return np.diag([*half_sizes, 1.0])
 
 
 def _placed(sx: float, sy: float, sz: float, z: float = 0.0) -> np.ndarray:

@@ -58,8 +58,8 @@ def image(model: mujoco.MjModel, texture: int) -> np.ndarray:
     return np.repeat(pixels, 3, axis=2) if shape[2] == 1 else pixels[..., :3]
 
 
-def reflectance(model: mujoco.MjModel, geom: int, repeat: np.ndarray | None = None) -> dict[str, Any]:
-    """Mitsuba texture of a geom's reflectance; `repeat` where the shape brings texture coordinates of its own."""
+def reflectance(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> dict[str, Any]:
+    """Mitsuba texture of a geom's reflectance; `to_uv` (3, 3) turns the shape's texture coordinates to MuJoCo's."""
     color = rgba(model, geom)[:3]
     texture = texture_id(model, geom)
     if texture < 0 or model.tex_type[texture] != mujoco.mjtTexture.mjTEXTURE_2D:
@@ -69,11 +69,12 @@ def reflectance(model: mujoco.MjModel, geom: int, repeat: np.ndarray | None = No
         linear = pixels * decode_srgb(color)
     else:
         linear = decode_srgb(pixels * color)
-    # Mitsuba counts v upwards, MuJoCo downwards: the image is turned, so that texture coordinates need not be.
-    bitmap = mi.Bitmap(np.ascontiguousarray(linear[::-1], dtype=np.float32))
+    # Given as an object, a bitmap has its first row at v = 0, as in MuJoCo (a bitmap's `data` would be taken as
+    # coefficients of spectra, not as RGB).
+    bitmap = mi.Bitmap(np.ascontiguousarray(linear, dtype=np.float32))
     bitmap.set_srgb_gamma(False)
-    scale = mi.ScalarTransform3f().scale([1.0, 1.0] if repeat is None else [float(r) for r in repeat])
-    return {"type": "bitmap", "bitmap": bitmap, "wrap_mode": "repeat", "to_uv": scale}
+    transform = mi.ScalarTransform3f((np.eye(3) if to_uv is None else to_uv).tolist())
+    return {"type": "bitmap", "bitmap": bitmap, "wrap_mode": "repeat", "to_uv": transform}
 
 
 def is_open(model: mujoco.MjModel, geom: int) -> bool:
@@ -81,10 +82,10 @@ def is_open(model: mujoco.MjModel, geom: int) -> bool:
     return geom_type(model, geom) in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_MESH)
 
 
-def bsdf(model: mujoco.MjModel, geom: int, repeat: np.ndarray | None = None) -> Any:
+def bsdf(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> Any:
     """A geom's BSDF (a Mitsuba object of the variant in force): Lambertian; both sides of planes and meshes, which
     may be open; see-through by its rgba's alpha."""
-    description: dict[str, Any] = {"type": "diffuse", "reflectance": reflectance(model, geom, repeat)}
+    description: dict[str, Any] = {"type": "diffuse", "reflectance": reflectance(model, geom, to_uv)}
     if is_open(model, geom):
         description = {"type": "twosided", "inside": description}
     alpha = float(rgba(model, geom)[3])

@@ -15,10 +15,6 @@ import numpy as np
 SLICES = 128
 STACKS = 64
 
-# Half sides of an infinite plane in units of the model's extent. An eye one extent above it sees its end 1e-5 rad below
-# the horizon.
-FAR, NEAR = 1e5, 10.0
-
 
 @dataclass(frozen=True)
 class Triangles:
@@ -50,27 +46,7 @@ def join(parts: list[Triangles]) -> Triangles:
 _QUAD = np.array([[0, 1, 2], [0, 2, 3]])
 
 
-def plane(half_size: np.ndarray, extent: float) -> Triangles:
-    """z = 0, facing +z: u = (x/sx + 1)/2, v = 1 - (y/sy + 1)/2.
-
-    A half size of 0 is infinite: the plane then ends at ±FAR `extent` [m], with a smaller patch at ±NEAR `extent` so
-    that float32 resolves texture coordinates where one looks closely.
-    """
-    axes = [np.array([-s, s]) if s > 0 else extent * np.array([-FAR, -NEAR, NEAR, FAR]) for s in half_size]
-    x, y = (a.ravel() for a in np.meshgrid(*axes, indexing="ij"))
-    index = np.arange(len(x)).reshape(len(axes[0]), len(axes[1]))
-    a, b, c, d = (i.ravel() for i in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
-    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
-    half = np.where(half_size > 0, half_size, 1.0)
-    uv = np.column_stack([(x / half[0] + 1) / 2, (1 - y / half[1]) / 2])
-    return Triangles(np.column_stack([x, y, np.zeros_like(x)]), faces, uv=uv)
-
-
-def infinite_axes_uv(triangles: Triangles, half_size: np.ndarray, repeat: np.ndarray) -> Triangles:
-    """Texture coordinates along a plane's infinite axes: repeats count per 2 m, (x, -y) repeat/2 + 1/2."""
-    assert triangles.uv is not None
-    per_length = triangles.vertices[:, :2] * [0.5, -0.5] * repeat + 0.5
-    return replace(triangles, uv=np.where(half_size > 0, triangles.uv, per_length))
+_QUAD = np.array([[0, 1, 2], [0, 2, 3]])
 
 
 def box(half_size: np.ndarray) -> Triangles:

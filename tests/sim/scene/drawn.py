@@ -1,0 +1,48 @@
+"""MuJoCo's own renderer, in a child process: a machine's OpenGL may bring an LLVM of its own, which does not always
+live in peace with the one that Dr.Jit loads.
+
+As a program: drawn.py OUT WIDTH HEIGHT MODEL.mjb ... draws camera 0 of each model, colours and geom ids.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+
+def draw(models, width, height):
+    """Colours (n, y, x, 3) uint8 and geom ids (n, y, x), -1 for none; None where there is no OpenGL."""
+    with tempfile.TemporaryDirectory() as folder:
+        names = [str(Path(folder) / f"{i}.mjb") for i in range(len(models))]
+        for model, name in zip(models, names, strict=True):
+            mujoco.mj_saveModel(model, name)
+        out = str(Path(folder) / "out.npz")
+        command = [sys.executable, __file__, out, str(width), str(height), *names]
+        # EGL needs no display; where someone has set another way, that one is taken.
+        child = subprocess.run(command, env={"MUJOCO_GL": "egl", **os.environ}, capture_output=True, check=False)
+        if child.returncode:
+            return None
+        with np.load(out) as pictures:
+            return pictures["colors"], pictures["ids"]
+
+
+def main(out, width, height, *names):
+    colors, ids = [], []
+    for name in names:
+        model = mujoco.MjModel.from_binary_path(name)
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        with mujoco.Renderer(model, int(height), int(width)) as renderer:
+            renderer.update_scene(data, 0)
+            colors.append(renderer.render())
+            renderer.enable_segmentation_rendering()
+            ids.append(renderer.render()[..., 0])
+    np.savez(out, colors=np.array(colors), ids=np.array(ids))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
