@@ -144,8 +144,8 @@ class Mirror:
             sensor = cameras.sensor(view, width, height, self._near())
             names, points = rays.first_hits(self.scene, sensor)
         ids = np.array([int(name.split("_")[1]) if name else -1 for name in names], dtype=np.int32)
-        depth = (points - view.position) @ -view.rotation[:, 2]
-        depth = np.where(ids >= 0, depth, np.inf).astype(np.float32)
+        depth = np.full(len(ids), np.inf, dtype=np.float32)
+        depth[ids >= 0] = (points[ids >= 0] - view.position) @ -view.rotation[:, 2]
         return ids.reshape(height, width), depth.reshape(height, width)
 
     def _near(self) -> float:

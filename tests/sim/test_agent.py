@@ -1,0 +1,63 @@
+"""Where eyes sit and look."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+import sim
+from sim.agent import BODY_RADIUS, camera_rotations, eye_positions, eye_rotations
+
+
+def test_eyes_spread_evenly_from_left_to_right():
+    three = sim.Eyes(n_eyes=3, placement_range_deg=90)
+    np.testing.assert_allclose(np.degrees(three.azimuths()), [45, 0, -45], atol=1e-12)
+    assert np.array_equal(sim.Eyes(n_eyes=1, placement_range_deg=90).azimuths(), [0.0])
+    assert three.names() == ("left", "center", "right")
+
+
+def test_eyes_look_outwards_with_the_left_on_the_left():
+    azimuths = np.radians([90.0, 0.0])  # to the left, ahead (x ahead, y left, z up)
+    right, up, axis = np.moveaxis(eye_rotations(azimuths), -1, 0)
+    np.testing.assert_allclose(axis, [[0, 1, 0], [1, 0, 0]], atol=1e-15)
+    np.testing.assert_allclose(right, [[1, 0, 0], [0, -1, 0]], atol=1e-15)
+    np.testing.assert_allclose(up, [[0, 0, 1], [0, 0, 1]], atol=1e-15)
+    np.testing.assert_allclose(eye_positions(azimuths), BODY_RADIUS * axis, atol=1e-15)
+    np.testing.assert_allclose(np.linalg.det(camera_rotations(azimuths)), 1.0)
+
+
+def test_cameras_of_a_world_are_the_eyes():
+    eyes = sim.Eyes(n_eyes=4, placement_range_deg=200, resolution=(3, 5), fov_deg=60)
+    model = sim.build_world("detection", eyes=eyes).model
+    data = mujoco.MjData(model)
+    heading = 0.7
+    data.qpos[2] = heading
+    mujoco.mj_forward(model, data)
+    for i, azimuth in enumerate(eyes.azimuths()):
+        camera = model.camera(f"eye_{i}").id
+        outwards = [math.cos(azimuth + heading), math.sin(azimuth + heading), 0]
+        np.testing.assert_allclose(-data.cam_xmat[camera].reshape(3, 3)[:, 2], outwards, atol=1e-12)
+        np.testing.assert_allclose(
+            data.cam_xpos[camera], data.xpos[model.body("agent").id] + BODY_RADIUS * np.array(outwards), atol=1e-12
+        )
+        # Receptors are square: 60° across 5 of them, and 3 of the same pitch high.
+        assert math.tan(math.radians(model.cam_fovy[camera]) / 2) == pytest.approx(math.tan(math.radians(30)) * 3 / 5)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("n_eyes", 0),
+        ("resolution", (0, 3)),
+        ("fov_deg", 180.0),
+        ("fov_deg", math.nan),
+        ("placement_range_deg", 361.0),
+        ("sensor_width", 0.0),
+        ("noise_sigma", -1.0),
+        ("bands", 0),
+    ],
+)
+def test_values_out_of_range_are_named(name, value):
+    with pytest.raises(ValueError, match=f"Eyes: {name} = "):
+        sim.Eyes(**{name: value})

@@ -1,0 +1,190 @@
+"""Worlds: what stands where, how the agent moves, and what it can touch."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import sim
+from sim import materials
+from sim.agent import BODY_RADIUS, eye_positions
+from sim.color import decode_srgb
+from sim.layout import CELL
+from sim.scene.surfaces import image
+from sim.tasks import detection, navigation
+from sim.world import MAX_SPEED
+
+ACTION = 10  # substeps
+
+
+@pytest.fixture(scope="module")
+def field():
+    return sim.build_world("detection")
+
+
+def started(world, x, y):
+    data = mujoco.MjData(world.model)
+    data.qpos[:2] = x, y
+    mujoco.mj_forward(world.model, data)
+    return data
+
+
+def test_speed_rises_as_in_the_published_environment(field):
+    """.44, 1.12, 1.50, 1.71 m per action from rest, limit 1.98 m (DESIGN §7, read off the published code, to 1 cm).
+
+    That code reads `xpos` after mj_step, which is one substep old; the same is read here.
+    """
+    data = started(field, -10, 0)
+    data.ctrl[:] = MAX_SPEED, 0
+    body, x = field.model.body("agent").id, [-10.0]
+    for _ in range(9):
+        for _ in range(ACTION):
+            mujoco.mj_step(field.model, data)
+        x.append(data.xpos[body, 0])
+    steps = np.diff(x)
+    np.testing.assert_allclose(steps[:4], [0.44, 1.12, 1.50, 1.71], atol=0.01)
+    assert 1.95 < steps[-1] < 1.98
+    # The continuous lag, v = 9.9 (1 - exp(-t/0.35)), integrated over the first action: a first-order method's error.
+    assert data.qvel[0] == pytest.approx(9.9 * (1 - np.exp(-1.8 / 0.35)), rel=2e-3)
+
+
+@pytest.mark.parametrize("direction", [(1, 0), (0.6, 0.8), (0.98, 0.199)])
+def test_no_eye_ever_passes_through_a_wall(field, direction):
+    """At full speed against the walls, from many distances, so that the substeps fall differently."""
+    azimuths = np.linspace(0, 2 * np.pi, 36)
+    for start in np.linspace(-3, -2, 7):
+        data = started(field, start, start)
+        data.ctrl[:] = MAX_SPEED * np.array(direction)
+        touched = False
+        for _ in range(25 * ACTION):
+            mujoco.mj_step(field.model, data)
+            eyes = data.qpos[:2] + eye_positions(azimuths)[:, :2]
+            assert np.all(np.abs(eyes) < [11.0, 9.0])
+            touched |= data.sensordata[0] > 0
+        assert touched
+        assert data.sensordata[0] > 0  # still leaning against the wall
+        # ... and at rest along the wall's normal, without a bounce.
+        assert np.abs(data.qvel[0]) < 0.02
+
+
+def test_objects_are_no_obstacles(field):
+    data = started(field, -2, 0)
+    data.ctrl[:] = MAX_SPEED, 0
+    for _ in range(3 * ACTION):
+        mujoco.mj_step(field.model, data)
+        assert data.ncon == 0
+    assert data.qpos[0] > 0.5  # right through the goal, which is at the origin
+    assert data.sensordata[0] == 0
+
+
+@pytest.mark.parametrize("task", sim.TASKS)
+def test_only_pairs_of_agent_and_wall_can_touch(task):
+    model = sim.build_world(task).model
+    agent = model.geom("agent").id
+    for a in range(model.ngeom):
+        for b in range(a):
+            meets = (model.geom_contype[a] & model.geom_conaffinity[b]) | (
+                model.geom_contype[b] & model.geom_conaffinity[a]
+            )
+            wall = {model.geom(g).name.split("_")[0] for g in (a, b)} - {"agent"} == {"wall"}
+            assert bool(meets) == (agent in (a, b) and wall)
+    assert model.opt.jacobian == mujoco.mjtJacobian.mjJAC_DENSE
+
+
+def test_joints_read_world_coordinates(field):
+    data = started(field, 3.0, -4.0)
+    np.testing.assert_allclose(data.xpos[field.model.body("agent").id], [3, -4, BODY_RADIUS])
+    np.testing.assert_allclose(field.model.qpos0[:2], field.agent_spawn[0])
+
+
+def test_starts_are_apart_from_objects_and_walls(field):
+    apart = np.linalg.norm(field.agent_spawn[:, None] - field.object_spawn[None], axis=2)
+    assert apart.min() >= 2 * CELL
+    assert np.abs(np.concatenate([field.agent_spawn, field.object_spawn])).max(0) == pytest.approx([10, 8])
+
+
+def test_objects_differ_only_in_the_orientation_of_their_stripes(field):
+    model = field.model
+    goal, *adversaries = (model.geom(name).id for name in field.objects)
+    for geom in adversaries:
+        assert np.array_equal(model.geom_size[geom], model.geom_size[goal])
+        assert np.array_equal(model.mat_rgba[model.geom_matid[geom]], model.mat_rgba[model.geom_matid[goal]])
+    upright = image(model, model.texture("upright_stripes").id)[..., 0]
+    level = image(model, model.texture("level_stripes").id)[..., 0]
+    # Equal angles: 16 sectors of 22.5° around, 8 bands of 22.5° from pole to pole.
+    assert np.sum(upright[0] != np.roll(upright[0], 1)) == 16
+    assert np.sum(np.diff(level[:, 0]) != 0) == 7
+    # As much light from either kind over the whole sphere: bands weighted with their area.
+    polar = (np.arange(level.shape[0]) + 0.5) / level.shape[0] * np.pi
+    assert np.average(decode_srgb(level[:, 0]), weights=np.sin(polar)) == pytest.approx(
+        decode_srgb(upright[0]).mean(), rel=1e-3
+    )
+
+
+def test_mazes_have_a_way_and_no_dead_ends():
+    for seed in range(20):
+        walls = navigation.draw_maze(navigation.MAZE, np.random.default_rng(seed))
+        assert walls[[0, -1]].all()
+        assert walls[:, [0, -1]].all()
+        free = ~walls
+        neighbors = sum(np.roll(free, shift, axis) for axis in (0, 1) for shift in (1, -1))
+        assert neighbors[free].min() >= 2
+        reached = np.zeros_like(free)
+        reached[1, 1] = True
+        while True:  # grow along the corridors
+            grown = free & sum((np.roll(reached, s, a) for a in (0, 1) for s in (1, -1)), reached.astype(int)).astype(
+                bool
+            )
+            if np.array_equal(grown, reached):
+                break
+            reached = grown
+        assert np.array_equal(reached, free)
+
+
+def test_merged_walls_cover_the_maze_exactly():
+    walls = navigation.draw_maze(navigation.MAZE, np.random.default_rng(3))
+    covered = np.zeros(walls.shape, int)
+    runs = navigation.merge_walls(walls, 4)
+    for row, column, rows, columns in runs:
+        covered[row : row + rows, column : column + columns] += 1
+        assert min(rows, columns) == 1
+        assert max(rows, columns) <= 4
+    assert np.array_equal(covered, walls.astype(int))
+    assert len(runs) < walls.sum() / 2
+
+
+def test_a_maze_is_its_seeds():
+    def walls(seed):
+        return sim.build_world("navigation", seed=seed).model.geom_pos
+
+    assert np.array_equal(walls(1), walls(1))
+    assert walls(1).shape != walls(2).shape or not np.array_equal(walls(1), walls(2))
+
+
+def test_maze_starts_and_goal_lie_in_free_cells():
+    world = sim.build_world("navigation", seed=5)
+    x_min, y_min, x_max, y_max = world.goal_region
+    assert world.agent_spawn[:, 0].max() < x_min
+    for x, y in world.agent_spawn:
+        data = started(world, x, y)
+        assert data.ncon == 0
+    assert (x_max, y_max) == (37.0, 11.0)
+    assert (x_min, y_min) == (31.0, -11.0)
+    assert world.objects == ()
+
+
+def test_stripes_start_light_and_split_evenly():
+    picture = decode_srgb(materials.stripes((4, 64), 8, axis=1) / 255)[0, :, 0]
+    np.testing.assert_allclose(picture[:8], materials.WHITE, atol=0.005)
+    np.testing.assert_allclose(picture[8:16], materials.BLACK, atol=0.005)
+    assert np.mean(picture > 0.5) == 0.5
+
+
+def test_bad_input_is_named():
+    with pytest.raises(ValueError, match="did you mean 'navigation'"):
+        sim.build_world("navigate")
+    with pytest.raises(ValueError, match="seed = -1"):
+        sim.build_world("detection", seed=-1)
+
+
+def test_tracking_is_the_field_of_detection():
+    assert sim.build_world("tracking").objects == detection.OBJECTS
