@@ -1,0 +1,42 @@
+"""Light to photoreceptor signal by wave optics. SI units; arrays are (wavelength, y, x)."""
+
+from importlib import import_module
+from typing import Any
+
+_CONTENTS = {
+    "AccuracyError": "planner",
+    "BSplineRelief": "doe",
+    "BackendError": "backend",
+    "Eye": "eye",
+    "Grid": "grid",
+    "HeightMap": "doe",
+    "PSFResult": "point_spread",
+    "Plan": "planner",
+    "PointSource": "source",
+    "PropagationResult": "propagation",
+    "Pupil": "pupil",
+    "RefractiveIndex": "refractive_index",
+    "Relief": "doe",
+    "SpectralBands": "spectrum",
+    "encircled_energy": "quality",
+    "image_quality": "quality",
+    "mtf": "quality",
+    "propagate": "propagation",
+    "psf": "point_spread",
+    "require": "backend",
+    "strehl_ratio": "quality",
+}
+
+__all__ = sorted(_CONTENTS)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _CONTENTS:
+        raise AttributeError(f"module 'optics' has no attribute {name!r}")
+    value = getattr(import_module(f"optics.{_CONTENTS[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

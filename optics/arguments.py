@@ -1,0 +1,70 @@
+"""Bad input ends in one line that names the argument, its value and the valid range."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+__all__ = ["finite", "in_range", "positive", "radiance_cube", "shape_2d"]
+
+
+def finite(name: str, value: float) -> float:
+    """`value` as float; ValueError unless it is a finite number."""
+    number = _number(name, value)
+    if not math.isfinite(number):
+        raise ValueError(f"{name} = {value!r}: must be finite")
+    return number
+
+
+def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False) -> float:
+    """`value` as float; ValueError unless it is > 0 (and finite, unless `infinite` may be)."""
+    number = _number(name, value)
+    if not number > 0 or (math.isinf(number) and not infinite):
+        upper = "infinity included" if infinite else "finite"
+        raise ValueError(f"{name} = {value!r}: must be greater than 0 {unit} ({upper})".replace("0  (", "0 ("))
+    return number
+
+
+def in_range(name: str, value: float, low: float, high: float) -> float:
+    """`value` as float; ValueError unless low <= value <= high."""
+    number = _number(name, value)
+    if not low <= number <= high:
+        raise ValueError(f"{name} = {value!r}: must lie in [{low:g}, {high:g}]")
+    return number
+
+
+def shape_2d(name: str, value: Any) -> tuple[int, int]:
+    """(height, width) as ints; ValueError unless both are whole and at least 1."""
+    try:
+        height, width = (int(n) for n in value)
+        whole = all(float(n) == int(n) for n in value)
+    except (TypeError, ValueError, OverflowError):
+        height = width = 0
+        whole = False
+    if not whole or height < 1 or width < 1:
+        raise ValueError(f"{name} = {value!r}: must be two whole numbers (height, width), each at least 1")
+    return height, width
+
+
+def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
+    """(band, Y, X) float32; ValueError unless it has `bands` bands and at least the shape `least`."""
+    radiance = np.asarray(value, dtype=np.float32)
+    if (
+        radiance.ndim != 3
+        or radiance.shape[0] != bands
+        or any(n < m for n, m in zip(radiance.shape[1:], least, strict=True))
+    ):
+        raise ValueError(
+            f"radiance has shape {radiance.shape}: must be (band, Y, X) with {bands} bands "
+            f"and at least {least[0]} x {least[1]} cells"
+        )
+    if not np.isfinite(radiance).all():
+        raise ValueError("radiance holds NaN or infinity: must be finite")
+    return radiance
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {value!r}: must be a number") from None

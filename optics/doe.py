@@ -1,0 +1,192 @@
+"""Reliefs: height maps of the pupil's glass, over the square that holds the pupil.
+
+A relief is a smooth function of (x, y) in units of the aperture radius; inside the pupil both lie in [-1, 1].
+Row index and y grow together, as do column index and x.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.precision import Precision
+
+__all__ = ["BSplineRelief", "HeightMap", "Relief"]
+
+
+class Relief(ABC):
+    """A height map [m]."""
+
+    @abstractmethod
+    def height(self, x: Any, y: Any, types: Precision) -> Any:
+        """Height [m] at normalised positions: flat Dr.Jit float64 arrays in and out."""
+
+    @abstractmethod
+    def bandwidth(self, level: float) -> float:
+        """Spatial frequency [cycles per aperture radius] above which the relief's content is below `level` [m]."""
+
+    @property
+    @abstractmethod
+    def knots(self) -> int:
+        """Polynomial pieces across the pupil."""
+
+
+@dataclass(frozen=True, eq=False)
+class BSplineRelief(Relief):
+    """One uniform bicubic B-spline patch: heights h(x, y) = Σ_ij c[i, j] B_i(v) B_j(u), u = (x/a + 1)/2.
+
+    control_points: (4, 4) heights [m], (y, x), knots -3 ... 4. The patch is every bicubic polynomial, so it contains
+    every paraboloid exactly (`paraboloid`). Outside the square the polynomial goes on.
+    Piegl & Tiller, The NURBS Book, ch. 2.
+
+    Raises:
+        ValueError: not 4 x 4 finite numbers.
+    """
+
+    control_points: np.ndarray
+
+    def __post_init__(self) -> None:
+        points = np.array(self.control_points, dtype=np.float64)
+        if points.shape != (4, 4) or not np.isfinite(points).all():
+            raise ValueError(f"control_points has shape {points.shape}: must be 4 x 4 finite heights [m]")
+        points.setflags(write=False)
+        object.__setattr__(self, "control_points", points)
+
+    @classmethod
+    def paraboloid(cls, height: float, curvature: float, radius: float) -> BSplineRelief:
+        """h = height - curvature (x² + y²)/2 [m], curvature in 1/m, over a pupil of the given radius [m].
+
+        On uniform knots the polar form gives x² the control values X_i² - δ²/3, X_i = (2i - 3) a the Greville
+        abscissae and δ = 2a the knot spacing.
+        """
+        greville = (2 * np.arange(4) - 3) * radius
+        square = greville**2 - (2 * radius) ** 2 / 3
+        return cls(height - curvature * (square[:, None] + square[None, :]) / 2)
+
+    def height(self, x: Any, y: Any, types: Precision) -> Any:
+        import drjit as dr
+
+        points = types.Float64(self.control_points.ravel())
+        across, along = _cubic_basis((x + 1) / 2), _cubic_basis((y + 1) / 2)
+        total = types.Float64(0)
+        for i in range(4):
+            row = types.Float64(0)
+            for j in range(4):
+                row = dr.fma(across[j], dr.gather(types.Float64, points, types.Index(4 * i + j)), row)
+            total = dr.fma(along[i], row, total)
+        return total
+
+    def bandwidth(self, level: float) -> float:
+        return 1.0  # a cubic polynomial: half a cycle per half width, doubled
+
+    @property
+    def knots(self) -> int:
+        return 1
+
+
+@dataclass(frozen=True, eq=False)
+class HeightMap(Relief):
+    """Heights [m] sampled at cell centres over the square [-a, a]², joined by cubic splines (not-a-knot ends).
+
+    samples: (n, n), (y, x). Beyond the outermost centres the spline goes on for a cell, then straight.
+
+    Raises:
+        ValueError: not square, empty, or not finite.
+    """
+
+    samples: np.ndarray
+
+    def __post_init__(self) -> None:
+        samples = np.array(self.samples, dtype=np.float64)
+        if samples.ndim != 2 or samples.shape[0] != samples.shape[1] or samples.size == 0:
+            raise ValueError(f"height has shape {samples.shape}: must be square (n, n), n at least 1")
+        if not np.isfinite(samples).all():
+            raise ValueError("height holds NaN or infinity: must be finite heights [m]")
+        samples.setflags(write=False)
+        object.__setattr__(self, "samples", samples)
+        margin = max(3, samples.shape[0] // 4)
+        coefficients = _spline_coefficients(_spline_coefficients(samples, margin).T, margin).T
+        object.__setattr__(self, "_coefficients", np.ascontiguousarray(coefficients))
+        object.__setattr__(self, "_margin", margin)
+
+    def height(self, x: Any, y: Any, types: Precision) -> Any:
+        import drjit as dr
+
+        coefficients: np.ndarray = self._coefficients  # type: ignore[attr-defined]
+        n, width = len(self.samples), coefficients.shape[1]
+        values = types.Float64(coefficients.ravel())
+        columns = dr.opaque(types.Index, width)
+        (column, across), (row, along) = (self._cell(position, n, width, types) for position in (x, y))
+        total = types.Float64(0)
+        for i in range(4):
+            start = (row + i) * columns + column
+            line = types.Float64(0)
+            for j in range(4):
+                line = dr.fma(across[j], dr.gather(types.Float64, values, start + j), line)
+            total = dr.fma(along[i], line, total)
+        return total
+
+    def _cell(self, position: Any, n: int, width: int, types: Precision) -> tuple[Any, list[Any]]:
+        """First of the four coefficients that act at a position, and the four weights."""
+        import drjit as dr
+
+        half, shift = dr.opaque(types.Float64, n / 2), dr.opaque(types.Float64, self._margin - 0.5)  # type: ignore[attr-defined]
+        place = position * half + half + shift
+        cell = dr.clip(dr.floor(place), 1, dr.opaque(types.Float64, width - 3))
+        return types.Index(cell) - 1, _cubic_basis(place - cell)
+
+    def bandwidth(self, level: float) -> float:
+        """From the samples' spectrum; content near their Nyquist frequency has spline images up to twice that."""
+        n = len(self.samples)
+        if n < 4:
+            return 1.0
+        window = np.hanning(n + 2)[1:-1]
+        residue = self.samples - _plane(self.samples)
+        spectrum = np.abs(np.fft.fft2(residue * window[:, None] * window)) / n
+        frequency = np.abs(np.fft.fftfreq(n, 2 / n))
+        radial = np.maximum(frequency[:, None], frequency[None, :])
+        order = np.argsort(radial, axis=None)[::-1]
+        power = np.cumsum((spectrum.ravel()[order] / n) ** 2)
+        reached = radial.ravel()[order][int(np.searchsorted(power, level**2).clip(max=power.size - 1))]
+        return float(max(1.0, reached if reached < 0.3 * n / 2 else 2 * reached))
+
+    @property
+    def knots(self) -> int:
+        return len(self.samples)
+
+
+def _cubic_basis(t: Any) -> list[Any]:
+    """The four uniform cubic B-splines that act on a knot interval, at t in [0, 1]."""
+    s = 1 - t
+    return [s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6]
+
+
+def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
+    """Uniform B-spline coefficients along axis 0, `margin` more at either end: c = s - s''/6 of a cubic spline s."""
+    from scipy.interpolate import make_interp_spline
+
+    n = len(samples)
+    places = np.arange(-2, n + 2)
+    if n < 4:
+        polynomial = np.polynomial.polynomial.polyfit(np.arange(n), samples, n - 1)
+        second = np.polynomial.polynomial.polyder(polynomial, 2)
+        value = np.polynomial.polynomial.polyval(places, polynomial).T
+        bend = np.polynomial.polynomial.polyval(places, second).T
+    else:
+        spline = make_interp_spline(np.arange(n), samples, k=3)
+        value, bend = spline(places), spline(places, nu=2)
+    core = value - bend / 6
+    steps = np.arange(1, margin - 1)[:, None]
+    before = core[0] + (core[0] - core[1]) * steps[::-1]
+    after = core[-1] + (core[-1] - core[-2]) * steps
+    return np.concatenate([before, core, after])
+
+
+def _plane(samples: np.ndarray) -> np.ndarray:
+    """Least-squares plane through the samples."""
+    position = np.linspace(-1, 1, len(samples))
+    slope = position / np.sum(position**2) / len(samples)
+    return samples.mean() + (slope @ samples.sum(axis=1)) * position[:, None] + (samples.sum(axis=0) @ slope) * position

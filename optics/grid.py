@@ -1,0 +1,66 @@
+"""Sample positions: n samples at pitch dx with sample n//2 at the origin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.arguments import positive, shape_2d
+from optics.precision import Precision, opaque
+
+__all__ = ["Grid", "sample_positions"]
+
+
+def sample_positions(n: int, dx: float) -> np.ndarray:
+    """Positions [m] of n samples at pitch dx, float64; sample n//2 is at 0."""
+    return (np.arange(n) - n // 2) * dx
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A plane's samples, shape (y, x), pitch dx [m] (or [1/m] for spatial frequencies)."""
+
+    shape: tuple[int, int]
+    dx: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "shape", shape_2d("shape", self.shape))
+        positive("dx", self.dx)
+
+    @classmethod
+    def square(cls, n: int, dx: float) -> Grid:
+        return cls((n, n), dx)
+
+    @property
+    def x(self) -> np.ndarray:
+        return sample_positions(self.shape[1], self.dx)
+
+    @property
+    def y(self) -> np.ndarray:
+        return sample_positions(self.shape[0], self.dx)
+
+    @property
+    def half_width(self) -> float:
+        """Largest distance of a sample from the origin along an axis."""
+        return max(n // 2 for n in self.shape) * self.dx
+
+    @property
+    def half_diagonal(self) -> float:
+        """Largest distance of a sample from the origin."""
+        return float(np.hypot(self.shape[0] // 2, self.shape[1] // 2) * self.dx)
+
+    def coordinates(self, precision: Precision) -> tuple[Any, Any]:
+        """x and y of every sample as flat Dr.Jit arrays, float64 (phases need them)."""
+        import drjit as dr
+
+        height, width = self.shape
+        index = dr.arange(precision.Index, height * width)
+        columns = dr.opaque(precision.Index, width)
+        row = index // columns
+        column = index - row * columns
+        pitch = opaque(precision, self.dx)
+        x = (precision.Float64(column) - opaque(precision, width // 2)) * pitch
+        y = (precision.Float64(row) - opaque(precision, height // 2)) * pitch
+        return x, y

@@ -1,0 +1,50 @@
+"""Dr.Jit's types for one dtype, on the CUDA device where there is one and LLVM otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+__all__ = ["Precision", "opaque", "precision"]
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Float: type of fields; Float64: type of optical paths, which lose their whole waves before they become Float."""
+
+    dtype: str
+    Float: Any
+    Tensor: Any
+    Float64: Any
+    Index: Any
+    complex_dtype: type[np.complexfloating]
+
+
+@lru_cache(maxsize=2)
+def precision(dtype: str = "float32") -> Precision:
+    """The types for "float32" or "float64".
+
+    Raises:
+        ValueError: any other dtype.
+        BackendError: no LLVM that Dr.Jit can use.
+    """
+    if dtype not in ("float32", "float64"):
+        raise ValueError(f"dtype = {dtype!r}: must be 'float32' or 'float64'")
+    from optics.backend import require
+
+    require()
+    import drjit.auto.ad as types
+
+    if dtype == "float32":
+        return Precision(dtype, types.Float, types.TensorXf, types.Float64, types.UInt32, np.complex64)
+    return Precision(dtype, types.Float64, types.TensorXf64, types.Float64, types.UInt32, np.complex128)
+
+
+def opaque(types: Precision, value: float) -> Any:
+    """A float64 scalar that Dr.Jit treats as data: another value does not compile another kernel."""
+    import drjit as dr
+
+    return dr.opaque(types.Float64, value)

@@ -1,0 +1,118 @@
+"""The directions that a receptor sees through a pupil: how wide a window holds them, and the PSF summed over cells."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from optics.grid import Grid
+from optics.planner import AccuracyError, Plan, choose
+from optics.point_spread import PSFResult, intensity, problem
+from optics.pupil import Pupil
+from optics.source import PointSource
+
+__all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
+
+# Light that leaves the pupil more than this far off its axis counts as lost to the eye.
+WIDEST_TANGENT = math.tan(math.radians(60))
+MOST_CELLS = 4097
+MOST_SECONDS = 1.0  # per band
+
+
+@dataclass(frozen=True)
+class Retina:
+    """Where the PSF is wanted: distance behind the pupil [m], wavelengths [m], cell size [m], tolerance."""
+
+    distance: float
+    wavelengths: np.ndarray
+    cell: float
+    tolerance: float
+
+
+@dataclass(frozen=True)
+class _View:
+    """What one wavelength asks of the grid: half the window [m], the pitch that resolves the PSF [m], the band [1/m]
+    beyond which the hard edge's light is less than the tolerance."""
+
+    half_window: float
+    pitch: float
+    band: float
+
+
+def visual_kernel(pupil: Pupil, retina: Retina, z: float) -> np.ndarray:
+    """PSF integrated over the retina's cells and turned by 180°: (band, k, k) float32, k odd."""
+    result = retinal_psf(pupil, retina, z)
+    samples = result.psf.shape[-1]
+    cells = _cells_within(result.dx * samples / 2, retina.cell)
+    sums = _cell_integrals(samples, result.dx, cells, retina.cell)
+    kernel = np.einsum("ci,bij,dj->bcd", sums, result.psf, sums, optimize=True)
+    return np.ascontiguousarray(np.maximum(kernel, 0)[:, ::-1, ::-1], dtype=np.float32)
+
+
+def retinal_psf(pupil: Pupil, retina: Retina, z: float) -> PSFResult:
+    """PSF of an axial point at distance z on the window that loses less than the tolerance at every wavelength.
+
+    Raises:
+        AccuracyError: no method meets the tolerance within the limits on memory and time.
+    """
+    source = PointSource(z)
+    views = [_view(pupil, float(wavelength), source, retina) for wavelength in retina.wavelengths]
+    half, pitch = max(view.half_window for view in views), min(view.pitch for view in views)
+    if _cells_within(half, retina.cell) > MOST_CELLS:
+        raise AccuracyError(
+            f"the light spreads over {2 * half:.3g} m, {2 * half / retina.cell:.0f} cells of {retina.cell:.3g} m: "
+            f"at most {MOST_CELLS}; widen the field of view or the cells, or flatten the relief"
+        )
+    half = retina.cell * (_cells_within(half, retina.cell) + 1) / 2
+    window = Grid.square(2 * math.ceil(half / pitch) + 1, pitch)
+    images, plans = [], []
+    for wavelength, view in zip(retina.wavelengths, views, strict=True):
+        task = problem(pupil, float(wavelength), retina.distance, source, window, retina.tolerance)
+        task = replace(task, widest_band=view.band)
+        plan, sampling = choose(task, most_seconds=MOST_SECONDS)
+        image, plan = intensity(pupil, source, float(wavelength), task, plan, sampling)
+        images.append(image)
+        plans.append(plan)
+    return PSFResult(np.stack(images), pitch, retina.wavelengths, retina.distance, pupil, tuple(plans))
+
+
+def perfect_psf(retina: Retina) -> PSFResult:
+    """All power in one cell: the perfect lens."""
+    image = np.full((len(retina.wavelengths), 1, 1), 1 / retina.cell**2, dtype=np.float32)
+    plan = Plan("perfect_lens", (1, 1), "float32", 0.0, "no pupil: geometric image, no blur")
+    return PSFResult(image, retina.cell, retina.wavelengths, retina.distance, None, (plan,))
+
+
+def _view(pupil: Pupil, wavelength: float, source: PointSource, retina: Retina) -> _View:
+    """Half the loss goes to rays outside the window, half to what the hard edge sends further than δ [1/m] off its
+    geometric direction: 1/(π²Rδ) of the light, as in the Airy pattern (1 - 2/(πv), v = 2πRδ; Born & Wolf §8.5.2)."""
+    slopes = pupil.slopes(wavelength, source)
+    x, y = slopes.rays(retina.distance, pupil.medium_n)
+    lam, z, radius = wavelength / pupil.medium_n, retina.distance, pupil.aperture_radius
+    shadow = float(np.quantile(np.fmax(np.abs(x), np.abs(y)), 1 - retina.tolerance / 2, method="higher"))
+    tail = 2 / (math.pi**2 * radius * retina.tolerance)
+    half = WIDEST_TANGENT * z + radius
+    if math.isfinite(shadow):
+        sine = shadow / math.hypot(shadow, z) + tail * lam
+        half = min(half, z * sine / math.sqrt(1 - sine * sine) if sine < 1 else math.inf)
+    steepest = slopes.steepest_inside / wavelength
+    # The field's local bandwidth on the sensor is 2R/(λz); the intensity has twice that. Cubic splines want a margin.
+    detail = min(2 * radius / (lam * z), 2 * (steepest + tail))
+    return _View(half, 1 / (3 * detail), steepest + tail)
+
+
+def _cells_within(half: float, cell: float) -> int:
+    """Odd number of cells, one centred on the axis, that covers ± half."""
+    return 2 * math.ceil(max(half / cell - 0.5, 0) - 1e-6) + 1
+
+
+def _cell_integrals(samples: int, pitch: float, cells: int, cell: float) -> np.ndarray:
+    """(cell, sample): integrals over the cells of the cubic spline through the samples, one axis."""
+    from scipy.interpolate import make_interp_spline
+
+    grid = Grid((1, samples), pitch)
+    primitive = make_interp_spline(grid.x, np.eye(samples), k=3).antiderivative()
+    edges = (np.arange(cells + 1) - cells / 2) * cell
+    return np.diff(primitive(np.clip(edges, grid.x[0], grid.x[-1])), axis=0)

@@ -1,0 +1,45 @@
+"""Light sources: a point at some distance, or a plane wave."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from optics.arguments import in_range, positive
+from optics.precision import Precision, opaque
+
+__all__ = ["PointSource"]
+
+
+@dataclass(frozen=True)
+class PointSource:
+    """A point source of unit amplitude on the pupil: exp(ik(ρ(x, y) - ρ(0, 0))), ρ the distance from the source.
+
+    distance: axial distance in front of the pupil [m]; infinite for a plane wave.
+    angle: (θx, θy) [rad], the direction in which its light travels: an ideal lens focuses it at f (tan θx, tan θy).
+    """
+
+    distance: float = math.inf
+    angle: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        positive("source_distance", self.distance, infinite=True)
+        tx, ty = self.angle
+        angle = in_range("source_angle", tx, -1.5, 1.5), in_range("source_angle", ty, -1.5, 1.5)
+        object.__setattr__(self, "angle", angle)
+
+    def path(self, x: Any, y: Any, types: Precision) -> Any:
+        """Optical path [m] in vacuum at the pupil's points, less the one at the centre (flat float64 arrays)."""
+        import drjit as dr
+
+        tx, ty = (math.tan(theta) for theta in self.angle)
+        norm = math.sqrt(1 + tx * tx + ty * ty)
+        along = x * opaque(types, tx / norm) + y * opaque(types, ty / norm)
+        if math.isinf(self.distance):
+            return along
+        centre = self.distance * norm
+        # ρ - ρ₀ = (r² + 2 ρ₀ (x, y)·t) / (ρ + ρ₀): no difference of nearly equal numbers
+        excess = x * x + y * y + 2 * opaque(types, centre) * along
+        rho = dr.sqrt(excess + opaque(types, centre * centre))
+        return excess / (rho + opaque(types, centre))
