@@ -26,6 +26,7 @@ __all__ = [
     "bootstrap_interval",
     "gene_values",
     "generation_statistics",
+    "psnr",
     "succeeded",
     "trajectory",
 ]
@@ -168,3 +169,14 @@ def bootstrap_interval(
     chosen = np.random.default_rng(seed).integers(values.size, size=(PERCENTILE_RESAMPLES, values.size))
     low, high = np.quantile(statistic(values[chosen], axis=1), [(1 - level) / 2, (1 + level) / 2])
     return float(low), float(high)
+
+
+def psnr(signals: NDArray[np.floating], reference: NDArray[np.floating], gain: float = 1.0) -> float:
+    """Peak signal-to-noise ratio of `gain` x signals against a reference [dB]; the peak is 1, white in daylight.
+
+    Infinite where they agree. Raises ValueError for different shapes.
+    """
+    if signals.shape != reference.shape:
+        raise ValueError(f"signals has shape {signals.shape}: must be that of the reference, {reference.shape}")
+    error = np.mean((gain * signals.astype(np.float64) - reference) ** 2)
+    return math.inf if error == 0 else float(-10 * math.log10(error))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from evolve.analysis import acuity_cpd, bootstrap_interval, gene_values, generation_statistics, trajectory
+from evolve.analysis import acuity_cpd, bootstrap_interval, gene_values, generation_statistics, psnr, trajectory
 from evolve.candidate import Candidate
 from evolve.development import Phenotype
 
@@ -150,3 +150,12 @@ def test_bootstrap_is_seeded():
 def test_bootstrap_refuses(samples, level, says):
     with pytest.raises(ValueError, match=says):
         bootstrap_interval(samples, level=level)
+
+
+def test_psnr():
+    reference = np.full((4, 3, 2, 2), 0.5)
+    assert psnr(reference + 0.1, reference) == pytest.approx(20.0)
+    assert psnr((reference + 0.1) / 4, reference, gain=4.0) == pytest.approx(20.0)
+    assert psnr(reference, reference) == math.inf
+    with pytest.raises(ValueError, match="shape"):
+        psnr(reference[:1], reference)

@@ -1,0 +1,33 @@
+"""The report of a run: one HTML file that needs nothing but itself.
+
+write(run)                          the report, into the run's directory
+player.write_player(episode, path)  one episode as a playable page
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from evolve.store import Run
+
+__all__ = ["write"]
+
+FILE = "report.html"
+
+
+def write(run: Run) -> Path:
+    """Write `report.html` of a run, whole or not at all; the best candidate plays one episode for it.
+
+    The same run gives the same bytes with the same versions of the libraries.
+    Raises ValueError where the best candidate's policy is missing or damaged.
+    """
+    from evolve.episode import record
+    from evolve.files import write_whole
+    from evolve.report.page import render
+
+    episode = record(run) if run.best is not None else None
+    path = run.path / FILE
+    write_whole(path, render(run, episode))
+    return path

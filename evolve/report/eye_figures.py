@@ -1,0 +1,185 @@
+"""Figures of one eye's optics: the pupil's relief, its point spread function, its modulation transfer function."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.patches import Circle, Rectangle
+
+import optics
+from evolve.config import EyeConfig
+from evolve.development import Phenotype
+from evolve.report.markup import figure, number
+from evolve.report.svg import drawing, inline
+from evolve.report.theme import MUTED
+from optics.precision import precision
+from optics.spectrum import daylight
+
+__all__ = ["eye_figures"]
+
+SIZE = (370, 310)
+PIXELS = 161  # of a picture, at most: fine enough for its size on the page
+DECADES = 4  # of the PSF that are shown
+SHOWN_POWER = 0.98  # of the light in its window that the PSF's picture holds
+
+
+@dataclass(frozen=True)
+class Light:
+    """The eye's PSF and what white daylight makes of it.
+
+    polychromatic  (y, x) [1/m²]: the bands' PSFs weighted as the mean receptor channel weighs white in daylight
+    """
+
+    eye: optics.Eye
+    psf: Any  # optics.PSFResult
+    polychromatic: np.ndarray
+
+    @classmethod
+    def through(cls, eye: optics.Eye) -> Light:
+        psf, bands = eye.psf(), eye.spectral_bands
+        weights = bands.weights.mean(axis=0) * daylight(bands.wavelengths)
+        return cls(eye, psf, np.tensordot(weights, psf.psf.astype(np.float64), axes=1))
+
+
+def eye_figures(phenotype: Phenotype, config: EyeConfig) -> str:
+    """Figures with captions; for a perfect lens a sentence instead."""
+    eye = phenotype.eyes(config).eye()
+    if eye.pupil is None:
+        return "<p>Optics are off in this run: every eye has a perfect lens, which neither blurs nor dims.</p>\n"
+    light = Light.through(eye)
+    parts = [_pupil(eye, phenotype), _psf(light), _cuts(light)]
+    return f'<div class="figures">{"".join(parts)}</div>\n'
+
+
+def _pupil(eye: optics.Eye, phenotype: Phenotype) -> str:
+    """Height of the relief over the pupil."""
+    pupil = eye.pupil
+    assert pupil is not None
+    heights, inside = _heights(pupil)
+    low, high = 1e6 * heights[inside].min(), 1e6 * heights[inside].max()
+    radius = 1e6 * pupil.aperture_radius
+    with drawing(*SIZE) as drawn:
+        axes = drawn.subplots()
+        extent = (-radius, radius, -radius, radius)
+        picture = axes.imshow(1e6 * heights, extent=extent, origin="lower", interpolation="none", vmin=low, vmax=high)
+        picture.set_clip_path(Circle((0, 0), radius, transform=axes.transData))
+        _bar(axes, picture, "height [µm]")
+        axes.grid(False)
+        axes.set_xlabel("x [µm]")
+        axes.set_ylabel("y [µm]")
+        svg = inline(drawn, "pupil", f"Height map of the pupil's relief, from {low:.3g} to {high:.3g} µm.")
+    index = phenotype.refractive_index or 1.0
+    waves = (index - 1) * (high - low) / 0.55
+    caption = (
+        f"<b>Pupil.</b> Height of its relief, {number(low)} to {number(high)} µm within a radius of "
+        f"{number(radius)} µm (a = {number(eye.relative_aperture)}). With n = {number(index, 4)} the relief delays "
+        f"green light (550 nm) by up to {number(waves)} waves from place to place."
+    )
+    return figure(svg, caption)
+
+
+def _heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
+    """Relief [m] over the pupil's square, (y, x), row 0 at y = -a; and which of it lies in the aperture."""
+    types = precision("float64")
+    centres = (np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1
+    x, y = (plane.ravel() for plane in np.meshgrid(centres, centres))
+    if pupil.height is None:
+        heights = np.zeros(x.size)
+    else:
+        heights = pupil.height.height(types.Float64(x), types.Float64(y), types).numpy()
+    shape = (PIXELS, PIXELS)
+    return heights.reshape(shape), (np.hypot(x, y) <= 1).reshape(shape)
+
+
+def _psf(light: Light) -> str:
+    """The polychromatic PSF, logarithmic, with a receptor's outline."""
+    picture, half = _shown(light)
+    edge, pitch = 1e6 * half, 1e6 * light.eye.receptor_pitch
+    peak = picture.max()
+    with drawing(*SIZE) as drawn:
+        axes = drawn.subplots()
+        image = axes.imshow(
+            np.maximum(picture, peak * 10.0**-DECADES) / 1e12,
+            extent=(-edge, edge, -edge, edge),
+            origin="lower",
+            norm=LogNorm(peak * 10.0**-DECADES / 1e12, peak / 1e12),
+            interpolation="none",
+        )
+        axes.add_patch(Rectangle((-pitch / 2, -pitch / 2), pitch, pitch, fill=False, ec="#ffffff", lw=1.2))
+        axes.set(xlim=(-edge, edge), ylim=(-edge, edge), xlabel="x on the retina [µm]", ylabel="y [µm]")
+        axes.grid(False)
+        _bar(axes, image, "PSF [1/µm²]")
+        _degrees(axes, light.eye, edge)
+        svg = inline(drawn, "psf", f"Point spread function over {2 * edge:.3g} µm, peak {peak / 1e12:.3g} per µm².")
+    plan = light.psf.plan
+    caption = (
+        f"<b>Point spread function</b> of a distant point, all bands as white daylight weighs them; logarithmic, "
+        f"{DECADES} decades. White square: one receptor, {number(pitch)} µm wide. Least accurate band: "
+        f"{plan.method.replace('_', ' ')}, predicted error {plan.predicted_error:.1g}."
+    )
+    return figure(svg, caption)
+
+
+def _shown(light: Light) -> tuple[np.ndarray, float]:
+    """The middle of the PSF that holds most of the light, averaged to at most PIXELS, and its half width [m]."""
+    image, dx = light.polychromatic, light.psf.dx
+    middle = image.shape[0] // 2
+    ring = np.maximum(*np.abs(np.indices(image.shape) - middle))
+    power = np.cumsum(np.bincount(ring.ravel(), image.ravel()))
+    reach = int(np.searchsorted(power, SHOWN_POWER * power[-1]))
+    reach = max(reach, int(1.5 * light.eye.receptor_pitch / dx), 8)
+    reach = min(reach, middle)
+    block = -(-(2 * reach + 1) // PIXELS)
+    cells = (2 * reach + 1) // block
+    first = middle - cells * block // 2
+    cut = image[first : first + cells * block, first : first + cells * block]
+    return cut.reshape(cells, block, cells, block).mean(axis=(1, 3)), cells * block * dx / 2
+
+
+def _cuts(light: Light) -> str:
+    """Each band's PSF along x through the axis."""
+    psf = light.psf
+    _, half = _shown(light)
+    inside = np.abs(psf.x) <= half
+    row = psf.psf.shape[1] // 2
+    cuts = psf.psf[:, row][:, inside] / 1e12
+    with drawing(*SIZE) as drawn:
+        axes = drawn.subplots()
+        chosen = np.unique(np.linspace(0, len(cuts) - 1, min(len(cuts), 6)).astype(int))
+        for band in chosen:
+            colour = colormaps["viridis"](0.1 + 0.75 * band / max(len(cuts) - 1, 1))
+            label = f"{1e9 * psf.wavelengths[band]:.0f} nm"
+            axes.semilogy(1e6 * psf.x[inside], cuts[band], color=colour, lw=1.2, label=label)
+        axes.set(xlim=(-1e6 * half, 1e6 * half), ylim=(cuts.max() * 10.0**-DECADES, 2 * cuts.max()))
+        axes.set(xlabel="x on the retina [µm]", ylabel="PSF [1/µm²]")
+        axes.legend(frameon=False, loc="upper right", handlelength=1.2, labelcolor=MUTED)
+        _degrees(axes, light.eye, 1e6 * half)
+        svg = inline(drawn, "psf-bands", "Cuts through the point spread function, one per spectral band.")
+    return figure(svg, "<b>PSF per band</b>: cuts along x through the optical axis; dark lines are short wavelengths.")
+
+
+def _bar(axes: Axes, picture: Any, label: str) -> None:
+    bar = axes.figure.colorbar(picture, ax=axes, shrink=0.92, pad=0.02, aspect=24)
+    assert bar.solids is not None
+    bar.solids.set_rasterized(True)
+    bar.outline.set_visible(False)
+    bar.set_label(label, color=MUTED)
+
+
+def _degrees(axes: Axes, eye: optics.Eye, edge: float) -> None:
+    """A second axis on top: the angle that a retinal position [µm] looks at."""
+    distance = 1e6 * eye.sensor_distance
+    top = axes.secondary_xaxis(
+        "top",
+        functions=(
+            lambda x: np.degrees(np.arctan2(x, distance)),
+            lambda angle: distance * np.tan(np.radians(angle)),
+        ),
+    )
+    top.set_xlabel("visual angle [°]", color=MUTED)
+    top.tick_params(length=3)

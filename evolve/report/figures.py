@@ -1,0 +1,139 @@
+"""Figures of a whole run: fitness, success and genes over the generations, learning curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike, NDArray
+
+from evolve.analysis import GenerationStatistics, Trajectory, succeeded
+from evolve.candidate import Candidate
+from evolve.report.svg import drawing, inline
+from evolve.report.theme import ACCENT, LINE, MUTED, VERMILLION
+
+__all__ = ["fitness_figure", "gene_figure", "learning_figure", "relief_figure", "success_figure"]
+
+SIZE = (370, 260)
+Generations = Sequence[int] | NDArray[np.int64]
+
+
+def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Candidate]) -> str:
+    """Every candidate's fitness as a dot, the population's spread and median, the best so far."""
+    with drawing(*SIZE) as figure:
+        axes = figure.subplots()
+        _candidates(axes, candidates, [c.fitness for c in candidates])
+        generations = [row.generation for row in rows]
+        _spread(axes, generations, [r.low for r in rows], [r.median for r in rows], [r.high for r in rows])
+        axes.plot(generations, [r.best_so_far for r in rows], color=ACCENT, lw=2, marker="o", ms=4)
+        _generation_axis(axes, generations)
+        axes.set_ylabel("fitness (mean return)")
+        last = rows[-1]
+        alt = f"Fitness over {len(rows)} generations: best {last.best_so_far:.3g}, last median {last.median:.3g}."
+        return inline(figure, "fitness", alt)
+
+
+def success_figure(candidates: Sequence[Candidate]) -> str:
+    """Share of evaluation episodes solved, against fitness's generation."""
+    with drawing(*SIZE) as figure:
+        axes = figure.subplots()
+        _candidates(axes, candidates, [100 * c.success_rate for c in candidates])
+        generations = sorted({c.generation for c in candidates})
+        finished = [[c for c in candidates if c.generation == g and succeeded(c)] for g in generations]
+        means = [100 * float(np.mean([c.success_rate for c in group])) if group else np.nan for group in finished]
+        axes.plot(generations, means, color=MUTED, lw=1.5, marker="o", ms=3)
+        _generation_axis(axes, generations)
+        axes.set_ylim(-4, 104)
+        axes.set_ylabel("episodes solved [%]")
+        return inline(figure, "success", f"Mean success rate of the last generation: {means[-1]:.0f} %.")
+
+
+def learning_figure(candidates: Sequence[Candidate], best: Candidate) -> str:
+    """Mean evaluation return while each candidate learned; the best one's curve in the accent colour."""
+    with drawing(*SIZE) as figure:
+        axes = figure.subplots()
+        faint = float(np.clip(8 / len(candidates), 0.08, 0.4))
+        for candidate in candidates:
+            if candidate.curve and candidate.id != best.id:
+                steps, returns = np.transpose(candidate.curve)
+                axes.plot(steps / 1000, returns, color=MUTED, alpha=faint, lw=0.9, marker="o", ms=2, mew=0)
+        if best.curve:
+            steps, returns = np.transpose(best.curve)
+            axes.plot(steps / 1000, returns, color=ACCENT, lw=2, marker="o", ms=4)
+        axes.set_xlim(left=0)
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+        axes.set_xlabel("training [thousand agent steps]")
+        axes.set_ylabel("mean return")
+        return inline(figure, "learning", "Learning curves of all candidates, the best one's highlighted.")
+
+
+def gene_figure(
+    name: str, label: str, path: Trajectory, limits: tuple[float, float] | None, whole: bool = False
+) -> str:
+    """One gene over the generations, on the range that evolution may search; ticks at whole numbers only if `whole`."""
+    with drawing(250, 165, font=10.5) as figure:
+        axes = figure.subplots()
+        _trajectory(axes, path)
+        if limits is not None:
+            margin = 0.05 * (limits[1] - limits[0])
+            axes.set_ylim(limits[0] - margin, limits[1] + margin)
+        axes.yaxis.set_major_locator(MaxNLocator(4, integer=whole, steps=[1, 2, 3, 5, 10]))
+        axes.set_ylabel(label)
+        alt = f"{name}: best {path.best[-1]:.3g}, median of the last generation {path.median[-1]:.3g}."
+        return inline(figure, f"gene-{name}", alt)
+
+
+def relief_figure(paths: dict[str, Trajectory]) -> str:
+    """The relief's 16 control points, laid out as they lie over the pupil (row 0 at y = -a, at the bottom)."""
+    with drawing(440, 340) as figure:
+        rows = sorted({name[-2] for name in paths}, reverse=True)
+        columns = sorted({name[-1] for name in paths})
+        axes = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
+        for i, row in enumerate(rows):
+            for j, column in enumerate(columns):
+                panel = axes[i, j]
+                if (path := paths.get(f"doe_{row}{column}")) is None:
+                    panel.set_axis_off()
+                    continue
+                _trajectory(panel, path, marker_size=2)
+                panel.set_xlabel("")
+                panel.set_ylim(-0.08, 1.08)
+                panel.set_yticks([0, 1])
+                panel.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=3, min_n_ticks=1))
+        figure.supxlabel("generation", color=MUTED, fontsize=11)
+        figure.supylabel("control point / relief height", color=MUTED, fontsize=11)
+        return inline(figure, "relief", "The 16 control points of the pupil's relief over the generations.")
+
+
+def _trajectory(axes: Axes, path: Trajectory, marker_size: float = 3) -> None:
+    _spread(axes, path.generations, path.low, path.median, path.high)
+    axes.plot(path.generations, path.best, color=ACCENT, lw=1.8, marker="o", ms=marker_size)
+    _generation_axis(axes, path.generations)
+
+
+def _spread(axes: Axes, x: Generations, low: ArrayLike, median: ArrayLike, high: ArrayLike) -> None:
+    """The population: 10-90 % band (bars where a single generation has no width) and median."""
+    if len(x) == 1:
+        axes.vlines(x, low, high, color=MUTED, alpha=0.4, lw=6)
+    axes.fill_between(x, low, high, color=MUTED, alpha=0.18, lw=0)
+    axes.plot(x, median, color=MUTED, lw=1.3, marker="o" if len(x) < 4 else None, ms=2.5)
+
+
+def _candidates(axes: Axes, candidates: Sequence[Candidate], values: Sequence[float]) -> None:
+    """A dot per candidate, those of one generation side by side; a cross at the bottom for a failed one."""
+    generations = np.array([c.generation for c in candidates], float)
+    population = max(c.index for c in candidates) + 1
+    x = generations + 0.5 * (np.array([c.index for c in candidates]) / max(population - 1, 1) - 0.5)
+    good = np.array([succeeded(c) for c in candidates])
+    axes.plot(x[good], np.asarray(values, float)[good], ls="none", marker="o", ms=3.2, mew=0, color=MUTED, alpha=0.6)
+    bottom = axes.get_xaxis_transform()
+    axes.plot(x[~good], np.full((~good).sum(), 0.02), ls="none", marker="x", ms=4, color=VERMILLION, transform=bottom)
+
+
+def _generation_axis(axes: Axes, generations: Generations) -> None:
+    axes.set_xlim(min(generations) - 0.5, max(generations) + 0.5)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=6, min_n_ticks=1))
+    axes.set_xlabel("generation")
+    axes.tick_params(color=LINE)

@@ -1,0 +1,168 @@
+"""A recorded episode as something to play: trajectory from above, what each eye signals, the reward so far."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evolve.episode import Episode
+from evolve.files import write_whole
+from evolve.report.markup import document, exact, json_script, number, text
+from evolve.report.picture import data_uri, display, film_sheet
+from evolve.report.stage import Stage
+
+__all__ = ["player", "write_player"]
+
+LARGEST_FILM = 1_500_000  # bytes of pixels per sheet; noise hardly compresses, and the page should stay small
+TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # as in player.js
+
+
+def write_player(episode: Episode, path: Path) -> Path:
+    """Write the playable episode as a page of its own; returns its path."""
+    name = f"{episode.task.capitalize()}: candidate {episode.candidate_id} plays"
+    body = (
+        f'<header><p class="kicker">rhabdom · replay</p>\n<h1>{text(name)}</h1>\n'
+        f"<p>{summary(episode)}</p></header>\n{player(episode, Stage.of(episode))}"
+    )
+    write_whole(Path(path), document(name, body, ["player.js"]))
+    return Path(path)
+
+
+def summary(episode: Episode) -> str:
+    """One sentence of HTML on how the episode went."""
+    total = number(float(episode.reward.sum(dtype=np.float64)), 4)
+    terms = ", ".join(f"{text(name)} {number(float(term.sum()))}" for name, term in episode.reward_terms.items())
+    return f"Evaluation episode with seed {episode.seed}: {len(episode)} actions, return {total} ({terms})."
+
+
+def player(episode: Episode, stage: Stage) -> str:
+    """The player's element; the page that holds it needs player.js."""
+    film = json_script(_film(episode, stage), "film")
+    left, right = _world(stage) + _controls(episode), _sights(stage) + _score(episode)
+    return f'<div class="player"><div>{left}</div><div>{right}</div>{film}</div>\n'
+
+
+def _world(stage: Stage) -> str:
+    x0, y0, x1, y1 = stage.bounds
+    legend = ""
+    if stage.object_radius:
+        legend = (
+            ' <b class="green">G</b> goal, <b class="vermillion">A</b> adversary; a ring marks where one was reached.'
+        )
+    if stage.goal_region is not None:
+        legend = ' The <b class="green">tinted</b> area is the goal.'
+    caption = (
+        f"<b>From above</b>, {exact(x1 - x0)} m × {exact(y1 - y0)} m: the path so far, the agent (its tip points where "
+        f"it heads) and the horizontal fields of view of its eyes.{legend}"
+    )
+    return (
+        '<figure><canvas class="world" role="img" aria-label="The world from above: walls, objects, the agent, its '
+        f'path and the fields of view of its eyes" style="aspect-ratio:{x1 - x0:g}/{y1 - y0:g}"></canvas>'
+        f"<figcaption>{caption}</figcaption></figure>\n"
+    )
+
+
+def _sights(stage: Stage) -> str:
+    """A pair of canvases per eye: what it signals, and what it would signal behind a perfect lens."""
+    eyes = stage.eyes
+    height, width = eyes.resolution
+    room = 140 if eyes.n_eyes <= 2 else 88 if eyes.n_eyes <= 6 else 60
+    scale = room / max(height, width)
+    size = f'width="{width}" height="{height}" style="width:{scale * width:.4g}px;aspect-ratio:{width}/{height}"'
+    pairs = [_pair(eye, name, size) for eye, name in enumerate(eyes.names())]
+    brighter = (
+        "" if stage.gain == 1 else f", brightened {number(stage.gain)} times (1/a², the light the pupil leaves out)"
+    )
+    note = (
+        f"<b>What the eyes see</b>, left to right: receptor signals shown as linear red, green and blue, noise "
+        f"included{brighter}; beside them the same receptors behind a perfect lens, without noise."
+    )
+    return f'<figure class="sights"><div class="eyes">{"".join(pairs)}</div><figcaption>{note}</figcaption></figure>\n'
+
+
+def _pair(eye: int, name: str, size: str) -> str:
+    canvases = "".join(
+        f'<div><canvas data-eye="{eye}" data-sheet="{sheet}" {size} role="img" aria-label="{text(name)} eye: {label}">'
+        f"</canvas><span>{label}</span></div>"
+        for sheet, label in (("seen", "signals"), ("perfect", "perfect lens"))
+    )
+    return f'<div class="sight"><span class="name">{text(name)}</span><div class="pair">{canvases}</div></div>'
+
+
+def _controls(episode: Episode) -> str:
+    return (
+        f'<div class="controls"><input type="range" min="0" max="{len(episode) - 1}" value="0" step="1" '
+        'aria-label="Time in the episode"><button type="button" class="play" aria-pressed="false">Play</button>'
+        '<label>Speed <select><option value="1">1×</option><option value="2" selected>2×</option>'
+        '<option value="4">4×</option></select></label><span class="time"></span></div>\n'
+    )
+
+
+def _score(episode: Episode) -> str:
+    """Cumulated reward, term by term."""
+    names = [*episode.reward_terms, "total"]
+    colours = [TERM_COLOURS[i % len(TERM_COLOURS)] for i in range(len(names) - 1)] + ["ink"]
+    cells = "".join(
+        f'<div><dt><span class="key {colour}" aria-hidden="true"></span> {text(name)}</dt>'
+        f'<dd data-term="{text(name)}"></dd></div>'
+        for name, colour in zip(names, colours, strict=True)
+    )
+    return (
+        '<figure class="score"><canvas class="rewards" role="img" aria-label="Cumulated reward terms over time">'
+        f"</canvas><dl>{cells}</dl><figcaption><b>Reward so far</b> (dimensionless), by term, weighted as in fitness; "
+        "the action at this instant counted in. Arrow keys step (with shift: ten steps), space plays."
+        "</figcaption></figure>\n"
+    )
+
+
+def _film(episode: Episode, stage: Stage) -> dict[str, Any]:
+    """What player.js reads. Times [s], positions [m], angles [rad]; everything over the frames that are kept."""
+    kept = np.arange(0, len(episode), _stride(episode))
+    terms = {name: np.cumsum(term, dtype=np.float64)[kept] for name, term in episode.reward_terms.items()}
+    seen, columns = film_sheet(display(episode.signals[kept], stage.gain))
+    perfect, _ = film_sheet(display(episode.perfect_signals[kept]))
+    return {
+        "times": _rounded(kept * stage.seconds),
+        "bounds": stage.bounds,
+        "walls": _rounded(stage.walls),
+        "goal_region": stage.goal_region,
+        "body_radius": stage.body_radius,
+        "eyes": {
+            "azimuths": _rounded(stage.eyes.azimuths(), 5),
+            "fov": float(np.radians(stage.eyes.fov_deg)),
+            "resolution": stage.eyes.resolution,
+        },
+        "position": _rounded(episode.position[kept]),
+        "heading": _rounded(episode.heading[kept], 4),
+        "objects": _rounded(episode.objects[kept][..., :2]),
+        "object_names": stage.object_names,
+        "object_radius": stage.object_radius,
+        "events": _events(episode, kept),
+        "terms": {name: _rounded(values) for name, values in terms.items()},
+        "total": _rounded(np.sum(list(terms.values()), axis=0)),
+        "sheet_columns": columns,
+        "sheets": {"seen": data_uri(seen), "perfect": data_uri(perfect)},
+    }
+
+
+def _stride(episode: Episode) -> int:
+    """Every so many frames are kept: all, but for eyes so many and fine that the page would grow too large."""
+    pixels = episode.signals[0, :, 0].size * 3
+    return max(1, -(-len(episode) * pixels // LARGEST_FILM))
+
+
+def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
+    """(frame, "goal" or "adversary"): what was reached since the frame before."""
+    found = [
+        (int(np.searchsorted(kept, time)), name)
+        for name in ("goal", "adversary")
+        for time in np.flatnonzero(episode.reward_terms[name])
+    ]
+    return sorted((min(frame, len(kept) - 1), name) for frame, name in found)
+
+
+def _rounded(values: np.ndarray, decimals: int = 3) -> Any:
+    """Nested lists of numbers, short ones: no one sees a millimetre."""
+    return np.round(np.asarray(values, dtype=np.float64), decimals).tolist()

@@ -1,0 +1,68 @@
+"""Where an episode plays: the world's ground plan and the eyes that look at it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+import sim
+from evolve.episode import Episode
+from sim.agent import BODY_RADIUS
+from sim.physics import SUBSTEPS
+
+__all__ = ["Stage"]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Ground plan [m] and eyes.
+
+    walls          (n, 4): centre x, y and half sides along x, y
+    bounds         x_min, y_min, x_max, y_max of all walls
+    goal_region    the same of navigation's goal, or None
+    object_names, object_radius  (object,)
+    body_radius    of the agent
+    seconds        that one action lasts
+    gain           1/a²: what the pupil's area takes from the light
+    """
+
+    eyes: sim.Eyes
+    object_names: tuple[str, ...]
+    walls: np.ndarray
+    bounds: tuple[float, ...]
+    goal_region: tuple[float, ...] | None
+    object_radius: tuple[float, ...]
+    body_radius: float
+    seconds: float
+    gain: float
+
+    @classmethod
+    def of(cls, episode: Episode) -> Stage:
+        """The stage of an episode."""
+        world = sim.build_world(episode.task)
+        model = world.model
+        walls = np.array([_footprint(model, i) for i in range(model.ngeom) if model.geom(i).name.startswith("wall")])
+        low, high = walls[:, :2] - walls[:, 2:], walls[:, :2] + walls[:, 2:]
+        region = world.goal_region
+        return cls(
+            eyes=episode.eyes,
+            object_names=tuple(world.objects),
+            walls=walls,
+            bounds=(*low.min(axis=0).tolist(), *high.max(axis=0).tolist()),
+            goal_region=None if region is None else tuple(float(edge) for edge in region),
+            object_radius=tuple(float(model.geom(name).size[0]) for name in world.objects),
+            body_radius=BODY_RADIUS,
+            seconds=SUBSTEPS * float(model.opt.timestep),
+            gain=1 / episode.eyes.eye().throughput,
+        )
+
+
+def _footprint(model: mujoco.MjModel, geom: int) -> tuple[float, float, float, float]:
+    """Ground plan of a box that is turned by a multiple of 90°: half sides are |R| times the box's own."""
+    rotation = np.empty(9)
+    mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+    half = np.abs(rotation.reshape(3, 3)) @ model.geom_size[geom]
+    x, y = model.geom_pos[geom][:2]
+    return float(x), float(y), float(half[0]), float(half[1])

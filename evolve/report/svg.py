@@ -1,0 +1,75 @@
+"""Matplotlib figures as inline SVG that follows the page's theme; no pyplot, no state, same figure -> same bytes."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from html import escape
+from typing import Any
+
+import matplotlib
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from evolve.report.theme import INK, LINE, MUTED, VARIABLES
+
+__all__ = ["drawing", "inline"]
+
+_STYLE = {
+    "svg.fonttype": "none",  # real text: the reader's own font, selectable, small
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": LINE,
+    "axes.labelcolor": MUTED,
+    "axes.titlecolor": INK,
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": LINE,
+    "grid.linewidth": 0.6,
+    "text.color": INK,
+    "xtick.color": LINE,
+    "ytick.color": LINE,
+    "xtick.labelcolor": MUTED,
+    "ytick.labelcolor": MUTED,
+    "xtick.major.size": 3,
+    "ytick.major.size": 3,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "savefig.facecolor": "none",
+    "lines.solid_capstyle": "round",
+}
+
+
+@contextmanager
+def drawing(width: float, height: float, font: float = 11.0) -> Iterator[Figure]:
+    """A figure of `width` x `height` SVG units, in the report's style as long as the context lasts."""
+    sizes = {"font.size": font, "axes.titlesize": font, "axes.labelsize": font, "legend.fontsize": font}
+    ticks = {"xtick.labelsize": font - 1, "ytick.labelsize": font - 1}
+    with matplotlib.rc_context({**_STYLE, **sizes, **ticks}):
+        yield Figure(figsize=(width / 72, height / 72), dpi=72, layout="constrained")
+
+
+def inline(figure: Figure, name: str, alt: str) -> str:
+    """The figure as an <svg> element; `name` keeps its ids apart from other figures' on the page."""
+    buffer = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
+        nothing: dict[str, Any] = {"Date": None, "Creator": None, "Format": None, "Type": None}
+        FigureCanvasSVG(figure).print_svg(buffer, metadata=nothing)
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->\s*", "", text, flags=re.DOTALL)
+    view_box = re.search(r'viewBox="[^"]*"', text)
+    assert view_box is not None
+    text = re.sub(r"<svg[^>]*>", f'<svg {view_box[0]} role="img" aria-label="{escape(alt)}">', text, count=1)
+    text = re.sub("#[0-9a-f]{6}", lambda colour: VARIABLES.get(colour[0], colour[0]), text)
+    return _with_own_ids(text, name)
+
+
+def _with_own_ids(text: str, name: str) -> str:
+    """Only the ids that something refers to, marked with the figure's name."""
+    used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', text))
+    text = re.sub(r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", text)
+    return re.sub(r'(url\(#|href="#)', rf"\1{name}-", text)

@@ -1,0 +1,136 @@
+"""The report's numbers: headline, best candidate's genes, all candidates, failures, facts of the run."""
+
+from __future__ import annotations
+
+from evolve.analysis import acuity_cpd, bootstrap_interval, gene_values, succeeded
+from evolve.candidate import Candidate
+from evolve.config_source import to_toml
+from evolve.development import Phenotype
+from evolve.genotype import GENES
+from evolve.report.markup import exact, number, table, text
+from evolve.store import Run
+from evolve.versions import recorded
+
+__all__ = ["all_candidates", "best_genes", "failures", "headline", "run_facts"]
+
+
+def headline(run: Run) -> str:
+    """The numbers one asks for first."""
+    failed = sum(not succeeded(c) for c in run.candidates)
+    generations = len({c.generation for c in run.candidates})
+    hours = sum(c.seconds for c in run.candidates) / 3600
+    steps = sum(c.steps for c in run.candidates)
+    tiles = [
+        (
+            "Candidates evaluated",
+            f"{len(run.candidates)}",
+            f"of {run.config.candidates} planned; {failed} failed",
+        ),
+        ("Generations", f"{generations}", f"of {run.config.search.generations} planned"),
+        ("Training", f"{number(steps / 1e6)} M", "agent steps, all candidates"),
+        ("Evaluation time", f"{number(hours)} h", "training and evaluation, summed over workers"),
+    ]
+    if (best := run.best) is not None:
+        tiles = [*_best_tiles(best), *tiles]
+    items = "".join(f"<div><dt>{label}</dt><dd>{value}<small>{note}</small></dd></div>" for label, value, note in tiles)
+    return f'<dl class="tiles">{items}</dl>\n'
+
+
+def _best_tiles(best: Candidate) -> list[tuple[str, str, str]]:
+    low, high = bootstrap_interval(best.returns)
+    spread = f"mean of {len(best.returns)} episodes; 95 % interval {number(low)} to {number(high)}"
+    return [
+        ("Best fitness", number(best.fitness, 4), spread),
+        ("Best candidate", f"no. {best.id}", f"generation {best.generation}"),
+        ("Episodes solved by the best", f"{number(100 * best.success_rate)} %", f"of {len(best.returns)}"),
+        ("Its acuity", f"{number(acuity_cpd(best.phenotype))} cpd", "cycles per degree, by sampling alone"),
+    ]
+
+
+def best_genes(run: Run, best: Candidate) -> str:
+    """Every gene of the best candidate beside where it started."""
+    values = gene_values(best.phenotype)
+    relief = sorted({name[:-1] for name in values if name.startswith("doe_")})
+    groups = [[name] for name in values if not name.startswith("doe_")]
+    groups += [[name for name in values if name.startswith(row)] for row in relief]
+    rows = [_gene_row(run, names, values) for names in groups]
+    return table(["gene", "meaning", "best", "start", "searched", "unit"], rows, "genes-of-the-best")
+
+
+def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str]:
+    """One gene, or a row of the relief's control points side by side."""
+    genes, uses = [GENES[name] for name in names], [run.config.genome[name] for name in names]
+    name, meaning = names[0], genes[0].meaning
+    if len(names) > 1:
+        name, meaning = f"{names[0]} … {names[-1]}", f"relief control points, row {names[0][-2]}"
+    best = [exact(values[g.name]) if g.kind == "integer" else number(values[g.name]) for g in genes]
+    searched = list(dict.fromkeys(f"{exact(u.low)} to {exact(u.high)}" if u.open else "frozen" for u in uses))
+    columns = (best, [exact(u.start) for u in uses], searched)
+    return [f"<code>{name}</code>", text(meaning), *("&ensp;".join(c) for c in columns), text(genes[0].unit) or "–"]
+
+
+def all_candidates(run: Run) -> str:
+    """One row per candidate, in the order of their ids; the best one stands out."""
+    header = [
+        *("no.", "gener&shy;ation", "fitness", "lowest", "highest", "solved [%]"),
+        *("eyes", "placement [°]", "fov [°]", "receptors (h × w)", "acuity [cpd]"),
+        *("aperture a", "index n", "memory", "neurons", "steps [k]", "minutes"),
+    ]
+    best = run.best
+    place = next((i for i, c in enumerate(run.candidates) if best is not None and c.id == best.id), None)
+    return table(header, [_candidate_row(c) for c in run.candidates], "all-candidates", place)
+
+
+def _candidate_row(candidate: Candidate) -> list[str]:
+    good = succeeded(candidate)
+    outcome = [candidate.fitness, min(candidate.returns), max(candidate.returns)] if good and candidate.returns else []
+    shown = [number(value) for value in outcome] or ["failed", "–", "–"]
+    solved = number(100 * candidate.success_rate) if good else "–"
+    effort = [number(candidate.steps / 1000), number(candidate.seconds / 60)]
+    return [str(candidate.id), str(candidate.generation), *shown, solved, *_traits(candidate.phenotype), *effort]
+
+
+def _traits(phenotype: Phenotype) -> list[str]:
+    height, width = phenotype.resolution
+    aperture, index = (
+        "–" if value is None else number(value) for value in (phenotype.relative_aperture, phenotype.refractive_index)
+    )
+    return [
+        *(str(phenotype.n_eyes), number(phenotype.placement_range_deg), number(phenotype.fov_deg)),
+        *(f"{height} × {width}", number(acuity_cpd(phenotype)), aperture, index),
+        *(str(phenotype.memory_frames), str(phenotype.neurons)),
+    ]
+
+
+def failures(run: Run) -> str:
+    """Which candidates failed, and why; "" if none did."""
+    failed = [c for c in run.candidates if not succeeded(c)]
+    if not failed:
+        return ""
+    rows = [[str(c.id), str(c.generation), text(c.failure or f"fitness is {c.fitness}")] for c in failed]
+    return f"<h3>Failed candidates</h3>\n{table(['no.', 'generation', 'reason'], rows, 'failures')}"
+
+
+def run_facts(run: Run) -> str:
+    """Settings, seeds and software."""
+    versions = recorded(run.path)
+    commit = versions.pop("commit", "") or "not recorded"
+    software = ", ".join(f"{name} {version}" for name, version in versions.items()) or "not recorded"
+    facts = {
+        "run": run.path.resolve().name,
+        "task": run.config.task,
+        "seed": run.config.seed,
+        "workers": run.config.workers or "one per core",
+        "commit": commit,
+        "software": software,
+    }
+    if run.notice:
+        facts["notice"] = run.notice.replace(str(run.path), run.path.name)
+    entries = "".join(f"<dt>{name}</dt><dd>{text(value)}</dd>" for name, value in facts.items())
+    config = f"<details><summary>config.toml, every setting</summary><pre>{text(to_toml(run.config))}</pre></details>\n"
+    return f'<dl class="facts">{entries}</dl>\n{config}{_seeds(run)}'
+
+
+def _seeds(run: Run) -> str:
+    seeds = "\n".join(f"{c.id:6d}  {c.seed}" for c in run.candidates)
+    return f"<details><summary>training seeds of the candidates</summary><pre>{seeds}</pre></details>\n"

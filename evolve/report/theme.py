@@ -1,0 +1,33 @@
+"""Colours of the report: one accent, the rest from Okabe & Ito's palette, which colour-blind readers can tell apart.
+
+Every colour has a light and a dark value. Figures are drawn with the light ones; `svg` turns them into CSS variables,
+so that the page's theme reaches into them.
+"""
+
+from __future__ import annotations
+
+__all__ = ["ACCENT", "CSS", "GREEN", "INK", "LINE", "MUTED", "PAPER", "PURPLE", "VARIABLES", "VERMILLION"]
+
+INK, MUTED, LINE, PAPER, PANEL = "#1d2329", "#5c6670", "#d8dde2", "#fefefe", "#f5f6f8"
+ACCENT, VERMILLION, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#b8568f"
+
+_DARK = {
+    "ink": (INK, "#e4e7ea"),
+    "muted": (MUTED, "#9aa5b0"),
+    "line": (LINE, "#3a424a"),
+    "paper": (PAPER, "#14181c"),
+    "panel": (PANEL, "#1d2227"),
+    "accent": (ACCENT, "#56b4e9"),
+    "vermillion": (VERMILLION, "#f08a4b"),
+    "green": (GREEN, "#2fbf94"),
+    "purple": (PURPLE, "#d98fbb"),
+}
+
+VARIABLES = {light: f"var(--{name})" for name, (light, _) in _DARK.items()}
+
+
+def _root(column: int) -> str:
+    return ":root{" + ";".join(f"--{name}:{values[column]}" for name, values in _DARK.items()) + "}"
+
+
+CSS = f"{_root(0)}\n@media (prefers-color-scheme: dark){{{_root(1)}}}\n@media print{{{_root(0)}}}\n"

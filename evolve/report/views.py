@@ -1,0 +1,60 @@
+"""One moment of an episode: the scene before each eye, through a perfect lens, and through the evolved optics."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from evolve.analysis import psnr
+from evolve.episode import Episode
+from evolve.report.markup import number, text
+from evolve.report.picture import data_uri, display
+from evolve.report.stage import Stage
+
+__all__ = ["views"]
+
+WIDTH = 168  # CSS pixels of one picture, where there are few eyes
+MOST_EYES = 6
+
+
+def views(episode: Episode, stage: Stage) -> str:
+    """Pictures and their caption."""
+    frame = _busiest(episode)
+    time = int(episode.radiance_frames[frame])
+    weights = stage.eyes.eye().spectral_bands.weights
+    names = stage.eyes.names()
+    shown = range(min(len(names), MOST_EYES))
+    rows = "".join(_row(episode, eye, names[eye], frame, weights, stage.gain) for eye in shown)
+    brighter = f", brightened {number(stage.gain)} times (1/a²)" if stage.gain != 1 else ""
+    rest = f" The first {MOST_EYES} of {len(names)} eyes." if len(names) > MOST_EYES else ""
+    quality = psnr(episode.signals, episode.perfect_signals, stage.gain)
+    caption = (
+        f"<b>What it sees</b> at {number(time * stage.seconds)} s of the episode below, left to right: the scene, "
+        f"finely sampled; what its receptors would signal behind a perfect lens; and what they signal{brighter}, "
+        f"noise included.{rest} Over the whole episode the signals have a PSNR of {number(quality)} dB "
+        "against the perfect lens."
+    )
+    return f'<figure class="views"><div class="eyes">{rows}</div><figcaption>{caption}</figcaption></figure>\n'
+
+
+def _busiest(episode: Episode) -> int:
+    """The kept frame in which the eyes have most to look at: the largest variance along the horizon (sky above floor
+    is there in all of them)."""
+    return int(np.argmax(episode.radiance.mean(axis=2).var(axis=-1).mean(axis=(1, 2))))
+
+
+def _row(episode: Episode, eye: int, name: str, frame: int, weights: np.ndarray, gain: float) -> str:
+    time = episode.radiance_frames[frame]
+    scene = np.einsum("cb,byx->cyx", weights, episode.radiance[frame, eye])
+    pictures = (
+        ("scene", display(scene)),
+        ("perfect lens", display(episode.perfect_signals[time, eye])),
+        ("its own optics", display(episode.signals[time, eye], gain)),
+    )
+    height, width = episode.signals.shape[-2:]
+    scale = WIDTH / max(height, width)
+    size = f'style="width:{scale * width:.4g}px;aspect-ratio:{width}/{height}"'
+    cells = "".join(
+        f'<div><img src="{data_uri(pixels)}" {size} alt="{text(name)} eye: {label}"><span>{label}</span></div>'
+        for label, pixels in pictures
+    )
+    return f'<div class="sight"><span class="name">{text(name)}</span><div class="pair">{cells}</div></div>'
