@@ -3,7 +3,7 @@ without its noise, since each emitter has exactly one direction."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,6 +45,15 @@ def directional_lights(scene: Any, wavelengths: np.ndarray) -> tuple[Directional
     return tuple(lights)
 
 
+def check_lambertian(bsdfs: Sequence[Any]) -> None:
+    """Raise ValueError for a BSDF that is not a Lambertian reflector, on one side or both."""
+    sides = int(mi.BSDFFlags.FrontSide) | int(mi.BSDFFlags.BackSide)
+    for bsdf in bsdfs:
+        kinds = int(bsdf.flags()) & ~(sides | int(mi.BSDFFlags.SpatiallyVarying))
+        if kinds != int(mi.BSDFFlags.DiffuseReflection):
+            raise ValueError(f"the batched renderer knows Lambertian surfaces only, not {bsdf.class_name()}")
+
+
 def direct_light(
     si: Any,
     bsdf: Any,
@@ -52,19 +61,24 @@ def direct_light(
     bands: list[Any],
     occluded: Callable[[Any, Any], Any],
 ) -> list[Any]:
-    """Radiance [mi.Spectrum per chunk of bands] that leaves si towards si.wi.
+    """Radiance [mi.Spectrum per chunk of bands] that leaves a Lambertian surface at si: ρ/π Σ_l E_l cos θ_l.
 
-    occluded(ray, active) tells which rays towards a light are blocked.
+    occluded(ray, active) tells which rays towards a light are blocked. The inside of a closed one-sided surface
+    needs no case of its own: no light gets there.
     """
-    radiance = [mi.Spectrum(0) for _ in bands]
-    context = mi.BSDFContext()
+    irradiance = [mi.Spectrum(0) for _ in bands]
+    seen_from = dr.dot(si.n, si.to_world(si.wi))
     for light in lights:
         towards = mi.Vector3f(*map(float, light.direction))
-        wo = si.to_local(towards)
-        lit = si.is_valid() & (dr.dot(si.n, towards) * dr.dot(si.n, si.to_world(si.wi)) > 0)
+        lit = si.is_valid() & (dr.dot(si.n, towards) * seen_from > 0)
         lit &= ~occluded(si.spawn_ray(towards), lit)
+        cosine = dr.select(lit, dr.abs(dr.dot(si.sh_frame.n, towards)), 0)
         chunks = np.pad(light.irradiance, (0, -len(light.irradiance) % LANES)).reshape(-1, LANES)
-        for i, (wavelengths, irradiance) in enumerate(zip(bands, chunks, strict=True)):
-            si.wavelengths = wavelengths
-            radiance[i] += bsdf.eval(context, si, wo, lit) * mi.Spectrum(*map(float, irradiance))
-    return radiance
+        for i, chunk in enumerate(chunks):
+            irradiance[i] += cosine * mi.Spectrum(*map(float, chunk))
+    return [e * _reflectance(si, bsdf, b) * dr.inv_pi for e, b in zip(irradiance, bands, strict=True)]
+
+
+def _reflectance(si: Any, bsdf: Any, wavelengths: Any) -> Any:
+    si.wavelengths = wavelengths
+    return bsdf.eval_diffuse_reflectance(si, si.is_valid())

@@ -131,6 +131,7 @@ class _Wavefront:
         self.lanes = renderer.n_envs * self.n_eyes * self.n_rays
         self.stride = renderer._poses.stride
         self.spheres = stage.spheres
+        lighting.check_lambertian([*stage.spheres.bsdfs, *(shape.bsdf() for shape in stage.scene.shapes())])
         self.lights = lighting.directional_lights(stage.scene, renderer.bands.wavelengths)
         self.n_bands = len(renderer.bands.wavelengths)
         self.bands = lighting.spectra(renderer.bands.wavelengths)
@@ -144,7 +145,8 @@ class _Wavefront:
         radii = [BODY_RADIUS, *map(float, self.spheres.radii)]
 
         def occluded(shadow: Any, active: Any) -> Any:
-            return scene.ray_test(shadow, active) | movers.blocks(radii, [agent, *centres], shadow)
+            blocked = movers.blocks(radii, [agent, *centres], shadow)
+            return blocked | scene.ray_test(shadow, active & ~blocked)
 
         radiance = lighting.direct_light(si, bsdf, self.lights, self.bands, occluded)
         out = dr.zeros(mi.Float, self.lanes * self.n_bands)
@@ -178,7 +180,7 @@ class _Wavefront:
 
     def _first_hit(self, scene: Any, ray: Any, centres: list[Any], inputs: dict[str, Any]) -> tuple[Any, Any]:
         """Where the ray meets the static scene or a sphere first, and the BSDF there."""
-        preliminary = scene.ray_intersect_preliminary(ray, coherent=True)
+        preliminary = scene.ray_intersect_preliminary(ray)
         si = preliminary.compute_surface_interaction(ray, mi.RayFlags.All)
         bsdf = si.bsdf()
         if not centres:
