@@ -7,7 +7,7 @@ cameras. Surfaces are Lambertian. What cannot be mirrored is named in one Mirror
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mitsuba as mi
@@ -108,7 +108,7 @@ class Mirror:
         camera: str | int | Viewpoint,
         width: int,
         height: int,
-        integrator: str = "direct",
+        integrator: str | Mapping[str, Any] = "direct",
         spp: int = 16,
         wavelengths: np.ndarray | Sequence[float] = (450e-9, 550e-9, 650e-9),
         seed: int = 0,
@@ -116,7 +116,7 @@ class Mirror:
         """Spectral radiance at `wavelengths` [m], (band, y, x) float32, averaged over each pixel's square.
 
         camera      name or id of a camera of the model, or a Viewpoint
-        integrator  a Mitsuba integrator: "direct", "path", ...
+        integrator  a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}
         spp         samples per pixel
         Units: a white Lambertian that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
         """
@@ -160,8 +160,7 @@ class Mirror:
                 description[name] = shapes.build(part, self._poses[geom], name, self._bsdf(geom), glow)
         for emitter in self._emitters:
             description[emitter.name] = emitter.description
-        # Mitsuba would merge meshes that share a BSDF, and then no hit tells its geom.
-        return mi.load_dict(description, optimize=False)
+        return mi.load_dict(description)
 
     def _glow(self, geom: int) -> dict[str, Any] | None:
         """Spectrum that a geom of an emissive material sends out."""

@@ -5,6 +5,7 @@ Works on the types of the variant in force: whole wavefronts, or, in a scalar va
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import drjit as dr
@@ -21,10 +22,12 @@ def check_size(width: int, height: int, spp: int) -> None:
             raise ValueError(f"{name} = {value}, must be at least 1")
 
 
-def radiance(scene: Any, sensor: Any, integrator: str, spp: int, wavelengths: np.ndarray, seed: int) -> np.ndarray:
+def radiance(
+    scene: Any, sensor: Any, integrator: str | Mapping[str, Any], spp: int, wavelengths: np.ndarray, seed: int
+) -> np.ndarray:
     """Radiance (band, y, x) float32 at `wavelengths` [m]: the mean over `spp` random positions in each pixel."""
     width, height = (int(n) for n in sensor.film().size())
-    method = mi.load_dict({"type": integrator})
+    method = mi.load_dict(_description(integrator))
     samples_at_once = max(1, WAVEFRONT // (width * height))
     bands = []
     for start in range(0, len(wavelengths), LANES):
@@ -38,6 +41,14 @@ def radiance(scene: Any, sensor: Any, integrator: str, spp: int, wavelengths: np
             total += _sum_of_samples(scene, sensor, method, spectrum, n, sampler_seed)
         bands.append(total[: len(nm)] / spp)
     return np.concatenate(bands).reshape(-1, height, width).astype(np.float32)
+
+
+def _description(integrator: str | Mapping[str, Any]) -> dict[str, Any]:
+    description = {"type": integrator} if isinstance(integrator, str) else dict(integrator)
+    if description["type"] == "direct" and {"emitter_samples", "shading_samples"} & description.keys():
+        # Mitsuba 3.9.1 adds these samples up instead of averaging them where the light is a point or a direction.
+        raise ValueError('integrator "direct": its light samples cannot be set; take more spp')
+    return description
 
 
 def first_hits(scene: Any, sensor: Any) -> tuple[list[str], np.ndarray]:

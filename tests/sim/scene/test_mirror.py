@@ -1,8 +1,8 @@
 """The mirror's geometry against MuJoCo's own ray casting, and its light against closed forms.
 
-Tried and seen to fail, one at a time: camera mirrored (diag(1, 1, -1)), fov taken as horizontal, quaternion order
-(transposed rotation), open cylinders, capsule's caps at the wrong end, mesh vertices not posed, light direction
-reversed, colours not linearised.
+Tried and seen to fail, one at a time: camera mirrored (diag(1, 1, -1)), fov taken as horizontal, poses transposed,
+open cylinders, a capsule's caps at one end, ellipsoid's quaternion with its real part first, meshes not turned, light
+reversed, π forgotten, colours not linearised, sync that does nothing.
 """
 
 import mujoco
@@ -130,6 +130,22 @@ def test_light_shines_along_its_direction():
         np.testing.assert_allclose(seen, (0.6 if sign > 0 else 0.0) * daylight(NM * 1e-9), rtol=1e-4)
 
 
+def test_one_bounce_off_an_infinite_floor():
+    """A white wall under a light from above gets no direct light, and half of its hemisphere is floor of radiance 1:
+    its radiance is 1/2. (`direct` sees nothing, one bounce all of it.)"""
+    floor = '<geom type="plane" size="0 0 1" rgba="1 1 1 1"/>'
+    wall = '<geom type="box" size="0.1 50 50" pos="0.1 0 0" rgba="1 1 1 1"/>'
+    mirror = sim.mirror(mujoco.MjModel.from_xml_string(_xml(LIGHT, floor + wall)))
+    view = Viewpoint.looking_at(np.array([-3.0, 0, 1.0]), np.array([0, 0, 1.0]), 1.0)
+
+    def seen(integrator):
+        return mirror.render(view, 2, 2, integrator, spp=4096, wavelengths=[560e-9]).mean()
+
+    assert seen("direct") == 0
+    # 16384 samples of 0 or 1: standard error 0.004.
+    assert seen({"type": "path", "max_depth": 3}) == pytest.approx(0.5, abs=0.016)
+
+
 def test_shadows():
     blocker = '<geom type="sphere" size="0.5" pos="0 0 2"/>'
     assert np.all(radiance(_xml(LIGHT, WHITE + blocker), origin=(3.0, 0, 3)) == 0)
@@ -219,6 +235,8 @@ def test_bad_input_is_named():
         mirror.render("eye_9", 4, 4)
     with pytest.raises(ValueError, match="width = 0"):
         mirror.render_ids(Viewpoint(np.zeros(3), np.eye(3), 45.0), 0, 4)
+    with pytest.raises(ValueError, match="light samples"):
+        mirror.render(Viewpoint(np.zeros(3), np.eye(3), 45.0), 4, 4, {"type": "direct", "emitter_samples": 4})
     with pytest.raises(ValueError, match="no body 'arm'"):
         sim.mirror(model, bodies=["arm"])
     with pytest.raises(ValueError, match="llvm_ad_rgb"):

@@ -1,8 +1,8 @@
 """Where a texture lies on every kind of geom: against formulas written here, and against MuJoCo's own renderer.
 
 The texture's grey value codes u in one model, v in another; a white one tells the light, so that a ratio of radiances
-gives the coordinate. Tried and seen to fail, one at a time: u and v swapped, u mirrored, image upside down,
-box faces ±x mirrored, a capsule's cap upside down, repeats forgotten, sRGB not decoded.
+gives the coordinate. Tried and seen to fail, one at a time: a box's u and v swapped or u mirrored, u mirrored around an
+axis, a plane's v upwards, image upside down, a capsule's caps swapped, uniform repeats ignored, sRGB not decoded.
 """
 
 import mujoco
