@@ -50,7 +50,7 @@ class ReceptiveFieldSensor:
 
         signal_r = sum_p W_b[r, p] radiance_b(p),   W_b[r, p] ∝ RF_{r,b}(p) / q(p),   sum_p W_b[r, p] = power_b
 
-    with RF the PSF kernel convolved with the receptor's square, q the density that directions were drawn from
+    with RF the turned PSF kernel convolved with the receptor's square, q the density that directions were drawn from
     and power_b the fraction of the pupil's power inside the kernel.
 
     directions  unit vectors in the eye's frame, (ray, 3) float32
@@ -112,7 +112,8 @@ def box_sensor(eye: optics.Eye, rays_per_receptor: int) -> BoxSensor:
 
 def receptive_field_sensor(eye: optics.Eye, rays: int, cells: int) -> ReceptiveFieldSensor:
     """Directions from the mixture of all receptive fields, tabulated on `cells` x `cells` per receptor."""
-    fields = _receptive_fields(eye.kernel(cells), cells)
+    # (K ⊗ L)(r) = Σ_v K(r - v) L(v): as weights around the receptor, the convolution's kernel is turned about.
+    fields = _receptive_fields(eye.kernel(cells)[:, ::-1, ::-1], cells)
     density = _mixture(fields, eye.resolution, cells)
     positions, ys, xs = _draw(density, rays)
     margin = (np.array(density.shape) - cells * np.array(eye.resolution)) // 2

@@ -6,8 +6,9 @@ Medians over repeated calls after warm-up, in agent-steps per second (one step o
     render         every eye of every world, perfect lens
     render_optics  the same behind a pupil: receptive fields, weights, bands
     step           the whole VecEnv step behind that pupil: physics, rewards, rendering, optics, noise, infos
-    mujoco         mujoco.Renderer drawing the same eyes of one world, one after the other (RGB, no optics)
-Ratios are to `mujoco`. Absolute numbers say as much about the machine as about the code.
+    mujoco         mujoco.Renderer drawing the same eyes of one world, one after the other (RGB, no optics, no shadows)
+    mujoco_shadows the same with shadows, which the batched renderer has; in software they cost MuJoCo nearly all its time
+Ratios are to `mujoco`, the faster one. Absolute numbers say as much about the machine as about the code.
 """
 
 from __future__ import annotations
@@ -83,7 +84,8 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
         renderer = sim.BatchedRenderer(world, eyes, n_envs, RAYS_PER_RECEPTOR)
         rates[name] = n_envs / seconds(lambda renderer=renderer: renderer.signals(moved()), budget)  # type: ignore[misc]
     rates["step"] = n_envs / _step_seconds(case, n_envs, budget)
-    rates["mujoco"] = _mujoco_rate(world, case.eyes, state, budget)
+    for name, shadows in (("mujoco", False), ("mujoco_shadows", True)):
+        rates[name] = _mujoco_rate(world, case.eyes, state, budget, shadows)
     base = rates["mujoco"]
     ratios = {name: rates[name] / base for name in ("render", "render_optics", "step")} if base else None
     return {"task": case.task, "n_envs": n_envs, "agent_steps_per_second": rates, "ratio_to_mujoco": ratios}
@@ -98,7 +100,7 @@ def _step_seconds(case: Case, n_envs: int, budget: float) -> float:
     return duration
 
 
-def _mujoco_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float) -> float | None:
+def _mujoco_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float, shadows: bool) -> float | None:
     """Agent-steps/s of mujoco.Renderer with the eyes' resolution; None where there is no OpenGL."""
     height, width = eyes.resolution
     try:
@@ -113,6 +115,7 @@ def _mujoco_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float) ->
         pose(data, world, state, next(worlds) % state.n)
         for i in range(eyes.n_eyes):
             renderer.update_scene(data, camera=f"eye_{i}")
+            renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
             renderer.render()
 
     try:
