@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optics.arguments import positive
-from optics.diffraction import diffract
+from optics.diffraction import Beam, intensity
 from optics.grid import Grid
-from optics.planner import FLOAT_NOISE, AccuracyError, Plan, Problem, Sampling, choose
+from optics.planner import FLOAT_NOISE, AccuracyError, Plan, choose
 from optics.pupil import Pupil
+from optics.sampling import GridSampling, Problem, Sampling
 from optics.source import PointSource
 
 __all__ = ["PSFResult", "psf"]
@@ -82,46 +83,37 @@ def psf(
         raise ValueError("wavelengths is empty: must hold at least one wavelength [m]")
     images, plans = [], []
     for wavelength in lambdas:
-        task = problem(pupil, float(wavelength), sensor_distance, source, window, tolerance, dtype)
-        plan, sampling = choose(task, method)
-        image, plan = intensity(pupil, source, float(wavelength), task, plan, sampling)
+        beam = Beam(pupil, source, float(positive("wavelength", wavelength)))
+        image, plan = monochromatic(beam, problem(beam, sensor_distance, window, tolerance, dtype), method)
         images.append(image)
         plans.append(plan)
     return PSFResult(np.stack(images), dx, lambdas, sensor_distance, pupil, tuple(plans))
 
 
-def problem(
-    pupil: Pupil,
-    wavelength: float,
-    distance: float,
-    source: PointSource,
-    window: Grid,
-    tolerance: float,
-    dtype: str = "float32",
-) -> Problem:
-    """The numbers that decide the sampling at one wavelength."""
+def problem(beam: Beam, distance: float, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
+    """The numbers that decide the sampling."""
+    pupil, wavelength = beam.pupil, beam.wavelength
     positive("sensor_distance", distance)
-    positive("wavelength", wavelength)
-    steepest = pupil.slopes(wavelength, source).steepest / wavelength
+    steepest = pupil.slopes(wavelength, beam.source).steepest / wavelength
     band = 1.02 * steepest + pupil.bandwidth(wavelength, tolerance / 10)
     return Problem(pupil.aperture_radius, wavelength / pupil.medium_n, distance, window, band, tolerance, dtype)
 
 
-def intensity(
-    pupil: Pupil, source: PointSource, wavelength: float, task: Problem, plan: Plan, sampling: Sampling
+def monochromatic(
+    beam: Beam, task: Problem, method: str = "auto", most_seconds: float = 60.0
 ) -> tuple[np.ndarray, Plan]:
     """PSF over the window, and the plan with the error that the picture itself tells: rounding is as large in a dark
     window as in a bright one, so there it weighs more.
 
     Raises:
-        AccuracyError: the window is so dark that rounding breaks the tolerance.
+        AccuracyError: no method meets the tolerance, or the window is so dark that rounding breaks it.
     """
-    field = diffract(pupil, source, wavelength, task, sampling)
-    image = (field.intensity.numpy() / pupil.area).reshape(task.window.shape)
-    mean_square = float(np.mean(np.square(image, dtype=np.float64)))
-    bright = 1 / max(sampling.period, 2 * task.radius) ** 2  # mean PSF over the plane that the transform spans
+    plan, sampling = choose(task, method, most_seconds)
+    image = (intensity(beam, task, sampling).numpy() / beam.pupil.area).reshape(task.window.shape)
+    mean, mean_square = float(image.mean(dtype=np.float64)), float(np.mean(np.square(image, dtype=np.float64)))
+    bright = 1 / _plane(task, sampling) ** 2  # mean PSF over the plane that the transform spans
     noise = FLOAT_NOISE[task.dtype]
-    rounding = noise * 2 * math.sqrt(bright * float(image.mean(dtype=np.float64))) + noise**2 * bright
+    rounding = 2 * noise * math.sqrt(bright * mean) + noise**2 * bright
     error = task.tolerance / 2 + rounding / math.sqrt(mean_square) if mean_square > 0 else math.inf
     if error > task.tolerance:
         raise AccuracyError(
@@ -129,3 +121,8 @@ def intensity(
             + ("; dtype='float64' has a 1e6 times lower floor" if task.dtype == "float32" else "")
         )
     return image, replace(plan, predicted_error=error)
+
+
+def _plane(task: Problem, sampling: Sampling) -> float:
+    """Width [m] over which rounding spreads the pupil's light."""
+    return max(sampling.period if isinstance(sampling, GridSampling) else 0.0, 2 * task.radius)

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from optics.diffraction import Beam
 from optics.grid import Grid
-from optics.planner import AccuracyError, Plan, choose
-from optics.point_spread import PSFResult, intensity, problem
+from optics.planner import AccuracyError, Plan
+from optics.point_spread import PSFResult, monochromatic, problem
 from optics.pupil import Pupil
 from optics.source import PointSource
 
@@ -19,6 +20,8 @@ __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 WIDEST_TANGENT = math.tan(math.radians(60))
 MOST_CELLS = 4097
 MOST_SECONDS = 1.0  # per band
+# Light beyond the window's reach is less than the tolerance; what leaks back of it may be a tenth in amplitude.
+FADE_RIPPLE = 0.1
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,8 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: float) -> PSFResult:
     Raises:
         AccuracyError: no method meets the tolerance within the limits on memory and time.
     """
-    source = PointSource(z)
-    views = [_view(pupil, float(wavelength), source, retina) for wavelength in retina.wavelengths]
+    beams = [Beam(pupil, PointSource(z), float(wavelength)) for wavelength in retina.wavelengths]
+    views = [_view(beam, retina) for beam in beams]
     half, pitch = max(view.half_window for view in views), min(view.pitch for view in views)
     if _cells_within(half, retina.cell) > MOST_CELLS:
         raise AccuracyError(
@@ -68,11 +71,10 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: float) -> PSFResult:
     half = retina.cell * (_cells_within(half, retina.cell) + 1) / 2
     window = Grid.square(2 * math.ceil(half / pitch) + 1, pitch)
     images, plans = [], []
-    for wavelength, view in zip(retina.wavelengths, views, strict=True):
-        task = problem(pupil, float(wavelength), retina.distance, source, window, retina.tolerance)
-        task = replace(task, widest_band=view.band)
-        plan, sampling = choose(task, most_seconds=MOST_SECONDS)
-        image, plan = intensity(pupil, source, float(wavelength), task, plan, sampling)
+    for beam, view in zip(beams, views, strict=True):
+        task = problem(beam, retina.distance, window, retina.tolerance)
+        task = replace(task, widest_band=view.band, reach=half, fade_ripple=FADE_RIPPLE)
+        image, plan = monochromatic(beam, task, most_seconds=MOST_SECONDS)
         images.append(image)
         plans.append(plan)
     return PSFResult(np.stack(images), pitch, retina.wavelengths, retina.distance, pupil, tuple(plans))
@@ -85,10 +87,11 @@ def perfect_psf(retina: Retina) -> PSFResult:
     return PSFResult(image, retina.cell, retina.wavelengths, retina.distance, None, (plan,))
 
 
-def _view(pupil: Pupil, wavelength: float, source: PointSource, retina: Retina) -> _View:
+def _view(beam: Beam, retina: Retina) -> _View:
     """Half the loss goes to rays outside the window, half to what the hard edge sends further than δ [1/m] off its
     geometric direction: 1/(π²Rδ) of the light, as in the Airy pattern (1 - 2/(πv), v = 2πRδ; Born & Wolf §8.5.2)."""
-    slopes = pupil.slopes(wavelength, source)
+    pupil, wavelength = beam.pupil, beam.wavelength
+    slopes = pupil.slopes(wavelength, beam.source)
     x, y = slopes.rays(retina.distance, pupil.medium_n)
     lam, z, radius = wavelength / pupil.medium_n, retina.distance, pupil.aperture_radius
     shadow = float(np.quantile(np.fmax(np.abs(x), np.abs(y)), 1 - retina.tolerance / 2, method="higher"))
