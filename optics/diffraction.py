@@ -72,9 +72,8 @@ def _transfer(problem: Problem, how: GridSampling, types: Precision) -> Field:
     f = dr.sqrt(fx * fx + fy * fy)
     s2 = dr.minimum(dr.square(f * opaque(types, problem.wavelength)), 1)
     q = s2 / (1 + dr.sqrt(1 - s2))
-    waves = -opaque(types, problem.distance / problem.wavelength) * (
-        q if how.method == "angular_spectrum" else q * q / 2
-    )
+    sag = q if how.method == "angular_spectrum" else q * q / 2
+    waves = -opaque(types, problem.distance / problem.wavelength) * sag
     # The error function falls to the ripple in √ln(1/ripple), which is what the taper's blur is made of.
     steepness = math.sqrt(math.pi * how.taper.width * how.taper.blur / 2)
     middle = opaque(types, how.taper.band + how.taper.width / 2)
@@ -106,7 +105,7 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
     U(x) = z/(λρ²) ∫ P(ξ) G(ξ; x) e^{-ik s·ξ} dξ,  G = (ρ/D)² (1/(kD) - i) e^{ik(D - ρ + s·ξ)},
 
     ρ = |(x, z)|, D = |(x - ξ, z)|, s = x/ρ. G hardly varies with x (it is Fresnel's quadratic phase and less), so it is
-    taken at Chebyshev nodes x_ab and the integrals, one Fourier transform each, are interpolated.
+    taken at nodes x_ab and the integrals, one Fourier transform each, are interpolated.
     """
     import drjit as dr
 
@@ -114,12 +113,14 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
     dr.eval(u.re, u.im)
     s = how.directions.x
     cosine = np.sqrt(np.maximum(1 - s[:, None] ** 2 - s[None, :] ** 2, 1e-6))
-    nodes = how.half_width * chebyshev_nodes(how.nodes)
-    along_x = lagrange(np.clip(problem.distance * s[None, :] / cosine, -how.half_width, how.half_width), nodes)
+    nodes = how.half_angle * chebyshev_nodes(how.nodes)
+    angle = np.clip(np.arctan2(s[None, :], cosine), -how.half_angle, how.half_angle)
+    along_x = lagrange(angle, nodes)
     total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
     period = problem.wavelength / (how.pupil.dx * how.directions.dx)
-    for a, x in enumerate(nodes):
-        for b, y in enumerate(nodes):
+    places = problem.distance * np.tan(nodes)
+    for a, x in enumerate(places):
+        for b, y in enumerate(places):
             part = u * _slow_kernel(float(x), float(y), problem, how.pupil, types)
             part = dft2(part, period, how.directions.shape, -1, how.directions.dx)
             weight = types.Float(np.ascontiguousarray(along_x[a] * along_x[b].T, dtype=types.dtype).ravel())

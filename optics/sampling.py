@@ -265,18 +265,16 @@ def _nodes_needed(problem: Problem, error: float) -> int | None:
         weights = lagrange(test, places)
         worst = 0.0
         for across in (0.0, problem.window.half_width):
-            exact, known = (
-                _slow_part(problem, rim_x, rim_y, problem.distance * np.tan(angles), across)
-                for angles in (test, places)
-            )
+            exact, known = (_slow_part(problem, rim_x, rim_y, angles, across) for angles in (test, places))
             worst = max(worst, float(np.abs(exact - known @ weights).max()))
         if worst < error:
             return n
     return None
 
 
-def _slow_part(problem: Problem, rim_x: np.ndarray, rim_y: np.ndarray, x: np.ndarray, y: float) -> np.ndarray:
-    """exp(ik(D - ρ + s·ξ)), D the distance from ξ to (x, y, z), ρ that from the axis, s the direction."""
+def _slow_part(problem: Problem, rim_x: np.ndarray, rim_y: np.ndarray, angle: np.ndarray, y: float) -> np.ndarray:
+    """exp(ik(D - ρ + s·ξ)), D the distance from ξ to (z tan(angle), y, z), ρ that from the axis, s the direction."""
+    x = problem.distance * np.tan(angle)
     rho = np.sqrt(x * x + y * y + problem.distance**2)
     along = (x * rim_x + y * rim_y) / rho
     excess = problem.radius**2 - 2 * rho * along
