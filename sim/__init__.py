@@ -3,8 +3,8 @@
 Eyes, build_world, World            what there is to see, and with which eyes
 mirror, Mirror                      any MuJoCo model as a Mitsuba scene
 BatchedRenderer                     all eyes of all worlds as one wavefront
-make_vec_env, make_env              the environments, natively batched or single; gymnasium.make("rhabdom/Detection-v0"),
-                                    Navigation-v0 and Tracking-v0 make the latter
+make_vec_env, make_env              the environments, natively batched or single
+                                    (also gymnasium.make("rhabdom/Detection-v0"), Navigation-v0, Tracking-v0)
 View, write_exr, read_exr           what was seen, on disk
 """
 

@@ -1,40 +1,40 @@
 """What the batched renderer needs of a world: the static scene, and the movers' shapes and materials.
 
-Both come from the mirror, so that the renderer shows the same geometry, texture coordinates, textures and lights.
+Both are made by the mirror's own parts, so that the renderer shows the same geometry, texture coordinates, textures
+and lights. Static geoms that share a material become one shape here: nobody asks which geom a ray hit, and every
+shape costs time in every launch of the kernel.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import mitsuba as mi
 import mujoco
 import numpy as np
 
 from sim.movers import Spheres
+from sim.scene import lights, shapes, tessellation
 from sim.scene.mirror import Mirror, mirror
+from sim.scene.shapes import Part
+from sim.scene.tessellation import Triangles
+from sim.variant import variant as in_variant
 from sim.world import World
 
 
 @dataclass(frozen=True)
 class Stage:
-    """static: mirror of the world's own geoms · spheres: the objects', in the order of World.objects"""
+    """scene: mi.Scene of the world's own geoms · spheres: the objects', in the order of World.objects · variant"""
 
-    static: Mirror
+    scene: Any
     spheres: Spheres
-
-    @property
-    def scene(self) -> Any:
-        return self.static.scene
-
-    @property
-    def variant(self) -> str:
-        return self.static.variant
+    variant: str
 
 
 def build_stage(world: World) -> Stage:
-    """The stage of a world. Raises ValueError for an object that is not one sphere, and for moving geoms that are
-    neither the agent's nor an object's."""
+    """The stage of a world. Raises ValueError for an object that is not one sphere, for moving geoms that are
+    neither the agent's nor an object's, and for geoms that glow."""
     model = world.model
     static = mirror(model, bodies=["world"])
     geoms = [_sphere_of(model, name) for name in world.objects]
@@ -49,7 +49,45 @@ def build_stage(world: World) -> Stage:
         offsets=np.array([offset for _, offset in poses]).reshape(-1, 3),
         bsdfs=tuple(static.bsdf(geom) for geom in geoms),
     )
-    return Stage(static, spheres)
+    with in_variant(static.variant):
+        return Stage(_static_scene(static), spheres, static.variant)
+
+
+def _static_scene(static: Mirror) -> Any:
+    """The mirror's scene with one shape per material (and per plugin that is no mesh)."""
+    model = static.model
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    description: dict[str, Any] = {"type": "scene"}
+    meshes: dict[tuple[int, bool, bool], tuple[Any, list[Triangles]]] = {}
+    for geom in map(int, static.geoms):
+        _refuse_glow(model, geom)
+        bsdf, pose = static.bsdf(geom), shapes.pose(data, geom)
+        for k, part in enumerate(shapes.parts(model, geom)):
+            if part.triangles is None:
+                description[f"geom_{geom}_{k}"] = shapes.build(part, pose, f"geom_{geom}_{k}", bsdf, None)
+                continue
+            placed = _placed(part.triangles, pose)
+            key = id(bsdf), placed.uv is None, placed.normals is None
+            meshes.setdefault(key, (bsdf, []))[1].append(placed)
+    for i, (bsdf, triangles) in enumerate(meshes.values()):
+        whole = Part(triangles=tessellation.join(triangles))
+        description[f"mesh_{i}"] = shapes.build(whole, np.eye(4), f"mesh_{i}", bsdf, None)
+    for emitter in lights.emitters(model, data)[0]:
+        description[emitter.name] = emitter.description
+    return mi.load_dict(description, optimize=False)
+
+
+def _placed(triangles: Triangles, pose: np.ndarray) -> Triangles:
+    """Triangles of a geom's frame in the world's."""
+    normals = None if triangles.normals is None else triangles.normals @ pose[:3, :3].T
+    return replace(triangles, vertices=triangles.vertices @ pose[:3, :3].T + pose[:3, 3], normals=normals)
+
+
+def _refuse_glow(model: mujoco.MjModel, geom: int) -> None:
+    material = model.geom_matid[geom]
+    if material >= 0 and model.mat_emission[material] > 0:
+        raise ValueError(f"geom {model.geom(geom).name!r} glows; the batched renderer knows directional lights only")
 
 
 def _sphere_of(model: mujoco.MjModel, body: str) -> int:

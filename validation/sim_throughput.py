@@ -7,7 +7,7 @@ Medians over repeated calls after warm-up, in agent-steps per second (one step o
     render_optics  the same behind a pupil: receptive fields, weights, bands
     step           the whole VecEnv step behind that pupil: physics, rewards, rendering, optics, noise, infos
     mujoco         mujoco.Renderer drawing the same eyes of one world, one after the other (RGB, no optics, no shadows)
-    mujoco_shadows the same with shadows, which the batched renderer has; in software they cost MuJoCo nearly all its time
+    mujoco_shadows the same with shadows, which the batched renderer has; in software they are what it mostly does
 Ratios are to `mujoco`, the faster one. Absolute numbers say as much about the machine as about the code.
 """
 
