@@ -20,7 +20,7 @@ from evolve.report.theme import MUTED
 from optics.precision import precision
 from optics.spectrum import daylight
 
-__all__ = ["eye_figures"]
+__all__ = ["eye_figures", "relief_heights"]
 
 SIZE = (370, 310)
 PIXELS = 161  # of a picture, at most: fine enough for its size on the page
@@ -60,7 +60,7 @@ def _pupil(eye: optics.Eye, phenotype: Phenotype) -> str:
     """Height of the relief over the pupil."""
     pupil = eye.pupil
     assert pupil is not None
-    heights, inside = _heights(pupil)
+    heights, inside = relief_heights(pupil)
     low, high = 1e6 * heights[inside].min(), 1e6 * heights[inside].max()
     radius = 1e6 * pupil.aperture_radius
     with drawing(*SIZE) as drawn:
@@ -83,7 +83,7 @@ def _pupil(eye: optics.Eye, phenotype: Phenotype) -> str:
     return figure(svg, caption)
 
 
-def _heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
+def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
     """Relief [m] over the pupil's square, (y, x), row 0 at y = -a; and which of it lies in the aperture."""
     types = precision("float64")
     centres = (np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1
