@@ -77,7 +77,7 @@ def _transfer(problem: Problem, how: GridSampling, types: Precision) -> Field:
     # The error function falls to the ripple in √ln(1/ripple), which is what the taper's blur is made of.
     steepness = math.sqrt(math.pi * how.taper.width * how.taper.blur / 2)
     middle = opaque(types, how.taper.band + how.taper.width / 2)
-    fade = dr.erf((f - middle) * opaque(types, 2 * steepness / how.taper.width))
+    fade = dr.erf(types.Float((f - middle) * opaque(types, 2 * steepness / how.taper.width)))
     return Field.from_waves((1 - fade) / 2, waves, how.spectrum, types)
 
 
@@ -114,7 +114,8 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
     s = how.directions.x
     cosine = np.sqrt(np.maximum(1 - s[:, None] ** 2 - s[None, :] ** 2, 1e-6))
     nodes = how.half_angle * chebyshev_nodes(how.nodes)
-    angle = np.clip(np.arctan2(s[None, :], cosine), -how.half_angle, how.half_angle)
+    edge = math.asin(min(float(s[-1]), 0.999))  # a margin beyond the window, for the interpolation that follows
+    angle = np.clip(np.arctan2(s[None, :], cosine), -edge, edge)
     along_x = lagrange(angle, nodes)
     total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
     period = problem.wavelength / (how.pupil.dx * how.directions.dx)

@@ -5,8 +5,8 @@ One function, `dft2`, stands for all transforms of this package:
     U[k] = Σ_j u[j] exp(± 2πi j·k / period),   j and k counted from the centre sample n//2.
 
 The period is free (a matrix DFT evaluates any output pitch); a whole period may go through the FFT. Which of the two
-runs is decided here by predicted time: Dr.Jit's matrix product does about 80 Gflop/s per 2 cores, SciPy's FFT about
-8 Gflop/s, so matrices win for small windows and the FFT for large ones. Both are differentiable.
+runs is decided here by predicted time on one core: Dr.Jit's matrix product does about 45 Gflop/s, SciPy's FFT about
+12 Gflop/s less the copies, so matrices win for small windows and the FFT for large ones. Both are differentiable.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def dft2(field: Field, period: float, shape: tuple[int, int], sign: int, pitch: 
 
 
 def predicted_seconds(shape_in: tuple[int, int], period: float, shape_out: tuple[int, int]) -> float:
-    """Time one `dft2` takes on two cores, roughly."""
+    """Time one `dft2` takes on one core, roughly."""
     if _fft_wins(shape_in, period, shape_out):
         return _fft_seconds(shape_in, int(period), shape_out)
     return _matrix_seconds(shape_in, shape_out)
@@ -58,12 +58,12 @@ def _fft_wins(shape_in: tuple[int, int], period: float, shape_out: tuple[int, in
 
 def _matrix_seconds(shape_in: tuple[int, int], shape_out: tuple[int, int]) -> float:
     (ny, nx), (my, mx) = shape_in, shape_out
-    return 8 * (ny * nx * mx + ny * mx * my) / 80e9 + 2e-4
+    return 8 * (ny * nx * mx + ny * mx * my) / 45e9 + 2e-4
 
 
 def _fft_seconds(shape_in: tuple[int, int], period: int, shape_out: tuple[int, int]) -> float:
-    lines = shape_in[0] + shape_out[1]
-    return lines * period * (5 * log2(period + 1) / 8e9 + 8e-9) + 2e-4
+    lines, copied = shape_in[0] + shape_out[1], shape_in[0] * shape_in[1] + shape_out[0] * shape_out[1]
+    return lines * period * (5 * log2(period + 1) / 12e9 + 5e-9) + copied * 8e-9 + 2e-4
 
 
 def _fourier_matrix(types: Precision, n_out: int, n_in: int, period: float, sign: int) -> tuple[Any, Any]:
@@ -128,15 +128,36 @@ def _fft_axis(u: np.ndarray, period: int, n_out: int, sign: int, axis: int) -> n
     """Sum along one axis: wrap the centred samples into one period, transform, unwrap as many as asked."""
     from scipy import fft
 
-    u = np.moveaxis(u, axis, -1)
-    n_in = u.shape[-1]
-    places = (np.arange(n_in) - n_in // 2) % period
-    wrapped = np.zeros((*u.shape[:-1], period), dtype=u.dtype)
-    for start in range(0, n_in, period):  # an input longer than the period folds onto itself
-        part = slice(start, min(start + period, n_in))
-        wrapped[..., places[part]] += u[..., part]
+    wrapped = _wrap(u, period, axis)
     if sign < 0:
-        spectrum = fft.fft(wrapped, axis=-1, overwrite_x=True)
+        spectrum = fft.fft(wrapped, axis=axis, overwrite_x=True)
     else:
-        spectrum = fft.ifft(wrapped, axis=-1, norm="forward", overwrite_x=True)
-    return np.moveaxis(spectrum[..., (np.arange(n_out) - n_out // 2) % period], -1, axis)
+        spectrum = fft.ifft(wrapped, axis=axis, norm="forward", overwrite_x=True)
+    if n_out > period:
+        return np.take(spectrum, (np.arange(n_out) - n_out // 2) % period, axis=axis)
+    before, after = np.split(spectrum, [n_out - n_out // 2], axis=axis)
+    return np.concatenate([after[_along(axis, period - n_out, None)], before], axis=axis)
+
+
+def _wrap(u: np.ndarray, period: int, axis: int) -> np.ndarray:
+    """Centred samples in FFT order, zero-padded to one period; more than a period folds onto itself."""
+    n = u.shape[axis]
+    start = -(n // 2) % period
+    periods = -(-(start + n) // period)
+    shape = list(u.shape)
+    if n <= period:
+        shape[axis] = period
+        wrapped = np.zeros(shape, dtype=u.dtype)
+        wrapped[_along(axis, 0, n - n // 2)] = u[_along(axis, n // 2, None)]
+        wrapped[_along(axis, period - n // 2, None)] = u[_along(axis, 0, n // 2)]
+        return wrapped
+    shape[axis] = periods * period
+    padded = np.zeros(shape, dtype=u.dtype)
+    padded[_along(axis, start, start + n)] = u
+    return padded.reshape(*shape[:axis], periods, period, *shape[axis + 1 :]).sum(axis=axis)
+
+
+def _along(axis: int, start: int, stop: int | None) -> tuple[slice, ...]:
+    """Index that cuts one axis of a two-dimensional array."""
+    cut = slice(start, stop)
+    return (cut, slice(None)) if axis == 0 else (slice(None), cut)

@@ -56,11 +56,8 @@ class Grid:
         import drjit as dr
 
         height, width = self.shape
-        index = dr.arange(precision.Index, height * width)
-        columns = dr.opaque(precision.Index, width)
-        row = index // columns
-        column = index - row * columns
-        pitch = opaque(precision, self.dx)
-        x = (precision.Float64(column) - opaque(precision, width // 2)) * pitch
-        y = (precision.Float64(row) - opaque(precision, height // 2)) * pitch
-        return x, y
+        index = precision.Float64(dr.arange(precision.Index, height * width))
+        columns, pitch = opaque(precision, width), opaque(precision, self.dx)
+        row = dr.floor((index + 0.5) / columns)  # integer division would not vectorise
+        column = dr.fma(-row, columns, index)
+        return (column - opaque(precision, width // 2)) * pitch, (row - opaque(precision, height // 2)) * pitch

@@ -36,7 +36,7 @@ class Plan:
 
     samples: (y, x) samples of the pupil (radial and angular nodes, for the direct sum).
     predicted_error: relative L2 error of the intensity over the window.
-    seconds: predicted time on two cores.
+    seconds: predicted time on one core.
     """
 
     method: str

@@ -16,10 +16,10 @@ from optics.source import PointSource
 
 __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 
-# Light that leaves the pupil more than this far off its axis counts as lost to the eye.
-WIDEST_TANGENT = math.tan(math.radians(60))
-MOST_CELLS = 4097
-MOST_SECONDS = 1.0  # per band
+# Light from further off a receptor's direction counts as screened by the eye's rim: half the widest field of view.
+WIDEST_TANGENT = math.tan(math.radians(50))
+MOST_CELLS = 2049
+MOST_SECONDS = 1.5  # per band
 # Light beyond the window's reach is less than the tolerance; what leaks back of it may be a tenth in amplitude.
 FADE_RIPPLE = 0.1
 
