@@ -118,12 +118,11 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
     angle = np.clip(np.arctan2(s[None, :], cosine), -edge, edge)
     along_x = lagrange(angle, nodes)
     total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
-    period = problem.wavelength / (how.pupil.dx * how.directions.dx)
     places = problem.distance * np.tan(nodes)
     for a, x in enumerate(places):
         for b, y in enumerate(places):
             part = u * _slow_kernel(float(x), float(y), problem, how.pupil, types)
-            part = dft2(part, period, how.directions.shape, -1, how.directions.dx)
+            part = dft2(part, how.period, how.directions.shape, -1, how.directions.dx)
             weight = types.Float(np.ascontiguousarray(along_x[a] * along_x[b].T, dtype=types.dtype).ravel())
             total_re, total_im = total_re + weight * part.re, total_im + weight * part.im
             dr.eval(total_re, total_im)

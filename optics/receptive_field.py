@@ -19,7 +19,7 @@ __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 # Light from further off a receptor's direction counts as screened by the eye's rim: half the widest field of view.
 WIDEST_TANGENT = math.tan(math.radians(50))
 MOST_CELLS = 2049
-MOST_SECONDS = 1.5  # per band
+MOST_SECONDS = 3.0  # per band
 # Light beyond the window's reach is less than the tolerance; what leaks back of it may be a tenth in amplitude.
 FADE_RIPPLE = 0.1
 

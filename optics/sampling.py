@@ -150,7 +150,7 @@ class NodeSampling:
 
 @dataclass(frozen=True)
 class FarFieldSampling:
-    """Pupil samples, direction cosines (pitch in units of 1), and nodes per axis over the window.
+    """Pupil samples, direction cosines (pitch 1/period of their transform), and nodes per axis over the window.
 
     The nodes are Chebyshev points in the angle atan(x/z) up to half_angle [rad]: in x the kernel has a pole at ±iz.
     """
@@ -158,6 +158,7 @@ class FarFieldSampling:
     disk: SoftDisk
     pupil: Grid
     directions: Grid
+    period: int
     nodes: int
     half_angle: float
     seconds: float
@@ -246,12 +247,13 @@ def _far_field(problem: Problem) -> list[Sampling]:
     disk = _soft_disk(problem, band + phase_band)
     pitch = 1 / (band + disk.stopband + phase_band)
     pupil = Grid.square(2 * math.ceil((disk.radius + disk.reach) / pitch) + 1, pitch)
-    step = problem.wavelength / (8 * problem.radius)
+    period = fast_length(8 * problem.radius / pitch)  # a whole number, for the FFT
+    step = problem.wavelength / (period * pitch)
     directions = Grid.square(2 * (math.ceil(half / math.hypot(half, problem.distance) / step) + 10) + 1, step)
-    once = predicted_seconds(pupil.shape, 0.5, directions.shape) + 2e-3
+    once = predicted_seconds(pupil.shape, period, directions.shape) + 2e-3
     once += pupil.shape[0] ** 2 * 6e-8 + directions.shape[0] ** 2 * 2e-8
     seconds = nodes**2 * once + math.prod(problem.window.shape) * 3e-7
-    return [FarFieldSampling(disk, pupil, directions, nodes, math.atan2(half, problem.distance), seconds)]
+    return [FarFieldSampling(disk, pupil, directions, period, nodes, math.atan2(half, problem.distance), seconds)]
 
 
 def _nodes_needed(problem: Problem, error: float) -> int | None:
