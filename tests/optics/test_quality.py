@@ -1,0 +1,111 @@
+"""MTF, Strehl ratio, encircled energy and image quality against closed forms."""
+
+import numpy as np
+import pytest
+
+import optics
+from validation import reference
+
+WAVELENGTH, FOCAL_LENGTH = 550e-9, 240e-6
+
+
+def ideal(f_number: float, dx: float, n: int, defocus: float = 0.0, **options) -> optics.PSFResult:
+    pupil = optics.Pupil(aperture_radius=FOCAL_LENGTH / (2 * f_number), thin_lens_focal_length=FOCAL_LENGTH + defocus)
+    return optics.psf(pupil, [WAVELENGTH], FOCAL_LENGTH, dx=dx, shape=(n, n), **options)
+
+
+def circular_mtf(f: np.ndarray, cutoff: float) -> np.ndarray:
+    """2/π (arccos s - s √(1 - s²)), s = f / cutoff (Goodman, eq. 6-32)."""
+    s = np.clip(f / cutoff, 0, 1)
+    return 2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
+
+
+def test_mtf_of_an_ideal_lens_is_the_overlap_of_two_disks():
+    """f/8: the window of 400 µm loses 1 % of the light in far rings, which raises low frequencies by as much."""
+    result = ideal(8, 1.6e-6, 257)
+    transfer = optics.mtf(result)
+    f = np.linspace(0.1, 1, 10) * transfer.cutoff[0]
+    expected = circular_mtf(f, transfer.cutoff[0])
+    measured = transfer.profile(f)[0]
+    np.testing.assert_allclose(measured, expected, atol=0.01)
+    wrong_cutoff = circular_mtf(f, 1.1 * transfer.cutoff[0])
+    assert np.abs(measured - wrong_cutoff).max() > 0.03
+
+
+def test_mtf_is_one_at_zero_frequency_and_nothing_beyond_the_cutoff():
+    result = ideal(4, 0.8e-6, 257)
+    transfer = optics.mtf(result)
+    assert transfer.mtf[0, 128, 128] == pytest.approx(1)
+    assert transfer.fx[128] == transfer.fy[128] == 0
+    beyond = np.hypot(transfer.fx[None, :], transfer.fy[:, None]) > 1.1 * transfer.cutoff[0]
+    assert transfer.mtf[0][beyond].max() < 2e-3
+
+
+def test_mtf_keeps_the_order_of_axes():
+    """A PSF stretched along x blurs along fx."""
+    result = ideal(8, 2e-6, 65)
+    x, y = result.x[None, :], result.y[:, None]
+    stretched = np.exp(-(x**2) / (2 * 8e-6**2) - y**2 / (2 * 4e-6**2))[None]
+    transfer = optics.mtf(
+        optics.PSFResult(stretched, 2e-6, result.wavelengths, FOCAL_LENGTH, result.pupil, result.plans)
+    )
+    along_x = np.interp(2e4, transfer.fx, transfer.mtf[0, 32])
+    along_y = np.interp(2e4, transfer.fy, transfer.mtf[0, :, 32])
+    assert along_x == pytest.approx(np.exp(-2 * (np.pi * 8e-6 * 2e4) ** 2), abs=0.02)
+    assert along_y == pytest.approx(np.exp(-2 * (np.pi * 4e-6 * 2e4) ** 2), abs=0.02)
+
+
+@pytest.mark.parametrize("f_number", [2, 4, 16])
+def test_strehl_ratio_of_an_ideal_lens_is_one_at_any_aperture(f_number):
+    """The exact peak: Airy's πR²/(λf)² would be 4 % off at f/2."""
+    assert optics.strehl_ratio(ideal(f_number, 0.5e-6, 33))[0] == pytest.approx(1, abs=1e-4)
+
+
+def test_strehl_ratio_under_defocus():
+    """sinc²(W/2) with W the defocus in waves at the edge; f/8 defocused by a tenth (Mahajan, Aberration Theory)."""
+    defocus = 0.05 * FOCAL_LENGTH
+    result = ideal(8, 0.5e-6, 65, defocus)
+    radius = result.pupil.aperture_radius
+    waves = radius**2 / (2 * WAVELENGTH) * (1 / FOCAL_LENGTH - 1 / (FOCAL_LENGTH + defocus))
+    on_axis = result.psf[0, 32, 32] / (result.psf.max() / optics.strehl_ratio(result)[0])
+    assert on_axis == pytest.approx(np.sinc(waves) ** 2, rel=5e-3)
+
+
+def test_encircled_energy_follows_airy_and_converges_with_the_pitch():
+    f_number = 16
+    radius = FOCAL_LENGTH / (2 * f_number)
+    radii = np.array([5e-6, 1.07e-5, 2e-5])
+    expected = reference.airy_encircled_energy(radii, WAVELENGTH, radius, FOCAL_LENGTH)
+    errors = []
+    for dx in (2e-6, 1e-6, 0.5e-6):
+        n = 2 * int(30e-6 / dx) + 1
+        errors.append(np.abs(optics.encircled_energy(ideal(f_number, dx, n), radii)[0] - expected).max())
+    assert errors[-1] < 2e-3  # f/16 departs from Airy by about that much
+    assert errors[0] > 4 * errors[-1]
+
+
+def test_encircled_energy_follows_its_centre():
+    result = ideal(4, 0.5e-6, 65)
+    off = optics.encircled_energy(result, 2e-6, centre=(6e-6, 0))[0, 0]
+    assert off < 0.1 * optics.encircled_energy(result, 2e-6)[0, 0]
+
+
+def test_image_quality_trades_light_against_blur_and_noise():
+    result = ideal(8, 2e-6, 129)
+    clear = optics.image_quality(result, nyquist=2e4)[0]
+    assert 0.8 < clear < 1
+    assert optics.image_quality(result, nyquist=2e5)[0] < 0.7 * clear
+    assert optics.image_quality(result, nyquist=2e4, throughput=0.5)[0] == pytest.approx(0.5 * clear)
+    noisy = optics.image_quality(result, nyquist=2e4, throughput=0.5, noise_sigma=0.05)[0]
+    assert noisy == pytest.approx(0.5 * (clear - 0.1), abs=1e-6)  # the floor is 0.05 / 0.5, below the MTF everywhere
+    assert optics.image_quality(result, nyquist=2e4, throughput=0.0)[0] == 0
+
+
+def test_bad_arguments_are_named():
+    result = ideal(8, 2e-6, 33)
+    with pytest.raises(ValueError, match=r"radii.*\[0, 3.2e-05\]"):
+        optics.encircled_energy(result, 1e-3)
+    with pytest.raises(ValueError, match="nyquist"):
+        optics.image_quality(result, nyquist=0)
+    with pytest.raises(ValueError, match="throughput"):
+        optics.image_quality(result, nyquist=1e4, throughput=1.5)
