@@ -64,6 +64,11 @@ class BatchedRenderer:
                 "bsdfs": mi.BSDFPtr([*stage.spheres.bsdfs, stage.scene.shapes()[0].bsdf()]),
             }
             wavefront = _Wavefront(self, stage)
+            # Read lane by lane, so that a replay has the width that was recorded. With tables alone as inputs, Dr.Jit
+            # 1.5 took it from one that changes with what else the process has loaded: 126 lanes replayed out of 128,
+            # the last receptors silently dark (tests/test_parameters.py runs each life twice and has met it).
+            self._inputs["lanes"] = dr.arange(mi.UInt32, wavefront.lanes)
+            dr.eval(self._inputs["lanes"])
             reduced = self.sensor.rays_per_receptor
             self._rays: Any = dr.freeze(lambda scene, poses, inputs: wavefront(scene, poses, inputs, 1))
             self._sums: Any = dr.freeze(lambda scene, poses, inputs: wavefront(scene, poses, inputs, reduced))
@@ -137,7 +142,7 @@ class _Wavefront:
         self.bands = lighting.spectra(renderer.bands.wavelengths)
 
     def __call__(self, scene: Any, poses: Any, inputs: dict[str, Any], reduced: int) -> Any:
-        lane = dr.arange(mi.UInt32, self.lanes)
+        lane = inputs["lanes"]
         view = lane // self.n_rays
         world = view // self.n_eyes
         ray, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, lane - view * self.n_rays)
