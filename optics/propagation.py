@@ -1,0 +1,204 @@
+"""A sampled field carried from plane to plane by its angular spectrum.
+
+The samples stand for the band-limited function through them, zero outside. Their spectrum is multiplied by the transfer
+function of free space and summed again wherever the result is wanted:
+
+    U(x, y; z) = F⁻¹{F{U₀} H},   H = exp(2πi z √((n/λ)² - fx² - fy²))     (Goodman, §3.10.2)
+
+A finite transform repeats the field every period. The period is chosen so that light aimed anywhere near the window
+lands there once; light aimed farther is faded out before it can wrap around, and what the spectrum holds too near to
+grazing for either is counted into the predicted error.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.arguments import finite, in_range, positive
+from optics.field import Field
+from optics.fourier import dft2, fast_length, predicted_seconds
+from optics.grid import Grid
+from optics.planner import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Plan
+from optics.precision import Precision, opaque, precision
+
+__all__ = ["PROPAGATION_METHODS", "PropagationResult", "propagate"]
+
+PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
+# Steepest light that the period makes room for, as sin θ; z tan θ has no bound beyond.
+STEEPEST_SINE = 0.995
+# The fade's width against the band it ends: wider blurs less and costs period.
+FADE = 0.12
+
+
+@dataclass(frozen=True, eq=False)
+class PropagationResult:
+    """u: complex field (…, y, x) at pitch dx [m], centre sample n//2. plan: how it was computed, and how well.
+
+    evanescent_power: fraction of the input's power in waves that do not propagate. Forwards they decay; backwards they
+        are dropped, since undoing the decay would amplify noise without bound.
+    """
+
+    u: np.ndarray
+    dx: float
+    plan: Plan
+    evanescent_power: float
+
+
+@dataclass(frozen=True)
+class _Sampling:
+    """period [m]; spectrum: the grid of frequencies; band, fade [1/m]: kept up to band, gone at band + fade."""
+
+    method: str
+    source: Grid
+    window: Grid
+    wavelength: float
+    distance: float
+    period: float
+    spectrum: Grid
+    band: float
+    fade: float
+    ripple: float
+
+
+def propagate(
+    u: np.ndarray,
+    *,
+    dx: float,
+    wavelength: float,
+    distance: float,
+    out_dx: float | None = None,
+    out_shape: tuple[int, int] | None = None,
+    medium_n: float = 1.0,
+    tolerance: float = 1e-3,
+    method: str = "auto",
+    dtype: str = "float32",
+) -> PropagationResult:
+    """Field at `distance` [m] behind (or, negative, before) the plane in which it is u, carrier exp(ikz) included.
+
+    u: complex (…, y, x), pitch dx [m], centre sample n//2. wavelength: vacuum [m].
+    out_dx, out_shape: pitch and shape (y, x) wanted; default as u's.
+    tolerance: relative L2 error of the intensity over the window, beyond that of the sampling of u itself.
+    method: "auto" and "angular_spectrum" are exact; "fresnel" is the paraxial approximation, only on request.
+
+    Raises:
+        ValueError: bad argument, named with its value and valid range.
+        AccuracyError: the tolerance cannot be met; says what can.
+    """
+    if method not in ("auto", *PROPAGATION_METHODS):
+        raise ValueError(f"method = {method!r}: must be 'auto' or one of {', '.join(PROPAGATION_METHODS)}")
+    field = _field(u)
+    source = Grid(field.shape[-2:], dx)
+    window = Grid(out_shape or source.shape, dx if out_dx is None else out_dx)
+    in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5)
+    how = _sampling(
+        "angular_spectrum" if method == "auto" else method,
+        source,
+        window,
+        positive("wavelength", wavelength) / in_range("medium_n", medium_n, 1.0, 10.0),
+        finite("distance", distance),
+        0.3 * tolerance,
+    )
+    types = precision(dtype)
+    planes = [_one(plane, how, types) for plane in field.reshape(-1, *source.shape)]
+    out = np.stack([plane for plane, _, _ in planes]).reshape(*field.shape[:-2], *window.shape)
+    error = max(error for _, error, _ in planes) + FLOAT_NOISE[dtype]
+    if error > tolerance:
+        raise AccuracyError(
+            f"tolerance = {tolerance:g}: too much of the light leaves so flat, or so little of it meets the window, "
+            f"that the error reaches {error:.1g}; ask for that, or for a larger out_shape"
+        )
+    return PropagationResult(out, window.dx, _plan(how, error, dtype), max(lost for _, _, lost in planes))
+
+
+def _field(u: np.ndarray) -> np.ndarray:
+    field = np.asarray(u)
+    if field.ndim < 2 or 0 in field.shape:
+        raise ValueError(f"u has shape {field.shape}: must be (…, y, x), not empty")
+    if not np.isfinite(field).all():
+        raise ValueError("u: must be finite everywhere")
+    return field
+
+
+def _sampling(method: str, source: Grid, window: Grid, wavelength: float, distance: float, ripple: float) -> _Sampling:
+    z, nyquist = abs(distance), math.sqrt(0.5) / source.dx  # along the diagonal
+    corner = source.half_diagonal + source.dx + window.half_diagonal
+    blur = 2 * math.log(1 / ripple) / math.pi
+    paraxial = method == "fresnel"
+    band = (corner / max(z, 1e-300) if paraxial else corner / math.hypot(corner, z)) / wavelength
+    # The fade blurs by blur / fade; the band that lands this far outside the window includes that margin.
+    for _ in range(20):
+        fade = FADE * band
+        reach = corner + blur / fade
+        band = (reach / max(z, 1e-300) if paraxial else reach / math.hypot(reach, z)) / wavelength
+    end = band + fade
+    if end >= nyquist or (not paraxial and end * wavelength >= STEEPEST_SINE):
+        band, fade = math.inf, 0.0  # nothing to fade: all that the samples hold may matter
+        end = nyquist if paraxial else min(nyquist, STEEPEST_SINE / wavelength)
+        reach = corner
+    sine = end * wavelength
+    walk = z * (sine if paraxial else sine / math.sqrt(1 - sine * sine))
+    halves = [(n // 2 + 1) * source.dx + (m // 2) * window.dx for n, m in zip(source.shape, window.shape, strict=True)]
+    least = max(max(halves) + min(walk, reach), 2 * (max(source.shape) // 2 + 1) * source.dx)
+    samples = fast_length(least / source.dx)
+    period = samples * source.dx
+    across = samples if math.isinf(band) else min(samples, 2 * math.ceil(end * period) + 1)
+    if max(across, *window.shape) > MOST_SAMPLES:
+        raise AccuracyError(
+            f"distance = {distance:g} m over a window of {2 * window.half_width:.3g} m needs {across} samples across; "
+            f"the limit is {MOST_SAMPLES}: shrink the window, or sample u more coarsely if it allows"
+        )
+    spectrum = Grid.square(across, 1 / period)
+    return _Sampling(method, source, window, wavelength, distance, period, spectrum, band, fade, ripple)
+
+
+def _one(plane: np.ndarray, how: _Sampling, types: Precision) -> tuple[np.ndarray, float, float]:
+    """The propagated plane, the predicted error of its intensity, and the fraction of evanescent power."""
+    u = Field.from_numpy(plane, how.source.dx, types)
+    spectrum = dft2(u, round(how.period / how.source.dx), how.spectrum.shape, -1, how.spectrum.dx)
+    power = spectrum.intensity.numpy().astype(np.float64) * how.source.dx**4 / how.period**2
+    total = float(np.sum(np.abs(plane) ** 2, dtype=np.float64)) * how.source.dx**2
+    if total == 0:
+        return np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0
+    sine = np.hypot(how.spectrum.x[None, :], how.spectrum.y[:, None]).ravel() * how.wavelength
+    out = dft2(spectrum * _transfer(how, types), how.period / how.window.dx, how.window.shape, +1, how.window.dx)
+    result = out.scaled((how.source.dx / how.period) ** 2).numpy()
+    arrived = float(np.sum(np.abs(result) ** 2, dtype=np.float64)) * how.window.dx**2
+    loose = power[(sine > STEEPEST_SINE) & (sine < 1)].sum() if math.isinf(how.band) and how.distance else 0.0
+    rounding = FLOAT_NOISE[types.dtype] * math.sqrt(total / arrived) if arrived else math.inf
+    error = 2 * math.sqrt(loose / arrived) + rounding + (how.ripple if how.fade else 0.0) if arrived else math.inf
+    return result, error, float(power[sine >= 1].sum() / total)
+
+
+def _transfer(how: _Sampling, types: Precision) -> Field:
+    """H under the fade, over the spectrum's grid; whole waves are dropped in float64."""
+    import drjit as dr
+
+    fx, fy = how.spectrum.coordinates(types)
+    f2 = fx * fx + fy * fy
+    s2 = f2 * opaque(types, how.wavelength**2)
+    z = opaque(types, how.distance / how.wavelength)
+    if how.method == "fresnel":
+        waves, decay = z * (1 - s2 / 2), types.Float64(1)
+    else:
+        waves = z * dr.sqrt(dr.maximum(1 - s2, 0))
+        gone = dr.exp(-2 * math.pi * dr.abs(z) * dr.sqrt(dr.maximum(s2 - 1, 0)))
+        decay = dr.select(s2 < 1, 1, gone if how.distance >= 0 else 0)
+    if how.fade:
+        steepness = 2 * math.sqrt(math.log(1 / how.ripple)) / how.fade
+        middle = how.band + how.fade / 2
+        decay *= (1 - dr.erf((dr.sqrt(f2) - opaque(types, middle)) * opaque(types, steepness))) / 2
+    return Field.from_waves(decay, waves, how.spectrum, types)
+
+
+def _plan(how: _Sampling, error: float, dtype: str) -> Plan:
+    kept = f"band {how.band * how.wavelength:.2g} n/λ" if how.fade else "the whole spectrum of u"
+    why = f"period {how.period:.3g} m, {kept}" + ("; paraxial, as asked" if how.method == "fresnel" else "")
+    samples = round(how.period / how.source.dx)
+    seconds = predicted_seconds(how.source.shape, samples, how.spectrum.shape)
+    seconds += predicted_seconds(how.spectrum.shape, how.period / how.window.dx, how.window.shape)
+    any_samples: Any = (samples, samples)
+    return Plan(how.method, any_samples, dtype, error, why, seconds)
