@@ -19,7 +19,7 @@ from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 __all__ = ["BackendError", "Llvm", "candidates", "find", "prove", "require"]
 
@@ -139,7 +139,7 @@ def _prove_cached(path: str) -> Llvm:
     return result
 
 
-def _read_cache() -> dict[str, dict[str, str]]:
+def _read_cache() -> dict[str, Any]:
     try:
         known = json.loads(_cache_file().read_text())
     except (OSError, ValueError):
@@ -147,7 +147,7 @@ def _read_cache() -> dict[str, dict[str, str]]:
     return known if isinstance(known, dict) else {}
 
 
-def _write_cache(content: dict[str, dict[str, str]]) -> None:
+def _write_cache(content: dict[str, Any]) -> None:
     """A cache that cannot be written costs 0.2 s a start, so it is no error."""
     cache = _cache_file()
     try:
