@@ -84,7 +84,7 @@ class Eye:
         """
         positive("z", z, infinite=True)
         if self.pupil is None:
-            return perfect_psf(self._retina(1))
+            return perfect_psf(self._retina(1), self.sensor_width / 2)
         return retinal_psf(self.pupil, self._retina(4), z)
 
     def kernel(self, samples_per_receptor: int, z: float = math.inf) -> np.ndarray:

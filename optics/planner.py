@@ -13,14 +13,25 @@ Rayleigh-Sommerfeld integral); they differ in where they sample it:
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from optics.angular_spectrum import GridSampling, split, whole
 from optics.arguments import in_range
-from optics.sampling import Problem, Sampling, options
+from optics.direct_sum import NodeSampling, nodes
+from optics.far_field import FarFieldSampling, far_field
+from optics.problem import Problem
 
-__all__ = ["METHODS", "AccuracyError", "Plan", "choose"]
+__all__ = ["METHODS", "AccuracyError", "Plan", "Sampling", "choose"]
 
-METHODS = ("angular_spectrum", "split_angular_spectrum", "far_field", "rayleigh_sommerfeld")
+Sampling = GridSampling | NodeSampling | FarFieldSampling
+# Each maps a problem to the samplings by which it meets the tolerance: none, one or several.
+METHODS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
+    "angular_spectrum": whole,
+    "split_angular_spectrum": split,
+    "far_field": far_field,
+    "rayleigh_sommerfeld": nodes,
+}
 # Largest square array: 4096² complex64 is 134 MB, and a handful of such arrays live at once.
 MOST_SAMPLES = 4096
 FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}  # relative to the field's root mean square, see tests
@@ -69,8 +80,8 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
         raise ValueError(f"method = {method!r}: must be 'auto' or one of {', '.join(METHODS)}")
     in_range("tolerance", problem.tolerance, 1e-12, 0.5)
     _check_dtype(problem)
-    asked = METHODS if method == "auto" else (method,)
-    cheapest = {name: min(found, key=_seconds) for name in asked if (found := options(problem, name))}
+    asked = tuple(METHODS) if method == "auto" else (method,)
+    cheapest = {name: min(found, key=_seconds) for name in asked if (found := METHODS[name](problem))}
     fitting = [option for option in cheapest.values() if _within(option, most_seconds)]
     if not fitting:
         raise AccuracyError(_refusal(problem, list(cheapest.values()), most_seconds))

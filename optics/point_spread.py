@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from optics.angular_spectrum import GridSampling
 from optics.arguments import positive
-from optics.diffraction import Beam, intensity
+from optics.beam import Beam
 from optics.grid import Grid
-from optics.planner import FLOAT_NOISE, AccuracyError, Plan, choose
+from optics.planner import FLOAT_NOISE, AccuracyError, Plan, Sampling, choose
+from optics.problem import Problem
 from optics.pupil import Pupil
-from optics.sampling import GridSampling, Problem, Sampling
 from optics.source import PointSource
 
 __all__ = ["PSFResult", "psf"]
@@ -32,7 +33,7 @@ class PSFResult:
     dx: float
     wavelengths: np.ndarray
     sensor_distance: float
-    pupil: Pupil | None
+    pupil: Pupil
     plans: tuple[Plan, ...]
 
     @property
@@ -109,7 +110,7 @@ def monochromatic(
         AccuracyError: no method meets the tolerance, or the window is so dark that rounding breaks it.
     """
     plan, sampling = choose(task, method, most_seconds)
-    image = (intensity(beam, task, sampling).numpy() / beam.pupil.area).reshape(task.window.shape)
+    image = (sampling.intensity(beam, task).numpy() / beam.pupil.area).reshape(task.window.shape)
     mean, mean_square = float(image.mean(dtype=np.float64)), float(np.mean(np.square(image, dtype=np.float64)))
     bright = 1 / _plane(task, sampling) ** 2  # mean PSF over the plane that the transform spans
     noise = FLOAT_NOISE[task.dtype]

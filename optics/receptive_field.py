@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from optics.diffraction import Beam
+from optics.beam import Beam
 from optics.grid import Grid
 from optics.planner import AccuracyError, Plan
 from optics.point_spread import PSFResult, monochromatic, problem
@@ -80,11 +80,12 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: float) -> PSFResult:
     return PSFResult(np.stack(images), pitch, retina.wavelengths, retina.distance, pupil, tuple(plans))
 
 
-def perfect_psf(retina: Retina) -> PSFResult:
-    """All power in one cell: the perfect lens."""
+def perfect_psf(retina: Retina, radius: float) -> PSFResult:
+    """All power in one cell: a perfect lens of the given aperture radius [m], diffraction left out."""
     image = np.full((len(retina.wavelengths), 1, 1), 1 / retina.cell**2, dtype=np.float32)
+    pupil = Pupil(radius, thin_lens_focal_length=retina.distance)
     plan = Plan("perfect_lens", (1, 1), "float32", 0.0, "no pupil: geometric image, no blur")
-    return PSFResult(image, retina.cell, retina.wavelengths, retina.distance, None, (plan,))
+    return PSFResult(image, retina.cell, retina.wavelengths, retina.distance, pupil, (plan,))
 
 
 def _view(beam: Beam, retina: Retina) -> _View:

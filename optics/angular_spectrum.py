@@ -1,0 +1,164 @@
+"""The angular spectrum of a pupil's field on grids, whole or with its paraxial part split off."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+from optics.aperture import SoftDisk
+from optics.beam import Beam
+from optics.field import Field
+from optics.fourier import dft2, fast_length, predicted_seconds
+from optics.grid import Grid
+from optics.precision import Precision, opaque, precision
+from optics.problem import Problem, Taper
+
+__all__ = ["FADES", "STEEPEST_SINE", "GridSampling", "split", "whole"]
+
+# The taper must end this far from grazing incidence, where z tan θ has no bound.
+STEEPEST_SINE = 0.9995
+FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)  # blurs to try, in units of the problem's size
+
+
+@dataclass(frozen=True)
+class GridSampling:
+    """Samples of "angular_spectrum" and "split_angular_spectrum".
+
+    period: width [m] after which the pupil plane repeats, in pupil_period samples; spectrum_samples lie 1/period apart.
+    output_period: samples over the period of the plane that the last transform starts from or ends on.
+    """
+
+    method: str
+    disk: SoftDisk
+    taper: Taper
+    period: float
+    pupil_period: int
+    output_period: int
+    seconds: float = 0.0
+
+    @property
+    def pupil(self) -> Grid:
+        """The samples that hold the soft disk."""
+        pitch = self.period / self.pupil_period
+        across = 2 * math.ceil((self.disk.radius + self.disk.reach) / pitch) + 1
+        return Grid.square(min(self.pupil_period, across), pitch)
+
+    @property
+    def spectrum(self) -> Grid:
+        return Grid.square(2 * math.ceil(self.taper.end * self.period) + 1, 1 / self.period)
+
+    @property
+    def relay(self) -> Grid:
+        return Grid.square(self.output_period, self.period / self.output_period)
+
+    def intensity(self, beam: Beam, problem: Problem) -> Any:
+        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        return _angular_spectrum(beam, problem, self, precision(problem.dtype)).intensity
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        return self.pupil.shape
+
+    @property
+    def largest(self) -> int:
+        """Side of the largest square array."""
+        arrays = [self.pupil.shape[0], self.spectrum.shape[0]]
+        return max([*arrays, self.output_period] if self.method.startswith("split") else arrays)
+
+
+def whole(problem: Problem) -> list[GridSampling]:
+    """Samplings by which the whole spectrum meets the problem's tolerance."""
+    return [_whole(problem, taper) for taper in _tapers(problem)]
+
+
+def split(problem: Problem) -> list[GridSampling]:
+    """Samplings by which the split spectrum meets the problem's tolerance."""
+    return [_split(problem, taper) for taper in _tapers(problem)]
+
+
+def _tapers(problem: Problem) -> list[Taper]:
+    size = problem.radius + problem.outermost
+    tapers = [Taper.of(problem, share * size) for share in FADES]
+    return [taper for taper in tapers if taper.sine < STEEPEST_SINE]
+
+
+def _whole(problem: Problem, taper: Taper) -> GridSampling:
+    """One period holds the window and all light that could wrap around into it."""
+    disk = problem.soft_disk(taper.end + problem.phase_band)
+    beam = problem.radius + disk.reach + taper.blur + problem.distance * taper.tangent
+    pitch = problem.window.dx
+    output_period = fast_length(max(problem.window.half_width + beam, 2 * (problem.radius + disk.reach)) / pitch)
+    period = output_period * pitch
+    pupil_period = fast_length(period * (taper.end + disk.stopband + problem.phase_band))
+    sampling = GridSampling("angular_spectrum", disk, taper, period, pupil_period, output_period)
+    last = predicted_seconds(sampling.spectrum.shape, output_period, problem.window.shape)
+    return _timed(sampling, last)
+
+
+def _split(problem: Problem, taper: Taper) -> GridSampling:
+    """One period holds the pupil and the non-paraxial walk-off z (tan θ - sin θ)."""
+    disk = problem.soft_disk(taper.end + problem.phase_band)
+    relay = problem.radius + disk.reach + taper.blur + problem.distance * (taper.tangent - taper.sine)
+    period = 2 * relay
+    pupil_period = fast_length(period * (taper.end + disk.stopband + problem.phase_band))
+    reached = problem.window.half_width + relay + problem.distance * taper.sine
+    relay_period = fast_length(period * reached / (problem.wavelength * problem.distance))
+    sampling = GridSampling("split_angular_spectrum", disk, taper, period, pupil_period, relay_period)
+    last = predicted_seconds(sampling.spectrum.shape, relay_period, sampling.relay.shape)
+    last += predicted_seconds(sampling.relay.shape, 0.5, problem.window.shape)  # no whole period: a matrix
+    return _timed(sampling, last)
+
+
+def _timed(sampling: GridSampling, last: float) -> GridSampling:
+    pupil, spectrum = sampling.pupil.shape, sampling.spectrum.shape
+    seconds = predicted_seconds(pupil, sampling.pupil_period, spectrum) + last
+    seconds += pupil[0] ** 2 * 6e-8 + spectrum[0] ** 2 * 2e-8 + 2e-3
+    return replace(sampling, seconds=seconds)
+
+
+def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
+    """U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10), up to a phase that intensity forgets."""
+    u = beam.behind(how.disk, how.pupil, types)
+    spectrum = dft2(u, how.pupil_period, how.spectrum.shape, -1, how.spectrum.dx)
+    spectrum = spectrum * _transfer(problem, how, types)
+    scale = (how.pupil.dx / how.period) ** 2
+    if how.method == "angular_spectrum":
+        window = problem.window
+        return dft2(spectrum, how.output_period, window.shape, +1, window.dx).scaled(scale)
+    return _paraxial_rest(spectrum, problem, how, types).scaled(scale)
+
+
+def _transfer(problem: Problem, how: GridSampling, types: Precision) -> Field:
+    """exp(ikz (cos θ - 1)) under the spectral taper; the split method leaves the paraxial -ikz sin²θ/2 for later.
+
+    Goodman, eq. 3-74. cos θ - 1 = -q, q = sin²θ / (1 + cos θ), and with the paraxial part taken out -q²/2: no
+    difference of nearly equal numbers.
+    """
+    import drjit as dr
+
+    fx, fy = how.spectrum.coordinates(types)
+    f = dr.sqrt(fx * fx + fy * fy)
+    s2 = dr.minimum(dr.square(f * opaque(types, problem.wavelength)), 1)
+    q = s2 / (1 + dr.sqrt(1 - s2))
+    sag = q if how.method == "angular_spectrum" else q * q / 2
+    waves = -opaque(types, problem.distance / problem.wavelength) * sag
+    return Field.from_waves(how.taper.fade(f, types), waves, how.spectrum, types)
+
+
+def _paraxial_rest(spectrum: Field, problem: Problem, how: GridSampling, types: Precision) -> Field:
+    """Fresnel's integral of the relay field: quadratic phase, then one Fourier sum of free output pitch.
+
+    U(x) = 1/(iλz) e^{iπx²/λz} ∫ u(ξ) e^{iπξ²/λz} e^{-2πi xξ/λz} dξ (Goodman, eq. 4-17); the outer curvature is dropped.
+    """
+    relay, window = how.relay, problem.window
+    u = dft2(spectrum, how.output_period, relay.shape, +1, relay.dx)
+    x, y = relay.coordinates(types)
+    u = u * Field.from_waves(1.0, (x * x + y * y) * opaque(types, 0.5 / _scale(problem)), relay, types)
+    period = _scale(problem) / (relay.dx * window.dx)
+    return dft2(u, period, window.shape, -1, window.dx).scaled(relay.dx**2 / _scale(problem))
+
+
+def _scale(problem: Problem) -> float:
+    """λz [m²]"""
+    return problem.wavelength * problem.distance

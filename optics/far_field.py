@@ -1,0 +1,175 @@
+"""The Rayleigh-Sommerfeld integral by one Fourier transform onto directions for each of a few nodes of the window."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.aperture import EDGE_REACH, SoftDisk
+from optics.beam import Beam
+from optics.field import Field
+from optics.fourier import dft2, fast_length, predicted_seconds
+from optics.grid import Grid
+from optics.precision import Precision, opaque, precision
+from optics.problem import Problem
+
+__all__ = ["FarFieldSampling", "far_field"]
+
+CHEBYSHEV_NODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16)
+
+
+@dataclass(frozen=True)
+class FarFieldSampling:
+    """Pupil samples, direction cosines (pitch 1/period of their transform), and nodes per axis over the window.
+
+    The nodes are Chebyshev points in the angle atan(x/z) up to half_angle [rad]: in x the kernel has a pole at ±iz.
+    """
+
+    disk: SoftDisk
+    pupil: Grid
+    directions: Grid
+    period: int
+    nodes: int
+    half_angle: float
+    seconds: float
+    method: str = "far_field"
+
+    def intensity(self, beam: Beam, problem: Problem) -> Any:
+        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        return _far_field(beam, problem, self, precision(problem.dtype))
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        return self.pupil.shape
+
+    @property
+    def largest(self) -> int:
+        return max(self.pupil.shape[0], self.directions.shape[0])
+
+
+def far_field(problem: Problem) -> list[FarFieldSampling]:
+    """Directions at twice the intensity's Nyquist rate; as many nodes as the kernel's slow part needs."""
+    half = problem.window.half_width
+    nodes = _nodes_needed(problem, problem.tolerance)
+    if nodes is None or problem.tolerance < 1e-3:
+        return []
+    band = problem.outermost / math.hypot(problem.outermost, problem.distance) / problem.wavelength
+    phase_band = problem.phase_band + (1 + EDGE_REACH) * problem.radius / (problem.wavelength * problem.distance)
+    disk = problem.soft_disk(band + phase_band)
+    pitch = 1 / (band + disk.stopband + phase_band)
+    pupil = Grid.square(2 * math.ceil((disk.radius + disk.reach) / pitch) + 1, pitch)
+    period = fast_length(8 * problem.radius / pitch)  # a whole number, for the FFT
+    step = problem.wavelength / (period * pitch)
+    directions = Grid.square(2 * (math.ceil(half / math.hypot(half, problem.distance) / step) + 10) + 1, step)
+    once = predicted_seconds(pupil.shape, period, directions.shape) + 2e-3
+    once += pupil.shape[0] ** 2 * 6e-8 + directions.shape[0] ** 2 * 2e-8
+    seconds = nodes**2 * once + math.prod(problem.window.shape) * 3e-7
+    return [FarFieldSampling(disk, pupil, directions, period, nodes, math.atan2(half, problem.distance), seconds)]
+
+
+def _nodes_needed(problem: Problem, error: float) -> int | None:
+    """Chebyshev nodes along an axis that interpolate the far-field kernel's slow part, tried on the aperture's rim."""
+    angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
+    rim_x, rim_y = problem.radius * np.cos(angle), problem.radius * np.sin(angle)
+    half_angle = math.atan2(problem.window.half_width, problem.distance)
+    test = half_angle * np.linspace(-1, 1, 41)
+    for n in CHEBYSHEV_NODES:
+        places = half_angle * _chebyshev_nodes(n)
+        weights = _lagrange(test, places)
+        worst = 0.0
+        for across in (0.0, problem.window.half_width):
+            exact, known = (_slow_part(problem, rim_x, rim_y, angles, across) for angles in (test, places))
+            worst = max(worst, float(np.abs(exact - known @ weights).max()))
+        if worst < error:
+            return n
+    return None
+
+
+def _slow_part(problem: Problem, rim_x: np.ndarray, rim_y: np.ndarray, angle: np.ndarray, y: float) -> np.ndarray:
+    """exp(ik(D - ρ + s·ξ)), D the distance from ξ to (z tan(angle), y, z), ρ that from the axis, s the direction."""
+    x = problem.distance * np.tan(angle)
+    rho = np.sqrt(x * x + y * y + problem.distance**2)
+    along = (x * rim_x + y * rim_y) / rho
+    excess = problem.radius**2 - 2 * rho * along
+    distance = excess / (np.sqrt(rho**2 + excess) + rho)
+    return np.exp(2j * np.pi / problem.wavelength * (distance + along))
+
+
+def _chebyshev_nodes(n: int) -> np.ndarray:
+    """Chebyshev points of the first kind on [-1, 1]."""
+    return np.cos(np.pi * (np.arange(n) + 0.5) / n)
+
+
+def _lagrange(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """(node, *x.shape): the Lagrange polynomials of the nodes at x."""
+    basis = np.ones((len(nodes), *np.shape(x)))
+    for i, node in enumerate(nodes):
+        for other in np.delete(nodes, i):
+            basis[i] *= (x - other) / (node - other)
+    return basis
+
+
+def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Any:
+    """Rayleigh-Sommerfeld's integral with the plane wave of each direction split off:
+
+    U(x) = z/(λρ²) ∫ P(ξ) G(ξ; x) e^{-ik s·ξ} dξ,  G = (ρ/D)² (1/(kD) - i) e^{ik(D - ρ + s·ξ)},
+
+    ρ = |(x, z)|, D = |(x - ξ, z)|, s = x/ρ. G hardly varies with x (it is Fresnel's quadratic phase and less), so it is
+    taken at nodes x_ab and the integrals, one Fourier transform each, are interpolated.
+    """
+    import drjit as dr
+
+    u = beam.behind(how.disk, how.pupil, types)
+    dr.eval(u.re, u.im)
+    s = how.directions.x
+    cosine = np.sqrt(np.maximum(1 - s[:, None] ** 2 - s[None, :] ** 2, 1e-6))
+    nodes = how.half_angle * _chebyshev_nodes(how.nodes)
+    edge = math.asin(min(float(s[-1]), 0.999))  # a margin beyond the window, for the interpolation that follows
+    angle = np.clip(np.arctan2(s[None, :], cosine), -edge, edge)
+    along_x = _lagrange(angle, nodes)
+    total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
+    places = problem.distance * np.tan(nodes)
+    for a, x in enumerate(places):
+        for b, y in enumerate(places):
+            part = u * _slow_kernel(float(x), float(y), problem, how.pupil, types)
+            part = dft2(part, how.period, how.directions.shape, -1, how.directions.dx)
+            weight = types.Float(np.ascontiguousarray(along_x[a] * along_x[b].T, dtype=types.dtype).ravel())
+            total_re, total_im = total_re + weight * part.re, total_im + weight * part.im
+            dr.eval(total_re, total_im)
+    return _onto_window(total_re * total_re + total_im * total_im, problem, how, types)
+
+
+def _slow_kernel(x: float, y: float, problem: Problem, grid: Grid, types: Precision) -> Field:
+    """G(ξ; x) on the pupil's grid, without its constant factor -i (1/(kD) is kept)."""
+    import drjit as dr
+
+    px, py = grid.coordinates(types)
+    rho = math.sqrt(x * x + y * y + problem.distance**2)
+    along = px * opaque(types, x / rho) + py * opaque(types, y / rho)
+    far = opaque(types, rho)
+    excess = px * px + py * py - 2 * far * along
+    distance = dr.sqrt(far * far + excess)
+    waves = (excess / (distance + far) + along) * opaque(types, 1 / problem.wavelength)
+    near = opaque(types, problem.wavelength / (2 * math.pi)) / distance
+    size = dr.square(far / distance)
+    return Field.from_waves(size, waves, grid, types) * Field(
+        types.Float(dr.ones(types.Float64, dr.width(px))), types.Float(near), grid, types
+    )
+
+
+def _onto_window(squared: Any, problem: Problem, how: FarFieldSampling, types: Precision) -> Any:
+    """Quintic interpolation from direction cosines to the window; directions are sampled at twice Nyquist's rate."""
+    from scipy.ndimage import map_coordinates
+
+    window, directions = problem.window, how.directions
+    rho = np.sqrt(window.x[None, :] ** 2 + window.y[:, None] ** 2 + problem.distance**2)
+    places = np.stack([window.y[:, None] / rho, window.x[None, :] / rho]) / directions.dx + directions.shape[0] // 2
+    values = map_coordinates(squared.numpy().reshape(directions.shape), places, order=5, mode="nearest")
+    amplitude = how.pupil.dx**2 * problem.distance / (problem.wavelength * rho**2)
+    image = np.maximum(values, 0) * amplitude**2
+    if problem.reach is not None:
+        image[np.hypot(window.x[None, :], window.y[:, None]) > problem.reach] = 0
+    return types.Float(np.ascontiguousarray(image, dtype=types.dtype).ravel())

@@ -1,0 +1,95 @@
+"""A propagation in numbers: what decides where a method must sample."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from optics.aperture import EDGE_REACH, SoftDisk
+from optics.grid import Grid
+from optics.precision import Precision, opaque
+
+__all__ = ["Problem", "Taper"]
+
+# Amplitude ripple of the soft aperture and of the spectral taper against the tolerance on intensity. The predicted
+# error is half the tolerance; tests hold the actual one below it on random reliefs.
+RIPPLE_PER_TOLERANCE = 0.3
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One monochromatic propagation from a disk to a window, in numbers.
+
+    radius, distance [m]; wavelength [m] in the medium; window: output grid.
+    phase_band: highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge.
+    widest_band: frequencies beyond it may be dropped (infinite: whatever reaches the window counts).
+    reach: distance from the axis [m] up to which the window counts (None: to its corners).
+    fade_ripple: amplitude error allowed to light from beyond the band (None: as everywhere).
+    """
+
+    radius: float
+    wavelength: float
+    distance: float
+    window: Grid
+    phase_band: float
+    tolerance: float
+    dtype: str = "float32"
+    widest_band: float = math.inf
+    reach: float | None = None
+    fade_ripple: float | None = None
+
+    @property
+    def ripple(self) -> float:
+        return self.tolerance * RIPPLE_PER_TOLERANCE
+
+    @property
+    def outermost(self) -> float:
+        return self.window.half_diagonal if self.reach is None else self.reach
+
+    @property
+    def fresnel_number(self) -> float:
+        return self.radius**2 / (self.wavelength * self.distance)
+
+    def soft_disk(self, band: float) -> SoftDisk:
+        """The aperture as samples can carry it that leave frequencies up to `band` [1/m] untouched."""
+        return SoftDisk.cheapest(self.radius, band, self.ripple, EDGE_REACH * self.radius)
+
+    def band(self, margin: float = 0.0) -> float:
+        """Highest frequency [1/m] whose light can come within `margin` of the window from anywhere on the disk."""
+        reach = (1 + EDGE_REACH) * self.radius + self.outermost + margin
+        return min(self.widest_band, reach / math.hypot(reach, self.distance) / self.wavelength)
+
+
+@dataclass(frozen=True)
+class Taper:
+    """Where the spectrum fades out: from `band` over `width` [1/m], which blurs the field by `blur` [m].
+
+    The fading is an error function whose derivative's transform falls to the ripple within the blur. What it removes
+    must therefore land at least that far outside the window.
+    """
+
+    band: float
+    width: float
+    blur: float
+    sine: float
+    tangent: float
+
+    @classmethod
+    def of(cls, problem: Problem, blur: float) -> Taper:
+        ripple = problem.ripple if problem.fade_ripple is None else problem.fade_ripple
+        band, width = problem.band(blur), 2 * math.log(1 / ripple) / (math.pi * blur)
+        sine = (band + width) * problem.wavelength
+        return cls(band, width, blur, sine, sine / math.sqrt(max(1 - sine * sine, 1e-12)))
+
+    @property
+    def end(self) -> float:
+        return self.band + self.width
+
+    def fade(self, f: Any, types: Precision) -> Any:
+        """1 below the band, 0 beyond its end: the error function falls to the ripple in √ln(1/ripple)."""
+        import drjit as dr
+
+        steepness = 2 / self.width * math.sqrt(math.pi * self.width * self.blur / 2)
+        middle = opaque(types, self.band + self.width / 2)
+        return (1 - dr.erf(types.Float((f - middle) * opaque(types, steepness)))) / 2
