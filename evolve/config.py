@@ -46,7 +46,7 @@ class EyeConfig:
 
     optics: bool = _setting(True, None, "see through pupil and relief; off: a perfect lens")
     sensor_width: float = _setting(200e-6, Interval(1e-6, 1e-2), "width of the retina [m]")
-    noise_sigma: float = _setting(0.05, Interval(0, 10), "standard deviation of a receptor's noise [signal]")
+    noise_sigma: float = _setting(0.01, Interval(0, 10), "standard deviation of a receptor's noise [signal]")
     bands: int = _setting(4, Interval(1, 64), "spectral bands")
     relief_height: float = _setting(
         100e-6, Interval(0, 1e-2, open_low=True), "height that a relief gene of 1 means [m]"

@@ -37,7 +37,7 @@ class Eye:
     fov_deg: float = 45.0
     sensor_width: float = 200e-6
     bands: int = 4
-    noise_sigma: float = 0.05
+    noise_sigma: float = 0.01
     tolerance: float = 1e-2
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 

@@ -41,7 +41,7 @@ class Eyes:
     placement_range_deg: float = 60.0
     optics: Pupil | None = None
     sensor_width: float = 200e-6
-    noise_sigma: float = 0.05
+    noise_sigma: float = 0.01
     bands: int = 4
 
     def __post_init__(self) -> None:
