@@ -1,4 +1,4 @@
-"""What a run's candidates say: statistics per generation, gene trajectories, acuity, confidence intervals.
+"""What a run's candidates say: statistics per generation, gene trajectories, acuity, image quality, confidence.
 
 Pure functions of candidates and phenotypes; the report and the comparisons draw what they return.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +17,9 @@ from evolve.development import Phenotype
 from evolve.genotype import DOE_SHAPE
 
 if TYPE_CHECKING:
+    import optics
     from evolve.candidate import Candidate
+    from evolve.config import EyeConfig
 
 __all__ = [
     "GenerationStatistics",
@@ -26,6 +28,8 @@ __all__ = [
     "bootstrap_interval",
     "gene_values",
     "generation_statistics",
+    "image_quality",
+    "polychromatic",
     "psnr",
     "succeeded",
     "trajectory",
@@ -146,6 +150,31 @@ def acuity_cpd(phenotype: Phenotype) -> float:
         return 1 / (2 * between_receptors)
     between_eyes = phenotype.placement_range_deg / (phenotype.n_eyes - 1)
     return 1 / (2 * min(between_eyes, between_receptors))
+
+
+def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:
+    """The PSF of white daylight, (1, y, x): bands weighted as the mean of the receptor channels weighs them."""
+    from optics.spectrum import daylight
+
+    bands = eye.spectral_bands
+    weights = bands.weights.mean(axis=0) * daylight(bands.wavelengths)
+    image = np.tensordot(weights / weights.sum(), psf.psf.astype(np.float64), axes=1)
+    mean = np.average(bands.wavelengths, weights=weights)
+    return replace(psf, psf=image[None], wavelengths=np.array([mean]), plans=(psf.plan,))
+
+
+def image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
+    """`optics.image_quality` of the phenotype's eye in white daylight, up to its receptors' Nyquist frequency: [0, 1].
+
+    A perfect lens has contrast 1 at all of them. Raises optics.AccuracyError where the PSF cannot be computed.
+    """
+    import optics
+
+    eye = phenotype.eyes(config).eye()
+    if eye.pupil is None:
+        return max(1 - eye.noise_sigma, 0.0)
+    white = polychromatic(eye, eye.psf())
+    return float(optics.image_quality(white, 1 / (2 * eye.receptor_pitch), eye.throughput, eye.noise_sigma)[0])
 
 
 def bootstrap_interval(

@@ -12,11 +12,12 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Circle, Rectangle
 
 import optics
+from evolve.analysis import polychromatic
 from evolve.config import EyeConfig
 from evolve.development import Phenotype
-from evolve.report.markup import figure, number
+from evolve.report.markup import KEY, figure, number
 from evolve.report.svg import drawing, inline
-from evolve.report.theme import MUTED
+from evolve.report.theme import ACCENT, INK, MUTED, VERMILLION
 from optics.precision import precision
 from optics.spectrum import daylight
 
@@ -30,20 +31,21 @@ SHOWN_POWER = 0.98  # of the light in its window that the PSF's picture holds
 
 @dataclass(frozen=True)
 class Light:
-    """The eye's PSF and what white daylight makes of it.
-
-    polychromatic  (y, x) [1/m²]: the bands' PSFs weighted as the mean receptor channel weighs white in daylight
-    """
+    """An eye, its PSF per band, and in white daylight."""
 
     eye: optics.Eye
-    psf: Any  # optics.PSFResult
-    polychromatic: np.ndarray
+    psf: optics.PSFResult
+    white: optics.PSFResult
 
     @classmethod
     def through(cls, eye: optics.Eye) -> Light:
-        psf, bands = eye.psf(), eye.spectral_bands
-        weights = bands.weights.mean(axis=0) * daylight(bands.wavelengths)
-        return cls(eye, psf, np.tensordot(weights, psf.psf.astype(np.float64), axes=1))
+        psf = eye.psf()
+        return cls(eye, psf, polychromatic(eye, psf))
+
+    @property
+    def per_degree(self) -> float:
+        """Metres on the retina, near the axis, that a degree spans."""
+        return self.eye.sensor_distance * np.pi / 180
 
 
 def eye_figures(phenotype: Phenotype, config: EyeConfig) -> str:
@@ -52,8 +54,8 @@ def eye_figures(phenotype: Phenotype, config: EyeConfig) -> str:
     if eye.pupil is None:
         return "<p>Optics are off in this run: every eye has a perfect lens, which neither blurs nor dims.</p>\n"
     light = Light.through(eye)
-    parts = [_pupil(eye, phenotype), _psf(light), _cuts(light)]
-    return f'<div class="figures">{"".join(parts)}</div>\n'
+    parts = [_pupil(eye, phenotype), _psf(light), _cuts(light), _mtf(light)]
+    return f'<div class="figures pairs">{"".join(parts)}</div>\n'
 
 
 def _pupil(eye: optics.Eye, phenotype: Phenotype) -> str:
@@ -127,7 +129,7 @@ def _psf(light: Light) -> str:
 
 def _shown(light: Light) -> tuple[np.ndarray, float]:
     """The middle of the PSF that holds most of the light, averaged to at most PIXELS, and its half width [m]."""
-    image, dx = light.polychromatic, light.psf.dx
+    image, dx = light.white.psf[0], light.white.dx
     middle = image.shape[0] // 2
     ring = np.maximum(*np.abs(np.indices(image.shape) - middle))
     power = np.cumsum(np.bincount(ring.ravel(), image.ravel()))
@@ -161,6 +163,46 @@ def _cuts(light: Light) -> str:
         _degrees(axes, light.eye, 1e6 * half)
         svg = inline(drawn, "psf-bands", "Cuts through the point spread function, one per spectral band.")
     return figure(svg, "<b>PSF per band</b>: cuts along x through the optical axis; dark lines are short wavelengths.")
+
+
+def _mtf(light: Light) -> str:
+    """Contrast over spatial frequency beside what the aperture allows at best."""
+    eye, scale = light.eye, light.per_degree
+    cutoff = optics.mtf(light.psf).cutoff
+    nyquist = 1 / (2 * eye.receptor_pitch)
+    frequency = np.geomspace(min(nyquist / 8, cutoff.max() / 100), cutoff.max(), 240)
+    contrast = optics.mtf(light.white).profile(frequency)[0]
+    with drawing(*SIZE) as drawn:
+        axes = drawn.subplots()
+        axes.semilogx(frequency * scale, diffraction_limit(light, frequency), color=INK, lw=1.2, ls="--")
+        axes.semilogx(frequency * scale, contrast, color=ACCENT, lw=2)
+        axes.axvline(nyquist * scale, color=VERMILLION, lw=1.2, ls=":")
+        axes.set(xlim=(frequency[0] * scale, frequency[-1] * scale), ylim=(-0.02, 1.04))
+        axes.set(xlabel="spatial frequency [cycles / degree]", ylabel="contrast (MTF)")
+        at_nyquist = float(np.interp(nyquist, frequency, contrast))
+        svg = inline(
+            drawn, "mtf", f"Modulation transfer function; {at_nyquist:.2g} at the receptors' Nyquist frequency."
+        )
+    green = int(np.argmin(np.abs(light.psf.wavelengths - 550e-9)))
+    strehl = optics.strehl_ratio(light.psf)[green]
+    quality = optics.image_quality(light.white, nyquist, eye.throughput, eye.noise_sigma)[0]
+    caption = (
+        f"<b>Modulation transfer function</b> in white daylight, mean of all orientations ({KEY.format('accent')}), "
+        f"and its diffraction limit (dashed). Dotted: the receptors' Nyquist frequency, {number(nyquist * scale)} "
+        f"cycles per degree; contrast there {number(at_nyquist)}. Strehl ratio {number(strehl)} at "
+        f"{1e9 * light.psf.wavelengths[green]:.0f} nm; image quality {number(quality)} (in 0 to 1: contrast above the "
+        "noise, times throughput)."
+    )
+    return figure(svg, caption)
+
+
+def diffraction_limit(light: Light, frequency: np.ndarray) -> np.ndarray:
+    """MTF of the same circular aperture without aberrations, in white daylight, (frequency,): the bands' limits
+    (2/π)(arccos s - s √(1 - s²)), s = f / cutoff (Goodman, §6.3.3), weighted by their light."""
+    weights = light.eye.spectral_bands.weights.mean(axis=0) * daylight(light.psf.wavelengths)
+    s = np.clip(frequency / optics.mtf(light.psf).cutoff[:, None], 0, 1)
+    limits = 2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
+    return weights / weights.sum() @ limits
 
 
 def _bar(axes: Axes, picture: Any, label: str) -> None:

@@ -9,10 +9,12 @@ from html import escape
 from importlib import resources
 from typing import Any
 
-__all__ = ["asset", "document", "exact", "figure", "json_script", "number", "section", "table", "text"]
+__all__ = ["KEY", "asset", "document", "exact", "figure", "json_script", "number", "section", "table", "text"]
 
 # The browser itself refuses anything from outside this file.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+
+KEY = '<span class="key {}" aria-hidden="true"></span>'  # a line of a legend, in the colour of that class
 
 
 def text(value: object) -> str:

@@ -10,7 +10,7 @@ from evolve.genotype import CLUSTERS, GENES, Gene
 from evolve.report import tables
 from evolve.report.eye_figures import eye_figures
 from evolve.report.figures import fitness_figure, gene_figure, learning_figure, relief_figure, success_figure
-from evolve.report.markup import document, figure, number, section, text
+from evolve.report.markup import KEY, document, figure, number, section, text
 from evolve.report.player import player, summary
 from evolve.report.stage import Stage
 from evolve.report.views import views
@@ -18,7 +18,6 @@ from evolve.store import Run
 
 __all__ = ["render"]
 
-KEY = '<span class="key {}" aria-hidden="true"></span>'
 POPULATION = f"{KEY.format('muted band')} 10–90 % of the population, {KEY.format('muted')} its median"
 
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+import optics
 from evolve.analysis import psnr
 from evolve.episode import Episode
 from evolve.report.markup import number, text
 from evolve.report.picture import data_uri, display
 from evolve.report.stage import Stage
 
-__all__ = ["views"]
+__all__ = ["through", "views"]
 
-WIDTH = 168  # CSS pixels of one picture, where there are few eyes
+WIDTH = 120  # CSS pixels of one picture, where there are few eyes
 MOST_EYES = 6
 
 
@@ -20,18 +21,18 @@ def views(episode: Episode, stage: Stage) -> str:
     """Pictures and their caption."""
     frame = _busiest(episode)
     time = int(episode.radiance_frames[frame])
-    weights = stage.eyes.eye().spectral_bands.weights
+    lens = stage.eyes.eye()
     names = stage.eyes.names()
     shown = range(min(len(names), MOST_EYES))
-    rows = "".join(_row(episode, eye, names[eye], frame, weights, stage.gain) for eye in shown)
+    rows = "".join(_row(episode, eye, names[eye], frame, lens) for eye in shown)
     brighter = f", brightened {number(stage.gain)} times (1/a²)" if stage.gain != 1 else ""
     rest = f" The first {MOST_EYES} of {len(names)} eyes." if len(names) > MOST_EYES else ""
     quality = psnr(episode.signals, episode.perfect_signals, stage.gain)
     caption = (
         f"<b>What it sees</b> at {number(time * stage.seconds)} s of the episode below, left to right: the scene, "
-        f"finely sampled; what its receptors would signal behind a perfect lens; and what they signal{brighter}, "
-        f"noise included.{rest} Over the whole episode the signals have a PSNR of {number(quality)} dB "
-        "against the perfect lens."
+        "finely sampled; what its receptors would signal behind a perfect lens; what its own optics make of it"
+        f"{brighter}; and the same with the receptors' noise, as the brain gets it.{rest} Over the whole episode "
+        f"the signals have a PSNR of {number(quality)} dB against the perfect lens."
     )
     return f'<figure class="views"><div class="eyes">{rows}</div><figcaption>{caption}</figcaption></figure>\n'
 
@@ -42,13 +43,15 @@ def _busiest(episode: Episode) -> int:
     return int(np.argmax(episode.radiance.mean(axis=2).var(axis=-1).mean(axis=(1, 2))))
 
 
-def _row(episode: Episode, eye: int, name: str, frame: int, weights: np.ndarray, gain: float) -> str:
+def _row(episode: Episode, eye: int, name: str, frame: int, lens: optics.Eye) -> str:
     time = episode.radiance_frames[frame]
-    scene = np.einsum("cb,byx->cyx", weights, episode.radiance[frame, eye])
+    scene = np.einsum("cb,byx->cyx", lens.spectral_bands.weights, episode.radiance[frame, eye])
+    gain = 1 / lens.throughput
     pictures = (
         ("scene", display(scene)),
         ("perfect lens", display(episode.perfect_signals[time, eye])),
-        ("its own optics", display(episode.signals[time, eye], gain)),
+        ("own optics, no noise", display(through(lens, episode.radiance[frame, eye]), gain)),
+        ("own optics, noise", display(episode.signals[time, eye], gain)),
     )
     height, width = episode.signals.shape[-2:]
     scale = WIDTH / max(height, width)
@@ -58,3 +61,11 @@ def _row(episode: Episode, eye: int, name: str, frame: int, weights: np.ndarray,
         for label, pixels in pictures
     )
     return f'<div class="sight"><span class="name">{text(name)}</span><div class="pair">{cells}</div></div>'
+
+
+def through(eye: optics.Eye, radiance: np.ndarray) -> np.ndarray:
+    """Noise-free signals (channel, h, w) of the radiance (band, y, x) before an eye; at the picture's edge the scene
+    is taken to go on as it ends, as far as the eye's kernel reaches (at most a picture's width)."""
+    samples = radiance.shape[-1] // eye.resolution[1]
+    reach = min(max(eye.kernel(samples).shape[1:]) // 2, radiance.shape[-1])
+    return eye.see(np.pad(radiance, ((0, 0), (reach, reach), (reach, reach)), mode="edge"), samples)

@@ -5,8 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from evolve.analysis import acuity_cpd, bootstrap_interval, gene_values, generation_statistics, psnr, trajectory
+from evolve.analysis import (
+    acuity_cpd,
+    bootstrap_interval,
+    gene_values,
+    generation_statistics,
+    image_quality,
+    polychromatic,
+    psnr,
+    trajectory,
+)
 from evolve.candidate import Candidate
+from evolve.config import EyeConfig
 from evolve.development import Phenotype
 
 
@@ -159,3 +169,36 @@ def test_psnr():
     assert psnr(reference, reference) == math.inf
     with pytest.raises(ValueError, match="shape"):
         psnr(reference[:1], reference)
+
+
+LENS = (0.2, 0.5, 0.5, 0.2, 0.5, 0.8, 0.8, 0.5, 0.5, 0.8, 0.8, 0.5, 0.2, 0.5, 0.5, 0.2)
+
+
+def test_image_quality_of_the_perfect_lens_is_what_noise_leaves():
+    perfect = phenotype(relative_aperture=None, relief=None, refractive_index=None)
+    assert image_quality(perfect, EyeConfig(optics=False, noise_sigma=0.05)) == pytest.approx(0.95)
+
+
+def test_image_quality_knows_focus_light_and_noise():
+    """A lens in focus beats the same pupil without relief; more noise than light leaves nothing."""
+    focused = phenotype(relative_aperture=0.3, relief=LENS, resolution=(15, 15))
+    flat = phenotype(relative_aperture=0.3, relief=(0.5,) * 16, resolution=(15, 15))
+    calm, loud = EyeConfig(noise_sigma=0.0), EyeConfig(noise_sigma=0.1)
+    quality = image_quality(focused, calm)
+    assert 0.7 * 0.09 < quality < 0.09  # throughput a² = 0.09 times a contrast that the aperture keeps near 1
+    assert image_quality(flat, calm) < 0.7 * quality
+    assert image_quality(focused, loud) == 0.0  # the noise floor, 0.1 / 0.09, lies above all contrast
+
+
+def test_polychromatic_weighs_bands_by_daylight_and_receptors():
+    eye = phenotype(relative_aperture=0.3, relief=LENS).eyes(EyeConfig(bands=2)).eye()
+    psf = eye.psf()
+    white = polychromatic(eye, psf)
+    assert white.psf.shape == (1, *psf.psf.shape[1:])
+    blue, red = (float(band.sum()) for band in psf.psf)
+    # channels look at white with weights 1, shared by the bands: their mean's share of the first band
+    share = float(np.mean(eye.spectral_bands.weights[:, 0])) * DAYLIGHT_475
+    assert white.psf.sum() == pytest.approx(share * blue + (1 - share) * red, rel=1e-5)
+
+
+DAYLIGHT_475 = 1.15392  # CIE D65 at 475 nm over that at 560 nm: 115.392 / 100
