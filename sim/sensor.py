@@ -84,14 +84,23 @@ Sensor = BoxSensor | ReceptiveFieldSensor
 
 
 def build_sensor(eye: optics.Eye, rays_per_receptor: int) -> Sensor:
-    """The sensor of an eye. Raises ValueError for less than one ray."""
+    """The sensor of an eye. Raises ValueError for less than one ray, and optics.AccuracyError for a pupil whose
+    light spreads too far to be computed."""
     if rays_per_receptor < 1:
         raise ValueError(f"rays_per_receptor = {rays_per_receptor!r}, must be at least 1")
     if eye.pupil is None:
         return box_sensor(eye, rays_per_receptor)
     height, width = eye.resolution
     rays = max(rays_per_receptor * height * width, MIN_RAYS)
-    return receptive_field_sensor(eye, rays, cells_per_receptor(eye.resolution))
+    cells = cells_per_receptor(eye.resolution)
+    while True:
+        try:
+            return receptive_field_sensor(eye, rays, cells)
+        except optics.AccuracyError:
+            # Light that spreads over too many cells for a PSF is smooth on the scale of coarser ones.
+            if cells == 1:
+                raise
+            cells //= 2
 
 
 def cells_per_receptor(resolution: tuple[int, int]) -> int:

@@ -158,6 +158,15 @@ def test_points_fill_the_square_evenly():
         assert np.abs(share - corners.prod(axis=1)).max() < (1.5 + np.log2(n)) / n
 
 
+def test_light_that_spreads_far_is_tabulated_on_coarser_cells():
+    """A pinhole behind which every receptor sees many times the field: 32 cells per receptor cannot hold that."""
+    e = optics.Eye(pupil=optics.Pupil(aperture_radius=10e-6), resolution=(1, 1), fov_deg=1.5, sensor_width=L)
+    with pytest.raises(optics.AccuracyError):
+        receptive_field_sensor(e, 64, cells_per_receptor((1, 1)))
+    sensor = build_sensor(e, 64)
+    assert np.asarray(sensor.weights[0].sum()) == pytest.approx(1.0, abs=0.02)
+
+
 def test_no_rays_is_refused():
     with pytest.raises(ValueError, match="rays_per_receptor"):
         build_sensor(eye(), 0)

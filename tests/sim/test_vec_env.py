@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+import optics
 import sim
 from sim.observation import Memory
 from sim.simulation import EPISODE_STEPS, MAX_TURN
@@ -40,10 +41,15 @@ def played(venv, steps):
     return first, [venv.step(seeking(venv, step)) for step in range(steps)]
 
 
-@pytest.mark.parametrize("task", ["detection", "tracking", "navigation"])
-def test_episodes_do_not_depend_on_the_number_of_worlds(task):
+LENS = dataclasses.replace(EYES, optics=optics.Pupil(aperture_radius=40e-6, thin_lens_focal_length=170e-6))
+
+
+@pytest.mark.parametrize(
+    ("task", "eyes"), [("detection", EYES), ("tracking", EYES), ("navigation", EYES), ("detection", LENS)]
+)
+def test_episodes_do_not_depend_on_the_number_of_worlds(task, eyes):
     """Bit-identical, over restarts, noise and moving objects."""
-    few, many = (played(make(n, task=task, memory=2), 50) for n in (2, 11))
+    few, many = (played(make(n, task=task, eyes=eyes, memory=2), 50) for n in (2, 19))
     ends = 0
     for name in few[0]:
         np.testing.assert_array_equal(few[0][name], many[0][name][:2])
