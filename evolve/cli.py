@@ -29,8 +29,8 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     parsed = _parser().parse_args(arguments)
-    command = import_module(f"evolve.commands.{parsed.module}")
     try:
+        command = import_module(f"evolve.commands.{parsed.module}")
         return int(getattr(command, parsed.function)(parsed))
     except KeyboardInterrupt:
         print("evolve: interrupted", file=sys.stderr)
@@ -61,7 +61,9 @@ def _parser() -> argparse.ArgumentParser:
 
     run = _command(commands, "run", "run.start", "begin a run: evolve eyes and brains for a task")
     run.add_argument("task", metavar="TASK", help="navigation, detection or tracking (see: evolve tasks)")
-    run.add_argument("--preset", default="paper", help="settings to begin with: quick (minutes) or paper (a day; default)")
+    run.add_argument(
+        "--preset", default="paper", help="settings to begin with: quick (minutes) or paper (a day; default)"
+    )
     run.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings; wins over the preset")
     run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="one setting; wins over the file")
     run.add_argument("--seed", type=int, help="same as --set seed=N")

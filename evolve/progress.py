@@ -118,7 +118,9 @@ class Bar:
     def evaluated(self, candidate: Candidate) -> None:
         self._tally.evaluated(candidate)
         if candidate.failure:
-            self._progress.console.print(f"candidate {candidate.id} failed: {candidate.failure}", markup=False)
+            self._progress.console.print(
+                f"candidate {candidate.id} failed: {candidate.failure}", markup=False, highlight=False
+            )
         self._update()
 
     def _update(self) -> None:

@@ -115,7 +115,7 @@ class Case:
 
 
 # Steps too small to move a weight: every evaluation plays the same, so none improves.
-STAGNANT = ("learning.learning_rate=1e-30", "learning.total_steps=128", "learning.eval_interval=32", *PERFECT)
+STAGNANT = ("learning.learning_rate=1e-30", "learning.total_steps=96", "learning.eval_interval=32", *PERFECT)
 FIELDS = {
     "task": Case("task=tracking", life),
     "seed": Case("seed=1", history),

@@ -73,9 +73,10 @@ def _finish(run: Run) -> int:
     if failures:
         print(f"failed: {len(failures)} of {len(run.candidates)} candidates; the last: {failures[-1].failure}")
     print("writing report and EXR files ...", flush=True)
-    from evolve import export, report
+    from evolve import episode, export, report
 
-    page, frames = report.write(run), export.main(run)
+    best = episode.record(run)
+    page, frames = report.write(run, best), export.export_episode(best, run.path / "exr")
     print(f"run directory: {run.path}")
     print(f"report: {page}")
     print(f"EXR files: {len(frames)} in {frames[0].parent}, the first: {frames[0].name}")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from evolve.episode import Episode
     from evolve.store import Run
 
 __all__ = ["write"]
@@ -17,8 +18,8 @@ __all__ = ["write"]
 FILE = "report.html"
 
 
-def write(run: Run) -> Path:
-    """Write `report.html` of a run, whole or not at all; the best candidate plays one episode for it.
+def write(run: Run, episode: Episode | None = None) -> Path:
+    """Write `report.html` of a run, whole or not at all, with an episode of the best candidate (default: played now).
 
     The same run gives the same bytes with the same versions of the libraries.
     Raises ValueError where the best candidate's policy is missing or damaged.
@@ -27,7 +28,8 @@ def write(run: Run) -> Path:
     from evolve.files import write_whole
     from evolve.report.page import render
 
-    episode = record(run) if run.best is not None else None
+    if episode is None and run.best is not None:
+        episode = record(run)
     path = run.path / FILE
     write_whole(path, render(run, episode))
     return path

@@ -7,9 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import sim
+from evolve.config import TASKS
 from evolve.config_source import assemble
 from evolve.development import Phenotype, develop
 from evolve.genotype import CLUSTERS, GENES, Genotype, group_members
+from optics import BSplineRelief
 
 CONFIG = assemble("detection")
 GENOTYPE = Genotype(CONFIG.genome)
@@ -80,6 +83,10 @@ def test_optics_off_is_the_perfect_lens():
     assert animal.eyes(config.eye).optics is None
 
 
+def test_tasks_are_those_of_the_simulation():
+    assert set(TASKS) == set(sim.TASKS)
+
+
 def test_groups_cover_all_genes_once():
     members = [name for cluster in CLUSTERS for name in group_members(cluster)]
     assert sorted(members) == sorted(GENES)
@@ -92,3 +99,16 @@ def test_phenotype_survives_being_written():
     assert Phenotype.from_json(animal.to_json()) == animal
     perfect = replace(animal, relative_aperture=None, relief=None, refractive_index=None)
     assert Phenotype.from_json(perfect.to_json()) == perfect
+
+
+def test_quick_preset_starts_behind_a_lens_in_focus():
+    """Its relief is the paraboloid h0 - r²/(2 f (n - 1)), to Rayleigh's quarter wave of optical path over the pupil."""
+    config = assemble("detection", "quick")
+    animal = develop(Genotype(config.genome).start, config)
+    eyes = animal.eyes(config.eye)
+    radius, focal_length = eyes.optics.aperture_radius, eyes.eye().sensor_distance
+    ideal = BSplineRelief.paraboloid(0.0, 1 / (focal_length * (animal.refractive_index - 1)), radius)
+    difference = eyes.optics.height.control_points - ideal.control_points
+    # A B-spline lies within the hull of its control points.
+    path_error = (animal.refractive_index - 1) * np.ptp(difference) / 2
+    assert path_error < 550e-9 / 4

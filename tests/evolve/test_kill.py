@@ -22,8 +22,6 @@ n_steps = 16
 batch_size = 64
 n_epochs = 1
 eval_interval = 100000
-[eye]
-optics = false
 [evaluation]
 episodes = 2
 """
