@@ -56,6 +56,11 @@ class GridSampling:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _angular_spectrum(beam, problem, self, precision(problem.dtype)).intensity
 
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light."""
+        whole = self.method == "angular_spectrum"
+        return self.period if whole else problem.wavelength * problem.distance / self.relay.dx
+
     @property
     def samples(self) -> tuple[int, int]:
         return self.pupil.shape

@@ -29,6 +29,10 @@ class NodeSampling:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _direct_sum(beam, problem, self, precision(problem.dtype)).intensity
 
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light: the focus, times the root of the summands."""
+        return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.radial * self.angular / math.pi)
+
     @property
     def samples(self) -> tuple[int, int]:
         return self.radial, self.angular
@@ -70,13 +74,13 @@ def _direct_sum(beam: Beam, problem: Problem, how: NodeSampling, types: Precisio
         phase = d2 / (distance + z) / wavelength + dr.gather(types.Float64, waves, i)
         sin, cos = dr.sincos(types.Float((phase - dr.round(phase)) * (2 * math.pi)))
         size = dr.gather(types.Float64, weight, i) * z / (2 * math.pi * distance * distance)
-        near, far = types.Float(size / distance), types.Float(size * k)
+        near, far, sin, cos = size / distance, size * k, types.Float64(sin), types.Float64(cos)
         return i + 1, re + near * cos + far * sin, im + near * sin - far * cos
 
-    zero = dr.zeros(types.Float, dr.width(x))
+    zero = dr.zeros(types.Float64, dr.width(x))
     start = dr.zeros(types.Index, dr.width(x))
     _, re, im = dr.while_loop((start, zero, zero), lambda i, re, im: i < count, add)
-    return Field(re, im, problem.window, types)
+    return Field(types.Float(re), types.Float(im), problem.window, types)
 
 
 def _disk_nodes(radius: float, how: NodeSampling, types: Precision) -> tuple[Any, Any, Any]:

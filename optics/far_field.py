@@ -41,6 +41,10 @@ class FarFieldSampling:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _far_field(beam, problem, self, precision(problem.dtype))
 
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light."""
+        return problem.wavelength * problem.distance / self.pupil.dx
+
     @property
     def samples(self) -> tuple[int, int]:
         return self.pupil.shape
@@ -51,9 +55,9 @@ class FarFieldSampling:
 
 
 def far_field(problem: Problem) -> list[FarFieldSampling]:
-    """Directions at twice the intensity's Nyquist rate; as many nodes as the kernel's slow part needs."""
+    """Directions beyond the intensity's Nyquist rate; as many nodes as the kernel's slow part needs."""
     half = problem.window.half_width
-    nodes = _nodes_needed(problem, problem.tolerance)
+    nodes = _nodes_needed(problem, problem.tolerance / 3)
     if nodes is None or problem.tolerance < 1e-3:
         return []
     band = problem.outermost / math.hypot(problem.outermost, problem.distance) / problem.wavelength
@@ -61,7 +65,8 @@ def far_field(problem: Problem) -> list[FarFieldSampling]:
     disk = problem.soft_disk(band + phase_band)
     pitch = 1 / (band + disk.stopband + phase_band)
     pupil = Grid.square(2 * math.ceil((disk.radius + disk.reach) / pitch) + 1, pitch)
-    period = fast_length(8 * problem.radius / pitch)  # a whole number, for the FFT
+    oversampling = 2 if problem.tolerance > 5e-3 else 3  # of the intensity's Nyquist rate, for quintic interpolation
+    period = fast_length(4 * oversampling * problem.radius / pitch)  # a whole number, for the FFT
     step = problem.wavelength / (period * pitch)
     directions = Grid.square(2 * (math.ceil(half / math.hypot(half, problem.distance) / step) + 10) + 1, step)
     once = predicted_seconds(pupil.shape, period, directions.shape) + 2e-3

@@ -17,7 +17,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from optics.angular_spectrum import GridSampling, split, whole
-from optics.arguments import in_range
 from optics.direct_sum import NodeSampling, nodes
 from optics.far_field import FarFieldSampling, far_field
 from optics.problem import Problem
@@ -78,7 +77,6 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
     """
     if method not in ("auto", *METHODS):
         raise ValueError(f"method = {method!r}: must be 'auto' or one of {', '.join(METHODS)}")
-    in_range("tolerance", problem.tolerance, 1e-12, 0.5)
     _check_dtype(problem)
     asked = tuple(METHODS) if method == "auto" else (method,)
     cheapest = {name: min(found, key=_seconds) for name in asked if (found := METHODS[name](problem))}

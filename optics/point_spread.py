@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from optics.angular_spectrum import GridSampling
-from optics.arguments import positive
+from optics.arguments import in_range, positive
 from optics.beam import Beam
 from optics.grid import Grid
-from optics.planner import FLOAT_NOISE, AccuracyError, Plan, Sampling, choose
+from optics.planner import FLOAT_NOISE, AccuracyError, Plan, choose
+from optics.precision import precision
 from optics.problem import Problem
 from optics.pupil import Pupil
 from optics.source import PointSource
@@ -95,6 +95,8 @@ def problem(beam: Beam, distance: float, window: Grid, tolerance: float, dtype: 
     """The numbers that decide the sampling."""
     pupil, wavelength = beam.pupil, beam.wavelength
     positive("sensor_distance", distance)
+    in_range("tolerance", tolerance, 1e-12, 0.5)
+    precision(dtype)
     steepest = pupil.slopes(wavelength, beam.source).steepest / wavelength
     band = 1.02 * steepest + pupil.bandwidth(wavelength, tolerance / 10)
     return Problem(pupil.aperture_radius, wavelength / pupil.medium_n, distance, window, band, tolerance, dtype)
@@ -112,7 +114,7 @@ def monochromatic(
     plan, sampling = choose(task, method, most_seconds)
     image = (sampling.intensity(beam, task).numpy() / beam.pupil.area).reshape(task.window.shape)
     mean, mean_square = float(image.mean(dtype=np.float64)), float(np.mean(np.square(image, dtype=np.float64)))
-    bright = 1 / _plane(task, sampling) ** 2  # mean PSF over the plane that the transform spans
+    bright = 1 / sampling.plane(task) ** 2  # mean PSF over the plane that the transform spans
     noise = FLOAT_NOISE[task.dtype]
     rounding = 2 * noise * math.sqrt(bright * mean) + noise**2 * bright
     error = task.tolerance / 2 + rounding / math.sqrt(mean_square) if mean_square > 0 else math.inf
@@ -122,8 +124,3 @@ def monochromatic(
             + ("; dtype='float64' has a 1e6 times lower floor" if task.dtype == "float32" else "")
         )
     return image, replace(plan, predicted_error=error)
-
-
-def _plane(task: Problem, sampling: Sampling) -> float:
-    """Width [m] over which rounding spreads the pupil's light."""
-    return max(sampling.period if isinstance(sampling, GridSampling) else 0.0, 2 * task.radius)

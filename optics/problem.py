@@ -12,9 +12,9 @@ from optics.precision import Precision, opaque
 
 __all__ = ["Problem", "Taper"]
 
-# Amplitude ripple of the soft aperture and of the spectral taper against the tolerance on intensity. The predicted
-# error is half the tolerance; tests hold the actual one below it on random reliefs.
-RIPPLE_PER_TOLERANCE = 0.3
+# Amplitude ripple of the soft aperture and of the spectral taper against the tolerance on intensity. Edge-diffracted
+# light errs by several ripples, its intensity by twice that, and a window may hold no other light: half the tolerance.
+RIPPLE_PER_TOLERANCE = 0.03
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,69 @@
+"""dft2: FFT and matrices give the same sums, for every parity, folding and tiling, and the adjoint is one."""
+
+import drjit as dr
+import numpy as np
+import pytest
+
+from optics import fourier
+from optics.field import Field
+from optics.precision import precision
+
+CASES = [((5, 6), 8, (4, 3)), ((7, 8), 12, (12, 12)), ((17, 20), 6, (5, 6)), ((9, 4), 5, (13, 11)), ((6, 6), 6, (6, 6))]
+
+
+def by_definition(u, period, shape, sign):
+    def matrix(n_out, n_in):
+        return np.exp(sign * 2j * np.pi * np.outer(np.arange(n_out) - n_out // 2, np.arange(n_in) - n_in // 2) / period)
+
+    return matrix(shape[0], u.shape[0]) @ u @ matrix(shape[1], u.shape[1]).T
+
+
+def random_field(shape, dtype="float64", seed=0):
+    rng = np.random.default_rng(seed)
+    u = rng.normal(size=shape) + 1j * rng.normal(size=shape)
+    return u, Field.from_numpy(u, 1.0, precision(dtype))
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(("shape", "period", "out"), CASES)
+@pytest.mark.parametrize("way", ["_fft", "_matrix_dft"])
+def test_sum_is_as_defined(way, shape, period, out, sign):
+    u, field = random_field(shape)
+    re, im = getattr(fourier, way)(field, period, out, sign)
+    result = (re.numpy() + 1j * im.numpy()).reshape(out)
+    np.testing.assert_allclose(result, by_definition(u, period, out, sign), atol=1e-12)
+
+
+def test_period_need_not_be_whole():
+    u, field = random_field((9, 12))
+    result = fourier.dft2(field, 17.3, (7, 10), -1, 1.0).numpy()
+    np.testing.assert_allclose(result, by_definition(u, 17.3, (7, 10), -1), atol=1e-12)
+
+
+def test_float32_carries_six_digits():
+    u, field = random_field((200, 200), "float32")
+    for way in (fourier._fft, fourier._matrix_dft):
+        re, im = way(field, 256, (256, 256), -1)
+        exact = by_definition(u, 256, (256, 256), -1)
+        error = np.linalg.norm((re.numpy() + 1j * im.numpy()).reshape(256, 256) - exact) / np.linalg.norm(exact)
+        assert error < 1e-6
+
+
+@pytest.mark.parametrize("way", ["_fft", "_matrix_dft"])
+def test_derivative_is_the_adjoint(way):
+    """d/du of Σ w·re + v·im of a linear sum is its adjoint applied to (w, v)."""
+    _, field = random_field((5, 6))
+    (w, v), out = np.random.default_rng(1).normal(size=(2, 42)), (6, 7)
+    dr.enable_grad(field.re, field.im)
+    re, im = getattr(fourier, way)(field, 11, out, 1)
+    loss = dr.sum(re * type(re)(w) + im * type(re)(v))
+    dr.backward(loss)
+    adjoint = by_definition((w + 1j * v).reshape(out), 11, (5, 6), -1)
+    np.testing.assert_allclose(field.re.grad.numpy(), adjoint.real.ravel(), atol=1e-12)
+    np.testing.assert_allclose(field.im.grad.numpy(), adjoint.imag.ravel(), atol=1e-12)
+
+
+def test_small_windows_go_by_matrix_and_large_ones_by_fft():
+    assert not fourier._fft_wins((400, 400), 800, (20, 20))
+    assert fourier._fft_wins((1000, 1000), 2000, (2000, 2000))
+    assert not fourier._fft_wins((1000, 1000), 2000.5, (2000, 2000))

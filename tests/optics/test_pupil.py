@@ -1,0 +1,74 @@
+"""The pupil's optical path, and what bad pupils are told."""
+
+import math
+
+import numpy as np
+import pytest
+
+from optics import BSplineRelief, HeightMap, PointSource, Pupil, RefractiveIndex
+from optics.precision import precision
+
+TYPES = precision("float64")
+X, Y = np.random.default_rng(0).uniform(-30e-6, 30e-6, (2, 50))
+
+
+def path(pupil, wavelength=550e-9):
+    return pupil.path(TYPES.Float64(X), TYPES.Float64(Y), wavelength, PointSource(), TYPES).numpy()
+
+
+@pytest.mark.parametrize("f", [100e-6, -100e-6])
+def test_ideal_lens(f):
+    exact = -np.sign(f) * (np.sqrt(X**2 + Y**2 + f**2) - abs(f))
+    np.testing.assert_allclose(path(Pupil(30e-6, thin_lens_focal_length=f)), exact, atol=1e-18)
+
+
+def test_glass_of_height_h_adds_the_index_step_times_h():
+    relief = BSplineRelief(np.random.default_rng(1).random((4, 4)) * 1e-5)
+    height = relief.height(TYPES.Float64(X / 30e-6), TYPES.Float64(Y / 30e-6), TYPES).numpy()
+    np.testing.assert_allclose(path(Pupil(30e-6, relief, n=1.6, medium_n=1.25)), 0.35 * height, rtol=1e-12)
+
+
+def test_index_of_the_medium_makes_any_relief_vanish():
+    relief = np.random.default_rng(1).random((9, 9)) * 1e-5
+    np.testing.assert_array_equal(path(Pupil(30e-6, relief, n=1.33, medium_n=1.33)), 0)
+
+
+def test_dispersion_bends_blue_more():
+    glass = RefractiveIndex.from_abbe(1.5, 30)
+    pupil = Pupil(30e-6, np.full((4, 4), 1e-5), n=glass)
+    assert path(pupil, 450e-9)[0] > path(pupil, 650e-9)[0] > 0
+
+
+def test_array_and_height_map_are_the_same():
+    samples = np.random.default_rng(1).random((12, 12)) * 1e-6
+    np.testing.assert_array_equal(path(Pupil(30e-6, samples)), path(Pupil(30e-6, HeightMap(samples))))
+
+
+def test_slopes_and_rays_of_a_prism():
+    tilt = 0.2 / 0.5  # height per metre; a ray leaves with sine 0.2
+    pupil = Pupil(30e-6, BSplineRelief(np.outer(np.ones(4), tilt * (2 * np.arange(4) - 3) * 30e-6)), n=1.5)
+    slopes = pupil.slopes(550e-9, PointSource())
+    assert slopes.steepest == pytest.approx(0.2, rel=1e-9)
+    x, y = slopes.rays(1e-3, 1.0)
+    assert x.mean() == pytest.approx(1e-3 * math.tan(math.asin(0.2)), rel=1e-6)
+    assert y.mean() == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"aperture_radius": 0.0}, r"aperture_radius = 0\.0: must be greater than 0"),
+        ({"aperture_radius": -1e-6}, "aperture_radius"),
+        ({"aperture_radius": math.nan}, "aperture_radius"),
+        ({"aperture_radius": math.inf}, "aperture_radius"),
+        ({"aperture_radius": "wide"}, "aperture_radius = 'wide': must be a number"),
+        ({"aperture_radius": 1e-5, "n": 0.5}, r"n = 0\.5: must lie in \[1, 10\]"),
+        ({"aperture_radius": 1e-5, "medium_n": 0.0}, "medium_n"),
+        ({"aperture_radius": 1e-5, "thin_lens_focal_length": 0.0}, "thin_lens_focal_length"),
+        ({"aperture_radius": 1e-5, "height": np.zeros((2, 3))}, "height has shape"),
+        ({"aperture_radius": 1e-5, "height": np.full((4, 4), np.nan)}, "height holds NaN"),
+    ],
+)
+def test_bad_pupils(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        Pupil(**arguments)

@@ -1,0 +1,70 @@
+"""Bands, daylight, pigments: the frozen tables against colour-science, the weights against fine quadrature."""
+
+import numpy as np
+import pytest
+
+from optics.spectrum import SpectralBands, cie_1931, daylight, pigment_absorptance
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_frozen_tables_are_those_of_colour_science():
+    colour = pytest.importorskip("colour")
+    nm = np.arange(360, 781, 5)
+    shape = colour.SpectralShape(360, 780, 5)
+    d65 = colour.SDS_ILLUMINANTS["D65"].copy().align(shape)
+    np.testing.assert_allclose(daylight(nm * 1e-9), d65.values / d65[560], rtol=2e-5)
+    cmfs = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape)
+    np.testing.assert_allclose(cie_1931(nm * 1e-9), cmfs.values, rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize("peak_nm", [360.0, 440.0, 520.0, 600.0])
+def test_pigment_peaks_where_it_says(peak_nm):
+    nm = np.arange(330.0, 750.0, 0.1)
+    sensitivity = pigment_absorptance(nm * 1e-9, peak_nm * 1e-9)
+    alpha = nm > peak_nm - 30
+    assert abs(nm[alpha][np.argmax(sensitivity[alpha])] - peak_nm) < 2
+    assert sensitivity[alpha].max() == pytest.approx(1, abs=0.02)
+    assert pigment_absorptance(1.25 * peak_nm * 1e-9, peak_nm * 1e-9) < 0.01  # no red tail
+
+
+@pytest.mark.parametrize("bands", [1, 3, 4, 8, 16])
+def test_white_in_daylight_gives_one(bands):
+    spectral = SpectralBands.uniform(bands)
+    assert spectral.wavelengths.shape == (bands,)
+    assert spectral.weights.shape == (3, bands)
+    assert (spectral.weights >= 0).all()
+    np.testing.assert_allclose(spectral.weights @ daylight(spectral.wavelengths), 1, rtol=1e-12)
+
+
+def test_bands_converge_in_second_order():
+    """A smooth reflectance seen through n bands: halving the bands' width quarters the error."""
+
+    def catch(bands):
+        spectral = SpectralBands.uniform(bands)
+        reflectance = 0.5 + 0.4 * np.sin(spectral.wavelengths / 60e-9)
+        return spectral.weights @ (reflectance * daylight(spectral.wavelengths))
+
+    exact = catch(60)
+    errors = [np.abs(catch(bands) - exact).max() for bands in (8, 16)]
+    assert errors[0] < 0.05
+    assert 1.6 < np.log2(errors[0] / errors[1]) < 3.2
+
+
+def test_channels_tell_colours_apart():
+    """Red, green and blue lights each excite their own channel most."""
+    spectral = SpectralBands.uniform(15)
+    strongest = [
+        np.argmax(spectral.weights[:, np.argmin(np.abs(spectral.wavelengths - nm))]) for nm in (640e-9, 530e-9, 440e-9)
+    ]
+    assert strongest == [0, 1, 2]
+
+
+@pytest.mark.parametrize("bands", [0, -1, 2.5, 65])
+def test_bad_bands(bands):
+    with pytest.raises(ValueError, match=r"bands = .*\[1, 64\]"):
+        SpectralBands.uniform(bands)
+
+
+def test_wavelength_outside_the_tables():
+    with pytest.raises(ValueError, match="wavelengths"):
+        daylight(np.array([900e-9]))
