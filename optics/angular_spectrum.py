@@ -92,6 +92,8 @@ def _whole(problem: Problem, taper: Taper) -> GridSampling:
     """One period holds the window and all light that could wrap around into it."""
     disk = problem.soft_disk(taper.end + problem.phase_band)
     beam = problem.radius + disk.reach + taper.blur + problem.distance * taper.tangent
+    if problem.reach is not None:  # what lies beyond the reach is negligible: it may wrap around to the window's rim
+        beam = min(beam, problem.reach + problem.radius + disk.reach)
     pitch = problem.window.dx
     output_period = fast_length(max(problem.window.half_width + beam, 2 * (problem.radius + disk.reach)) / pitch)
     period = output_period * pitch
