@@ -7,15 +7,16 @@ Commands load on use, so that help comes at once.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
 
-__all__ = ["main"]
+from evolve.commands import INTERRUPTED
 
-INTERRUPTED = 130
+__all__ = ["main"]
 
 
 class _Parser(argparse.ArgumentParser):
@@ -29,6 +30,8 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     parsed = _parser().parse_args(arguments)
+    # Numerical libraries read this as they load. More threads than one sum in another order, and a run must repeat.
+    os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
     try:
         command = import_module(f"evolve.commands.{parsed.module}")
         return int(getattr(command, parsed.function)(parsed))

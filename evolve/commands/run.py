@@ -6,7 +6,7 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from evolve.cli import INTERRUPTED
+from evolve.commands import INTERRUPTED
 from evolve.config import RunConfig
 from evolve.config_source import assemble
 from evolve.executors import LocalExecutor

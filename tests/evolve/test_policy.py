@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from evolve.policy import PolicyConfig, build_policy, load_policy, save_policy
+from evolve.policy import SIGNAL_GAIN, PolicyConfig, build_policy, load_policy, save_policy
 
 CONFIG = PolicyConfig(eyes=(3, 2, 3, 2, 4), neurons=8)
 
@@ -47,7 +47,7 @@ def test_features_are_those_of_a_loop_over_eyes_and_frames(policy):
     for sample in range(2):
         for eye in range(2):
             codes = []
-            for frame in observation["eyes"][sample, :, eye].reshape(3, -1):
+            for frame in SIGNAL_GAIN * observation["eyes"][sample, :, eye].reshape(3, -1):
                 for name in ("encoder.0", "encoder.2", "encoder.4"):
                     frame = layer(parameters, name, eye, frame)
                 codes.append(frame)
