@@ -8,6 +8,10 @@ import numpy as np
 __all__ = ["finite", "in_range", "positive", "radiance_cube", "shape_2d"]
 
 
+# Squares of lengths, and their ratios, must stay within double precision.
+SMALLEST, LARGEST = 1e-15, 1e15
+
+
 def finite(name: str, value: float) -> float:
     """`value` as float; ValueError unless it is a finite number."""
     number = _number(name, value)
@@ -17,11 +21,14 @@ def finite(name: str, value: float) -> float:
 
 
 def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False) -> float:
-    """`value` as float; ValueError unless it is > 0 (and finite, unless `infinite` may be)."""
+    """`value` as float; ValueError unless it is > 0, within what arithmetic can square, or infinite where it may."""
     number = _number(name, value)
-    if not number > 0 or (math.isinf(number) and not infinite):
-        upper = "infinity included" if infinite else "finite"
-        raise ValueError(f"{name} = {value!r}: must be greater than 0 {unit} ({upper})".replace("0  (", "0 ("))
+    if infinite and number == math.inf:
+        return number
+    if not SMALLEST <= number <= LARGEST:
+        size = f" (at least {SMALLEST:g})" if 0 < number < SMALLEST else ""
+        upper = ", or infinite" if infinite else f" and at most {LARGEST:g}"
+        raise ValueError(f"{name} = {value!r}: must be greater than 0{size}{upper}, in {unit}")
     return number
 
 

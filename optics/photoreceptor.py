@@ -25,7 +25,7 @@ def gaussian_noise(signal: np.ndarray, sigma: float, rng: np.random.Generator) -
 
 def photon_noise(signal: np.ndarray, photons: float, rng: np.random.Generator) -> np.ndarray:
     """Poisson noise where a signal of 1 is `photons` absorbed photons: standard deviation √(signal/photons)."""
-    budget = positive("photons", photons, "")
+    budget = positive("photons", photons, "1")
     if np.any(signal < 0):
         raise ValueError(f"signal = {np.min(signal):g} at its least: must not be negative")
     return rng.poisson(signal * budget) / budget

@@ -1,0 +1,65 @@
+"""Plans: the cheapest method that fits is named, with its reasons; what cannot be had is said."""
+
+import dataclasses
+import math
+
+import pytest
+
+from optics import AccuracyError, Grid
+from optics.planner import METHODS, choose
+from optics.problem import Problem
+
+LENS = Problem(30e-6, 550e-9, 240e-6, Grid.square(65, 0.5e-6), 0.13 / 550e-9, 1e-3)
+PINHOLE = Problem(1e-6, 550e-9, 5e-3, Grid.square(65, 1e-4), 0.0, 1e-3)
+WIDE = Problem(90e-6, 550e-9, 100e-6, Grid.square(201, 1e-6), 0.2 / 550e-9, 1e-2)
+
+
+@pytest.mark.parametrize("problem", [LENS, PINHOLE, WIDE])
+def test_auto_takes_the_cheapest(problem):
+    plan, _ = choose(problem)
+    for method in METHODS:
+        try:
+            other, _ = choose(problem, method)
+        except AccuracyError:
+            continue
+        assert plan.seconds <= other.seconds
+        assert other.method == method
+
+
+def test_method_follows_the_problem():
+    assert choose(LENS)[0].method == "split_angular_spectrum"
+    assert choose(PINHOLE)[0].method in ("far_field", "rayleigh_sommerfeld")
+    assert choose(WIDE)[0].method == "angular_spectrum"
+
+
+@pytest.mark.parametrize("method", ["angular_spectrum", "split_angular_spectrum"])
+def test_more_digits_cost_more_samples(method):
+    samples = [
+        choose(dataclasses.replace(LENS, tolerance=tolerance, dtype="float64"), method)[0].samples[0]
+        for tolerance in (1e-2, 1e-5, 1e-9)
+    ]
+    assert samples == sorted(samples)
+    assert samples[0] < samples[-1] < 3 * samples[0]  # digits cost little: convergence is spectral
+
+
+def test_sampling_resolves_the_lens():
+    """Phase of an ideal lens needs dx < λ / (2 NA)."""
+    _, sampling = choose(LENS, "angular_spectrum")
+    assert sampling.pupil.dx < 550e-9 / (2 * 0.124)
+
+
+def test_plan_prints_as_a_table():
+    text = str(choose(LENS)[0])
+    for name in ("method", "samples", "dtype", "predicted error", "predicted time", "why", "Fresnel number 6.82"):
+        assert name in text
+
+
+def test_refusals_say_what_it_would_take():
+    far_too_large = dataclasses.replace(WIDE, radius=3e-3, distance=2e-3, window=Grid.square(1001, 4e-6))
+    with pytest.raises(AccuracyError, match=r"needs \d+ samples across .* the limits are"):
+        choose(far_too_large)
+    with pytest.raises(AccuracyError, match="dtype='float64' carries"):
+        choose(dataclasses.replace(LENS, tolerance=1e-8))
+    with pytest.raises(AccuracyError, match="grazing"):
+        choose(dataclasses.replace(LENS, distance=1e-7), "angular_spectrum")
+    assert math.isfinite(choose(LENS)[0].predicted_error)
