@@ -57,7 +57,7 @@ class FarFieldSampling:
 def far_field(problem: Problem) -> list[FarFieldSampling]:
     """Directions beyond the intensity's Nyquist rate; as many nodes as the kernel's slow part needs."""
     half = problem.window.half_width
-    nodes = _nodes_needed(problem, problem.tolerance / 15)
+    nodes = _nodes_needed(problem, problem.ripple)
     if nodes is None or problem.tolerance < 1e-3:
         return []
     band = problem.outermost / math.hypot(problem.outermost, problem.distance) / problem.wavelength

@@ -15,6 +15,7 @@ __all__ = ["Problem", "Taper"]
 # Amplitude ripple of the soft aperture and of the spectral taper against the tolerance on intensity. Edge-diffracted
 # light errs by several ripples, its intensity by twice that, and a window may hold no other light: half the tolerance.
 RIPPLE_PER_TOLERANCE = 0.03
+BRIGHT_RIPPLE_PER_TOLERANCE = 0.3
 
 
 @dataclass(frozen=True)
@@ -24,8 +25,8 @@ class Problem:
     radius, distance [m]; wavelength [m] in the medium; window: output grid.
     phase_band: highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge.
     widest_band: frequencies beyond it may be dropped (infinite: whatever reaches the window counts).
-    reach: distance from the axis [m] up to which the window counts (None: to its corners).
-    fade_ripple: amplitude error allowed to light from beyond the band (None: as everywhere).
+    reach: given where all but a tolerance's share of the light stays within this distance of the axis [m]: what lies
+        beyond may be wrong, and edge-diffracted light less exact (None: the window counts to its corners).
     """
 
     radius: float
@@ -37,11 +38,16 @@ class Problem:
     dtype: str = "float32"
     widest_band: float = math.inf
     reach: float | None = None
-    fade_ripple: float | None = None
 
     @property
     def ripple(self) -> float:
-        return self.tolerance * RIPPLE_PER_TOLERANCE
+        """Amplitude error allowed to the soft aperture's spectrum."""
+        return self.tolerance * (RIPPLE_PER_TOLERANCE if self.reach is None else BRIGHT_RIPPLE_PER_TOLERANCE)
+
+    @property
+    def fade_ripple(self) -> float:
+        """Amplitude error allowed to light from beyond the band."""
+        return self.ripple if self.reach is None else 0.1
 
     @property
     def outermost(self) -> float:
@@ -77,8 +83,7 @@ class Taper:
 
     @classmethod
     def of(cls, problem: Problem, blur: float) -> Taper:
-        ripple = problem.ripple if problem.fade_ripple is None else problem.fade_ripple
-        band, width = problem.band(blur), 2 * math.log(1 / ripple) / (math.pi * blur)
+        band, width = problem.band(blur), 2 * math.log(1 / problem.fade_ripple) / (math.pi * blur)
         sine = (band + width) * problem.wavelength
         return cls(band, width, blur, sine, sine / math.sqrt(max(1 - sine * sine, 1e-12)))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from optics.beam import Beam
 from optics.grid import Grid
-from optics.planner import AccuracyError, Plan
+from optics.planner import AccuracyError, Plan, choose
 from optics.point_spread import PSFResult, monochromatic, problem
 from optics.pupil import Pupil
 from optics.source import PointSource
@@ -20,8 +20,6 @@ __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 WIDEST_TANGENT = math.tan(math.radians(50))
 MOST_CELLS = 2049
 MOST_SECONDS = 3.0  # per band
-# Light beyond the window's reach is less than the tolerance; what leaks back of it may be a tenth in amplitude.
-FADE_RIPPLE = 0.1
 
 
 @dataclass(frozen=True)
@@ -70,14 +68,15 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: float) -> PSFResult:
         )
     half = retina.cell * (_cells_within(half, retina.cell) + 1) / 2
     window = Grid.square(2 * math.ceil(half / pitch) + 1, pitch)
-    images, plans = [], []
-    for beam, view in zip(beams, views, strict=True):
-        task = problem(beam, retina.distance, window, retina.tolerance)
-        task = replace(task, widest_band=view.band, reach=half, fade_ripple=FADE_RIPPLE)
-        image, plan = monochromatic(beam, task, most_seconds=MOST_SECONDS)
-        images.append(image)
-        plans.append(plan)
-    return PSFResult(np.stack(images), pitch, retina.wavelengths, retina.distance, pupil, tuple(plans))
+    tasks = [
+        replace(problem(beam, retina.distance, window, retina.tolerance), widest_band=view.band, reach=half)
+        for beam, view in zip(beams, views, strict=True)
+    ]
+    for task in tasks:  # refused before anything is computed
+        choose(task, most_seconds=MOST_SECONDS)
+    solved = [monochromatic(beam, task, most_seconds=MOST_SECONDS) for beam, task in zip(beams, tasks, strict=True)]
+    images, plans = zip(*solved, strict=True)
+    return PSFResult(np.stack(images), pitch, retina.wavelengths, retina.distance, pupil, plans)
 
 
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:
