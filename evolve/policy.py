@@ -28,7 +28,7 @@ from evolve.files import write_whole
 ENCODER_WIDTHS = (4, 8, 16)  # hidden, hidden, code of one frame
 EYE_FEATURES = 16  # what the temporal layer makes of an eye's remembered codes
 SIGNAL_GAIN = 4.0  # signals of the tasks' worlds spread by 0.1 to 0.2: brought to the order of 1 for the tanh units
-# Standard deviation 0.5 of the first actions: with 1, most commands are clipped, and a turn is mostly noise.
+# Standard deviation 0.5 of the first actions: with 1, a third of the commands are clipped and turns are mostly noise.
 INITIAL_LOG_STD = -0.7
 
 
@@ -159,7 +159,8 @@ def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy
 def save_policy(policy: EyePolicy, path: Path | str) -> None:
     """Write the policy's tensors as safetensors, its shape in the metadata; whole or not at all."""
     tensors = {name: parameter.detach() for name, parameter in policy.named_parameters()}
-    metadata = {"format": "rhabdom policy 1", "config": json.dumps(asdict(policy.config))}
+    # One entry: safetensors writes several in random order, and the same policy must be the same bytes.
+    metadata = {"config": json.dumps(asdict(policy.config))}
     write_whole(Path(path), safetensors.torch.save(tensors, metadata))
 
 
