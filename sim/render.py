@@ -7,6 +7,9 @@ wavelengths are fixed, so a call does nothing but upload poses and launch the ke
 from __future__ import annotations
 
 import copy
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import drjit as dr
@@ -103,10 +106,23 @@ class BatchedRenderer:
     def _launch(self, frozen: Any, state: WorldState) -> np.ndarray:
         if state.n != self.n_envs:
             raise ValueError(f"state has {state.n} worlds, this renderer was built for n_envs = {self.n_envs}")
-        with variant(self._stage.variant):
+        with variant(self._stage.variant), _garbage_kept():
             poses = mi.Float(self._poses.pack(state, self._stage))
             # numpy() waits for the kernel: only then may the buffer, whose memory Dr.Jit shares, be written again.
             return np.array(frozen(self._stage.scene, poses, self._inputs).numpy())
+
+
+@contextmanager
+def _garbage_kept() -> Iterator[None]:
+    """Hold off Python's garbage collection: if it frees another renderer's kernels or scene while this one's kernel is
+    being recorded, Dr.Jit aborts the process."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 class _PoseBuffer:

@@ -1,0 +1,40 @@
+"""Recording a kernel survives that Python would collect another environment's remains just then."""
+
+import subprocess
+import sys
+
+# A first environment becomes garbage; collection falls due in the middle of the second one's recording.
+PROGRAM = """
+import gc
+import sim
+from sim import lighting
+
+def environment(seed):
+    return sim.make_vec_env("detection", sim.Eyes(n_eyes=1, resolution=(3, 3)), 2, seed=seed, rays_per_receptor=1)
+
+gc.disable()
+first = environment(0)
+first.reset()
+first.itself = first
+del first
+second = environment(1)
+gc.set_threshold(10**9)
+gc.enable()
+direct_light = lighting.direct_light
+
+def collection_falls_due(*arguments):
+    gc.set_threshold(1, 1, 1)
+    kept = [[] for _ in range(10_000)]
+    gc.set_threshold(10**9)
+    return direct_light(*arguments)
+
+lighting.direct_light = collection_falls_due
+second.reset()
+assert gc.isenabled()
+print("survived")
+"""
+
+
+def test_collection_waits_until_the_kernel_is_recorded():
+    child = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=False)
+    assert child.stdout.strip() == "survived", child.stderr[-500:]
