@@ -1,25 +1,111 @@
-"""A circular aperture that a grid can carry.
+"""An aperture's face: its shape, softened so that a grid can carry it, or as edge-fitted quadrature nodes.
 
-A hard edge has no band limit: sampled on a Cartesian grid, its error falls only like N⁻¹ to N⁻¹·⁵. Here the disk is
-convolved with a low-pass kernel of compact support, a jinc under a Kaiser window. Its spectrum is the disk's own up to
-`passband`, nothing beyond `stopband`, so sums over samples (the trapezoid rule) converge as fast as the window's side
-lobes fall. The function is 1 or 0 except within `reach` of the edge.
+A hard edge has no band limit: sampled on a Cartesian grid, its error falls only like N⁻¹ to N⁻¹·⁵. Here the aperture is
+convolved with a low-pass kernel of compact support (optics.soft_edge), so that sums over samples (the trapezoid rule)
+converge as fast as the kernel's side lobes fall. The function is 1 or 0 except within `reach` of the edge.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from math import log10, pi, sqrt
+from math import pi, sqrt
 from typing import Any
 
 import numpy as np
 
+from optics.arguments import LARGEST, in_range, positive
 from optics.precision import Precision, opaque
+from optics.soft_edge import SoftEdge, gauss_legendre, kaiser_beta
 
-__all__ = ["EDGE_REACH", "SoftDisk"]
+__all__ = ["EDGE_REACH", "Aperture", "Nodes", "SoftAperture", "SoftDisk"]
 
 # The soft edge reaches at most this far beyond the aperture, in radii.
 EDGE_REACH = 0.25
+
+
+class SoftAperture(ABC):
+    """An aperture whose edge a grid can carry. Lengths in units of the pupil's radius R, frequencies in cycles per R.
+
+    Its spectrum is the aperture's own up to `passband` and vanishes beyond `stopband`, to `ripple`; further than
+    `reach` from the edge it is 1 or 0.
+    """
+
+    edge: SoftEdge
+
+    @property
+    def passband(self) -> float:
+        return self.edge.passband
+
+    @property
+    def stopband(self) -> float:
+        return self.edge.stopband
+
+    @property
+    def ripple(self) -> float:
+        return self.edge.ripple
+
+    @property
+    def reach(self) -> float:
+        return self.edge.reach
+
+    @abstractmethod
+    def transmittance(self, x: Any, y: Any, types: Precision) -> Any:
+        """At points (x, y), flat Dr.Jit Float64 arrays; differentiable in both."""
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Quadrature nodes x, y and weights over an aperture: flat float64 arrays, in units of R and R²."""
+
+    x: np.ndarray
+    y: np.ndarray
+    weight: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.weight)
+
+
+class Aperture(ABC):
+    """An opening in an opaque screen, within the unit circle: lengths are in units of the pupil's radius R."""
+
+    @property
+    @abstractmethod
+    def area(self) -> float:
+        """In R²."""
+
+    @property
+    @abstractmethod
+    def rotationally_symmetric(self) -> bool:
+        """Whether the aperture is the same seen from every side."""
+
+    @property
+    @abstractmethod
+    def half_widths(self) -> tuple[float, float]:
+        """Half the width and height of the smallest centred rectangle that holds the aperture."""
+
+    @abstractmethod
+    def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Which points lie within the aperture."""
+
+    @abstractmethod
+    def nodes(self, cycles: float, digits: float) -> Nodes:
+        """Nodes whose sum is good to 10^-digits of the area, for integrands of at most `cycles` cycles per R."""
+
+    def soften(self, passband: float, ripple: float, widest_reach: float = EDGE_REACH) -> SoftAperture:
+        """The aperture, low-passed from `passband` [cycles per R] on with the transition that costs fewest samples.
+
+        Raises:
+            ValueError: passband negative, ripple outside [1e-13, 0.5], or widest_reach not positive.
+        """
+        in_range("passband", passband, 0.0, LARGEST)
+        in_range("ripple", ripple, 1e-13, 0.5)
+        positive("widest_reach", widest_reach, "pupil radii")
+        return self._softened(SoftEdge.cheapest(passband, ripple, widest_reach, self.half_widths))
+
+    @abstractmethod
+    def _softened(self, edge: SoftEdge) -> SoftAperture:
+        """The aperture convolved with the edge's kernel."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +120,13 @@ class SoftDisk:
     @classmethod
     def cheapest(cls, radius: float, passband: float, ripple: float, widest_reach: float) -> SoftDisk:
         """The transition that minimises samples: (radius + reach) x (2 passband + transition), reach limited."""
-        beta = _kaiser_beta(ripple)
+        beta = kaiser_beta(ripple)
         half = max(sqrt(passband * beta / (2 * pi * radius)), beta / (2 * pi * widest_reach))
         return cls(radius, passband, passband + 2 * half, ripple)
 
     @property
     def beta(self) -> float:
-        return _kaiser_beta(self.ripple)
+        return kaiser_beta(self.ripple)
 
     @property
     def reach(self) -> float:
@@ -56,7 +142,7 @@ class SoftDisk:
         rho = np.maximum(np.asarray(distance, dtype=np.float64), 1e-9 * self.radius)[:, None]
         lower = np.abs(rho - self.radius)
         span = np.maximum(np.minimum(self.reach, rho + self.radius) - lower, 0)
-        u, weight = _gauss_legendre(self._nodes)
+        u, weight = gauss_legendre(self._nodes)
         r = np.maximum(lower + span * np.sin(pi * u / 2) ** 2, 1e-300)
         cosine = np.clip((rho**2 + r**2 - self.radius**2) / (2 * rho * r), -1, 1)
         jacobian = span * np.sin(pi * u) * pi / 2
@@ -98,20 +184,6 @@ class SoftDisk:
 
         cutoff = (self.passband + self.stopband) / 2
         return j1(2 * pi * cutoff * r) * i0(self.beta * np.sqrt(np.maximum(1 - (r / self.reach) ** 2, 0)))
-
-
-def _kaiser_beta(ripple: float) -> float:
-    """Kaiser's rule for an attenuation (Oppenheim & Schafer, Discrete-Time Signal Processing, §7.5)."""
-    attenuation = -20 * log10(ripple)
-    if attenuation > 50:
-        return 0.1102 * (attenuation - 8.7)
-    return max(1.0, 0.5842 * max(attenuation - 21, 0.0) ** 0.4 + 0.07886 * max(attenuation - 21, 0.0))
-
-
-def _gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights on [0, 1]."""
-    nodes, weights = np.polynomial.legendre.leggauss(n)
-    return (nodes + 1) / 2, weights / 2
 
 
 def _lagrange6(t: Any) -> list[Any]:
