@@ -6,19 +6,15 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from optics.aperture import SoftDisk
 from optics.beam import Beam
 from optics.field import Field
 from optics.fourier import dft2, fast_length, predicted_seconds
 from optics.grid import Grid
 from optics.precision import Precision, opaque, precision
-from optics.problem import Problem, Taper
+from optics.problem import Problem, PupilEdge, Taper, tapers
+from optics.tracked import is_tracked
 
-__all__ = ["FADES", "STEEPEST_SINE", "GridSampling", "split", "whole"]
-
-# The taper must end this far from grazing incidence, where z tan θ has no bound.
-STEEPEST_SINE = 0.9995
-FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)  # blurs to try, in units of the problem's size
+__all__ = ["GridSampling", "split", "whole"]
 
 
 @dataclass(frozen=True)
@@ -30,7 +26,7 @@ class GridSampling:
     """
 
     method: str
-    disk: SoftDisk
+    edge: PupilEdge
     taper: Taper
     period: float
     pupil_period: int
@@ -41,7 +37,7 @@ class GridSampling:
     def pupil(self) -> Grid:
         """The samples that hold the soft disk."""
         pitch = self.period / self.pupil_period
-        across = 2 * math.ceil((self.disk.radius + self.disk.reach) / pitch) + 1
+        across = 2 * math.ceil(self.edge.outermost / pitch) + 1
         return Grid.square(min(self.pupil_period, across), pitch)
 
     @property
@@ -74,44 +70,38 @@ class GridSampling:
 
 def whole(problem: Problem) -> list[GridSampling]:
     """Samplings by which the whole spectrum meets the problem's tolerance."""
-    return [_whole(problem, taper) for taper in _tapers(problem)]
+    return [_whole(problem, taper) for taper in tapers(problem)]
 
 
 def split(problem: Problem) -> list[GridSampling]:
     """Samplings by which the split spectrum meets the problem's tolerance."""
-    return [_split(problem, taper) for taper in _tapers(problem)]
-
-
-def _tapers(problem: Problem) -> list[Taper]:
-    size = problem.radius + problem.outermost
-    tapers = [Taper.of(problem, share * size) for share in FADES]
-    return [taper for taper in tapers if taper.sine < STEEPEST_SINE]
+    return [_split(problem, taper) for taper in tapers(problem)]
 
 
 def _whole(problem: Problem, taper: Taper) -> GridSampling:
     """One period holds the window and all light that could wrap around into it."""
-    disk = problem.soft_disk(taper.end + problem.phase_band)
-    beam = problem.radius + disk.reach + taper.blur + problem.distance * taper.tangent
+    edge = problem.soft_edge(taper.end + problem.phase_band)
+    beam = edge.outermost + taper.blur + problem.distance * taper.tangent
     if problem.reach is not None:  # what lies beyond the reach is negligible: it may wrap around to the window's rim
-        beam = min(beam, problem.reach + problem.radius + disk.reach)
+        beam = min(beam, problem.reach + edge.outermost)
     pitch = problem.window.dx
-    output_period = fast_length(max(problem.window.half_width + beam, 2 * (problem.radius + disk.reach)) / pitch)
+    output_period = fast_length(max(problem.window.half_width + beam, 2 * (edge.outermost)) / pitch)
     period = output_period * pitch
-    pupil_period = fast_length(period * (taper.end + disk.stopband + problem.phase_band))
-    sampling = GridSampling("angular_spectrum", disk, taper, period, pupil_period, output_period)
+    pupil_period = fast_length(period * (taper.end + edge.stopband + problem.phase_band))
+    sampling = GridSampling("angular_spectrum", edge, taper, period, pupil_period, output_period)
     last = predicted_seconds(sampling.spectrum.shape, output_period, problem.window.shape)
     return _timed(sampling, last)
 
 
 def _split(problem: Problem, taper: Taper) -> GridSampling:
     """One period holds the pupil and the non-paraxial walk-off z (tan θ - sin θ)."""
-    disk = problem.soft_disk(taper.end + problem.phase_band)
-    relay = problem.radius + disk.reach + taper.blur + problem.distance * (taper.tangent - taper.sine)
+    edge = problem.soft_edge(taper.end + problem.phase_band)
+    relay = edge.outermost + taper.blur + problem.distance * (taper.tangent - taper.sine)
     period = 2 * relay
-    pupil_period = fast_length(period * (taper.end + disk.stopband + problem.phase_band))
+    pupil_period = fast_length(period * (taper.end + edge.stopband + problem.phase_band))
     reached = problem.window.half_width + relay + problem.distance * taper.sine
     relay_period = fast_length(period * reached / (problem.wavelength * problem.distance))
-    sampling = GridSampling("split_angular_spectrum", disk, taper, period, pupil_period, relay_period)
+    sampling = GridSampling("split_angular_spectrum", edge, taper, period, pupil_period, relay_period)
     last = predicted_seconds(sampling.spectrum.shape, relay_period, sampling.relay.shape)
     last += predicted_seconds(sampling.relay.shape, 0.5, problem.window.shape)  # no whole period: a matrix
     return _timed(sampling, last)
@@ -126,17 +116,17 @@ def _timed(sampling: GridSampling, last: float) -> GridSampling:
 
 def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
     """U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10), up to a phase that intensity forgets."""
-    u = beam.behind(how.disk, how.pupil, types)
+    u = beam.behind(how.edge.aperture, how.pupil, types)
     spectrum = dft2(u, how.pupil_period, how.spectrum.shape, -1, how.spectrum.dx)
-    spectrum = spectrum * _transfer(problem, how, types)
+    spectrum = spectrum * _transfer(beam, problem, how, types)
     scale = (how.pupil.dx / how.period) ** 2
     if how.method == "angular_spectrum":
         window = problem.window
         return dft2(spectrum, how.output_period, window.shape, +1, window.dx).scaled(scale)
-    return _paraxial_rest(spectrum, problem, how, types).scaled(scale)
+    return _paraxial_rest(spectrum, beam, problem, how, types).scaled(scale)
 
 
-def _transfer(problem: Problem, how: GridSampling, types: Precision) -> Field:
+def _transfer(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
     """exp(ikz (cos θ - 1)) under the spectral taper; the split method leaves the paraxial -ikz sin²θ/2 for later.
 
     Goodman, eq. 3-74. cos θ - 1 = -q, q = sin²θ / (1 + cos θ), and with the paraxial part taken out -q²/2: no
@@ -149,23 +139,19 @@ def _transfer(problem: Problem, how: GridSampling, types: Precision) -> Field:
     s2 = dr.minimum(dr.square(f * opaque(types, problem.wavelength)), 1)
     q = s2 / (1 + dr.sqrt(1 - s2))
     sag = q if how.method == "angular_spectrum" else q * q / 2
-    waves = -opaque(types, problem.distance / problem.wavelength) * sag
+    waves = -opaque(types, beam.distance) / opaque(types, problem.wavelength) * sag
     return Field.from_waves(how.taper.fade(f, types), waves, how.spectrum, types)
 
 
-def _paraxial_rest(spectrum: Field, problem: Problem, how: GridSampling, types: Precision) -> Field:
+def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
     """Fresnel's integral of the relay field: quadratic phase, then one Fourier sum of free output pitch.
 
     U(x) = 1/(iλz) e^{iπx²/λz} ∫ u(ξ) e^{iπξ²/λz} e^{-2πi xξ/λz} dξ (Goodman, eq. 4-17); the outer curvature is dropped.
     """
     relay, window = how.relay, problem.window
+    scale = opaque(types, beam.distance) * opaque(types, problem.wavelength)
     u = dft2(spectrum, how.output_period, relay.shape, +1, relay.dx)
     x, y = relay.coordinates(types)
-    u = u * Field.from_waves(1.0, (x * x + y * y) * opaque(types, 0.5 / _scale(problem)), relay, types)
-    period = _scale(problem) / (relay.dx * window.dx)
-    return dft2(u, period, window.shape, -1, window.dx).scaled(relay.dx**2 / _scale(problem))
-
-
-def _scale(problem: Problem) -> float:
-    """λz [m²]"""
-    return problem.wavelength * problem.distance
+    u = u * Field.from_waves(1.0, (x * x + y * y) * (0.5 / scale), relay, types)
+    period = scale if is_tracked(beam.distance) else problem.wavelength * problem.distance
+    return dft2(u, period / (relay.dx * window.dx), window.shape, -1, window.dx).scaled(relay.dx**2 / scale)

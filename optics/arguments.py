@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from optics.tracked import number
+
 __all__ = ["finite", "in_range", "positive", "radiance_cube", "shape_2d"]
 
 
@@ -72,6 +74,6 @@ def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
 
 def _number(name: str, value: Any) -> float:
     try:
-        return float(value)
+        return number(value)
     except (TypeError, ValueError):
         raise ValueError(f"{name} = {value!r}: must be a number") from None

@@ -1,11 +1,11 @@
-"""Light of one wavelength from a source through a pupil."""
+"""Light of one wavelength from a source through a pupil, on its way to a plane behind it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-from optics.aperture import SoftDisk
+from optics.aperture import SoftAperture
 from optics.field import Field
 from optics.grid import Grid
 from optics.precision import Precision, opaque
@@ -17,17 +17,27 @@ __all__ = ["Beam"]
 
 @dataclass(frozen=True)
 class Beam:
-    """Light of one vacuum wavelength [m] from a source through a pupil."""
+    """Light of one vacuum wavelength [m] from a source through a pupil to a plane at `distance` [m].
+
+    Radius, relief, index and distances may be Dr.Jit arrays that carry derivatives.
+    """
 
     pupil: Pupil
     source: PointSource
     wavelength: float
+    distance: Any
+
+    @property
+    def radius(self) -> Any:
+        """[m]"""
+        return self.pupil.aperture_radius
 
     def waves(self, x: Any, y: Any, types: Precision) -> Any:
         """Optical path in wavelengths at the pupil's points, float64."""
         return self.pupil.path(x, y, self.wavelength, self.source, types) * opaque(types, 1 / self.wavelength)
 
-    def behind(self, disk: SoftDisk, grid: Grid, types: Precision) -> Field:
+    def behind(self, soft: SoftAperture, grid: Grid, types: Precision) -> Field:
         """Field just behind the pupil, aperture softened."""
         x, y = grid.coordinates(types)
-        return Field.from_waves(disk.transmittance(x, y, types), self.waves(x, y, types), grid, types)
+        scale = 1 / opaque(types, self.radius)
+        return Field.from_waves(soft.transmittance(x * scale, y * scale, types), self.waves(x, y, types), grid, types)

@@ -4,67 +4,108 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
-import numpy as np
-
+from optics.aperture import Aperture, Nodes
 from optics.beam import Beam
 from optics.field import Field
+from optics.grid import Grid
 from optics.precision import Precision, opaque, precision
 from optics.problem import Problem
+from optics.radial import RadialLine
 
 __all__ = ["NodeSampling", "nodes"]
+
+PAIRS_PER_SECOND = 2.5e8
+SPARE_DIGITS = 1.0
 
 
 @dataclass(frozen=True)
 class NodeSampling:
-    """Gauss-Legendre nodes in radius times trapezoid nodes in angle."""
+    """Quadrature nodes fitted to the aperture's edge, good to `digits` for `cycles` turns per radius.
 
-    radial: int
-    angular: int
+    line: where the picture is rotationally symmetric, the radii it is computed on.
+    """
+
+    aperture: Aperture
+    cycles: float
+    digits: float
+    count: int
+    line: RadialLine | None
     seconds: float
     method: str = "rayleigh_sommerfeld"
 
     def intensity(self, beam: Beam, problem: Problem) -> Any:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
-        return _direct_sum(beam, problem, self, precision(problem.dtype)).intensity
+        types = precision(problem.dtype)
+        if self.line is None:
+            x, y = problem.window.coordinates(types)
+            return _direct_sum(beam, self, x, y, types).intensity
+        r = types.Float64(self.line.positions)
+        return self.line.onto(_direct_sum(beam, self, r, 0 * r, types).intensity, problem.window, types)
 
     def plane(self, problem: Problem) -> float:
         """Width [m] over which rounding spreads the pupil's light: the focus, times the root of the summands."""
-        return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.radial * self.angular / math.pi)
+        return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.count / math.pi)
 
     @property
     def samples(self) -> tuple[int, int]:
-        return self.radial, self.angular
+        return self.count, 1
 
     @property
     def largest(self) -> int:
-        return self.radial
+        return math.ceil(math.sqrt(self.count))
 
 
 def nodes(problem: Problem) -> list[NodeSampling]:
-    """Enough nodes for the cycles that phase and path turn through."""
-    cycles = problem.radius * (problem.phase_band + problem.band())
-    digits = -math.log10(problem.ripple)
-    radial = math.ceil(1.75 * cycles + 2 * digits + 4)
-    angular = 2 * math.ceil(math.pi * cycles + 1.5 * digits * (1 + cycles ** (1 / 3)) + 4)
-    pairs = radial * angular * problem.window.shape[0] * problem.window.shape[1]
-    return [NodeSampling(radial, angular, pairs / 1e8 + 5e-3)]
+    """Enough nodes for the cycles that pupil and path together turn through."""
+    cycles = problem.radius * problem.turning
+    digits = SPARE_DIGITS - math.log10(problem.ripple)
+    count = _count(problem.aperture, cycles, digits)
+    line, outputs = None, math.prod(problem.window.shape)
+    if problem.symmetric:
+        outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
+        line = RadialLine.resolving(outermost, _intensity_band(problem), problem.ripple)
+        outputs = line.points
+    seconds = 1e-3 + count * outputs / PAIRS_PER_SECOND + count * 4e-9
+    return [NodeSampling(problem.aperture, cycles, digits, count, line, seconds)]
 
 
-def _direct_sum(beam: Beam, problem: Problem, how: NodeSampling, types: Precision) -> Field:
-    """First Rayleigh-Sommerfeld integral over edge-fitted nodes (Goodman, §3.5):
+def _count(aperture: Aperture, cycles: float, digits: float) -> int:
+    """Number of nodes; beyond a hundred cycles it grows like their square, and is not worth counting."""
+    most = 100.0
+    counted = len(_nodes(aperture, min(cycles, most), digits).weight)
+    return math.ceil(counted * max(cycles / most, 1.0) ** 2)
+
+
+@lru_cache(maxsize=16)
+def _nodes(aperture: Aperture, cycles: float, digits: float) -> Nodes:
+    return aperture.nodes(cycles, digits)
+
+
+def _intensity_band(problem: Problem) -> float:
+    """Highest frequency [1/m] of the intensity over the window: rays from the disk's rims interfere there."""
+    reach = problem.radius + problem.outermost
+    steepest = reach / math.hypot(reach, problem.distance) / problem.wavelength
+    return min(2 * steepest, 2 * problem.radius / (problem.wavelength * problem.distance))
+
+
+def _direct_sum(beam: Beam, how: NodeSampling, x: Any, y: Any, types: Precision) -> Field:
+    """First Rayleigh-Sommerfeld integral at points (x, y) [m] (Goodman, §3.5):
 
     U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ikD} dξ. D - z = d²/(D + z) loses its whole waves in float64.
     """
     import drjit as dr
 
-    nodes_x, nodes_y, weight = _disk_nodes(problem.radius, how, types)
+    found = _nodes(how.aperture, how.cycles, how.digits)
+    radius = opaque(types, beam.radius)
+    nodes_x, nodes_y = types.Float64(found.x) * radius, types.Float64(found.y) * radius
+    weight = types.Float64(found.weight) * dr.square(radius)
     waves = beam.waves(nodes_x, nodes_y, types)
-    dr.eval(nodes_x, nodes_y, weight, waves)
-    count = dr.opaque(types.Index, len(weight))
-    x, y = problem.window.coordinates(types)
-    z, wavelength = opaque(types, problem.distance), opaque(types, problem.wavelength)
+    dr.eval(nodes_x, nodes_y, weight, waves, x, y)
+    count = dr.opaque(types.Index, len(found.weight))
+    z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.pupil.medium_n)
     k = 2 * math.pi / wavelength
 
     def add(i: Any, re: Any, im: Any) -> tuple[Any, Any, Any]:
@@ -79,15 +120,5 @@ def _direct_sum(beam: Beam, problem: Problem, how: NodeSampling, types: Precisio
 
     zero = dr.zeros(types.Float64, dr.width(x))
     start = dr.zeros(types.Index, dr.width(x))
-    _, re, im = dr.while_loop((start, zero, zero), lambda i, re, im: i < count, add)
-    return Field(types.Float(re), types.Float(im), problem.window, types)
-
-
-def _disk_nodes(radius: float, how: NodeSampling, types: Precision) -> tuple[Any, Any, Any]:
-    """Gauss-Legendre in radius, trapezoid in angle, weights r dr dφ: exact edge, spectral convergence."""
-    nodes, weights = np.polynomial.legendre.leggauss(how.radial)
-    r = radius * (nodes + 1) / 2
-    angle = 2 * np.pi * (np.arange(how.angular) + 0.5) / how.angular
-    x, y = np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle))
-    weight = np.outer(weights * r * radius / 2, np.full(how.angular, 2 * np.pi / how.angular))
-    return types.Float64(x.ravel()), types.Float64(y.ravel()), types.Float64(weight.ravel())
+    _, re, im = dr.while_loop((start, zero, zero), lambda i, re, im: i < count, add, max_iterations=-1)
+    return Field(types.Float(re), types.Float(im), Grid((1, dr.width(x)), 1.0), types)

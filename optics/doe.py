@@ -7,12 +7,14 @@ Row index and y grow together, as do column index and x.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from optics.precision import Precision
+from optics.tracked import is_tracked, plain
 
 __all__ = ["BSplineRelief", "HeightMap", "Relief"]
 
@@ -33,6 +35,11 @@ class Relief(ABC):
     def knots(self) -> int:
         """Polynomial pieces across the pupil."""
 
+    @property
+    def rotationally_symmetric(self) -> bool:
+        """Whether the height depends on the distance from the axis alone, under any change that is asked about."""
+        return False
+
 
 @dataclass(frozen=True, eq=False)
 class BSplineRelief(Relief):
@@ -42,18 +49,23 @@ class BSplineRelief(Relief):
     every paraboloid exactly (`paraboloid`). Outside the square the polynomial goes on.
     Piegl & Tiller, The NURBS Book, ch. 2.
 
+    A Dr.Jit tensor of control points carries derivatives.
+
     Raises:
         ValueError: not 4 x 4 finite numbers.
     """
 
-    control_points: np.ndarray
+    control_points: Any
 
     def __post_init__(self) -> None:
-        points = np.array(self.control_points, dtype=np.float64)
+        points = np.array(plain(self.control_points))
+        if is_tracked(self.control_points) and points.size == 16:
+            points = points.reshape(4, 4)
         if points.shape != (4, 4) or not np.isfinite(points).all():
             raise ValueError(f"control_points has shape {points.shape}: must be 4 x 4 finite heights [m]")
-        points.setflags(write=False)
-        object.__setattr__(self, "control_points", points)
+        if not is_tracked(self.control_points):
+            points.setflags(write=False)
+            object.__setattr__(self, "control_points", points)
 
     @classmethod
     def paraboloid(cls, height: float, curvature: float, radius: float) -> BSplineRelief:
@@ -69,7 +81,9 @@ class BSplineRelief(Relief):
     def height(self, x: Any, y: Any, types: Precision) -> Any:
         import drjit as dr
 
-        points = types.Float64(self.control_points.ravel())
+        points = types.Float64(
+            dr.ravel(self.control_points) if is_tracked(self.control_points) else self.control_points.ravel()
+        )
         across, along = _cubic_basis((x + 1) / 2), _cubic_basis((y + 1) / 2)
         total = types.Float64(0)
         for i in range(4):
@@ -86,6 +100,17 @@ class BSplineRelief(Relief):
     def knots(self) -> int:
         return 1
 
+    @property
+    def rotationally_symmetric(self) -> bool:
+        """A paraboloid on the axis, whose control values lie on c₀ + c₁ (i² + j²), or a constant."""
+        if is_tracked(self.control_points):
+            return False  # a derivative asks about every control point
+        points = self.control_points
+        square = (2 * np.arange(4) - 3) ** 2
+        corner, curvature = points[1, 1], (points[0, 1] - points[1, 1]) / 8
+        paraboloid = corner + curvature * (square[:, None] + square[None, :] - 2)
+        return bool(np.abs(points - paraboloid).max() <= 1e-12 * np.abs(points).max())
+
 
 @dataclass(frozen=True, eq=False)
 class HeightMap(Relief):
@@ -93,31 +118,53 @@ class HeightMap(Relief):
 
     samples: (n, n), (y, x). Beyond the outermost centres the spline goes on for a cell, then straight.
 
+    A Dr.Jit tensor of samples carries derivatives.
+
     Raises:
         ValueError: not square, empty, or not finite.
     """
 
-    samples: np.ndarray
+    samples: Any
+    _heights: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        samples = np.array(self.samples, dtype=np.float64)
+        samples = np.array(plain(self.samples))
         if samples.ndim != 2 or samples.shape[0] != samples.shape[1] or samples.size == 0:
             raise ValueError(f"height has shape {samples.shape}: must be square (n, n), n at least 1")
         if not np.isfinite(samples).all():
             raise ValueError("height holds NaN or infinity: must be finite heights [m]")
         samples.setflags(write=False)
-        object.__setattr__(self, "samples", samples)
-        margin = max(3, samples.shape[0] // 4)
-        coefficients = _spline_coefficients(_spline_coefficients(samples, margin).T, margin).T
-        object.__setattr__(self, "_coefficients", np.ascontiguousarray(coefficients))
-        object.__setattr__(self, "_margin", margin)
+        object.__setattr__(self, "_heights", samples)
+        if not is_tracked(self.samples):
+            object.__setattr__(self, "samples", samples)
+
+    @cached_property
+    def _margin(self) -> int:
+        return max(3, len(self._heights) // 4)
+
+    @cached_property
+    def _coefficients(self) -> np.ndarray:
+        along_y = _spline_coefficients(self._heights, self._margin)
+        return np.ascontiguousarray(_spline_coefficients(along_y.T, self._margin).T)
+
+    def _values(self, types: Precision) -> Any:
+        """Spline coefficients as a flat array; they are linear in the samples, M h Mᵀ."""
+        import drjit as dr
+
+        if not is_tracked(self.samples):
+            return types.Float64(self._coefficients.ravel())
+        matmul: Any = dr.matmul
+        n = len(self._heights)
+        tensor: Any = types.Tensor64(types.Float64(dr.ravel(self.samples)), (n, n))
+        matrix = types.Tensor64(np.ascontiguousarray(_spline_coefficients(np.eye(n), self._margin)))
+        return matmul(matmul(matrix, tensor), matrix, Bt=True).array
 
     def height(self, x: Any, y: Any, types: Precision) -> Any:
         import drjit as dr
 
-        coefficients: np.ndarray = self._coefficients  # type: ignore[attr-defined]
-        n, width = len(self.samples), coefficients.shape[1]
-        values = types.Float64(coefficients.ravel())
+        n = len(self._heights)
+        width = n + 2 * self._margin
+        values = self._values(types)
         columns = dr.opaque(types.Index, width)
         (column, across), (row, along) = (self._cell(position, n, width, types) for position in (x, y))
         total = types.Float64(0)
@@ -133,18 +180,18 @@ class HeightMap(Relief):
         """First of the four coefficients that act at a position, and the four weights."""
         import drjit as dr
 
-        half, shift = dr.opaque(types.Float64, n / 2), dr.opaque(types.Float64, self._margin - 0.5)  # type: ignore[attr-defined]
+        half, shift = dr.opaque(types.Float64, n / 2), dr.opaque(types.Float64, self._margin - 0.5)
         place = position * half + half + shift
         cell = dr.clip(dr.floor(place), 1, dr.opaque(types.Float64, width - 3))
         return types.Index(cell) - 1, _cubic_basis(place - cell)
 
     def bandwidth(self, level: float) -> float:
         """From the samples' spectrum; content near their Nyquist frequency has spline images up to twice that."""
-        n = len(self.samples)
+        n = len(self._heights)
         if n < 4:
             return 1.0
         window = np.hanning(n + 2)[1:-1]
-        residue = self.samples - _plane(self.samples)
+        residue = self._heights - _plane(self._heights)
         spectrum = np.abs(np.fft.fft2(residue * window[:, None] * window)) / n
         frequency = np.abs(np.fft.fftfreq(n, 2 / n))
         radial = np.maximum(frequency[:, None], frequency[None, :])
@@ -155,7 +202,11 @@ class HeightMap(Relief):
 
     @property
     def knots(self) -> int:
-        return len(self.samples)
+        return len(self._heights)
+
+    @property
+    def rotationally_symmetric(self) -> bool:
+        return len(self._heights) == 1
 
 
 def _cubic_basis(t: Any) -> list[Any]:

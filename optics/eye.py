@@ -50,7 +50,7 @@ class Eye:
         object.__setattr__(self, "spectral_bands", SpectralBands.uniform(self.bands))
         if self.pupil is not None and self.relative_aperture > 1 + 1e-9:
             raise ValueError(
-                f"pupil.aperture_radius = {self.pupil.aperture_radius:g}: must be at most sensor_width / 2 = "
+                f"pupil.aperture_radius = {self.pupil.radius:g}: must be at most sensor_width / 2 = "
                 f"{self.sensor_width / 2:g} m"
             )
 
@@ -67,7 +67,7 @@ class Eye:
     @property
     def relative_aperture(self) -> float:
         """a = 2 R / L; 1 for the perfect lens."""
-        return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.sensor_width
+        return 1.0 if self.pupil is None else 2 * self.pupil.radius / self.sensor_width
 
     @property
     def throughput(self) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from optics.grid import Grid
-from optics.precision import Precision
+from optics.precision import Precision, opaque
 
 __all__ = ["Field"]
 
@@ -48,10 +48,8 @@ class Field:
         im = self.re * other.im + self.im * other.re
         return Field(re, im, self.grid, self.types)
 
-    def scaled(self, factor: float) -> Field:
-        import drjit as dr
-
-        scale = self.types.Float(dr.opaque(self.types.Float64, factor))
+    def scaled(self, factor: Any) -> Field:
+        scale = self.types.Float(opaque(self.types, factor))
         return Field(self.re * scale, self.im * scale, self.grid, self.types)
 
     @property

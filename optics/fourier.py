@@ -18,7 +18,8 @@ import numpy as np
 
 from optics.field import Field
 from optics.grid import Grid
-from optics.precision import Precision
+from optics.precision import Precision, opaque
+from optics.tracked import is_tracked
 
 __all__ = ["dft2", "fast_length", "predicted_seconds"]
 
@@ -30,13 +31,13 @@ def fast_length(least: float) -> int:
     return int(next_fast_len(max(1, int(np.ceil(least))), real=True))
 
 
-def dft2(field: Field, period: float, shape: tuple[int, int], sign: int, pitch: float) -> Field:
+def dft2(field: Field, period: Any, shape: tuple[int, int], sign: int, pitch: float) -> Field:
     """Fourier sum of a field onto `shape` samples (formula above), on a grid of the given output pitch.
 
     sign: -1 forward (exp(-2πi...)), +1 inverse; neither is normalised.
     """
     grid = Grid(shape, pitch)
-    if _fft_wins(field.grid.shape, period, shape):
+    if not is_tracked(period) and _fft_wins(field.grid.shape, period, shape):
         re, im = _fft(field, int(period), shape, sign)
     else:
         re, im = _matrix_dft(field, period, shape, sign)
@@ -66,18 +67,16 @@ def _fft_seconds(shape_in: tuple[int, int], period: int, shape_out: tuple[int, i
     return lines * period * (5 * log2(period + 1) / 12e9 + 5e-9) + copied * 8e-9 + 2e-4
 
 
-def _fourier_matrix(types: Precision, n_out: int, n_in: int, period: float, sign: int) -> tuple[Any, Any]:
+def _fourier_matrix(types: Precision, n_out: int, n_in: int, period: Any, sign: int) -> tuple[Any, Any]:
     """cos and sin of ±2π k j / period as (k, j) tensors; the product k j loses whole periods in float64."""
     matrix = Grid((n_out, n_in), 1.0)
     j, k = matrix.coordinates(types)
-    import drjit as dr
-
-    waves = j * k / dr.opaque(types.Float64, sign * period)
+    waves = j * k / opaque(types, sign * period)
     wheel = Field.from_waves(1.0, waves, matrix, types)
     return types.Tensor(wheel.re, matrix.shape), types.Tensor(wheel.im, matrix.shape)
 
 
-def _matrix_dft(field: Field, period: float, shape: tuple[int, int], sign: int) -> tuple[Any, Any]:
+def _matrix_dft(field: Field, period: Any, shape: tuple[int, int], sign: int) -> tuple[Any, Any]:
     import drjit as dr
 
     matmul: Any = dr.matmul

@@ -3,11 +3,14 @@
 All methods evaluate the same integral (the angular spectrum of the thin-element field, equal to the first
 Rayleigh-Sommerfeld integral); they differ in where they sample it:
 
+- "hankel": a rotationally symmetric pupil on its axis needs two one-dimensional transforms and no soft edge.
+- "low_rank": Fourier's kernel times a slow rest of low rank, one matrix product. Best for lenses near their focus and
+  for small pupils. The pupil is sampled for the phase that lens and path have together, far less than either.
+- "far_field": one Fourier transform onto direction cosines for each of a few nodes of the window, between which the
+  slow rest of the kernel is interpolated. Best for small pupils and wide windows. Intensity only.
 - "angular_spectrum": pupil -> spectrum -> sensor plane, both planes within one period. Best at short distance.
 - "split_angular_spectrum": exp(ikz cos θ) is split into its paraxial part, whose Fourier transform is known, and the
   rest, whose spectrum is narrow. Period and samples no longer grow with the distance.
-- "far_field": one Fourier transform onto direction cosines for each of a few nodes of the window, between which the
-  slow rest of the kernel is interpolated. Best for small pupils and wide windows. Intensity only.
 - "rayleigh_sommerfeld": the direct sum over edge-fitted nodes; needs no grid, costs nodes x outputs. The reference.
 """
 
@@ -15,20 +18,51 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Protocol
 
-from optics.angular_spectrum import GridSampling, split, whole
-from optics.direct_sum import NodeSampling, nodes
-from optics.far_field import FarFieldSampling, far_field
+from optics.angular_spectrum import split, whole
+from optics.beam import Beam
+from optics.direct_sum import nodes
+from optics.far_field import far_field
+from optics.hankel import hankel
+from optics.low_rank import low_rank
 from optics.problem import Problem
 
-__all__ = ["METHODS", "AccuracyError", "Plan", "Sampling", "choose"]
+__all__ = ["METHODS", "AccuracyError", "Option", "Plan", "Sampling", "choose"]
 
-Sampling = GridSampling | NodeSampling | FarFieldSampling
+
+class Sampling(Protocol):
+    """How one method samples a problem; its time is predicted for a warm kernel on two cores."""
+
+    @property
+    def method(self) -> str: ...
+
+    @property
+    def seconds(self) -> float: ...
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        """(y, x) samples of the pupil, or (radial, angular) nodes, or (nodes, 1)."""
+
+    @property
+    def largest(self) -> int:
+        """Side of the largest square array."""
+
+    def intensity(self, beam: Beam, problem: Problem) -> Any:
+        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light."""
+
+
 # Each maps a problem to the samplings by which it meets the tolerance: none, one or several.
 METHODS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
+    "hankel": hankel,
+    "low_rank": low_rank,
+    "far_field": far_field,
     "angular_spectrum": whole,
     "split_angular_spectrum": split,
-    "far_field": far_field,
     "rayleigh_sommerfeld": nodes,
 }
 # Largest square array: 4096² complex64 is 134 MB, and a handful of such arrays live at once.
@@ -41,12 +75,23 @@ class AccuracyError(ValueError):
 
 
 @dataclass(frozen=True)
+class Option:
+    """A method that was weighed: what it would take, and why it lost (or "chosen")."""
+
+    method: str
+    samples: tuple[int, int]
+    seconds: float
+    verdict: str
+
+
+@dataclass(frozen=True)
 class Plan:
     """What was chosen, and why.
 
-    samples: (y, x) samples of the pupil (radial and angular nodes, for the direct sum).
+    samples: (y, x) samples of the pupil; for nodes (radial, angular) or (count, 1).
     predicted_error: relative L2 error of the intensity over the window.
-    seconds: predicted time on one core.
+    seconds: predicted time of a warm call on two cores.
+    options: every method that was weighed.
     """
 
     method: str
@@ -55,6 +100,7 @@ class Plan:
     predicted_error: float
     why: str
     seconds: float = 0.0
+    options: tuple[Option, ...] = ()
 
     def __str__(self) -> str:
         rows = {
@@ -65,7 +111,14 @@ class Plan:
             "predicted time": f"{self.seconds:.2g} s",
             "why": self.why,
         }
-        return "\n".join(f"{name:<17}{value}" for name, value in rows.items())
+        head = [f"{name:<17}{value}" for name, value in rows.items()]
+        if not self.options:
+            return "\n".join(head)
+        others = [
+            f"  {option.method:<24}{_size(option.samples):>13}{option.seconds:>11.2g} s  {option.verdict}"
+            for option in self.options
+        ]
+        return "\n".join([*head, "weighed", *others])
 
 
 def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -> tuple[Plan, Sampling]:
@@ -78,13 +131,19 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
     if method not in ("auto", *METHODS):
         raise ValueError(f"method = {method!r}: must be 'auto' or one of {', '.join(METHODS)}")
     _check_dtype(problem)
-    asked = tuple(METHODS) if method == "auto" else (method,)
-    cheapest = {name: min(found, key=_seconds) for name in asked if (found := METHODS[name](problem))}
-    fitting = [option for option in cheapest.values() if _within(option, most_seconds)]
+    cheapest = _weigh(problem, tuple(METHODS) if method == "auto" else (method,))
+    fitting = [option for option in cheapest.values() if option is not None and _within(option, most_seconds)]
     if not fitting:
-        raise AccuracyError(_refusal(problem, list(cheapest.values()), most_seconds))
+        raise AccuracyError(_refusal(problem, [option for option in cheapest.values() if option], most_seconds))
     best = min(fitting, key=_seconds)
-    return _plan(problem, best, [option for option in cheapest.values() if option is not best]), best
+    return _plan(problem, best, cheapest, most_seconds), best
+
+
+@lru_cache(maxsize=256)
+def _weigh(problem: Problem, methods: tuple[str, ...]) -> dict[str, Sampling | None]:
+    """The cheapest sampling of each method. Planning takes as long as a small PSF: the same problem is planned once."""
+    found = {name: METHODS[name](problem) for name in methods}
+    return {name: min(samplings, key=_cost) if samplings else None for name, samplings in found.items()}
 
 
 def _check_dtype(problem: Problem) -> None:
@@ -98,18 +157,41 @@ def _seconds(option: Sampling) -> float:
     return option.seconds
 
 
+def _cost(option: Sampling) -> tuple[bool, float]:
+    return option.largest > MOST_SAMPLES, option.seconds
+
+
 def _within(option: Sampling, most_seconds: float) -> bool:
     return option.largest <= MOST_SAMPLES and option.seconds <= most_seconds
 
 
-def _plan(problem: Problem, best: Sampling, others: list[Sampling]) -> Plan:
-    lost = ", ".join(f"{other.method} {other.seconds:.2g} s" for other in others)
+def _size(samples: tuple[int, int]) -> str:
+    return f"{samples[0]} x {samples[1]}" if samples[1] > 1 else str(samples[0])
+
+
+def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None], most_seconds: float) -> Plan:
+    options = [
+        Option(name, option.samples, option.seconds, _verdict(option, best, most_seconds))
+        for name, option in weighed.items()
+        if option is not None
+    ]
+    lost = ", ".join(f"{option.method} {option.seconds:.2g} s" for option in options if option.method != best.method)
     why = (
         f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "
         f"{problem.band() * problem.wavelength:.2g}; cheapest at {best.seconds:.2g} s" + (f" ({lost})" if lost else "")
     )
     error = problem.tolerance / 2 + FLOAT_NOISE[problem.dtype]
-    return Plan(best.method, best.samples, problem.dtype, error, why, best.seconds)
+    return Plan(best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options))
+
+
+def _verdict(option: Sampling, best: Sampling, most_seconds: float) -> str:
+    if option is best:
+        return "chosen"
+    if option.largest > MOST_SAMPLES:
+        return f"too large: {option.largest} across, at most {MOST_SAMPLES}"
+    if option.seconds > most_seconds:
+        return f"too slow: at most {most_seconds:g} s"
+    return f"{option.seconds / best.seconds:.1f} times as slow"
 
 
 def _refusal(problem: Problem, found: list[Sampling], most_seconds: float) -> str:

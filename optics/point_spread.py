@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -12,29 +14,35 @@ from optics.arguments import in_range, positive
 from optics.beam import Beam
 from optics.grid import Grid
 from optics.planner import FLOAT_NOISE, AccuracyError, Plan, choose
-from optics.precision import precision
+from optics.precision import opaque, precision
 from optics.problem import Problem
 from optics.pupil import Pupil
 from optics.source import PointSource
+from optics.tracked import number
 
-__all__ = ["PSFResult", "psf"]
+__all__ = ["PSFResult", "plan", "problem", "psf", "spread"]
 
 
 @dataclass(frozen=True, eq=False)
 class PSFResult:
     """PSF on a grid of sensor positions, sample n//2 on the axis, row and y growing together.
 
-    psf: (wavelength, y, x) [1/m²]; its integral over an unbounded plane is the fraction of the pupil's power that
-        arrives (evanescent light does not). Never renormalised.
+    tensor: the PSF as a Dr.Jit tensor (wavelength, y, x) that carries the derivatives of what it was made from.
+    psf: the same as a NumPy array [1/m²]; its integral over an unbounded plane is the fraction of the pupil's power
+        that arrives (evanescent light does not). Never renormalised.
     plans: one per wavelength; `plan` is the least accurate of them.
     """
 
-    psf: np.ndarray
+    tensor: Any
     dx: float
     wavelengths: np.ndarray
     sensor_distance: float
     pupil: Pupil
     plans: tuple[Plan, ...]
+
+    @cached_property
+    def psf(self) -> np.ndarray:
+        return self.tensor if isinstance(self.tensor, np.ndarray) else np.asarray(self.tensor.numpy())
 
     @property
     def plan(self) -> Plan:
@@ -42,11 +50,11 @@ class PSFResult:
 
     @property
     def x(self) -> np.ndarray:
-        return Grid(self.psf.shape[1:], self.dx).x
+        return Grid(self.tensor.shape[1:], self.dx).x
 
     @property
     def y(self) -> np.ndarray:
-        return Grid(self.psf.shape[1:], self.dx).y
+        return Grid(self.tensor.shape[1:], self.dx).y
 
     @property
     def power(self) -> np.ndarray:
@@ -77,44 +85,93 @@ def psf(
         ValueError: bad argument, named with its value and valid range.
         AccuracyError: no method meets the tolerance within the limits on memory and time.
     """
-    source = PointSource(source_distance, source_angle)
     window = Grid(shape, dx)
+    source = PointSource(source_distance, source_angle)
     lambdas = np.atleast_1d(np.asarray(wavelengths, dtype=np.float64))
     if lambdas.size == 0:
         raise ValueError("wavelengths is empty: must hold at least one wavelength [m]")
-    images, plans = [], []
-    for wavelength in lambdas:
-        beam = Beam(pupil, source, float(positive("wavelength", wavelength)))
-        image, plan = monochromatic(beam, problem(beam, sensor_distance, window, tolerance, dtype), method)
-        images.append(image)
-        plans.append(plan)
-    return PSFResult(np.stack(images), dx, lambdas, sensor_distance, pupil, tuple(plans))
+    beams = [Beam(pupil, source, float(positive("wavelength", at)), sensor_distance) for at in lambdas]
+    tasks = [problem(beam, window, tolerance, dtype) for beam in beams]
+    return spread(beams, tasks, method)
 
 
-def problem(beam: Beam, distance: float, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
+def plan(
+    pupil: Pupil,
+    wavelength: float = 550e-9,
+    sensor_distance: float = 240e-6,
+    source_distance: float = math.inf,
+    source_angle: tuple[float, float] = (0.0, 0.0),
+    dx: float = 0.25e-6,
+    shape: tuple[int, int] = (129, 129),
+    tolerance: float = 1e-3,
+    method: str = "auto",
+    dtype: str = "float32",
+) -> Plan:
+    """What `psf` would do at one wavelength, without doing it: see there for arguments and errors."""
+    beam = Beam(pupil, PointSource(source_distance, source_angle), positive("wavelength", wavelength), sensor_distance)
+    return choose(problem(beam, Grid(shape, dx), tolerance, dtype), method)[0]
+
+
+def problem(beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
     """The numbers that decide the sampling."""
-    pupil, wavelength = beam.pupil, beam.wavelength
-    positive("sensor_distance", distance)
+    distance = positive("sensor_distance", beam.distance)
     in_range("tolerance", tolerance, 1e-12, 0.5)
     precision(dtype)
-    steepest = pupil.slopes(wavelength, beam.source).steepest / wavelength
-    band = 1.02 * steepest + pupil.bandwidth(wavelength, tolerance / 10)
-    return Problem(pupil.aperture_radius, wavelength / pupil.medium_n, distance, window, band, tolerance, dtype)
+    source = PointSource(number(beam.source.distance), beam.source.angle)
+    return _problem(Beam(beam.pupil, source, beam.wavelength, distance), window, tolerance, dtype)
 
 
-def monochromatic(
-    beam: Beam, task: Problem, method: str = "auto", most_seconds: float = 60.0
-) -> tuple[np.ndarray, Plan]:
-    """PSF over the window, and the plan with the error that the picture itself tells: rounding is as large in a dark
-    window as in a bright one, so there it weighs more.
+@lru_cache(maxsize=256)
+def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
+    pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
+    slopes = pupil.slopes(wavelength, beam.source)
+    detail = pupil.bandwidth(wavelength, tolerance / 10)
+    turning = slopes.turning(distance, window.half_diagonal, pupil.medium_n)
+    return Problem(
+        aperture=pupil.aperture,
+        radius=pupil.radius,
+        wavelength=wavelength / pupil.medium_n,
+        distance=distance,
+        window=window,
+        phase_band=1.02 * slopes.steepest / wavelength + detail,
+        turning=1.02 * turning / wavelength + detail,
+        symmetric=pupil.rotationally_symmetric(wavelength) and beam.source.angle == (0.0, 0.0),
+        tolerance=tolerance,
+        dtype=dtype,
+    )
+
+
+def spread(beams: list[Beam], tasks: list[Problem], method: str = "auto", most_seconds: float = 60.0) -> PSFResult:
+    """PSFs of several wavelengths over one window.
 
     Raises:
-        AccuracyError: no method meets the tolerance, or the window is so dark that rounding breaks it.
+        AccuracyError: no method meets the tolerance, or a window is so dark that rounding breaks it.
     """
-    plan, sampling = choose(task, method, most_seconds)
-    image = (sampling.intensity(beam, task).numpy() / beam.pupil.area).reshape(task.window.shape)
+    import drjit as dr
+
+    chosen = [choose(task, method, most_seconds) for task in tasks]  # refused before anything is computed
+    window, types = tasks[0].window, precision(tasks[0].dtype)
+    flat, plans = [], []
+    for beam, task, (plan, sampling) in zip(beams, tasks, chosen, strict=True):
+        radius = opaque(types, beam.radius)
+        area = beam.pupil.aperture.area * radius * radius
+        image = sampling.intensity(beam, task) / types.Float(area)
+        flat.append(image)
+        plans.append(replace(plan, predicted_error=_predicted_error(image.numpy(), sampling.plane(task), task)))
+    tensor = types.Tensor(flat[0] if len(flat) == 1 else dr.concat(flat), (len(flat), *window.shape))
+    wavelengths = np.array([beam.wavelength for beam in beams])
+    return PSFResult(tensor, window.dx, wavelengths, tasks[0].distance, beams[0].pupil, tuple(plans))
+
+
+def _predicted_error(image: np.ndarray, plane: float, task: Problem) -> float:
+    """The error that the picture itself tells: rounding is as large in a dark window as in a bright one, so there it
+    weighs more.
+
+    Raises:
+        AccuracyError: the window is so dark that rounding breaks the tolerance.
+    """
     mean, mean_square = float(image.mean(dtype=np.float64)), float(np.mean(np.square(image, dtype=np.float64)))
-    bright = 1 / sampling.plane(task) ** 2  # mean PSF over the plane that the transform spans
+    bright = 1 / plane**2  # mean PSF over the plane that the transform spans
     noise = FLOAT_NOISE[task.dtype]
     rounding = 2 * noise * math.sqrt(bright * mean) + noise**2 * bright
     error = task.tolerance / 2 + rounding / math.sqrt(mean_square) if mean_square > 0 else math.inf
@@ -123,4 +180,4 @@ def monochromatic(
             f"tolerance = {task.tolerance:g}: the window is so dark that {task.dtype} rounding reaches {error:.1g}"
             + ("; dtype='float64' has a 1e6 times lower floor" if task.dtype == "float32" else "")
         )
-    return image, replace(plan, predicted_error=error)
+    return error

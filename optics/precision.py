@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from optics.tracked import is_tracked
+
 __all__ = ["Precision", "opaque", "precision"]
 
 
@@ -19,6 +21,7 @@ class Precision:
     Float: Any
     Tensor: Any
     Float64: Any
+    Tensor64: Any
     Index: Any
     complex_dtype: type[np.complexfloating]
 
@@ -39,12 +42,21 @@ def precision(dtype: str = "float32") -> Precision:
     import drjit.auto.ad as types
 
     if dtype == "float32":
-        return Precision(dtype, types.Float, types.TensorXf, types.Float64, types.UInt32, np.complex64)
-    return Precision(dtype, types.Float64, types.TensorXf64, types.Float64, types.UInt32, np.complex128)
+        return Precision(
+            dtype, types.Float, types.TensorXf, types.Float64, types.TensorXf64, types.UInt32, np.complex64
+        )
+    return Precision(
+        dtype, types.Float64, types.TensorXf64, types.Float64, types.TensorXf64, types.UInt32, np.complex128
+    )
 
 
-def opaque(types: Precision, value: float) -> Any:
-    """A float64 scalar that Dr.Jit treats as data: another value does not compile another kernel."""
+def opaque(types: Precision, value: Any) -> Any:
+    """A float64 scalar that Dr.Jit treats as data: another value does not compile another kernel.
+
+    A Dr.Jit array of one element stays what it is, derivative included.
+    """
     import drjit as dr
 
+    if is_tracked(value):
+        return types.Float64(dr.ravel(value))
     return dr.opaque(types.Float64, value)

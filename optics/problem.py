@@ -6,34 +6,44 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from optics.aperture import EDGE_REACH, SoftDisk
+from optics.aperture import EDGE_REACH, Aperture, SoftAperture
 from optics.grid import Grid
 from optics.precision import Precision, opaque
 
-__all__ = ["Problem", "Taper"]
+__all__ = ["FADES", "STEEPEST_SINE", "Problem", "PupilEdge", "Taper", "tapers"]
 
 # Amplitude ripple of the soft aperture and of the spectral taper against the tolerance on intensity. Edge-diffracted
 # light errs by several ripples, its intensity by twice that, and a window may hold no other light: half the tolerance.
 RIPPLE_PER_TOLERANCE = 0.03
 BRIGHT_RIPPLE_PER_TOLERANCE = 0.3
+# The taper must end this far from grazing incidence, where z tan θ has no bound.
+STEEPEST_SINE = 0.9995
+FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)  # blurs to try, in units of the problem's size
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One monochromatic propagation from a disk to a window, in numbers.
+    """One monochromatic propagation from a pupil to a window, in numbers.
 
-    radius, distance [m]; wavelength [m] in the medium; window: output grid.
+    aperture: its shape. radius, distance [m]; wavelength [m] in the medium; window: output grid.
     phase_band: highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge.
+    turning: highest spatial frequency [1/m] in the phase of the pupil and of the path to any point of the window
+        together; for a lens in focus far less than the sum of both.
+    detail: spatial frequency [1/m] of the relief's own bends, by which local frequencies are blurred.
+    symmetric: nothing depends on the azimuth.
     widest_band: frequencies beyond it may be dropped (infinite: whatever reaches the window counts).
     reach: given where all but a tolerance's share of the light stays within this distance of the axis [m]: what lies
         beyond may be wrong, and edge-diffracted light less exact (None: the window counts to its corners).
     """
 
+    aperture: Aperture
     radius: float
     wavelength: float
     distance: float
     window: Grid
     phase_band: float
+    turning: float
+    symmetric: bool
     tolerance: float
     dtype: str = "float32"
     widest_band: float = math.inf
@@ -57,14 +67,32 @@ class Problem:
     def fresnel_number(self) -> float:
         return self.radius**2 / (self.wavelength * self.distance)
 
-    def soft_disk(self, band: float) -> SoftDisk:
+    def soft_edge(self, band: float) -> PupilEdge:
         """The aperture as samples can carry it that leave frequencies up to `band` [1/m] untouched."""
-        return SoftDisk.cheapest(self.radius, band, self.ripple, EDGE_REACH * self.radius)
+        return PupilEdge(self.aperture.soften(band * self.radius, self.ripple, EDGE_REACH), self.radius)
 
     def band(self, margin: float = 0.0) -> float:
         """Highest frequency [1/m] whose light can come within `margin` of the window from anywhere on the disk."""
         reach = (1 + EDGE_REACH) * self.radius + self.outermost + margin
         return min(self.widest_band, reach / math.hypot(reach, self.distance) / self.wavelength)
+
+
+@dataclass(frozen=True)
+class PupilEdge:
+    """A soft aperture on a pupil of the given radius: its numbers in metres."""
+
+    aperture: SoftAperture
+    radius: float
+
+    @property
+    def outermost(self) -> float:
+        """Distance from the axis [m] beyond which nothing passes."""
+        return (1 + self.aperture.reach) * self.radius
+
+    @property
+    def stopband(self) -> float:
+        """Frequency [1/m] beyond which its spectrum is below the ripple."""
+        return self.aperture.stopband / self.radius
 
 
 @dataclass(frozen=True)
@@ -98,3 +126,10 @@ class Taper:
         steepness = 2 / self.width * math.sqrt(math.pi * self.width * self.blur / 2)
         middle = opaque(types, self.band + self.width / 2)
         return (1 - dr.erf(types.Float((f - middle) * opaque(types, steepness)))) / 2
+
+
+def tapers(problem: Problem) -> list[Taper]:
+    """Tapers that end before grazing incidence."""
+    size = problem.radius + problem.outermost
+    found = [Taper.of(problem, share * size) for share in FADES]
+    return [taper for taper in found if taper.sine < STEEPEST_SINE]

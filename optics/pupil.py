@@ -1,63 +1,84 @@
-"""The pupil: a circular aperture with a relief and, for validation, an ideal lens."""
+"""The pupil: an aperture with a relief and, for validation, an ideal lens."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
-from optics.aperture import EDGE_REACH
+from optics.aperture import EDGE_REACH, Aperture
 from optics.arguments import in_range, positive
+from optics.circular import Circle
 from optics.doe import HeightMap, Relief
 from optics.grid import Grid
 from optics.precision import Precision, opaque, precision
 from optics.refractive_index import RefractiveIndex
 from optics.source import PointSource
+from optics.tracked import is_tracked, number
 
-__all__ = ["Pupil"]
+__all__ = ["Pupil", "Slopes"]
 
 
 @dataclass(frozen=True, eq=False)
 class Pupil:
     """Transmittance A(x, y) exp(ik (n - medium_n) h(x, y)), thin-element model.
 
-    aperture_radius: [m].
-    height: None; a square array [m] (y, x) of samples at cell centres over [-a, a]² (see HeightMap); or a Relief.
+    aperture_radius: R [m].
+    height: None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (see HeightMap); or a Relief.
     n: refractive index of the relief, constant or dispersive.
     medium_n: index of what surrounds the pupil, on both sides.
     thin_lens_focal_length: adds an ideal lens exp(-ik(√(r² + f²) - f)) [m]; negative diverges.
+    aperture: its shape within the circle of radius R: Circle (default), Annulus, Polygon, Slit.
+
+    Radius, height, n and focal length may be Dr.Jit arrays (a height map: a tensor): derivatives flow through them.
 
     Raises:
         ValueError: names argument, value and valid range.
     """
 
-    aperture_radius: float
-    height: Relief | np.ndarray | None = None
-    n: float | RefractiveIndex = 1.5
+    aperture_radius: Any
+    height: Any = None
+    n: Any = 1.5
     medium_n: float = 1.0
-    thin_lens_focal_length: float | None = None
+    thin_lens_focal_length: Any = None
+    aperture: Aperture = field(default_factory=Circle)
 
     def __post_init__(self) -> None:
         positive("aperture_radius", self.aperture_radius)
         in_range("medium_n", self.medium_n, 1.0, 10.0)
         if not isinstance(self.n, RefractiveIndex):
-            object.__setattr__(self, "n", RefractiveIndex(float(in_range("n", self.n, 1.0, 10.0))))
+            in_range("n", self.n, 1.0, 10.0)
+            object.__setattr__(self, "n", RefractiveIndex(self.n))
         if self.height is not None and not isinstance(self.height, Relief):
-            object.__setattr__(self, "height", HeightMap(np.asarray(self.height, dtype=np.float64)))
-        focal_length = self.thin_lens_focal_length
-        if focal_length is not None:
-            positive("abs(thin_lens_focal_length)", abs(focal_length))
+            height = self.height if is_tracked(self.height) else np.asarray(self.height, dtype=np.float64)
+            object.__setattr__(self, "height", HeightMap(height))
+        if self.thin_lens_focal_length is not None:
+            positive("abs(thin_lens_focal_length)", abs(number(self.thin_lens_focal_length)))
+
+    @cached_property
+    def radius(self) -> float:
+        """R [m], without derivative."""
+        return number(self.aperture_radius)
 
     @property
     def area(self) -> float:
-        return float(np.pi * self.aperture_radius**2)
+        """[m²]"""
+        return self.aperture.area * self.radius**2
 
-    def index_step(self, wavelength: float) -> float:
+    def index_step(self, wavelength: float) -> Any:
         """n(λ) - medium_n."""
-        assert isinstance(self.n, RefractiveIndex)
         return self.n.at(wavelength) - self.medium_n
+
+    def bends(self, wavelength: float) -> bool:
+        """Whether the relief does anything, or is asked what it would do."""
+        step = self.index_step(wavelength)
+        return self.height is not None and (is_tracked(step) or step != 0)
+
+    def rotationally_symmetric(self, wavelength: float) -> bool:
+        relief_is = not self.bends(wavelength) or self.height.rotationally_symmetric
+        return self.aperture.rotationally_symmetric and relief_is
 
     def path(self, x: Any, y: Any, wavelength: float, source: PointSource, types: Precision) -> Any:
         """Optical path [m] through source and pupil at points (x, y) [m], flat float64 arrays."""
@@ -69,30 +90,34 @@ class Pupil:
             r2 = x * x + y * y
             total -= r2 / (dr.sqrt(r2 + f * f) + dr.abs(f)) * dr.sign(f)
         total *= opaque(types, self.medium_n)
-        step = self.index_step(wavelength)
-        if isinstance(self.height, Relief) and step != 0:
-            scale = opaque(types, 1 / self.aperture_radius)
-            total += opaque(types, step) * self.height.height(x * scale, y * scale, types)
+        if self.bends(wavelength):
+            scale = 1 / opaque(types, self.aperture_radius)
+            total += opaque(types, self.index_step(wavelength)) * self.height.height(x * scale, y * scale, types)
         return total
 
     def slopes(self, wavelength: float, source: PointSource) -> Slopes:
         """Gradient of the optical path over the disk and its soft edge, by central differences."""
-        types = precision("float64")
-        knots = self.height.knots if isinstance(self.height, Relief) else 1
-        n = int(min(1025, max(97, 4 * knots + 1)))
-        grid = Grid.square(n, 2 * (1 + EDGE_REACH) * self.aperture_radius / (n - 1))
-        x, y = grid.coordinates(types)
-        path = self.path(x, y, wavelength, source, types).numpy().reshape(grid.shape)
-        along_y, along_x = np.gradient(path, grid.dx)
-        return Slopes(grid, along_x, along_y, self.aperture_radius)
+        return _slopes(self, wavelength, number(source.distance), source.angle)
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
         """Spatial frequency [1/m] above which the relief changes the phase by less than `tolerance` rad."""
-        step = abs(self.index_step(wavelength))
-        if not isinstance(self.height, Relief) or step == 0:
+        step = abs(number(self.index_step(wavelength)))
+        if self.height is None or step == 0:
             return 0.0
         level = tolerance * wavelength / (2 * np.pi * step)
-        return self.height.bandwidth(level) / self.aperture_radius
+        return self.height.bandwidth(level) / self.radius
+
+
+@lru_cache(maxsize=64)
+def _slopes(pupil: Pupil, wavelength: float, distance: float, angle: tuple[float, float]) -> Slopes:
+    types = precision("float64")
+    pieces = pupil.height.knots if pupil.bends(wavelength) else 0
+    n = int(min(1025, max(65 if pieces else 33, 4 * pieces + 1)))
+    grid = Grid.square(n, 2 * (1 + EDGE_REACH) * pupil.radius / (n - 1))
+    x, y = grid.coordinates(types)
+    path = pupil.path(x, y, wavelength, PointSource(distance, angle), types).numpy().reshape(grid.shape)
+    along_y, along_x = np.gradient(path, grid.dx)
+    return Slopes(grid, along_x, along_y, pupil.radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,16 +133,31 @@ class Slopes:
     def distance_from_axis(self) -> np.ndarray:
         return np.hypot(self.grid.x[None, :], self.grid.y[:, None])
 
-    @property
+    @cached_property
     def steepest(self) -> float:
         """Largest slope over the disk and its soft edge."""
         inside = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
         return float(np.hypot(self.along_x, self.along_y)[inside].max())
 
-    @property
+    @cached_property
     def steepest_inside(self) -> float:
         """Largest slope over the disk alone."""
         return float(np.hypot(self.along_x, self.along_y)[self.distance_from_axis <= self.radius].max())
+
+    def turning(self, distance: float, outermost: float, medium_n: float) -> float:
+        """Largest slope of the path through the pupil and on to any point within `outermost` [m] of the axis of a
+        plane at `distance` [m]: |∇L + n (ξ - x) / D|, over the disk and its soft edge."""
+        inside = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
+        x = np.broadcast_to(self.grid.x[None, :], inside.shape)[inside]
+        y = np.broadcast_to(self.grid.y[:, None], inside.shape)[inside]
+        angle = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+        targets = [(0.0, 0.0), *zip(outermost * np.cos(angle), outermost * np.sin(angle), strict=True)]
+        worst = 0.0
+        for tx, ty in targets:
+            scale = medium_n / np.sqrt((x - tx) ** 2 + (y - ty) ** 2 + distance**2)
+            slope = np.hypot(self.along_x[inside] + (x - tx) * scale, self.along_y[inside] + (y - ty) * scale)
+            worst = max(worst, float(slope.max()))
+        return worst
 
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
         """Where rays from the disk's points meet a plane at `distance` [m]; evanescent ones end at infinity."""

@@ -52,7 +52,7 @@ def mtf(result: PSFResult) -> MTF:
     contrast = np.abs(otf) / np.abs(otf[:, :1, :1])
     height, width = result.psf.shape[1:]
     fy, fx = (np.fft.fftshift(np.fft.fftfreq(n, result.dx)) for n in (height, width))
-    radius, distance = result.pupil.aperture_radius, result.sensor_distance
+    radius, distance = result.pupil.radius, result.sensor_distance
     cutoff = 2 * radius / np.hypot(radius, distance) * result.pupil.medium_n / result.wavelengths
     return MTF(np.fft.fftshift(contrast, axes=(1, 2)), fx, fy, cutoff)
 
@@ -67,7 +67,7 @@ def strehl_ratio(result: PSFResult) -> np.ndarray:
     (first Rayleigh-Sommerfeld integral of exp(-ikL(r)), in closed form). The peak is the largest sample: a window
     that misses it, or samples it coarsely, shows less.
     """
-    radius, z = result.pupil.aperture_radius, result.sensor_distance
+    radius, z = result.pupil.radius, result.sensor_distance
     slant = np.hypot(z, radius)
     wavenumber = 2 * np.pi * result.pupil.medium_n / result.wavelengths
     peak = ((1 - z / slant) ** 2 + (wavenumber * z * np.log(slant / z)) ** 2) / result.pupil.area

@@ -9,8 +9,9 @@ import numpy as np
 
 from optics.beam import Beam
 from optics.grid import Grid
-from optics.planner import AccuracyError, Plan, choose
-from optics.point_spread import PSFResult, monochromatic, problem
+from optics.planner import AccuracyError, Plan
+from optics.point_spread import PSFResult, problem, spread
+from optics.precision import precision
 from optics.pupil import Pupil
 from optics.source import PointSource
 
@@ -58,7 +59,7 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: float) -> PSFResult:
     Raises:
         AccuracyError: no method meets the tolerance within the limits on memory and time.
     """
-    beams = [Beam(pupil, PointSource(z), float(wavelength)) for wavelength in retina.wavelengths]
+    beams = [Beam(pupil, PointSource(z), float(wavelength), retina.distance) for wavelength in retina.wavelengths]
     views = [_view(beam, retina) for beam in beams]
     half, pitch = max(view.half_window for view in views), min(view.pitch for view in views)
     if _cells_within(half, retina.cell) > MOST_CELLS:
@@ -69,14 +70,10 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: float) -> PSFResult:
     half = retina.cell * (_cells_within(half, retina.cell) + 1) / 2
     window = Grid.square(2 * math.ceil(half / pitch) + 1, pitch)
     tasks = [
-        replace(problem(beam, retina.distance, window, retina.tolerance), widest_band=view.band, reach=half)
+        replace(problem(beam, window, retina.tolerance), widest_band=view.band, reach=half)
         for beam, view in zip(beams, views, strict=True)
     ]
-    for task in tasks:  # refused before anything is computed
-        choose(task, most_seconds=MOST_SECONDS)
-    solved = [monochromatic(beam, task, most_seconds=MOST_SECONDS) for beam, task in zip(beams, tasks, strict=True)]
-    images, plans = zip(*solved, strict=True)
-    return PSFResult(np.stack(images), pitch, retina.wavelengths, retina.distance, pupil, plans)
+    return spread(beams, tasks, most_seconds=MOST_SECONDS)
 
 
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:
@@ -84,7 +81,7 @@ def perfect_psf(retina: Retina, radius: float) -> PSFResult:
     image = np.full((len(retina.wavelengths), 1, 1), 1 / retina.cell**2, dtype=np.float32)
     pupil = Pupil(radius, thin_lens_focal_length=retina.distance)
     plan = Plan("perfect_lens", (1, 1), "float32", 0.0, "no pupil: geometric image, no blur")
-    return PSFResult(image, retina.cell, retina.wavelengths, retina.distance, pupil, (plan,))
+    return PSFResult(precision().Tensor(image), retina.cell, retina.wavelengths, retina.distance, pupil, (plan,))
 
 
 def _view(beam: Beam, retina: Retina) -> _View:
@@ -93,7 +90,7 @@ def _view(beam: Beam, retina: Retina) -> _View:
     pupil, wavelength = beam.pupil, beam.wavelength
     slopes = pupil.slopes(wavelength, beam.source)
     x, y = slopes.rays(retina.distance, pupil.medium_n)
-    lam, z, radius = wavelength / pupil.medium_n, retina.distance, pupil.aperture_radius
+    lam, z, radius = wavelength / pupil.medium_n, retina.distance, pupil.radius
     shadow = float(np.quantile(np.fmax(np.abs(x), np.abs(y)), 1 - retina.tolerance / 2, method="higher"))
     tail = 2 / (math.pi**2 * radius * retina.tolerance)
     half = WIDEST_TANGENT * z + radius

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from optics.arguments import finite, in_range, positive
+from optics.tracked import number
 
 __all__ = ["RefractiveIndex"]
 
@@ -21,8 +23,8 @@ class RefractiveIndex:
     b: B [m²]; 0 is a material without dispersion.
     """
 
-    a: float
-    b: float = 0.0
+    a: Any
+    b: Any = 0.0
 
     def __post_init__(self) -> None:
         in_range("n", self.a, 1.0, 10.0)
@@ -36,13 +38,14 @@ class RefractiveIndex:
         b = (n_d - 1) / number / (LINE_F**-2 - LINE_C**-2)
         return cls(n_d - b / LINE_D**2, b)
 
-    def at(self, wavelength: float) -> float:
-        """n at a vacuum wavelength [m].
+    def at(self, wavelength: float) -> Any:
+        """n at a vacuum wavelength [m]; a Dr.Jit array if the coefficients are.
 
         Raises:
             ValueError: the curve falls below 1 there.
         """
         n = self.a + self.b / positive("wavelength", wavelength) ** 2
-        if not (math.isfinite(n) and n >= 1):
-            raise ValueError(f"n = {n:g} at wavelength {wavelength:g} m: must be at least 1")
+        value = number(n)
+        if not (math.isfinite(value) and value >= 1):
+            raise ValueError(f"n = {value:g} at wavelength {wavelength:g} m: must be at least 1")
         return n

@@ -8,6 +8,7 @@ from typing import Any
 
 from optics.arguments import in_range, positive
 from optics.precision import Precision, opaque
+from optics.tracked import number
 
 __all__ = ["PointSource"]
 
@@ -36,10 +37,10 @@ class PointSource:
         tx, ty = (math.tan(theta) for theta in self.angle)
         norm = math.sqrt(1 + tx * tx + ty * ty)
         along = x * opaque(types, tx / norm) + y * opaque(types, ty / norm)
-        if math.isinf(self.distance):
+        if math.isinf(number(self.distance)):
             return along
-        centre = self.distance * norm
+        centre = opaque(types, self.distance) * norm
         # ρ - ρ₀ = (r² + 2 ρ₀ (x, y)·t) / (ρ + ρ₀): no difference of nearly equal numbers
-        excess = x * x + y * y + 2 * opaque(types, centre) * along
-        rho = dr.sqrt(excess + opaque(types, centre * centre))
-        return excess / (rho + opaque(types, centre))
+        excess = x * x + y * y + 2 * centre * along
+        rho = dr.sqrt(excess + centre * centre)
+        return excess / (rho + centre)

@@ -1,0 +1,172 @@
+"""The Rayleigh-Sommerfeld integral as one matrix product: Fourier's kernel times a slow rest of low rank."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.beam import Beam
+from optics.chebyshev import chebyshev_points, lagrange
+from optics.field import Field
+from optics.grid import Grid
+from optics.precision import Precision, opaque, precision
+from optics.problem import Problem, PupilEdge
+
+__all__ = ["LowRankSampling", "low_rank"]
+
+RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
+FLOPS = {"float32": 45e9, "float64": 22e9}
+MOST_ENTRIES = 4_000_000  # of the matrix between pupil and window
+
+
+@dataclass(frozen=True)
+class LowRankSampling:
+    """Pupil samples; `rank` Chebyshev points per axis of the window [m], and the distance c [m] of Fourier's kernel
+    e^{-ik ξ·x/c}."""
+
+    edge: PupilEdge
+    pupil: Grid
+    rank: int
+    half_width: float
+    scale: float
+    seconds: float
+    method: str = "low_rank"
+
+    def intensity(self, beam: Beam, problem: Problem) -> Any:
+        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        return _low_rank(beam, problem, self, precision(problem.dtype)).intensity
+
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light."""
+        return problem.wavelength * problem.distance / self.pupil.dx
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        return self.pupil.shape
+
+    @property
+    def largest(self) -> int:
+        return self.rank * self.pupil.shape[0]
+
+
+def low_rank(problem: Problem) -> list[LowRankSampling]:
+    """As few pupil samples as the turns of pupil and path together allow, and the rank that the slow rest needs."""
+    edge = problem.soft_edge(problem.turning)
+    pitch = 1 / (problem.turning + edge.stopband)
+    pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
+    half = max(problem.window.half_width, problem.window.dx)
+    scale = math.hypot(problem.distance, 0.6 * half)
+    most = math.isqrt(MOST_ENTRIES) // pupil.shape[0]
+    rank = _rank(problem, edge.outermost, half, scale, most)
+    if rank is None:
+        return []
+    inner = rank * pupil.shape[0]
+    height, width = problem.window.shape
+    flops = 8 * (inner * inner * width + height * inner * width)
+    seconds = 1.5e-3 + flops / FLOPS[problem.dtype] + inner * inner * 2e-8 + inner * (height + width) * 1e-8
+    return [LowRankSampling(edge, pupil, rank, half, scale, seconds)]
+
+
+def _rank(problem: Problem, outermost: float, half: float, scale: float, most: int) -> int | None:
+    """Chebyshev points along an axis that interpolate the slow rest, tried on the soft aperture's rim."""
+    angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
+    rim_x, rim_y = outermost * np.cos(angle), outermost * np.sin(angle)
+    test = half * np.linspace(-1, 1, 41)
+    for rank in RANKS:
+        if rank > most:
+            return None
+        points = half * chebyshev_points(rank)
+        weights = lagrange(test, points)
+        worst = 0.0
+        for across in (0.0, half):
+            exact, known = (_rest(problem, scale, rim_x, rim_y, x, across) for x in (test, points))
+            worst = max(worst, float(np.abs(exact - known @ weights).max()))
+        if worst < problem.ripple:
+            return rank
+    return None
+
+
+def _rest(problem: Problem, scale: float, xi: np.ndarray, eta: np.ndarray, x: np.ndarray, y: float) -> np.ndarray:
+    """(z/D)² e^{ik(D - ρ + ξ·x/c)} at points (x, y) of the window."""
+    z = problem.distance
+    rho2 = x * x + y * y + z * z
+    excess = xi**2 + eta**2 - 2 * (x * xi + y * eta)
+    distance = np.sqrt(rho2 + excess)
+    waves = (excess / (distance + np.sqrt(rho2)) + (x * xi + y * eta) / scale) / problem.wavelength
+    return z * z / distance**2 * np.exp(2j * np.pi * waves)
+
+
+def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> Field:
+    """U(x) = Σ_ab L_a(x) L_b(y) Σ_ξ P(ξ) G(ξ; x_a, y_b) e^{-ik ξ·x/c}, up to a phase that intensity forgets:
+
+        G(ξ; x) = z/(λD²) (1/(kD) - i) e^{ik(D - ρ + ξ·x/c)},   D = |(x - ξ, z)|, ρ = |(x, z)|,
+
+    which varies slowly with x. Sums over a and ξ along one axis are one: A_y W A_xᵀ, two matrix products.
+    """
+    window = problem.window
+    inner = _kernel(beam, problem, how, types)
+    across_x, across_y = (_fourier(at, beam, problem, how, types) for at in (window.x, window.y))
+    re, im = _product(*inner, *across_x, transposed=True)
+    re, im = _product(*across_y, re, im, transposed=False)
+    return Field(re.array, im.array, window, types)
+
+
+def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> tuple[Any, Any]:
+    """W[(b, η), (a, ξ)] = P(ξ, η) G(ξ, η; x_a, y_b) as two tensors."""
+    import drjit as dr
+
+    n, rank = how.pupil.shape[0], how.rank
+    u = beam.behind(how.edge.aperture, how.pupil, types).scaled(how.pupil.dx**2)
+    dr.eval(u.re, u.im)
+    column, row = Grid.square(n * rank, 1.0).coordinates(types)  # counted from the centre
+    middle = dr.opaque(types.Float64, (n * rank) // 2)
+    (a, i), (b, j) = (_split(place + middle, n, types) for place in (column, row))
+    points = types.Float64(how.half_width * chebyshev_points(rank))
+    x, y = (dr.gather(types.Float64, points, types.Index(index)) for index in (a, b))
+    pitch, centre = opaque(types, how.pupil.dx), dr.opaque(types.Float64, n // 2)
+    xi, eta = (i - centre) * pitch, (j - centre) * pitch
+    z, wavelength = opaque(types, beam.distance), opaque(types, problem.wavelength)
+    rho2 = x * x + y * y + z * z
+    along = x * xi + y * eta
+    excess = xi * xi + eta * eta - 2 * along
+    distance = dr.sqrt(rho2 + excess)
+    waves = (excess / (distance + dr.sqrt(rho2)) + along * opaque(types, 1 / how.scale)) / wavelength
+    slow = Field.from_waves(z / (wavelength * distance * distance), waves, Grid.square(n * rank, 1.0), types)
+    near = types.Float(wavelength / (2 * math.pi * distance))
+    slow = slow * Field(near, types.Float(-1), slow.grid, types)
+    place = types.Index(j * dr.opaque(types.Float64, n) + i)
+    whole = slow * Field(dr.gather(types.Float, u.re, place), dr.gather(types.Float, u.im, place), slow.grid, types)
+    return types.Tensor(whole.re, slow.grid.shape), types.Tensor(whole.im, slow.grid.shape)
+
+
+def _split(index: Any, n: int, types: Precision) -> tuple[Any, Any]:
+    """Quotient and remainder of float64 indices by n."""
+    import drjit as dr
+
+    by = dr.opaque(types.Float64, n)
+    quotient = dr.floor((index + 0.5) / by)
+    return quotient, dr.fma(-quotient, by, index)
+
+
+def _fourier(at: np.ndarray, beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> tuple[Any, Any]:
+    """A[x, (a, ξ)] = L_a(x) e^{-ik ξ x/c} as two tensors."""
+    rank, xi = how.rank, how.pupil.x
+    waves = np.tile(np.outer(at, xi) / (-problem.wavelength * how.scale), rank)
+    weight = np.repeat(lagrange(at, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
+    wheel = weight * np.exp(2j * np.pi * waves)
+    re, im = (np.ascontiguousarray(part, dtype=types.dtype) for part in (wheel.real, wheel.imag))
+    return types.Tensor(re), types.Tensor(im)
+
+
+def _product(re: Any, im: Any, other_re: Any, other_im: Any, transposed: bool) -> tuple[Any, Any]:
+    """Complex matrix product of tensor pairs."""
+    import drjit as dr
+
+    matmul: Any = dr.matmul
+    return (
+        matmul(re, other_re, Bt=transposed) - matmul(im, other_im, Bt=transposed),
+        matmul(re, other_im, Bt=transposed) + matmul(im, other_re, Bt=transposed),
+    )

@@ -1,0 +1,34 @@
+"""Parameters that derivatives are asked for: plain numbers to the planner, Dr.Jit arrays to the physics."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+__all__ = ["is_tracked", "number", "plain"]
+
+
+def is_tracked(value: Any) -> bool:
+    """Whether value is a Dr.Jit array (or tensor), not a Python or NumPy number."""
+    return type(value).__module__.startswith("drjit")
+
+
+def number(value: Any) -> float:
+    """value as a float; a Dr.Jit array of one element gives its entry, without derivative.
+
+    Raises:
+        TypeError, ValueError: no number.
+    """
+    if is_tracked(value):
+        return float(plain(value).reshape(()))
+    return float(value)
+
+
+def plain(value: Any) -> np.ndarray:
+    """value as a NumPy array, without derivative."""
+    if is_tracked(value):
+        import drjit as dr
+
+        return np.array(dr.detach(value).numpy(), dtype=np.float64)
+    return np.asarray(value, dtype=np.float64)
