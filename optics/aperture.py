@@ -16,7 +16,8 @@ import numpy as np
 
 from optics.arguments import LARGEST, in_range, positive
 from optics.precision import Precision, opaque
-from optics.soft_edge import SoftEdge, gauss_legendre, kaiser_beta
+from optics.quadrature import gauss_legendre
+from optics.soft_edge import SoftEdge, kaiser_beta
 
 __all__ = ["EDGE_REACH", "Aperture", "Nodes", "SoftAperture", "SoftDisk"]
 

@@ -12,7 +12,8 @@ import numpy as np
 from optics.aperture import Aperture, Nodes, SoftAperture
 from optics.arguments import in_range
 from optics.precision import Precision
-from optics.soft_edge import SoftEdge, gauss_legendre
+from optics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
+from optics.soft_edge import SoftEdge
 from optics.table import Table
 
 __all__ = ["Annulus", "Circle"]
@@ -122,10 +123,21 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
 
 
 def _ring_nodes(inner: float, cycles: float, digits: float) -> Nodes:
-    """Gauss-Legendre in radius, trapezoid in angle: exact edge, spectral convergence."""
-    u, weights = gauss_legendre(ceil(1.75 * cycles + 2 * digits + 4))
-    count = 2 * ceil(pi * cycles + 1.5 * digits * (1 + cycles ** (1 / 3)) + 4)
-    r, weight = inner + (1 - inner) * u, (1 - inner) * weights
-    angle = 2 * pi * (np.arange(count) + 0.5) / count
-    x, y = np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle))
-    return Nodes(x.ravel(), y.ravel(), np.outer(r * weight, np.full(count, 2 * pi / count)).ravel())
+    """Gauss-Legendre in radius, trapezoid in angle with fewer nodes on smaller rings: exact edge, spectral convergence.
+
+    Over the full disk the mean around a ring is a smooth function of r², which pays for few cycles.
+    """
+    digits += 0.3  # half the error to each of the two rules
+    u, weight = gauss_legendre(gauss_legendre_count(cycles * (1 - inner), digits))
+    rings = [(inner + (1 - inner) * u, (1 - inner) * weight)]
+    if inner == 0:
+        # Along a diameter, of which r² sees half the nodes.
+        u, weight = gauss_legendre(ceil(gauss_legendre_count(2 * cycles, digits) / 2))
+        rings.append((np.sqrt(u), weight / (2 * np.sqrt(u))))
+    counts = [harmonics(2 * pi * cycles * r, digits) for r, _ in rings]
+    best = min(range(len(rings)), key=lambda i: int(counts[i].sum()))
+    (r, weight), count = rings[best], counts[best]
+    place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    angle = 2 * pi * (place + 0.5) / np.repeat(count, count)
+    r = np.repeat(r, count)
+    return Nodes(r * np.cos(angle), r * np.sin(angle), np.repeat(weight * 2 * pi / count, count) * r)

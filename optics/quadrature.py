@@ -1,0 +1,46 @@
+"""How many quadrature nodes a wave needs, and Gauss-Legendre nodes.
+
+Both rules here fail by aliasing. n equidistant nodes on a circle see e^{iz cos φ} as if its harmonics J_n(z) and beyond
+were constant (Jacobi-Anger); n Gauss-Legendre nodes take polynomials up to degree 2n - 1, and the Chebyshev series of a
+wave that turns through z radians either way from the middle has the coefficients 2 J_m(z). So one count serves both:
+the smallest m from which on 2 |J_m(z)| stays below what is asked.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import ceil, pi
+
+import numpy as np
+
+__all__ = ["gauss_legendre", "gauss_legendre_count", "harmonics"]
+
+
+def harmonics(z: np.ndarray, digits: float) -> np.ndarray:
+    """Smallest m with 2 |J_m| <= 10^-digits from there on and for all arguments up to z, by bisection."""
+    from scipy.special import jv
+
+    z = np.asarray(z, dtype=np.float64)
+    # |J_m(z)| falls steadily in m beyond m = z, and is below (ez/2m)^m, which bounds the search.
+    low, high = np.floor(z), np.ceil(1.36 * z + 3 * digits + 4)
+    while np.any(high - low > 1):
+        middle = np.ceil((low + high) / 2)
+        small = 2 * np.abs(jv(middle, z)) <= 10.0**-digits
+        low, high = np.where(small, low, middle), np.where(small, middle, high)
+    return np.asarray(high, dtype=np.int64)
+
+
+def gauss_legendre_count(cycles: float, digits: float) -> int:
+    """Nodes for an integrand that turns through this many cycles between the ends."""
+    return ceil(int(harmonics(np.array(pi * cycles), digits)) / 2)
+
+
+@lru_cache(maxsize=256)
+def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights on [0, 1]."""
+    from scipy.special import roots_legendre
+
+    nodes, weights = roots_legendre(n)
+    nodes, weights = (nodes + 1) / 2, weights / 2
+    nodes.flags.writeable = weights.flags.writeable = False
+    return nodes, weights
