@@ -1,0 +1,73 @@
+"""Gratings: where their orders go, how much light each gets, where they image themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.special import jv
+
+from validation.reference.waves import plane_wave
+
+__all__ = [
+    "binary_grating_efficiency",
+    "blazed_grating_efficiency",
+    "grating_field",
+    "paraxial_talbot_distance",
+    "sinusoidal_grating_efficiency",
+    "staircase_grating_efficiency",
+    "talbot_distance",
+]
+
+
+def binary_grating_efficiency(order: int, depth: float, duty: float = 0.5) -> float:
+    """Share of the light in a diffraction order of a two-level phase grating, depth in waves, thin element:
+
+    |1 + d(e^{2πi depth} - 1)|² for order 0, 4 d² sin²(π depth) sinc²(m d) else; 40.5 % at half a wave and d = 1/2
+    (Fourier series of a rectangular wave; Goodman §4.4).
+    """
+    if order == 0:
+        return float(np.abs(1 + duty * np.expm1(2j * np.pi * depth)) ** 2)
+    return float(4 * duty**2 * np.sin(np.pi * depth) ** 2 * np.sinc(order * duty) ** 2)
+
+
+def blazed_grating_efficiency(order: int, depth: float) -> float:
+    """sinc²(depth - m): a sawtooth of `depth` waves that rises along +x sends its light to order m = depth
+    (Swanson 1989, MIT Lincoln Laboratory Technical Report 854; at λ in place of the design's λ0 the depth is λ0/λ)."""
+    return float(np.sinc(depth - order) ** 2)
+
+
+def staircase_grating_efficiency(order: int, levels: int, depth: float = 1.0) -> float:
+    """The sawtooth of `depth` waves approximated by L equal steps of depth/L:
+
+    sinc²(m/L) [sin π(depth - m) / (L sin(π(depth - m)/L))]²; sinc²(1/L) in the design order (Swanson 1989):
+    40.5, 81.1, 95.0, 98.7 % for 2, 4, 8, 16 levels.
+    """
+    off = depth - order
+    wraps = np.isclose(off / levels, round(off / levels), rtol=0, atol=1e-12)
+    many = 1.0 if wraps else np.sin(np.pi * off) / (levels * np.sin(np.pi * off / levels))
+    return float(np.sinc(order / levels) ** 2 * many**2)
+
+
+def sinusoidal_grating_efficiency(order: int, depth: float) -> float:
+    """J_m(π depth)²: phase π depth sin(2πx/d), `depth` waves from crest to trough (Goodman §4.4.4)."""
+    return float(jv(order, np.pi * depth) ** 2)
+
+
+def grating_field(
+    x: np.ndarray, z: float, wavelength: float, period: float, orders: Mapping[int, complex]
+) -> np.ndarray:
+    """Field at distance z of Σ c_m exp(2πi m x/d), orders = {m: c_m}: each order is a plane wave, exactly."""
+    return np.sum([c * plane_wave(x, z, wavelength, m / period) for m, c in orders.items()], axis=0)
+
+
+def talbot_distance(period: float, wavelength: float) -> float:
+    """Where orders -1, 0 and 1 are in phase again: z = λ / (1 - √(1 - λ²/d²)), exactly (from
+    k z (1 - cos θ) = 2π, sin θ = λ/d; Rayleigh 1881, Phil. Mag. 11:196)."""
+    sine2 = (wavelength / period) ** 2
+    return wavelength * (1 + np.sqrt(1 - sine2)) / sine2
+
+
+def paraxial_talbot_distance(period: float, wavelength: float) -> float:
+    """2d²/λ: the limit of `talbot_distance` for d >> λ (Goodman §4.5.2)."""
+    return 2 * period**2 / wavelength

@@ -1,0 +1,110 @@
+"""The exact diffraction integral of a circular pupil with an ideal lens, by quadrature."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+__all__ = ["ideal_lens_field", "ideal_lens_profile"]
+
+# Nodes beyond the phase's own band: float64's 37 nepers, and the same again for amplitude and round numbers.
+DIGITS = 37.0
+
+
+def ideal_lens_field(
+    r: np.ndarray,
+    wavelength: float,
+    radius: float,
+    focal_length: float = math.inf,
+    distance: float | None = None,
+    *,
+    source_distance: float = math.inf,
+    nodes: tuple[int, int] | None = None,
+) -> np.ndarray:
+    """Field of an ideal lens exp(-ik(√(ρ² + f²) - f)) in a unit wave at radii r of the plane z = distance.
+
+    The wave is plane, or exp(ik(√(ρ² + s²) - s)) of a point source at s = source_distance. An infinite focal length is
+    the bare aperture. First Rayleigh-Sommerfeld integral (Goodman §3.5), D the distance from the aperture's point:
+
+        U = ∫∫ P z/(2πD²) (1/D - ik) e^{ik(D - z)} ρ dρ dφ
+
+    Gauss-Legendre in ρ, trapezoid in φ (half the circle by symmetry). nodes: (radial, angular); by default enough for
+    float64, from the gradient of the whole phase: what lens and path together still turn.
+    """
+    z = focal_length if distance is None else distance
+    if not math.isfinite(z):
+        raise ValueError(f"distance = {z}: must be finite where there is no lens")
+    k = 2 * np.pi / wavelength
+    r = np.asarray(r, dtype=np.float64)
+    field = np.empty(r.shape, dtype=np.complex128)
+    for index, at in np.ndenumerate(r):
+        n, m = nodes or _nodes(float(abs(at)), k, radius, focal_length, z, source_distance)
+        rho, weight = (radius * values for values in _gauss_legendre(n))
+        pupil = _phase(rho, source_distance) - _phase(rho, focal_length)
+        d2 = rho[:, None] ** 2 + at**2 - 2 * rho[:, None] * at * np.cos(np.pi * (np.arange(m) + 0.5) / m)
+        d = np.sqrt(d2 + z**2)
+        wave = np.exp(1j * k * (d2 / (d + z) + pupil[:, None]))
+        kernel = z / d**2 * (1 / d - 1j * k) * wave
+        field[index] = (weight * rho) @ kernel.sum(axis=1) / m
+    return field
+
+
+def ideal_lens_profile(
+    r_max: float, wavelength: float, radius: float, focal_length: float = math.inf, distance: float | None = None
+) -> Callable[[np.ndarray], np.ndarray]:
+    """`ideal_lens_field` as a function of r in [0, r_max]: its Chebyshev interpolant in r², good to 1e-11 of the peak.
+
+    The field is even and analytic in r, and band-limited by the steepest ray (Trefethen, Approximation Theory and
+    Approximation Practice, ch. 8). For windows: pays off beyond some hundred radii.
+    """
+    z = focal_length if distance is None else distance
+    steepest = (radius + r_max) / math.hypot(radius + r_max, z)
+    degree = int(0.6 * 2 * np.pi / wavelength * r_max * steepest + 40)
+
+    def values(t: np.ndarray) -> np.ndarray:
+        return ideal_lens_field(r_max * np.sqrt((t + 1) / 2), wavelength, radius, focal_length, distance)
+
+    coefficients = chebyshev.chebinterpolate(lambda t: values(t).view(np.float64).reshape(-1, 2), degree)
+    both = coefficients[:, 0] + 1j * coefficients[:, 1]
+
+    def profile(r: np.ndarray) -> np.ndarray:
+        if np.max(r) > r_max * (1 + 1e-12):
+            raise ValueError(f"r = {np.max(r):g} m: must lie in [0, {r_max:g}] m")
+        return chebyshev.chebval(2 * (np.asarray(r) / r_max) ** 2 - 1, both)
+
+    return profile
+
+
+def _phase(rho: np.ndarray, distance: float) -> np.ndarray:
+    """√(ρ² + d²) - d."""
+    return rho**2 / (np.hypot(rho, distance) + distance)
+
+
+def _nodes(r: float, k: float, radius: float, focal_length: float, z: float, source: float) -> tuple[int, int]:
+    """Radial and angular nodes: the phase's largest gradient, and the kernel's nearest complex singularity.
+
+    n Gauss-Legendre nodes integrate exp(iωx) on [-1, 1] once 2n exceeds ω, and lose ρ^-2n to a singularity on the
+    Bernstein ellipse ρ; 2m points around the circle integrate harmonics below 2m, losing e^{-2ms} to one at φ = is.
+    """
+    rho = np.linspace(0, radius, 33)[:, None]
+    angle = np.linspace(0, np.pi, 17)
+    d = np.sqrt(rho**2 + r**2 - 2 * rho * r * np.cos(angle) + z**2)
+    slope = (rho - r * np.cos(angle)) / d + rho / np.hypot(rho, source) - rho / np.hypot(rho, focal_length)
+    omega = 1.05 * k * radius / 2 * float(np.abs(slope).max())
+    turn = k * float((rho * r / d).max())
+    nearest = min(z, abs(focal_length), source)
+    n = 0.75 * omega + DIGITS / (2 * math.asinh(2 * nearest / radius)) + DIGITS
+    strip = math.acosh((radius**2 + r**2 + z**2) / max(2 * radius * r, 1e-300))
+    m = 0.6 * turn + DIGITS / (2 * strip) + DIGITS / 2
+    return 16 * math.ceil(n / 16), 8 * math.ceil(m / 8)
+
+
+@lru_cache(maxsize=256)
+def _gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(n)
+    return (nodes + 1) / 2, weights / 2

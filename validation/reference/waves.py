@@ -1,0 +1,87 @@
+"""Waves whose propagation is known: plane waves, beams, edges."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import fresnel, j0
+
+__all__ = [
+    "gaussian_beam",
+    "gaussian_evanescent_power",
+    "gaussian_field",
+    "knife_edge_field",
+    "plane_wave",
+    "slit_field",
+]
+
+
+def plane_wave(x: np.ndarray, z: float, wavelength: float, fx: float) -> np.ndarray:
+    """exp(2πi(fx x + z(√(1/λ² - fx²) - 1/λ))): beyond fx = 1/λ it decays like exp(-2πz √(fx² - 1/λ²))
+    (Goodman §3.10.2). For evanescent waves, too, the carrier is left out."""
+    axial = np.sqrt(complex(1 / wavelength**2 - fx**2))
+    difference = -(fx**2) / (axial + 1 / wavelength)
+    return np.exp(2j * np.pi * (fx * np.asarray(x) + z * difference))
+
+
+def gaussian_beam(r: np.ndarray, wavelength: float, waist: float, z: float) -> np.ndarray:
+    """Paraxial beam, w0/w exp(-r²/w² + ikr²/2R - iζ): w = w0 √(1 + (z/z_R)²), R = z + z_R²/z, Gouy's
+    ζ = arctan(z/z_R), z_R = πw0²/λ (Siegman, Lasers, §17.1)."""
+    rayleigh = np.pi * waist**2 / wavelength
+    width = waist * np.hypot(1, z / rayleigh)
+    curvature = z / (z**2 + rayleigh**2)
+    r2 = np.asarray(r) ** 2
+    phase = np.pi / wavelength * r2 * curvature - np.arctan2(z, rayleigh)
+    return waist / width * np.exp(-r2 / width**2 + 1j * phase)
+
+
+def gaussian_field(r: np.ndarray, wavelength: float, waist: float, z: float, *, nodes: int = 0) -> np.ndarray:
+    """What exp(-r²/w0²) becomes at distance z >= 0, exactly: its angular spectrum summed,
+
+    ∫ πw0² e^{-π²w0²f²} H(f) J0(2πfr) 2πf df, H as in `plane_wave` (Goodman §3.10; the Hankel transform §2.1.5).
+    Propagating part with f = sin θ / λ, evanescent part with f = cosh t / λ: both integrands are smooth.
+    """
+    r = np.asarray(r, dtype=np.float64)
+    top = min(np.pi / 2, float(np.arcsin(min(1, 6.1 * wavelength / (np.pi * waist)))))
+    turns = 2 * np.pi / wavelength * (np.sin(top) * np.max(r, initial=0) + z * (1 - np.cos(top)))
+    x, w = np.polynomial.legendre.leggauss(nodes or int(64 + turns))
+    theta, weight = top * (x + 1) / 2, top * w / 2
+    f, measure = np.sin(theta) / wavelength, weight * np.cos(theta) / wavelength
+    field = _hankel(r, f, measure, waist, np.exp(-4j * np.pi * z / wavelength * np.sin(theta / 2) ** 2))
+    if top == np.pi / 2:
+        highest = np.arccosh(1 + 6.1 * wavelength / (np.pi * waist))
+        t, weight = highest * (x + 1) / 2, highest * w / 2
+        f, measure = np.cosh(t) / wavelength, weight * np.sinh(t) / wavelength
+        decay = np.exp(-2 * np.pi * z / wavelength * (np.sinh(t) + 1j))
+        field = field + _hankel(r, f, measure, waist, decay)
+    return field
+
+
+def gaussian_evanescent_power(wavelength: float, waist: float) -> float:
+    """Share of exp(-r²/w0²)'s power at frequencies above 1/λ: exp(-2π²w0²/λ²), its power spectrum being Gaussian."""
+    return float(np.exp(-2 * (np.pi * waist / wavelength) ** 2))
+
+
+def knife_edge_field(x: np.ndarray, wavelength: float, z: float) -> np.ndarray:
+    """Fresnel's field behind an opaque half plane x < 0 in a unit plane wave: (1 - i)/2 (F(∞) + F(x √(2/λz))),
+    F(s) = ∫₀ˢ e^{iπt²/2} dt; intensity 1/4 at the edge (Born & Wolf §8.7.3)."""
+    return (1 - 1j) / 2 * ((1 + 1j) / 2 + _fresnel_integral(np.asarray(x) * np.sqrt(2 / (wavelength * z))))
+
+
+def slit_field(x: np.ndarray, half_width: float, wavelength: float, z: float) -> np.ndarray:
+    """Fresnel's field behind a slit |x| < a in a unit plane wave, the difference of two edges (Goodman §4.5.1).
+
+    The product of two is a rectangle's.
+    """
+    scale = np.sqrt(2 / (wavelength * z))
+    x = np.asarray(x)
+    return (1 - 1j) / 2 * (_fresnel_integral((x + half_width) * scale) - _fresnel_integral((x - half_width) * scale))
+
+
+def _fresnel_integral(s: np.ndarray) -> np.ndarray:
+    sine, cosine = fresnel(s)
+    return cosine + 1j * sine
+
+
+def _hankel(r: np.ndarray, f: np.ndarray, measure: np.ndarray, waist: float, transfer: np.ndarray) -> np.ndarray:
+    spectrum = np.pi * waist**2 * np.exp(-((np.pi * waist * f) ** 2)) * transfer * 2 * np.pi * f * measure
+    return np.tensordot(j0(2 * np.pi * np.multiply.outer(r, f)), spectrum, axes=1)
