@@ -92,7 +92,7 @@ class SoftAnnulus(SoftAperture):
     def transmittance(self, x: Any, y: Any, types: Precision) -> Any:
         import drjit as dr
 
-        distance = dr.sqrt(x * x + y * y)
+        distance = dr.sqrt(x * x + y * y + 1e-40)  # differentiable on the axis
         disk = _disk_table(self.edge, 1.0).at(distance, types)
         return disk if self.inner == 0 else disk - _disk_table(self.edge, self.inner).at(distance, types)
 

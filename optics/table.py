@@ -37,7 +37,7 @@ class Table:
         from scipy.interpolate import BarycentricInterpolator
 
         per_cycle = 2 * pi * (2.4e-4 / error) ** (1 / 6)
-        n = int(cycles * per_cycle + 24)
+        n = int(cycles * per_cycle + 64)
         degree = int(pi * cycles - 3 * np.log10(error) + 12)
         middle, half = (ends[0] + ends[1]) / 2, (ends[1] - ends[0]) / 2
         chebyshev = np.cos(pi * (np.arange(degree) + 0.5) / degree)
