@@ -126,10 +126,9 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
     angle = np.clip(np.arctan2(s[None, :], cosine), -edge, edge)
     along_x = lagrange(angle, nodes)
     total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
-    places = problem.distance * np.tan(nodes)
-    for a, x in enumerate(places):
-        for b, y in enumerate(places):
-            part = u * _slow_kernel(float(x), float(y), beam, how.pupil, types)
+    for a, across in enumerate(np.tan(nodes)):
+        for b, along in enumerate(np.tan(nodes)):
+            part = u * _slow_kernel(float(across), float(along), beam, how.pupil, types)
             part = dft2(part, how.period, how.directions.shape, -1, how.directions.dx)
             weight = types.Float(np.ascontiguousarray(along_x[a] * along_x[b].T, dtype=types.dtype).ravel())
             total_re, total_im = total_re + weight * part.re, total_im + weight * part.im
@@ -137,15 +136,15 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
     return _onto_window(total_re * total_re + total_im * total_im, beam, problem, how, types)
 
 
-def _slow_kernel(x: float, y: float, beam: Beam, grid: Grid, types: Precision) -> Field:
-    """G(ξ; x) on the pupil's grid, without its constant factor -i (1/(kD) is kept)."""
+def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Precision) -> Field:
+    """G(ξ; x) on the pupil's grid for x in the direction of the two tangents, without its constant factor -i (1/(kD) is kept)."""
     import drjit as dr
 
     px, py = grid.coordinates(types)
     wavelength = beam.wavelength / beam.pupil.medium_n
-    across, z = opaque(types, x * x + y * y), opaque(types, beam.distance)
-    far = dr.sqrt(across + z * z)
-    along = (px * opaque(types, x) + py * opaque(types, y)) / far
+    slant = math.sqrt(1 + tan_x**2 + tan_y**2)
+    far = opaque(types, beam.distance) * opaque(types, slant)
+    along = px * opaque(types, tan_x / slant) + py * opaque(types, tan_y / slant)
     excess = px * px + py * py - 2 * far * along
     distance = dr.sqrt(far * far + excess)
     waves = (excess / (distance + far) + along) * opaque(types, 1 / wavelength)
