@@ -30,9 +30,9 @@ def harmonics(z: np.ndarray, digits: float) -> np.ndarray:
     return np.asarray(high, dtype=np.int64)
 
 
-def gauss_legendre_count(cycles: float, digits: float) -> int:
-    """Nodes for an integrand that turns through this many cycles between the ends."""
-    return ceil(int(harmonics(np.array(pi * cycles), digits)) / 2)
+def gauss_legendre_count(cycles: float, digits: float, degree: int = 0) -> int:
+    """Nodes for an integrand that turns through this many cycles between the ends, times a polynomial."""
+    return ceil((int(harmonics(np.array(pi * cycles), digits)) + degree) / 2)
 
 
 @lru_cache(maxsize=256)

@@ -73,16 +73,16 @@ class _Chord:
         near = dr.abs(d) < self.reach
         whole = near & (start < -half) & (end > half)
         part = near & ~whole & (start < half) & (end > -half)
-        first, last = dr.clip(start, -half, half), dr.clip(end, -half, half)
+        first, last = (dr.select(near, dr.clip(s, -half, half), 0) for s in (start, end))
         # Angles of what lies beyond the reach on either side, as the argument of a product. The whole chord comes from
         # a table in which the line goes on for ever: what it lacks there is taken off.
         d2 = d * d + TINY
         re, im = _times(d2 + start * first, d * (first - start), d2 + last * end, d * (end - last))
-        beyond = dr.atan2(
-            dr.select(whole, d * (start - end), im), dr.select(whole, -d2 - start * end, re)
-        ) / (2 * pi)
+        beyond = dr.atan2(dr.select(whole, d * (start - end), im), dr.select(whole, -d2 - start * end, re)) / (2 * pi)
         zero = dr.zeros(self.types.Float64, dr.width(d))
-        through = dr.if_stmt((d, zero), whole, lambda d, zero: self.straight.at(d, self.types) - 0.5, lambda d, zero: zero)
+        through = dr.if_stmt(
+            (d, zero), whole, lambda d, zero: self.straight.at(d, self.types) - 0.5, lambda d, zero: zero
+        )
         corner = dr.if_stmt((d, first, last, zero), part, self._integral, lambda d, first, last, zero: zero)
         return beyond + through + corner
 
