@@ -30,8 +30,8 @@ __all__ = ["PROPAGATION_METHODS", "PropagationResult", "propagate"]
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 # Steepest light that the period makes room for, as sin θ; z tan θ has no bound beyond.
 STEEPEST_SINE = 0.995
-# The fade's width against the band it ends: wider blurs less and costs period.
-FADE = 0.12
+# Share of faded light that strays into the window: small, because the window may hold far less than is faded.
+RIPPLE_PER_TOLERANCE = 3e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ def propagate(
         window,
         positive("wavelength", wavelength) / in_range("medium_n", medium_n, 1.0, 10.0),
         finite("distance", distance),
-        0.3 * tolerance,
+        RIPPLE_PER_TOLERANCE * tolerance,
     )
     types = precision(dtype)
     planes = [_one(plane, how, types) for plane in field.reshape(-1, *source.shape)]
@@ -125,24 +125,15 @@ def _field(u: np.ndarray) -> np.ndarray:
 
 def _sampling(method: str, source: Grid, window: Grid, wavelength: float, distance: float, ripple: float) -> _Sampling:
     z, nyquist = abs(distance), math.sqrt(0.5) / source.dx  # along the diagonal
-    corner = source.half_diagonal + source.dx + window.half_diagonal
-    blur = 2 * math.log(1 / ripple) / math.pi
     paraxial = method == "fresnel"
-    band = (corner / max(z, 1e-300) if paraxial else corner / math.hypot(corner, z)) / wavelength
-    # The fade blurs by blur / fade; the band that lands this far outside the window includes that margin.
-    for _ in range(20):
-        fade = FADE * band
-        reach = corner + blur / fade
-        band = (reach / max(z, 1e-300) if paraxial else reach / math.hypot(reach, z)) / wavelength
+    band, fade = _band(source, window, wavelength, z, ripple, paraxial)
     end = band + fade
     if end >= nyquist or (not paraxial and end * wavelength >= STEEPEST_SINE):
         band, fade = math.inf, 0.0  # nothing to fade: all that the samples hold may matter
         end = nyquist if paraxial else min(nyquist, STEEPEST_SINE / wavelength)
-        reach = corner
-    sine = end * wavelength
-    walk = z * (sine if paraxial else sine / math.sqrt(1 - sine * sine))
     halves = [(n // 2 + 1) * source.dx + (m // 2) * window.dx for n, m in zip(source.shape, window.shape, strict=True)]
-    least = max(max(halves) + min(walk, reach), 2 * (max(source.shape) // 2 + 1) * source.dx)
+    walk = _walk(end, wavelength, z, paraxial)
+    least = max(max(halves) + walk, 2 * (max(source.shape) // 2 + 1) * source.dx)
     samples = fast_length(least / source.dx)
     period = samples * source.dx
     across = samples if math.isinf(band) else min(samples, 2 * math.ceil(end * period) + 1)
@@ -153,6 +144,33 @@ def _sampling(method: str, source: Grid, window: Grid, wavelength: float, distan
         )
     spectrum = Grid.square(across, 1 / period)
     return _Sampling(method, source, window, wavelength, distance, period, spectrum, band, fade, ripple)
+
+
+def _walk(frequency: float, wavelength: float, z: float, paraxial: bool) -> float:
+    """How far [m] to the side light of a spatial frequency [1/m] travels."""
+    sine = frequency * wavelength
+    return z * (sine if paraxial else sine / math.sqrt(1 - sine * sine))
+
+
+def _band(
+    source: Grid, window: Grid, wavelength: float, z: float, ripple: float, paraxial: bool
+) -> tuple[float, float]:
+    """Band kept whole, and the width [1/m] of the fade beyond it, that need the shortest period.
+
+    A narrow fade blurs far, so that the band must reach as far outside the window; a wide one lets light walk far
+    before it is gone. Either way the period has to hold what is not gone.
+    """
+    corner = source.half_diagonal + source.dx + window.half_diagonal
+    blur = 2 * math.log(1 / ripple) / math.pi
+    if z == 0:
+        return math.inf, 0.0
+    best = (math.inf, math.inf, 0.0)
+    for fade in np.geomspace(0.003, 0.6, 33) / wavelength:
+        reach = corner + blur / fade
+        band = reach / (z if paraxial else math.hypot(reach, z)) / wavelength
+        if paraxial or (band + fade) * wavelength < STEEPEST_SINE:
+            best = min(best, (_walk(band + fade, wavelength, z, paraxial), band, float(fade)))
+    return best[1:]
 
 
 def _one(plane: np.ndarray, how: _Sampling, types: Precision) -> tuple[np.ndarray, float, float]:
@@ -167,10 +185,16 @@ def _one(plane: np.ndarray, how: _Sampling, types: Precision) -> tuple[np.ndarra
     out = dft2(spectrum * _transfer(how, types), how.period / how.window.dx, how.window.shape, +1, how.window.dx)
     result = out.scaled((how.source.dx / how.period) ** 2).numpy()
     arrived = float(np.sum(np.abs(result) ** 2, dtype=np.float64)) * how.window.dx**2
-    loose = power[(sine > STEEPEST_SINE) & (sine < 1)].sum() if math.isinf(how.band) and how.distance else 0.0
+    grazing = (
+        (sine > STEEPEST_SINE) & (sine < 1) & (math.isinf(how.band) and how.distance != 0 and how.method != "fresnel")
+    )
+    loose = power[grazing].sum()
     rounding = FLOAT_NOISE[types.dtype] * math.sqrt(total / arrived) if arrived else math.inf
-    error = 2 * math.sqrt(loose / arrived) + rounding + (how.ripple if how.fade else 0.0) if arrived else math.inf
-    return result, error, float(power[sine >= 1].sum() / total)
+    fading = 2 * how.ripple * math.sqrt(power[sine > how.band * how.wavelength].sum() / arrived) if arrived else 0.0
+    error = 2 * math.sqrt(loose / arrived) + rounding + fading if arrived else math.inf
+    # A frequency's cell on the circle f = n/λ counts by how far it reaches outside: the error falls with its width².
+    outside = np.clip((sine - 1) / (how.spectrum.dx * how.wavelength) + 0.5, 0, 1)
+    return result, error, float(np.sum(power * outside) / total)
 
 
 def _transfer(how: _Sampling, types: Precision) -> Field:

@@ -1,0 +1,230 @@
+"""Lenses and round apertures against closed forms and the exact integral, at every aperture and distance."""
+
+import math
+
+import numpy as np
+import pytest
+
+import optics
+from validation import reference
+
+WAVELENGTH = 550e-9
+
+
+def lens(f_number, focal_length=300e-6):
+    return optics.Pupil(focal_length / (2 * f_number), thin_lens_focal_length=focal_length)
+
+
+def distances(result):
+    return np.hypot(result.x[None, :], result.y[:, None])
+
+
+def exact_psf(result):
+    """The exact integral on the result's window."""
+    r = distances(result)
+    pupil = result.pupil
+    focal_length = pupil.thin_lens_focal_length or math.inf
+    profile = reference.ideal_lens_profile(
+        float(r.max()), WAVELENGTH, pupil.aperture_radius, focal_length, result.sensor_distance
+    )
+    return np.abs(profile(r)) ** 2 / pupil.area
+
+
+class TestExactIntegral:
+    @pytest.mark.parametrize("f_number", [1.4, 2, 2.8, 4, 8, 16])
+    def test_lens_in_focus(self, f_number):
+        """±10 λ f#. Seven digits asked and given; Airy's pattern would be off by 2e-3 at f/16, 0.1 at f/1.4."""
+        result = optics.psf(
+            lens(f_number), [WAVELENGTH], 300e-6, dx=WAVELENGTH * f_number / 4, shape=(81, 81), tolerance=1e-7,
+            dtype="float64",
+        )  # fmt: skip
+        exact = exact_psf(result)
+        airy = reference.airy_psf(distances(result), WAVELENGTH, result.pupil.aperture_radius, 300e-6)
+        assert reference.relative_l2(result.psf[0], exact) < result.plan.predicted_error <= 1e-7
+        assert reference.relative_l2(airy, exact) > 1e-3
+
+    @pytest.mark.parametrize(("dtype", "tolerance"), [("float32", 1e-4), ("float64", 1e-7)])
+    def test_aperture_in_the_near_field(self, dtype, tolerance):
+        """Radius 50 µm at 200 µm, ±60 µm: Fresnel number 23, light and shadow in one window."""
+        result = optics.psf(
+            optics.Pupil(50e-6), [WAVELENGTH], 200e-6, dx=1.5e-6, shape=(81, 81), tolerance=tolerance, dtype=dtype
+        )
+        exact = exact_psf(result)
+        assert reference.relative_l2(result.psf[0], exact) < result.plan.predicted_error <= tolerance
+        cut = exact[40, 40:]
+        paraxial = reference.defocused_psf(result.x[40:], WAVELENGTH, 50e-6, math.inf, 200e-6)
+        assert reference.relative_l2(paraxial, cut) > 1e-2
+
+    @pytest.mark.parametrize("z", [5e-6, 17e-6, 40e-6, 300e-6, 2e-3])
+    def test_axis_behind_an_aperture(self, z):
+        """From a quarter of the radius to Fresnel number 0.36."""
+        result = optics.psf(
+            optics.Pupil(20e-6),
+            [WAVELENGTH],
+            z,
+            dx=0.25e-6,
+            shape=(9, 9),
+            tolerance=1e-6,
+            dtype="float64",
+        )
+        exact = reference.circular_aperture_on_axis(20e-6, z, WAVELENGTH)
+        # the tolerance is on the window's norm; where the axis is dark it is a share of its surroundings
+        bright = float(np.sqrt(np.mean(result.psf**2))) * result.pupil.area
+        assert result.psf[0, 4, 4] * result.pupil.area == pytest.approx(exact, abs=5e-6 * bright)
+
+    @pytest.mark.parametrize("f_number", [0.7, 1, 2, 8])
+    def test_peak_of_a_converging_wave(self, f_number):
+        """Strehl ratio 1 at any aperture, against the oracle's own peak: Airy's is 25 % too high at f/0.7."""
+        result = optics.psf(
+            lens(f_number),
+            [WAVELENGTH],
+            300e-6,
+            dx=0.2e-6,
+            shape=(9, 9),
+            tolerance=1e-6,
+            dtype="float64",
+        )
+        peak = abs(reference.converging_wave_at_focus(result.pupil.aperture_radius, 300e-6, WAVELENGTH)) ** 2
+        assert result.psf[0, 4, 4] * result.pupil.area == pytest.approx(peak, rel=2e-6)
+        assert optics.strehl_ratio(result)[0] == pytest.approx(1, abs=2e-6)
+
+    def test_finite_source(self):
+        """A point at 500 µm, sensor before, in and behind its image: the exact integral with both phases."""
+        pupil = lens(4, 200e-6)
+        image = reference.thin_lens_image_distance(200e-6, 500e-6)
+        for z in (0.9 * image, image, 1.1 * image):
+            result = optics.psf(
+                pupil,
+                [WAVELENGTH],
+                z,
+                source_distance=500e-6,
+                dx=0.7e-6,
+                shape=(1, 21),
+                tolerance=1e-6,
+                dtype="float64",
+            )
+            field = reference.ideal_lens_field(
+                np.abs(result.x), WAVELENGTH, pupil.aperture_radius, 200e-6, z, source_distance=500e-6
+            )
+            assert reference.relative_l2(result.psf[0, 0], np.abs(field) ** 2 / pupil.area) < 1e-6
+
+
+class TestParaxialLimits:
+    """Closed forms of the paraxial theory are limits: the package must leave them like the aperture squared."""
+
+    APERTURES = (0.05, 0.1, 0.2)
+
+    def departure(self, defocus_waves, closed_form, fresnel_number=20.0):
+        """Misfit at constant Fresnel number and defocus, where the paraxial pattern is always the same."""
+        errors = []
+        for aperture in self.APERTURES:
+            f = fresnel_number * WAVELENGTH / aperture**2
+            radius, z = aperture * f, f / (1 + 2 * defocus_waves / fresnel_number)
+            pupil = optics.Pupil(radius, thin_lens_focal_length=f)
+            dx = WAVELENGTH / aperture / 8
+            result = optics.psf(pupil, [WAVELENGTH], z, dx=dx, shape=(33, 33), tolerance=1e-5, dtype="float64")
+            errors.append(reference.relative_l2(result.psf[0], closed_form(distances(result), radius, f, z)))
+        return errors
+
+    def test_airy(self):
+        errors = self.departure(0, lambda r, radius, f, z: reference.airy_psf(r, WAVELENGTH, radius, f))
+        assert errors[0] < 2.5e-3
+        assert reference.order_of_convergence(self.APERTURES, errors) == pytest.approx(2, abs=0.1)
+
+    @pytest.mark.parametrize("waves", [-0.5, 0.7])
+    def test_lommel(self, waves):
+        def paraxial(r, radius, f, z):
+            return reference.defocused_psf(r, WAVELENGTH, radius, f, z)
+
+        errors = self.departure(waves, paraxial)
+        assert errors[0] < 1e-2
+        assert reference.order_of_convergence(self.APERTURES, errors) == pytest.approx(2, abs=0.15)
+        # Debye's form, symmetric about the focus, is not that limit: it misses the scale z/f
+        debye = self.departure(
+            waves,
+            lambda r, radius, f, z: (
+                np.pi
+                * radius**2
+                / (WAVELENGTH * f) ** 2
+                * reference.lommel_intensity(4 * np.pi * waves, 2 * np.pi * radius * r / (WAVELENGTH * f))
+            ),
+        )
+        assert debye[0] > 5 * errors[0]
+
+
+class TestQuality:
+    SLOW = optics.Pupil(0.5e-3, thin_lens_focal_length=50e-3)  # f/50, Fresnel number 9, NA 0.01: Airy to 1e-4
+
+    def window(self, rings, samples_per_ring=8):
+        """Window in units of λ f#."""
+        n = 2 * rings * samples_per_ring + 1
+        return optics.psf(
+            self.SLOW, [WAVELENGTH], 50e-3, dx=50 * WAVELENGTH / samples_per_ring, shape=(n, n), tolerance=1e-4
+        )
+
+    def test_mtf_is_that_of_a_disk_as_the_window_grows(self):
+        """A window of W rings misses 2/(π² W) of the light, which lifts all frequencies: order -1."""
+        f = np.linspace(0.1, 0.9, 9) / (50 * WAVELENGTH)
+        expected = reference.circular_mtf(f, WAVELENGTH, 0.5e-3, 50e-3)
+        rings, errors, renormalised = (8, 16, 32), [], []
+        for count in rings:
+            result = self.window(count, 4)
+            measured = optics.mtf(result).profile(f)[0]
+            errors.append(np.abs(measured - expected).mean())
+            renormalised.append(np.abs(measured * result.power[0] - expected).mean())
+        assert reference.order_of_convergence(rings, errors) == pytest.approx(-1, abs=0.25)
+        # divided by all of the pupil's light instead of the window's, only the sharp edge of the window is left
+        assert renormalised[-1] < 2e-3
+        wrong = reference.circular_mtf(1.05 * f, WAVELENGTH, 0.5e-3, 50e-3)
+        assert np.abs(wrong - expected).mean() > 10 * renormalised[-1]
+
+    def test_encircled_energy_is_airys(self):
+        """The sum over samples errs by (dx / ring)²: order -2 until the 1e-4 of Airy itself."""
+        zeros = reference.AIRY_ZEROS[:4] / np.pi * 50 * WAVELENGTH
+        expected = reference.airy_encircled_energy(zeros, WAVELENGTH, 0.5e-3, 50e-3)
+        samples, errors = (4, 8, 16), []
+        for count in samples:
+            errors.append(np.abs(optics.encircled_energy(self.window(5, count), zeros)[0] - expected).max())
+        assert errors[-1] < 5e-4
+        assert reference.order_of_convergence(samples, errors) < -1.7
+        assert expected[0] == pytest.approx(0.8378, abs=1e-4)
+        assert abs(reference.airy_encircled_energy(zeros[0] / 2, WAVELENGTH, 0.5e-3, 50e-3) - expected[0]) > 0.2
+
+
+class TestOrdersOfConvergence:
+    """A hard edge on a grid converges like N^-1 to N^-1.5; the soft edge of `psf` gives what is asked."""
+
+    RADIUS, Z = 20e-6, 60e-6
+
+    def exact(self, r):
+        return reference.ideal_lens_profile(float(r.max()), WAVELENGTH, self.RADIUS, distance=self.Z)(r)
+
+    def test_sampled_edge(self):
+        samples, errors = (64, 128, 256), []
+        for n in samples:
+            dx = 2 * self.RADIUS / n
+            x = (np.arange(n + 9) - (n + 9) // 2) * dx
+            disk = (np.hypot(x[None, :], x[:, None]) <= self.RADIUS).astype(float)
+            out = optics.propagate(
+                disk, dx=dx, wavelength=WAVELENGTH, distance=self.Z, out_dx=1e-6, out_shape=(25, 25), tolerance=1e-2,
+                dtype="float64",
+            )  # fmt: skip
+            r = np.hypot(*np.meshgrid(*[np.arange(-12, 13) * 1e-6] * 2))
+            errors.append(reference.relative_l2(np.abs(out.u) ** 2, np.abs(self.exact(r)) ** 2))
+        assert -2.2 < reference.order_of_convergence(samples, errors) < -0.7
+        assert errors[-1] > 1e-4
+
+    @pytest.mark.parametrize("method", ["angular_spectrum", "rayleigh_sommerfeld", "auto"])
+    def test_soft_edge(self, method):
+        """Five more digits for less than four times the samples across."""
+        samples, errors = [], []
+        for tolerance in (1e-3, 1e-5, 1e-8):
+            result = optics.psf(
+                optics.Pupil(self.RADIUS), [WAVELENGTH], self.Z, dx=1e-6, shape=(25, 25), tolerance=tolerance,
+                method=method, dtype="float64",
+            )  # fmt: skip
+            exact = np.abs(self.exact(distances(result))) ** 2 / result.pupil.area
+            errors.append(reference.relative_l2(result.psf[0], exact))
+            samples.append(max(result.plan.samples))
+            assert errors[-1] < tolerance
+        assert samples[-1] < 4 * samples[0]
