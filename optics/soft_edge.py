@@ -74,7 +74,7 @@ class SoftEdge:
 def _beta(ripple: float) -> float:
     """Kaiser's rule is for one dimension. In the plane side lobes from every direction meet at frequency 0, and add up
     to 7 ripples at 0.5, 20 at 1e-6 and 50 at 1e-12 (largest over the passband's width)."""
-    return kaiser_beta(ripple**1.075 / 7.5)
+    return kaiser_beta(ripple**1.08 / 9)
 
 
 def kaiser_beta(ripple: float) -> float:

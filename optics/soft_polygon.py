@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import log10, pi
+from math import ceil, log10, pi
 from typing import Any
 
 import numpy as np
@@ -42,75 +42,76 @@ class SoftPolygon(SoftAperture):
         columns = (*self.vertices.T, *(along / length[:, None]).T, length)
         sides = [types.Float64(np.ascontiguousarray(column)) for column in columns]
         count = dr.opaque(types.Index, len(length))
-        chord = _Chord(self.edge, types)
+        line = _Line(self.edge, types)
 
         def add(i: Any, total: Any, x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
             x0, y0, tx, ty, length = (dr.gather(types.Float64, side, i) for side in sides)
             d = tx * (y - y0) - ty * (x - x0)
             start = -(tx * (x - x0) + ty * (y - y0))
-            return i + 1, total + chord.share(d, start, start + length), x, y
+            return i + 1, total + line.between(d, start, start + length), x, y
 
         width = max(dr.width(x), dr.width(y))
         state = dr.zeros(types.Index, width), dr.zeros(types.Float64, width), types.Float64(x), types.Float64(y)
         return dr.while_loop(state, lambda i, total, x, y: i < count, add, max_iterations=-1)[1]
 
 
-class _Chord:
-    """What an edge at signed distance d, from `start` to `end` along its line, adds to the transmittance."""
+class _Line:
+    """What a piece of a line adds: W(d, s) for the piece from the foot of the perpendicular d to a distance s along it.
+
+    Beyond the reach that is an angle; the whole chord within the reach comes from the half-plane's profile, whose line
+    goes on for ever; what ends within the reach is ∫ d H(r) dt.
+    """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
+        import drjit as dr
+
         self.types = types
         self.reach = opaque(types, edge.reach)
         self.radial, self.straight = _radial_table(edge), _straight_table(edge)
-        nodes, weights = gauss_legendre(gauss_legendre_count(2 * edge.cycles, 2 - log10(edge.ripple)))
-        self.nodes, self.weights = types.Float64(2 * nodes - 1), types.Float64(2 * weights)
-        self.count = opaque_index(types, len(nodes))
+        # H is even in t, so that half the nodes of an even rule from -s to s are enough.
+        nodes, weights = gauss_legendre(2 * ceil(gauss_legendre_count(2 * edge.cycles, -log10(edge.ripple)) / 2))
+        half = len(nodes) // 2
+        self.nodes, self.weights = types.Float64(2 * nodes[half:] - 1), types.Float64(2 * weights[half:])
+        self.count = dr.opaque(types.Index, half)
 
-    def share(self, d: Any, start: Any, end: Any) -> Any:
+    def between(self, d: Any, start: Any, end: Any) -> Any:
+        """From `start` to `end` at the signed distance d, positive inside."""
         import drjit as dr
 
-        half = dr.sqrt(dr.maximum(self.reach * self.reach - d * d, TINY))
         near = dr.abs(d) < self.reach
-        whole = near & (start < -half) & (end > half)
-        part = near & ~whole & (start < half) & (end > -half)
-        first, last = (dr.select(near, dr.clip(s, -half, half), 0) for s in (start, end))
-        # Angles of what lies beyond the reach on either side, as the argument of a product. The whole chord comes from
-        # a table in which the line goes on for ever: what it lacks there is taken off.
-        d2 = d * d + TINY
-        re, im = _times(d2 + start * first, d * (first - start), d2 + last * end, d * (end - last))
-        beyond = dr.atan2(dr.select(whole, d * (start - end), im), dr.select(whole, -d2 - start * end, re)) / (2 * pi)
+        half = dr.sqrt(dr.maximum(self.reach * self.reach - d * d, TINY))
         zero = dr.zeros(self.types.Float64, dr.width(d))
-        through = dr.if_stmt(
-            (d, zero), whole, lambda d, zero: self.straight.at(d, self.types) - 0.5, lambda d, zero: zero
-        )
-        corner = dr.if_stmt((d, first, last, zero), part, self._integral, lambda d, first, last, zero: zero)
-        return beyond + through + corner
+        chord = dr.if_stmt((d, zero), near, lambda d, zero: self.straight.at(d, self.types) / 2 - 0.25, _nothing)
+        return self._to(end, d, near, half, chord, zero) - self._to(start, d, near, half, chord, zero)
 
-    def _integral(self, d: Any, first: Any, last: Any, zero: Any) -> Any:
-        """∫ d H(r) dt from first to last."""
+    def _to(self, s: Any, d: Any, near: Any, half: Any, chord: Any, zero: Any) -> Any:
+        """W(d, s); `chord` is half the whole chord's share and 0 where the line is not near."""
+        import drjit as dr
+
+        within = near & (dr.abs(s) < half)
+        # Selected before they are divided: no lane may divide by 0, for its derivative would be NaN.
+        slope = dr.select(within, 0, dr.select(near, -d, s)) / dr.select(within, 1, dr.select(near, s, d))
+        through = dr.select(within, 0, dr.select(s < 0, -chord, chord))
+        return dr.atan(slope) / (2 * pi) + through + dr.if_stmt((s, d, zero), within, self._integral, _nothing)
+
+    def _integral(self, s: Any, d: Any, zero: Any) -> Any:
+        """∫ d H(r) dt from 0 to s."""
         import drjit as dr
 
         types = self.types
 
-        def add(j: Any, total: Any, d: Any, middle: Any, half: Any) -> tuple[Any, ...]:
-            t = middle + half * dr.gather(types.Float64, self.nodes, j)
+        def add(j: Any, total: Any, s: Any, d: Any) -> tuple[Any, Any, Any, Any]:
+            t = s * dr.gather(types.Float64, self.nodes, j)
             value = self.radial.at(dr.sqrt(d * d + t * t + TINY), types)
-            return j + 1, total + dr.gather(types.Float64, self.weights, j) * value, d, middle, half
+            return j + 1, total + dr.gather(types.Float64, self.weights, j) * value, s, d
 
-        start = dr.zeros(types.Index, dr.width(d)), zero, d, (first + last) / 2, (last - first) / 2
+        start = dr.zeros(types.Index, dr.width(d)), zero, s, d
         total = dr.while_loop(start, lambda j, *_: j < self.count, add, max_iterations=-1)[1]
-        return total * d * (last - first) / 2
+        return total * s * d
 
 
-def opaque_index(types: Precision, value: int) -> Any:
-    import drjit as dr
-
-    return dr.opaque(types.Index, value)
-
-
-def _times(a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any]:
-    """(a + ib)(c + id)."""
-    return a * c - b * d, a * d + b * c
+def _nothing(*arguments: Any) -> Any:
+    return arguments[-1]
 
 
 @lru_cache(maxsize=64)

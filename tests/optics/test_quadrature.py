@@ -1,0 +1,30 @@
+"""Node counts are enough, and one fewer is not."""
+
+import numpy as np
+import pytest
+from scipy.special import jv
+
+from optics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
+
+
+@pytest.mark.parametrize("digits", [1, 3, 8, 12])
+def test_harmonics_are_the_fewest(digits):
+    z = np.concatenate([[0, 1e-6, 1e-2], np.geomspace(0.1, 3000, 60)])
+    m = harmonics(z, digits)
+    assert (2 * np.abs(jv(m, z)) <= 10.0**-digits).all()
+    below = m > np.floor(z) + 1  # the search starts at z
+    assert below.sum() > 40
+    assert (2 * np.abs(jv(m - 1, z)) > 10.0**-digits)[below].all()
+
+
+@pytest.mark.parametrize("digits", [3, 6, 9, 12])
+@pytest.mark.parametrize("cycles", [0.1, 1.0, 7.0, 60.0])
+def test_gauss_legendre_count(cycles, digits):
+    def error(n):
+        x, weight = gauss_legendre(n)
+        f = np.linspace(0, cycles, 100)
+        return np.abs(np.exp(2j * np.pi * np.outer(f, x - 0.5)) @ weight - np.sinc(f)).max()
+
+    n = gauss_legendre_count(cycles, digits)
+    assert error(n) < 10.0**-digits
+    assert error(int(0.8 * n)) > 10.0**-digits

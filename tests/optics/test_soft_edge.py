@@ -1,0 +1,49 @@
+"""The soft edge's kernel: its spectrum is 1, then 0, to the ripple; its transition costs the fewest samples."""
+
+import numpy as np
+import pytest
+from scipy.special import j0
+
+from optics.quadrature import gauss_legendre
+from optics.soft_edge import SoftEdge, kaiser_beta
+
+
+def spectrum(edge, f):
+    """Hankel transform of the kernel, by quadrature."""
+    u, weight = gauss_legendre(300)
+    r = edge.reach * u
+    return j0(2 * np.pi * np.outer(f, r)) @ (edge.reach * weight * edge.ring(r))
+
+
+@pytest.mark.parametrize("ripple", [1e-1, 1e-3, 1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("passband", [0.0, 0.3, 1.0, 3.0, 20.0, 150.0])
+def test_spectrum_keeps_its_ripple(ripple, passband):
+    edge = SoftEdge.cheapest(passband, ripple, 0.25)
+    assert np.abs(spectrum(edge, np.linspace(0, passband, 200)) - 1).max() < ripple
+    assert np.abs(spectrum(edge, np.linspace(edge.stopband, 2 * edge.stopband, 400))).max() < ripple
+
+
+def test_kaisers_rule_alone_misses_the_ripple():
+    """Why the margin: in the plane, side lobes from all directions meet at frequency 0."""
+    edge = SoftEdge.cheapest(0.5, 1e-8, 0.25)
+    bare = SoftEdge(0.5, 0.5 + kaiser_beta(1e-8) / np.pi / 0.25, (1e-8 * 9) ** (1 / 1.08))
+    assert bare.reach == pytest.approx(edge.reach)
+    assert np.abs(spectrum(bare, np.linspace(0, 0.5, 50)) - 1).max() > 5e-8
+
+
+@pytest.mark.parametrize("half_widths", [(1.0, 1.0), (0.05, 1.0), (0.3, 0.6)])
+def test_transition_is_the_cheapest(half_widths):
+    edge = SoftEdge.cheapest(50.0, 1e-5, 0.25, half_widths)
+
+    def samples(scale):
+        reach = edge.reach / scale
+        transition = scale * (edge.stopband - edge.passband)
+        return np.prod([h + reach for h in half_widths]) * (2 * edge.passband + transition) ** 2
+
+    assert edge.reach < 0.25
+    assert samples(1.0) < min(samples(0.97), samples(1.03))
+
+
+def test_reach_has_a_limit():
+    assert SoftEdge.cheapest(0.5, 1e-6, 0.25).reach == pytest.approx(0.25)
+    assert SoftEdge.cheapest(0.5, 1e-6, 0.1).reach == pytest.approx(0.1)
