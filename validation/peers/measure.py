@@ -1,0 +1,105 @@
+"""Runs turned into points, all on one thread of one process."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from datetime import date
+from importlib import metadata
+from typing import Any
+
+from validation.peers import installed, rhabdom
+from validation.peers.points import Point
+from validation.peers.problem import Case, Run, error, grids
+
+__all__ = ["OURS", "median_seconds", "one_thread", "our_points", "peer_points", "quickest"]
+
+OURS = "rhabdom"
+REPEATS = 5
+LARGEST_PARAXIAL = 600  # samples: their error is the model's long before, so more of them only take longer
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Dr.Jit, BLAS, OpenMP and (where loaded) torch on one thread each, as they were before afterwards."""
+    import drjit as dr
+    from threadpoolctl import threadpool_limits
+
+    before, torch = dr.thread_count(), sys.modules.get("torch")
+    torch_before = torch.get_num_threads() if torch else 0
+    dr.set_thread_count(1)
+    if torch:
+        torch.set_num_threads(1)
+    try:
+        with threadpool_limits(1):
+            yield
+    finally:
+        dr.set_thread_count(before)
+        if torch:
+            torch.set_num_threads(torch_before)
+
+
+def median_seconds(compute: Callable[[], Any], repeats: int = REPEATS, least: float = 0.05) -> float:
+    """Median of at least `repeats` calls and `least` seconds, after two calls to warm up (the second is often new)."""
+    compute(), compute()
+    times: list[float] = []
+    while len(times) < repeats or sum(times) < least:
+        start = time.perf_counter()
+        compute()
+        times.append(time.perf_counter() - start)
+    return statistics.median(times)
+
+
+def our_points(case: Case, machine: str) -> Iterator[Point]:
+    version = metadata.version(OURS)
+    for run in rhabdom.psf_runs(case):
+        yield _point(case, OURS, version, run, machine, fitted=False)
+    for grid in grids(case):
+        for run in rhabdom.plain_angular_spectrum(case, grid):
+            yield _point(case, OURS, version, run, machine, fitted=True)
+
+
+def peer_points(case: Case, machine: str) -> Iterator[Point]:
+    """Every method of every peer that is installed, on every grid, in every precision."""
+    for peer, version in installed().items():
+        done = set()  # methods that choose their own pitch see some grids as the same
+        for grid in grids(case):
+            for dtype in peer.dtypes:
+                for run in peer.runs(case, grid, dtype):
+                    setting = (run.method, run.detail, run.grid, dtype)
+                    if setting not in done and (run.kind != "paraxial" or grid.n <= LARGEST_PARAXIAL):
+                        done.add(setting)
+                        yield _point(case, peer.distribution, version, run, machine, fitted=True)
+
+
+def quickest(rounds: Sequence[Sequence[Point]]) -> list[Point]:
+    """One point of each method and setting: the least of its medians. Others' load only ever adds time."""
+    best: dict[tuple[object, ...], Point] = {}
+    for point in (point for points in rounds for point in points):
+        key = (*point.series, point.samples, point.pitch)
+        if key not in best or point.seconds < best[key].seconds:
+            best[key] = point
+    return list(best.values())
+
+
+def _point(case: Case, code: str, version: str, run: Run, machine: str, fitted: bool) -> Point:
+    wrong = error(case, run.intensity(run.compute()), fitted)
+    today, seconds = date.today().isoformat(), median_seconds(run.compute)
+    return Point(
+        case.name,
+        code,
+        version,
+        run.method,
+        run.kind,
+        run.grid.n,
+        run.grid.dx,
+        run.dtype,
+        wrong,
+        seconds,
+        today,
+        machine,
+        run.detail,
+    )
