@@ -89,9 +89,15 @@ class Aperture(ABC):
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Which points lie within the aperture."""
 
-    @abstractmethod
     def nodes(self, cycles: float, digits: float) -> Nodes:
-        """Nodes whose sum is good to 10^-digits of the area, for integrands of at most `cycles` cycles per R."""
+        """Nodes whose sum is good to 10^-digits of the area, for integrands of at most `cycles` cycles per R.
+
+        That bounds the local frequency in any direction, everywhere; a varying amplitude needs a share of it too.
+
+        Raises:
+            ValueError: cycles outside [0, 1e5] or digits outside [0, 16].
+        """
+        return self._nodes(in_range("cycles", cycles, 0.0, 1e5), in_range("digits", digits, 0.0, 16.0))
 
     def soften(self, passband: float, ripple: float, widest_reach: float = EDGE_REACH) -> SoftAperture:
         """The aperture, low-passed from `passband` [cycles per R] on with the transition that costs fewest samples.
@@ -103,6 +109,10 @@ class Aperture(ABC):
         in_range("ripple", ripple, 1e-13, 0.5)
         positive("widest_reach", widest_reach, "pupil radii")
         return self._softened(SoftEdge.cheapest(passband, ripple, widest_reach, self.half_widths))
+
+    @abstractmethod
+    def _nodes(self, cycles: float, digits: float) -> Nodes:
+        """Edge-fitted nodes."""
 
     @abstractmethod
     def _softened(self, edge: SoftEdge) -> SoftAperture:

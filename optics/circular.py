@@ -38,7 +38,7 @@ class Circle(Aperture):
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return np.asarray(np.hypot(x, y) <= 1)
 
-    def nodes(self, cycles: float, digits: float) -> Nodes:
+    def _nodes(self, cycles: float, digits: float) -> Nodes:
         return _ring_nodes(0.0, cycles, digits)
 
     def _softened(self, edge: SoftEdge) -> SoftAperture:
@@ -75,7 +75,7 @@ class Annulus(Aperture):
         r = np.hypot(x, y)
         return np.asarray((r >= self.inner) & (r <= 1))
 
-    def nodes(self, cycles: float, digits: float) -> Nodes:
+    def _nodes(self, cycles: float, digits: float) -> Nodes:
         return _ring_nodes(self.inner, cycles, digits)
 
     def _softened(self, edge: SoftEdge) -> SoftAperture:

@@ -73,7 +73,7 @@ class Polygon(Aperture):
                 inside ^= ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) * (x1 - x0) / (y1 - y0))
         return inside
 
-    def nodes(self, cycles: float, digits: float) -> Nodes:
+    def _nodes(self, cycles: float, digits: float) -> Nodes:
         centre = kernel_point(self.vertices)
         if centre is None:
             parts = triangles(self.vertices)
@@ -123,7 +123,7 @@ class Slit(Aperture):
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return np.asarray((np.abs(x) <= self.width / 2) & (np.abs(y) <= self.height / 2))
 
-    def nodes(self, cycles: float, digits: float) -> Nodes:
+    def _nodes(self, cycles: float, digits: float) -> Nodes:
         """Tensor Gauss-Legendre."""
         u, u_weight = gauss_legendre(gauss_legendre_count(cycles * self.width, digits + 0.3))
         v, v_weight = gauss_legendre(gauss_legendre_count(cycles * self.height, digits + 0.3))

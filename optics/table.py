@@ -44,8 +44,9 @@ class Table:
         weights = (-1.0) ** np.arange(degree) * np.sin(pi * (np.arange(degree) + 0.5) / degree)
         smooth = BarycentricInterpolator(chebyshev, function(middle + half * chebyshev), wi=weights)
         step = 2 / (n - 1)
-        place = np.clip(np.arange(-MARGIN, n + MARGIN) * step - 1, -1, 1)
-        return cls(ends[0], step * half, smooth(place))
+        samples = smooth(np.clip(np.arange(-MARGIN, n + MARGIN) * step - 1, -1, 1))
+        samples[: MARGIN + 1], samples[-MARGIN - 1 :] = function(np.array(ends))  # exact where it is constant
+        return cls(ends[0], step * half, samples)
 
     def at(self, place: Any, types: Precision) -> Any:
         """Interpolated at a flat Dr.Jit Float64 array; differentiable."""

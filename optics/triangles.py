@@ -8,6 +8,9 @@ from optics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
 
 __all__ = ["crossing", "kernel_point", "triangle_nodes", "triangles"]
 
+# Relative to the lengths involved: what counts as touching or parallel.
+ROUNDING = 1e-12
+
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
@@ -17,29 +20,32 @@ def crossing(vertices: np.ndarray) -> tuple[int, int] | None:
     """The first two edges that meet other than at a shared end, or None for a simple polygon."""
     n = len(vertices)
     along = np.roll(vertices, -1, axis=0) - vertices
-    for i in range(n):
-        j = (i + 1) % n
-        if abs(_cross(along[i], along[j])) <= 1e-12 * np.hypot(*along[i]) * np.hypot(*along[j]) and (
-            along[i] @ along[j] < 0
-        ):
-            return i, j  # folds back on itself
-        for k in range(i + 2, n if i else n - 1):
-            if _meet(vertices[i], along[i], vertices[k], along[k]):
-                return i, k
+    following = np.roll(along, -1, axis=0)
+    size = np.hypot(*along.T) * np.hypot(*following.T)
+    backwards = (np.abs(_cross(along, following)) <= ROUNDING * size) & (np.sum(along * following, axis=1) < 0)
+    if backwards.any():
+        i = int(np.argmax(backwards))
+        return i, (i + 1) % n
+    for i in range(n - 2):
+        others = slice(i + 2, n if i else n - 1)
+        meets = _meet(vertices[i], along[i], vertices[others], along[others])
+        if meets.any():
+            return i, i + 2 + int(np.argmax(meets))
     return None
 
 
-def _meet(a: np.ndarray, along_a: np.ndarray, b: np.ndarray, along_b: np.ndarray) -> bool:
-    """Whether the segments from a and from b share a point."""
-    determinant, gap = _cross(along_a, along_b), b - a
-    size = np.hypot(*along_a) * np.hypot(*along_b)
-    if abs(determinant) > 1e-12 * size:
-        s, t = _cross(gap, along_b) / determinant, _cross(gap, along_a) / determinant
-        return bool(-1e-12 <= s <= 1 + 1e-12 and -1e-12 <= t <= 1 + 1e-12)
-    if abs(_cross(gap, along_a)) > 1e-12 * np.hypot(*along_a):
-        return False
-    ends = sorted((gap @ along_a, (gap + along_b) @ along_a))  # parallel on one line: compare along it
-    return bool(ends[1] >= 0 and ends[0] <= along_a @ along_a)
+def _meet(a: np.ndarray, along: np.ndarray, others: np.ndarray, along_others: np.ndarray) -> np.ndarray:
+    """Which of the other segments share a point with the one from a."""
+    gap = others - a
+    determinant = _cross(along, along_others)
+    parallel = np.abs(determinant) <= ROUNDING * np.hypot(*along) * np.hypot(*along_others.T)
+    safe = np.where(parallel, 1.0, determinant)
+    s, t = _cross(gap, along_others) / safe, _cross(gap, along) / safe
+    cross = (np.abs(s - 0.5) <= 0.5 + ROUNDING) & (np.abs(t - 0.5) <= 0.5 + ROUNDING)
+    on_one_line = np.abs(_cross(gap, along)) <= ROUNDING * np.hypot(*along)
+    ends = gap @ along, (gap + along_others) @ along
+    overlap = on_one_line & (np.maximum(*ends) >= 0) & (np.minimum(*ends) <= along @ along)
+    return np.asarray(np.where(parallel, overlap, cross))
 
 
 def kernel_point(vertices: np.ndarray) -> np.ndarray | None:
