@@ -20,6 +20,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 
+from validation.peers import installed
 from validation.peers.goals import ACCURATE, CONVERGED_PEER, FASTER, SINGLE, verdicts
 from validation.peers.measure import one_thread, our_points, peer_points, quickest
 from validation.peers.points import STORED, Point, read_points, write_points
@@ -32,6 +33,8 @@ COLORS = {"float32": OURS, "float64": OURS_TOO}
 def measure(cases: Sequence[Case], machine: str, rounds: int, with_peers: bool) -> tuple[list[Point], list[Point]]:
     """Ours and the peers', interleaved; the least of each point's medians over the rounds."""
     ours, peers = [], []
+    if with_peers:
+        print(f"peers: {', '.join(f'{peer.distribution} {at}' for peer, at in installed().items())}", file=sys.stderr)
     for number in range(rounds):
         for case in cases:
             print(f"round {number + 1} of {rounds}: {case.name}", file=sys.stderr, flush=True)

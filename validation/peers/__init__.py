@@ -6,7 +6,12 @@ Adapters set a code up the way its documents say, in its own units and conventio
 
 from __future__ import annotations
 
+import sys
+import warnings
+from collections.abc import Mapping
+from functools import cache
 from importlib import import_module, metadata
+from types import MappingProxyType
 
 from validation.peers.problem import Peer
 
@@ -26,13 +31,18 @@ MODULES = (
 )
 
 
-def installed() -> dict[Peer, str]:
-    """Those that can be run here, with their versions."""
+@cache
+def installed() -> Mapping[Peer, str]:
+    """Those that can be run here, with their versions. One that is there but cannot be imported is named."""
     found = {}
     for module in MODULES:
         peer = import_module(f"validation.peers.{module}").PEER
         try:
             found[peer] = metadata.version(peer.distribution)
+            with warnings.catch_warnings(action="ignore"):
+                import_module(peer.package)
         except metadata.PackageNotFoundError:
             continue
-    return found
+        except ImportError as problem:
+            print(f"{peer.distribution} {found.pop(peer)} cannot be imported: {problem}", file=sys.stderr)
+    return MappingProxyType(found)

@@ -24,4 +24,4 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
         )
 
 
-PEER = Peer("deeplens-core", ("complex64", "complex128"), runs)
+PEER = Peer("deeplens-core", "deeplens.light.wave", ("complex64", "complex128"), runs)

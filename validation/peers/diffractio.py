@@ -46,4 +46,4 @@ def _field(case: Case, grid: SampleGrid) -> object:
     return field
 
 
-PEER = Peer("diffractio", ("complex128",), runs)
+PEER = Peer("diffractio", "diffractio.scalar_fields_XY", ("complex128",), runs)

@@ -32,4 +32,4 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
     )
 
 
-PEER = Peer("diffractsim", ("complex128",), runs)
+PEER = Peer("diffractsim", "diffractsim", ("complex128",), runs)

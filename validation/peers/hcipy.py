@@ -87,4 +87,4 @@ def _grey(case: Case, sampled: object) -> np.ndarray:
     return np.asarray(hcipy.evaluate_supersampled(circle, sampled, SUPERSAMPLED))
 
 
-PEER = Peer("hcipy", ("complex128",), runs)
+PEER = Peer("hcipy", "hcipy", ("complex128",), runs)

@@ -26,7 +26,7 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
         "padded to twice the grid",
     )
     # Its convolution takes the pitch to be size / (n - 1).
-    convolved = LightPipes.Begin(grid.dx * (grid.n - 1), WAVELENGTH, grid, dtype=kind)
+    convolved = LightPipes.Begin(grid.dx * (grid.n - 1), WAVELENGTH, grid.n, dtype=kind)
     convolved.field = case.pupil(grid, paraxial=True).astype(dtype)
     yield Run(
         "Fresnel",
@@ -38,4 +38,4 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
     )
 
 
-PEER = Peer("LightPipes", ("complex64", "complex128"), runs)
+PEER = Peer("LightPipes", "LightPipes", ("complex64", "complex128"), runs)

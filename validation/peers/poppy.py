@@ -56,4 +56,4 @@ def _near_field(case: Case, grid: SampleGrid, dtype: str) -> Run:
     )
 
 
-PEER = Peer("poppy", ("complex128",), runs)
+PEER = Peer("poppy", "poppy", ("complex128",), runs)

@@ -135,6 +135,7 @@ class Peer:
     """A library on PyPI and how to make it compute a case from n x n samples in one of its precisions."""
 
     distribution: str
+    package: str
     dtypes: tuple[str, ...]
     runs: Callable[[Case, SampleGrid, str], Iterator[Run]]
 

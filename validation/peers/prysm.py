@@ -46,4 +46,4 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
         )
 
 
-PEER = Peer("prysm", ("complex64", "complex128"), runs)
+PEER = Peer("prysm", "prysm.propagation", ("complex64", "complex128"), runs)

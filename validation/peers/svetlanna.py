@@ -31,4 +31,4 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
         )
 
 
-PEER = Peer("svetlanna", ("complex64", "complex128"), runs)
+PEER = Peer("svetlanna", "svetlanna", ("complex64", "complex128"), runs)

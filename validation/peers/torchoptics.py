@@ -47,4 +47,4 @@ def _target(case: Case, grid: SampleGrid) -> SampleGrid:
     return SampleGrid(least, grid.dx)
 
 
-PEER = Peer("torchoptics", ("complex64", "complex128"), runs)
+PEER = Peer("torchoptics", "torchoptics", ("complex64", "complex128"), runs)

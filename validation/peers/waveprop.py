@@ -57,4 +57,4 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
             )
 
 
-PEER = Peer("waveprop", ("complex64", "complex128"), runs)
+PEER = Peer("waveprop", "waveprop.rs", ("complex64", "complex128"), runs)
