@@ -34,17 +34,16 @@ class Table:
         The function is evaluated at Chebyshev nodes only, because it is dear. Six-point interpolation of a unit wave
         errs by (225/64)/720 (2π/N)⁶ with N samples per cycle; a step's spectrum falls with frequency, so 1/20 of that.
         """
-        from scipy.interpolate import BarycentricInterpolator
+        from scipy.fft import dct
 
         per_cycle = 2 * pi * (2.4e-4 / error) ** (1 / 6)
         n = int(cycles * per_cycle + 64)
         degree = int(pi * cycles - 3 * np.log10(error) + 12)
         middle, half = (ends[0] + ends[1]) / 2, (ends[1] - ends[0]) / 2
-        chebyshev = np.cos(pi * (np.arange(degree) + 0.5) / degree)
-        weights = (-1.0) ** np.arange(degree) * np.sin(pi * (np.arange(degree) + 0.5) / degree)
-        smooth = BarycentricInterpolator(chebyshev, function(middle + half * chebyshev), wi=weights)
+        values = function(middle + half * np.cos(pi * (np.arange(degree) + 0.5) / degree))
+        series = np.polynomial.Chebyshev(dct(values) / degree * np.where(np.arange(degree) == 0, 0.5, 1))
         step = 2 / (n - 1)
-        samples = smooth(np.clip(np.arange(-MARGIN, n + MARGIN) * step - 1, -1, 1))
+        samples = series(np.clip(np.arange(-MARGIN, n + MARGIN) * step - 1, -1, 1))
         samples[: MARGIN + 1], samples[-MARGIN - 1 :] = function(np.array(ends))  # exact where it is constant
         return cls(ends[0], step * half, samples)
 
