@@ -15,10 +15,10 @@ from optics.precision import Precision, opaque, precision
 from optics.problem import Problem
 from optics.radial import RadialLine
 
-__all__ = ["NodeSampling", "nodes"]
+__all__ = ["PAIRS_PER_SECOND", "NodeSampling", "direct_sum", "node_count", "nodes"]
 
 PAIRS_PER_SECOND = 2.5e8
-SPARE_DIGITS = 1.0
+SPARE_DIGITS = 0.5
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,17 @@ class NodeSampling:
         types = precision(problem.dtype)
         if self.line is None:
             x, y = problem.window.coordinates(types)
-            return _direct_sum(beam, self, x, y, types).intensity
+            return direct_sum(beam, self.rule, x, y, types).intensity
         r = types.Float64(self.line.positions)
-        return self.line.onto(_direct_sum(beam, self, r, 0 * r, types).intensity, problem.window, types)
+        return self.line.onto(direct_sum(beam, self.rule, r, 0 * r, types).intensity, problem.window, types)
 
     def plane(self, problem: Problem) -> float:
         """Width [m] over which rounding spreads the pupil's light: the focus, times the root of the summands."""
         return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.count / math.pi)
+
+    @property
+    def rule(self) -> tuple[Aperture, float, float]:
+        return self.aperture, self.cycles, self.digits
 
     @property
     def samples(self) -> tuple[int, int]:
@@ -62,17 +66,17 @@ def nodes(problem: Problem) -> list[NodeSampling]:
     """Enough nodes for the cycles that pupil and path together turn through."""
     cycles = problem.radius * problem.turning
     digits = SPARE_DIGITS - math.log10(problem.ripple)
-    count = _count(problem.aperture, cycles, digits)
+    count = node_count(problem.aperture, cycles, digits)
     line, outputs = None, math.prod(problem.window.shape)
     if problem.symmetric:
         outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
-        line = RadialLine.resolving(outermost, _intensity_band(problem), problem.ripple)
+        line = RadialLine.resolving(outermost, _intensity_band(problem), problem.distance, problem.ripple)
         outputs = line.points
     seconds = 1e-3 + count * outputs / PAIRS_PER_SECOND + count * 4e-9
     return [NodeSampling(problem.aperture, cycles, digits, count, line, seconds)]
 
 
-def _count(aperture: Aperture, cycles: float, digits: float) -> int:
+def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
     """Number of nodes; beyond a hundred cycles it grows like their square, and is not worth counting."""
     most = 100.0
     counted = len(_nodes(aperture, min(cycles, most), digits).weight)
@@ -91,14 +95,14 @@ def _intensity_band(problem: Problem) -> float:
     return min(2 * steepest, 2 * problem.radius / (problem.wavelength * problem.distance))
 
 
-def _direct_sum(beam: Beam, how: NodeSampling, x: Any, y: Any, types: Precision) -> Field:
-    """First Rayleigh-Sommerfeld integral at points (x, y) [m] (Goodman, §3.5):
+def direct_sum(beam: Beam, rule: tuple[Aperture, float, float], x: Any, y: Any, types: Precision) -> Field:
+    """First Rayleigh-Sommerfeld integral at points (x, y) [m], nodes after rule = (aperture, cycles, digits):
 
-    U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ikD} dξ. D - z = d²/(D + z) loses its whole waves in float64.
+    U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ikD} dξ (Goodman, §3.5). D - z = d²/(D + z) loses its whole waves in float64.
     """
     import drjit as dr
 
-    found = _nodes(how.aperture, how.cycles, how.digits)
+    found = _nodes(*rule)
     radius = opaque(types, beam.radius)
     nodes_x, nodes_y = types.Float64(found.x) * radius, types.Float64(found.y) * radius
     weight = types.Float64(found.weight) * dr.square(radius)

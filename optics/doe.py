@@ -186,7 +186,8 @@ class HeightMap(Relief):
         return types.Index(cell) - 1, _cubic_basis(place - cell)
 
     def bandwidth(self, level: float) -> float:
-        """From the samples' spectrum; content near their Nyquist frequency has spline images up to twice that."""
+        """From the samples' spectrum. A cubic spline repeats content of frequency f around multiples of the sampling
+        rate, weaker by the fourth power of the frequencies' ratio."""
         n = len(self._heights)
         if n < 4:
             return 1.0
@@ -198,7 +199,8 @@ class HeightMap(Relief):
         order = np.argsort(radial, axis=None)[::-1]
         power = np.cumsum((spectrum.ravel()[order] / n) ** 2)
         reached = radial.ravel()[order][int(np.searchsorted(power, level**2).clip(max=power.size - 1))]
-        return float(max(1.0, reached if reached < 0.3 * n / 2 else 2 * reached))
+        images = (np.sum((spectrum / n * radial**4) ** 2) / level**2) ** 0.125
+        return float(max(1.0, reached, images if images > n / 2 - reached else 0.0))
 
     @property
     def knots(self) -> int:

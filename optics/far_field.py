@@ -19,6 +19,7 @@ from optics.radial import TAPS, lagrange_weights
 
 __all__ = ["FarFieldSampling", "far_field"]
 
+MOST_DIRECTIONS = 4096
 CHEBYSHEV_NODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16)
 
 
@@ -65,9 +66,15 @@ def far_field(problem: Problem) -> list[FarFieldSampling]:
     pitch = 1 / (problem.turning + edge.stopband)
     pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
     oversampling = math.pi / _step(problem.ripple)  # of the intensity's Nyquist rate
-    period = fast_length(4 * oversampling * problem.radius / pitch)  # a whole number, for the FFT
+    sine = half / math.hypot(half, problem.distance)
+    corner = math.sqrt(2) * half / math.hypot(half, half, problem.distance)
+    # Interpolation reaches over the window's rim, but must not reach grazing incidence.
+    finest = problem.wavelength * max(TAPS / (0.98 - sine), TAPS / (0.98 - corner)) if corner < 0.95 else math.inf
+    if not finest / pitch < MOST_DIRECTIONS:
+        return []
+    period = fast_length(max(4 * oversampling * problem.radius, finest) / pitch)  # a whole number, for the FFT
     step = problem.wavelength / (period * pitch)
-    directions = Grid.square(2 * (math.ceil(half / math.hypot(half, problem.distance) / step) + TAPS) + 1, step)
+    directions = Grid.square(2 * (math.ceil(sine / step) + TAPS) + 1, step)
     once = predicted_seconds(pupil.shape, period, directions.shape) + 2e-3
     once += pupil.shape[0] ** 2 * 6e-8 + directions.shape[0] ** 2 * 2e-8
     seconds = nodes**2 * once + math.prod(problem.window.shape) * 1e-7
@@ -137,7 +144,7 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
 
 
 def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Precision) -> Field:
-    """G(ξ; x) on the pupil's grid for x in the direction of the two tangents, without its constant factor -i (1/(kD) is kept)."""
+    """G(ξ; x) on the pupil's grid for x in the direction of the two tangents, less a constant phase."""
     import drjit as dr
 
     px, py = grid.coordinates(types)

@@ -20,7 +20,8 @@ from optics.field import Field
 from optics.grid import Grid
 from optics.precision import Precision, opaque, precision
 from optics.problem import Problem, Taper, tapers
-from optics.radial import RadialLine, gauss_legendre, legendre_nodes
+from optics.quadrature import gauss_legendre, gauss_legendre_count
+from optics.radial import RadialLine
 
 __all__ = ["HankelSampling", "hankel"]
 
@@ -67,12 +68,12 @@ def hankel(problem: Problem) -> list[HankelSampling]:
 
 def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
     digits = -math.log10(problem.ripple)
-    radii = legendre_nodes(problem.radius * (problem.phase_band + taper.end), digits)
+    radii = gauss_legendre_count(problem.radius * (problem.phase_band + taper.end), digits)
     outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
     steepest = math.hypot(problem.distance, problem.radius + outermost) / problem.wavelength
-    angles = legendre_nodes(steepest * math.asin(min(1.0, taper.end * problem.wavelength)), digits)
+    angles = gauss_legendre_count(steepest * math.asin(min(1.0, taper.end * problem.wavelength)), digits)
     band = min(2 * taper.end, 2 * problem.radius / (problem.wavelength * problem.distance) + 2 / taper.blur)
-    line = RadialLine.resolving(outermost, band, problem.ripple)
+    line = RadialLine.resolving(outermost, band, problem.distance, problem.ripple)
     pairs = radii * angles + angles * line.points
     seconds = 1e-3 + pairs * 1e-8 + line.points * line.table * 1e-9 + math.prod(problem.window.shape) * 1.5e-8
     return HankelSampling(taper, _round_up(radii), _round_up(angles), line, seconds)

@@ -13,11 +13,12 @@ import numpy as np
 from optics.arguments import in_range, positive
 from optics.beam import Beam
 from optics.grid import Grid
-from optics.planner import FLOAT_NOISE, AccuracyError, Plan, choose
+from optics.planner import FLOAT_NOISE, AccuracyError, Plan, Sampling, choose
 from optics.precision import opaque, precision
 from optics.problem import Problem
 from optics.pupil import Pupil
 from optics.source import PointSource
+from optics.spot_check import spot_check
 from optics.tracked import number
 
 __all__ = ["PSFResult", "plan", "problem", "psf", "spread"]
@@ -36,7 +37,7 @@ class PSFResult:
     tensor: Any
     dx: float
     wavelengths: np.ndarray
-    sensor_distance: float
+    sensor_distance: Any
     pupil: Pupil
     plans: tuple[Plan, ...]
 
@@ -65,8 +66,8 @@ class PSFResult:
 def psf(
     pupil: Pupil,
     wavelengths: Sequence[float] | np.ndarray = (550e-9,),
-    sensor_distance: float = 240e-6,
-    source_distance: float = math.inf,
+    sensor_distance: Any = 240e-6,
+    source_distance: Any = math.inf,
     source_angle: tuple[float, float] = (0.0, 0.0),
     dx: float = 0.25e-6,
     shape: tuple[int, int] = (129, 129),
@@ -80,6 +81,7 @@ def psf(
     source_distance [m], source_angle [rad]: see PointSource.
     tolerance: relative L2 error of the intensity over the window.
     method: "auto" or one of planner.METHODS.
+    Both distances, as what the pupil is made of, may be Dr.Jit arrays that carry derivatives: see PSFResult.tensor.
 
     Raises:
         ValueError: bad argument, named with its value and valid range.
@@ -98,8 +100,8 @@ def psf(
 def plan(
     pupil: Pupil,
     wavelength: float = 550e-9,
-    sensor_distance: float = 240e-6,
-    source_distance: float = math.inf,
+    sensor_distance: Any = 240e-6,
+    source_distance: Any = math.inf,
     source_angle: tuple[float, float] = (0.0, 0.0),
     dx: float = 0.25e-6,
     shape: tuple[int, int] = (129, 129),
@@ -151,16 +153,42 @@ def spread(beams: list[Beam], tasks: list[Problem], method: str = "auto", most_s
 
     chosen = [choose(task, method, most_seconds) for task in tasks]  # refused before anything is computed
     window, types = tasks[0].window, precision(tasks[0].dtype)
-    flat, plans = [], []
-    for beam, task, (plan, sampling) in zip(beams, tasks, chosen, strict=True):
-        radius = opaque(types, beam.radius)
-        area = beam.pupil.aperture.area * radius * radius
-        image = sampling.intensity(beam, task) / types.Float(area)
-        flat.append(image)
-        plans.append(replace(plan, predicted_error=_predicted_error(image.numpy(), sampling.plane(task), task)))
+    found = [
+        _checked(beam, task, choice, (method, most_seconds))
+        for beam, task, choice in zip(beams, tasks, chosen, strict=True)
+    ]
+    flat, plans = zip(*found, strict=True)
     tensor = types.Tensor(flat[0] if len(flat) == 1 else dr.concat(flat), (len(flat), *window.shape))
     wavelengths = np.array([beam.wavelength for beam in beams])
-    return PSFResult(tensor, window.dx, wavelengths, tasks[0].distance, beams[0].pupil, tuple(plans))
+    return PSFResult(tensor, window.dx, wavelengths, beams[0].distance, beams[0].pupil, tuple(plans))
+
+
+def _checked(
+    beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], asked: tuple[str, float], tries: int = 3
+) -> tuple[Any, Plan]:
+    """The PSF, flat, and the plan with the error that a spot check tells. What does not meet the tolerance is planned
+    again for a smaller one: a dark window needs more digits than a bright one.
+
+    Raises:
+        AccuracyError: the check finds more than the tolerance all the same.
+    """
+    plan, sampling = chosen
+    types = precision(task.dtype)
+    radius = opaque(types, beam.radius)
+    area = beam.pupil.aperture.area * radius * radius
+    image = sampling.intensity(beam, task) / types.Float(area)
+    picture = image.numpy()
+    error = _predicted_error(picture, sampling.plane(task), task)
+    seen = spot_check(beam, task, picture, plan.seconds)
+    if seen is not None and seen > task.tolerance:
+        stricter = replace(task, tolerance=max(0.3 * task.tolerance**2 / seen, 10 * FLOAT_NOISE[task.dtype]))
+        if tries == 1 or stricter.tolerance >= task.tolerance:
+            raise AccuracyError(
+                f"tolerance = {task.tolerance:g}: a check against the direct sum finds an error of {seen:.1g} by "
+                f"{plan.method} in {task.dtype}; widen the tolerance or ask for another method or dtype"
+            )
+        return _checked(beam, stricter, choose(stricter, *asked), asked, tries - 1)
+    return image, replace(plan, predicted_error=error if seen is None else seen)
 
 
 def _predicted_error(image: np.ndarray, plane: float, task: Problem) -> float:

@@ -14,7 +14,7 @@ __all__ = ["FADES", "STEEPEST_SINE", "Problem", "PupilEdge", "Taper", "tapers"]
 
 # Amplitude ripple of the soft aperture and of the spectral taper against the tolerance on intensity. Edge-diffracted
 # light errs by several ripples, its intensity by twice that, and a window may hold no other light: half the tolerance.
-RIPPLE_PER_TOLERANCE = 0.03
+RIPPLE_PER_TOLERANCE = 0.1
 BRIGHT_RIPPLE_PER_TOLERANCE = 0.3
 # The taper must end this far from grazing incidence, where z tan θ has no bound.
 STEEPEST_SINE = 0.9995

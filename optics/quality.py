@@ -1,45 +1,73 @@
-"""What a PSF is worth: contrast over spatial frequency, peak, concentration, and one number for an eye."""
+"""What a PSF is worth: contrast over spatial frequency, peak, concentration, and one number for an eye.
+
+Where the PSF carries derivatives, so do these numbers: they are Dr.Jit arrays then, NumPy arrays otherwise.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from optics.arguments import in_range, positive
+from optics.field import Field
+from optics.fourier import dft2
+from optics.grid import Grid
 from optics.point_spread import PSFResult
+from optics.precision import opaque, precision
+from optics.tracked import at_border, number
 
 __all__ = ["MTF", "encircled_energy", "image_quality", "mtf", "strehl_ratio"]
+
+ORIENTATIONS = 64
 
 
 @dataclass(frozen=True, eq=False)
 class MTF:
-    """Modulation transfer function on a grid of spatial frequencies, zero frequency at n//2.
+    """Modulation transfer function on a square grid of spatial frequencies, zero frequency at n//2.
 
-    mtf: (wavelength, fy, fx), 1 at zero frequency; fx, fy: cycles per metre on the sensor.
+    tensor: (wavelength, fy, fx) in Dr.Jit, 1 at zero frequency; mtf: the same as a NumPy array.
+    fx, fy: cycles per metre on the sensor, 1 / (widest side of the window) apart.
     cutoff: (wavelength,) frequency [1/m] beyond which a pupil of this size passes nothing, 2 sin θ / λ.
     """
 
-    mtf: np.ndarray
+    tensor: Any
     fx: np.ndarray
     fy: np.ndarray
     cutoff: np.ndarray
 
-    def profile(self, frequencies: np.ndarray) -> np.ndarray:
+    @cached_property
+    def mtf(self) -> np.ndarray:
+        return np.asarray(self.tensor.numpy())
+
+    def profile(self, frequencies: np.ndarray) -> Any:
         """Mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency); 0 beyond the grid.
 
-        Interpolated linearly between the grid's frequencies, which are 1 / (window width) apart.
+        Interpolated linearly between the grid's frequencies.
         """
-        from scipy.interpolate import RegularGridInterpolator
+        import drjit as dr
 
+        types = precision("float64")
         f = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
-        angle = 2 * np.pi * (np.arange(64) + 0.5) / 64
-        points = np.stack([np.outer(f, np.sin(angle)), np.outer(f, np.cos(angle))], axis=-1)
-        planes = [
-            RegularGridInterpolator((self.fy, self.fx), plane, bounds_error=False, fill_value=0.0)(points)
-            for plane in self.mtf
+        angle = 2 * np.pi * (np.arange(ORIENTATIONS) + 0.5) / ORIENTATIONS
+        side, waves = self.fx.size, self.tensor.shape[0]
+        places = [
+            np.outer(f, wheel) / (self.fx[1] - self.fx[0]) + side // 2 for wheel in (np.sin(angle), np.cos(angle))
         ]
-        return np.mean(planes, axis=-1)
+        y, x = (np.tile(place.ravel(), waves) for place in places)
+        inside = (y >= 0) & (y <= side - 1) & (x >= 0) & (x <= side - 1)
+        row, column = (np.clip(np.floor(place), 0, side - 2).astype(np.int64) for place in (y, x))
+        plane = np.repeat(np.arange(waves), f.size * ORIENTATIONS) * side * side
+        total = types.Float(0)
+        for i, down in enumerate((1 - (y - row), y - row)):
+            for j, across in enumerate((1 - (x - column), x - column)):
+                at = types.Index((plane + (row + i) * side + column + j).astype(np.uint32))
+                total += dr.gather(types.Float, self.tensor.array, at) * types.Float(down * across * inside)
+        mean = dr.block_reduce(dr.ReduceOp.Add, total, ORIENTATIONS) / ORIENTATIONS
+        return at_border(types.Tensor(mean, (waves, f.size)))
 
 
 def mtf(result: PSFResult) -> MTF:
@@ -48,30 +76,51 @@ def mtf(result: PSFResult) -> MTF:
     Light that falls outside the PSF's window is missing from it: a window that holds little of the power shows too
     much contrast at low frequencies (see `PSFResult.power`).
     """
-    otf = np.fft.fft2(np.asarray(result.psf, dtype=np.float64))
-    contrast = np.abs(otf) / np.abs(otf[:, :1, :1])
-    height, width = result.psf.shape[1:]
-    fy, fx = (np.fft.fftshift(np.fft.fftfreq(n, result.dx)) for n in (height, width))
-    radius, distance = result.pupil.radius, result.sensor_distance
+    import drjit as dr
+
+    types = precision("float64")
+    waves, height, width = result.tensor.shape
+    side = max(height, width)
+    pitch, middle = 1 / (side * result.dx), (side // 2) * side + side // 2
+    flat, planes = types.Float(_flat(result.tensor)), []
+    for index in range(waves):
+        plane = dr.gather(types.Float, flat, dr.arange(types.Index, height * width) + index * height * width)
+        field = Field(plane, dr.zeros(types.Float, height * width), Grid((height, width), result.dx), types)
+        otf = dft2(field, side, (side, side), -1, pitch)
+        size = dr.sqrt(dr.maximum(otf.intensity, 1e-300))
+        planes.append(size / dr.gather(types.Float, size, types.Index(middle)))
+    tensor = types.Tensor(planes[0] if waves == 1 else dr.concat(planes), (waves, side, side))
+    f = Grid.square(side, pitch).x
+    radius, distance = result.pupil.radius, number(result.sensor_distance)
     cutoff = 2 * radius / np.hypot(radius, distance) * result.pupil.medium_n / result.wavelengths
-    return MTF(np.fft.fftshift(contrast, axes=(1, 2)), fx, fy, cutoff)
+    return MTF(tensor, f, f, cutoff)
 
 
-def strehl_ratio(result: PSFResult) -> np.ndarray:
+def strehl_ratio(result: PSFResult) -> Any:
     """Peak of the PSF over the peak that the same aperture makes without aberration, (wavelength,).
 
-    Unaberrated is the spherical wave that converges on the sensor's axis. With L = √(z² + R²) its field there is
+    Unaberrated is the spherical wave that converges on the sensor's axis; with L = √(z² + r²) its field there is
 
-        |U| = |1 - z/L - ikz ln(L/z)|
+        U = ∫ z/(2πL²) (1/L - ik) dξ
 
-    (first Rayleigh-Sommerfeld integral of exp(-ikL(r)), in closed form). The peak is the largest sample: a window
-    that misses it, or samples it coarsely, shows less.
+    (first Rayleigh-Sommerfeld integral of exp(-ikL(r)); for a circle |1 - z/L - ikz ln(L/z)|). The peak is the largest
+    sample: a window that misses it, or samples it coarsely, shows less.
     """
-    radius, z = result.pupil.radius, result.sensor_distance
-    slant = np.hypot(z, radius)
-    wavenumber = 2 * np.pi * result.pupil.medium_n / result.wavelengths
-    peak = ((1 - z / slant) ** 2 + (wavenumber * z * np.log(slant / z)) ** 2) / result.pupil.area
-    return result.psf.max(axis=(1, 2)) / peak
+    import drjit as dr
+
+    types = precision("float64")
+    waves, pixels = result.tensor.shape[0], math.prod(result.tensor.shape[1:])
+    highest = result.psf.reshape(waves, pixels).argmax(axis=1) + pixels * np.arange(waves)
+    peak = dr.gather(types.Float, types.Float(_flat(result.tensor)), types.Index(highest.astype(np.uint32)))
+    nodes = result.pupil.aperture.nodes(0.5, 10.0)
+    radius, z = opaque(types, result.pupil.aperture_radius), opaque(types, result.sensor_distance)
+    weight = types.Float(nodes.weight)
+    slant = dr.sqrt(z * z + radius * radius * types.Float(nodes.x**2 + nodes.y**2))
+    size = weight * z / (2 * np.pi * slant * slant)
+    wavenumber = types.Float(2 * np.pi * result.pupil.medium_n / result.wavelengths)
+    near, far = dr.sum(size / slant), dr.sum(size) * wavenumber
+    ideal = (near * near + far * far) * radius * radius / result.pupil.aperture.area
+    return at_border(types.Tensor(peak / ideal, (waves,)))
 
 
 def encircled_energy(
@@ -94,7 +143,7 @@ def encircled_energy(
     return np.einsum("ryx,wyx->wr", inside, np.asarray(result.psf, dtype=np.float64)) * result.dx**2
 
 
-def image_quality(result: PSFResult, nyquist: float, throughput: float = 1.0, noise_sigma: float = 0.0) -> np.ndarray:
+def image_quality(result: PSFResult, nyquist: float, throughput: Any = 1.0, noise_sigma: float = 0.0) -> Any:
     """Throughput times the area of the MTF above the noise floor, up to the retina's Nyquist frequency, (wavelength,).
 
         IQ = T / f_N ∫_0^f_N max(MTF(f) - σ / T, 0) df,   in [0, 1]
@@ -106,11 +155,26 @@ def image_quality(result: PSFResult, nyquist: float, throughput: float = 1.0, no
     Raises:
         ValueError: names argument, value and valid range.
     """
+    import drjit as dr
+
     positive("nyquist", nyquist)
     in_range("throughput", throughput, 0, 1)
     in_range("noise_sigma", noise_sigma, 0, 1e6)
-    if throughput == 0:
-        return np.zeros(len(result.wavelengths))
+    waves = result.tensor.shape[0]
+    if number(throughput) == 0:
+        return np.zeros(waves)
+    types = precision("float64")
     f = np.linspace(0, nyquist, 257)
-    above = np.maximum(mtf(result).profile(f) - noise_sigma / throughput, 0)
-    return throughput * np.trapezoid(above, f, axis=1) / nyquist
+    weight = np.full(f.size, 1 / (f.size - 1))
+    weight[[0, -1]] /= 2
+    light = opaque(types, throughput)
+    contrast = types.Float(_flat(mtf(result).profile(f)))
+    above = dr.maximum(contrast - noise_sigma / light, 0) * types.Float(np.tile(weight, waves))
+    return at_border(types.Tensor(light * dr.block_reduce(dr.ReduceOp.Add, above, f.size), (waves,)))
+
+
+def _flat(tensor: Any) -> Any:
+    """Row by row, Dr.Jit or NumPy."""
+    import drjit as dr
+
+    return np.ascontiguousarray(tensor).ravel() if isinstance(tensor, np.ndarray) else dr.ravel(tensor)

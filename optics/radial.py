@@ -11,8 +11,9 @@ import numpy as np
 
 from optics.grid import Grid
 from optics.precision import Precision
+from optics.quadrature import harmonics
 
-__all__ = ["RadialLine", "gauss_legendre", "legendre_nodes"]
+__all__ = ["TAPS", "RadialLine", "lagrange_weights"]
 
 TAPS = 8
 
@@ -32,19 +33,20 @@ class RadialLine:
     table: int
 
     @classmethod
-    def resolving(cls, rim: float, band: float, error: float) -> RadialLine:
+    def resolving(cls, rim: float, band: float, distance: float, error: float) -> RadialLine:
         """Points that carry intensity frequencies up to `band` [1/m] with a relative error of about `error`.
 
-        e^{2πi b r} over [-R, R] needs polynomials up to degree 2πbR and a few more for the digits. Eight-point Lagrange
-        interpolation errs by 1.07e-3 (2πbh)⁸.
+        A wave of r over [-R, R] has the Chebyshev coefficients 2 J_m(2πbR); obliquity has poles at ±i distance, whose
+        coefficients fall like e^{-m asinh(distance / R)}. Eight-point Lagrange interpolation errs by 1.07e-3 (2πbh)⁸.
         """
         digits = -math.log10(error)
-        step = min(1.0, (error / 1.07e-3) ** 0.125) / max(2 * math.pi * band * rim, 1.0)
+        turns = 2 * math.pi * band * rim + 2 * rim / distance
+        step = min(1.0, (error / 1.07e-3) ** 0.125) / max(turns, 1.0)
         table = math.ceil(1 / step) + TAPS
         radius = rim * (1 + TAPS / (2 * (table - 1)))
-        turns = band * radius
-        degree = 2 * math.pi * turns + digits * (2 + turns ** (1 / 3))
-        return cls(rim, radius, math.ceil(degree / 2) + 3, table)
+        degree = int(harmonics(np.array(2 * math.pi * band * radius), digits))
+        degree += math.ceil(digits * math.log(10) / math.asinh(distance / radius) / 2)
+        return cls(rim, radius, math.ceil(degree / 2) + 2, table)
 
     @property
     def positions(self) -> np.ndarray:
@@ -93,15 +95,3 @@ def lagrange_weights(t: Any) -> list[Any]:
         after.append(after[-1] * steps[TAPS - 1 - i])
     sign = [(-1) ** (TAPS - 1 - i) / (math.factorial(i) * math.factorial(TAPS - 1 - i)) for i in range(TAPS)]
     return [before[i] * after[TAPS - 1 - i] * sign[i] for i in range(TAPS)]
-
-
-def legendre_nodes(turns: float, digits: float) -> int:
-    """Gauss-Legendre nodes that integrate e^{2πi turns x} over [0, 1] to so many digits."""
-    return math.ceil(math.pi / 2 * turns + digits * (0.8 + 0.35 * turns ** (1 / 3)) + 2)
-
-
-@lru_cache(maxsize=64)
-def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights on [0, 1]."""
-    nodes, weights = np.polynomial.legendre.leggauss(n)
-    return (nodes + 1) / 2, weights / 2

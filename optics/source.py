@@ -21,7 +21,7 @@ class PointSource:
     angle: (θx, θy) [rad], the direction in which its light travels: an ideal lens focuses it at f (tan θx, tan θy).
     """
 
-    distance: float = math.inf
+    distance: Any = math.inf
     angle: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:

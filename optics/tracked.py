@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["is_tracked", "number", "plain"]
+__all__ = ["at_border", "is_tracked", "number", "plain"]
 
 
 def is_tracked(value: Any) -> bool:
@@ -32,3 +32,10 @@ def plain(value: Any) -> np.ndarray:
 
         return np.array(dr.detach(value).numpy(), dtype=np.float64)
     return np.asarray(value, dtype=np.float64)
+
+
+def at_border(tensor: Any) -> Any:
+    """What a user gets: a NumPy array, or the Dr.Jit tensor itself where it carries derivatives."""
+    import drjit as dr
+
+    return tensor if dr.grad_enabled(tensor) else np.asarray(tensor.numpy())

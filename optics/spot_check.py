@@ -1,0 +1,55 @@
+"""A picture held against the direct sum at a few of its points: the error that no prediction can hide."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from optics.beam import Beam
+from optics.direct_sum import PAIRS_PER_SECOND, direct_sum, node_count
+from optics.planner import FLOAT_NOISE
+from optics.precision import precision
+from optics.problem import Problem
+
+__all__ = ["CAUTION", "spot_check"]
+
+POINTS = 32
+# Of the estimate's own spread: a sample of 32 points sees the root mean square within a factor of about two.
+CAUTION = 2.5
+SPARE_DIGITS = 2.5
+# A check may cost this share of the picture it checks, or this many seconds.
+SHARE, SECONDS = 0.3, 3e-3
+
+
+def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) -> float | None:
+    """Relative L2 error of the intensity over the window, from the direct sum at points drawn half evenly and half in
+    proportion to the squared intensity; None where that would cost too much.
+
+    image: flat, |U|² / (pupil area); seconds: what it took. Σ (δI)² is estimated by Σ (δI_k)² / (n p_k).
+    """
+    import drjit as dr
+
+    if problem.reach is not None:
+        return None  # the picture is not meant to be right everywhere
+    total = float(np.sum(np.square(image, dtype=np.float64)))
+    if total == 0:
+        return None
+    # Nodes err in proportion to the light of the whole aperture, and a window may be far darker.
+    coherent = beam.pupil.area / (problem.wavelength * problem.distance) ** 2
+    darkness = max(0.0, 0.5 * math.log10(coherent / math.sqrt(total / image.size)))
+    cycles, digits = problem.radius * problem.turning, SPARE_DIGITS - math.log10(problem.tolerance) + darkness
+    affordable = max(SHARE * seconds, SECONDS) * PAIRS_PER_SECOND
+    points = int(min(POINTS, image.size, affordable / node_count(problem.aperture, cycles, digits)))
+    if points < 8:
+        return None
+    chance = 0.5 / image.size + 0.5 * np.square(image, dtype=np.float64) / total
+    rungs = (np.arange(points) + 0.5) / points
+    drawn = np.searchsorted(np.cumsum(chance), rungs).clip(max=image.size - 1)
+    row, column = np.divmod(drawn, problem.window.shape[1])
+    types = precision("float64")
+    x, y = types.Float64(problem.window.x[column]), types.Float64(problem.window.y[row])
+    with dr.suspend_grad():
+        exact = direct_sum(beam, (problem.aperture, cycles, digits), x, y, types).intensity.numpy() / beam.pupil.area
+    squared = float(np.mean(np.square(image[drawn] - exact) / chance[drawn]))
+    return CAUTION * math.sqrt(squared / total) + FLOAT_NOISE["float64"] + 2 * 10.0 ** (darkness - digits)
