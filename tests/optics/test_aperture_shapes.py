@@ -109,12 +109,15 @@ def test_one_or_zero_beyond_the_reach(shape):
 
 
 @shapes
-@pytest.mark.parametrize(("cycles", "digits"), [(0.3, 12), (3.0, 3), (3.0, 6), (3.0, 10), (25.0, 4), (25.0, 9)])
+@pytest.mark.parametrize(
+    ("cycles", "digits"), [(0.3, 12), (0.5, 12), (3.0, 3), (3.0, 6), (3.0, 10), (25.0, 4), (25.0, 9)]
+)
 def test_nodes_integrate_plane_waves(shape, cycles, digits):
     nodes = shape.nodes(cycles, digits)
     assert len(nodes) == len(nodes.x) == len(nodes.y)
     assert shape.contains(nodes.x, nodes.y).all()
-    fx, fy = frequencies(cycles / 60, cycles)
+    slow, fast = frequencies(cycles / 60, cycles), frequencies(cycles, cycles)
+    fx, fy = (np.concatenate(both) for both in zip(slow, fast, strict=True))
     waves = np.exp(-2j * np.pi * (np.outer(fx, nodes.x) + np.outer(fy, nodes.y))) @ nodes.weight
     assert np.abs(waves - closed_spectrum(shape, fx, fy)).max() < 10.0**-digits * shape.area
     assert nodes.weight.sum() == pytest.approx(shape.area, rel=10.0**-digits)
