@@ -65,16 +65,15 @@ def ideal_lens_profile(
     steepest = (radius + r_max) / math.hypot(radius + r_max, z)
     degree = int(0.6 * 2 * np.pi / wavelength * r_max * steepest + 40)
 
-    def values(t: np.ndarray) -> np.ndarray:
-        return ideal_lens_field(r_max * np.sqrt((t + 1) / 2), wavelength, radius, focal_length, distance)
-
-    coefficients = chebyshev.chebinterpolate(lambda t: values(t).view(np.float64).reshape(-1, 2), degree)
-    both = coefficients[:, 0] + 1j * coefficients[:, 1]
+    nodes = chebyshev.chebpts1(degree + 1)
+    field = ideal_lens_field(r_max * np.sqrt((nodes + 1) / 2), wavelength, radius, focal_length, distance)
+    coefficients = field @ chebyshev.chebvander(nodes, degree) * 2 / (degree + 1)
+    coefficients[0] /= 2
 
     def profile(r: np.ndarray) -> np.ndarray:
         if np.max(r) > r_max * (1 + 1e-12):
             raise ValueError(f"r = {np.max(r):g} m: must lie in [0, {r_max:g}] m")
-        return chebyshev.chebval(2 * (np.asarray(r) / r_max) ** 2 - 1, both)
+        return chebyshev.chebval(2 * (np.asarray(r) / r_max) ** 2 - 1, coefficients)
 
     return profile
 
