@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from validation.peers import installed
-from validation.peers.goals import ACCURATE, CONVERGED_PEER, FASTER, SINGLE, verdicts
+from validation.peers.goals import ACCURATE, CONVERGED_PEER, FASTER, SINGLE, own_best, verdicts
 from validation.peers.measure import one_thread, our_points, peer_points, quickest
 from validation.peers.points import STORED, Point, read_points, write_points
 from validation.peers.problem import CASES, Case
@@ -82,15 +82,19 @@ def regions(peers: Sequence[Point]) -> list[Region]:
     found = []
     converged = [point.seconds for point in peers if point.error <= CONVERGED_PEER]
     if converged:
-        found.append(Region(f"goal: {SINGLE:g} before any peer has {CONVERGED_PEER:g}", min(converged), SINGLE))
-    solvers = {point.peer for point in peers if point.kind != "paraxial"}
-    best = [
-        min((p for p in peers if p.peer == peer and p.kind != "paraxial"), key=lambda p: p.error) for peer in solvers
-    ]
+        label = f"goal: {_power(SINGLE)} before a peer has {_power(CONVERGED_PEER)}"
+        found.append(Region(label, min(converged), SINGLE))
+    best = own_best(peers)
     if best:
-        seconds = min(point.seconds for point in best) / FASTER
-        found.append(Region(f"goal: {ACCURATE:g}, {FASTER:g}x faster than any peer's best", seconds, ACCURATE))
+        label = f"goal: {_power(ACCURATE)}, {FASTER:g}x faster than a peer's best"
+        found.append(Region(label, min(point.seconds for point in best) / FASTER, ACCURATE))
     return found
+
+
+def _power(value: float) -> str:
+    mantissa, exponent = f"{value:.0e}".split("e")
+    factor = "" if mantissa == "1" else rf"{mantissa}\times"
+    return rf"${factor}10^{{{int(exponent)}}}$"
 
 
 def draw(ours: Sequence[Point], peers: Sequence[Point], path: Path, caption: str) -> None:
@@ -106,12 +110,13 @@ def draw(ours: Sequence[Point], peers: Sequence[Point], path: Path, caption: str
         draw_work_precision(axes, curves(mine, others), regions(others), TITLES.get(case, case))
     for axes in every[len(cases) :]:
         axes.set_visible(False)
-    figure.suptitle("How wrong a diffraction pattern is, and how long it takes (lower left is better)", fontsize=13)
-    figure.supxlabel(caption, fontsize=8, color="#666666")
+    figure.suptitle("Error against time: lower left is better", fontsize=13)
+    figure.supxlabel(f"{LEGEND}\n{caption}", fontsize=8, color="#666666")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
 
 
+LEGEND = "thick lines: the method that the planner chooses; dots: each method asked for by name; green: goals"
 TITLES = {
     case.name: f"ideal lens {case.name}, window ±10 λ f/#" if case.has_lens else "circular aperture, near field"
     for case in CASES
@@ -133,7 +138,7 @@ def main(arguments: list[str] | None = None) -> int:
         write_points([*others, *peers], options.stored)
         print(f"written: {options.stored}")
     path = options.out / "D0_work_precision_propagation.png"
-    draw(ours, peers, path, f"one thread of {options.machine}; peers {source}: best of their methods, scale fitted")
+    draw(ours, peers, path, f"one thread of {options.machine}; peers: best of each one's methods, {source}")
     print(f"figure: {path}")
     found = verdicts(ours, peers)
     print("\n".join(map(str, found)))

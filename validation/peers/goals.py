@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from validation.peers.points import Point
 
-__all__ = ["ACCURATE", "CONVERGED_PEER", "FASTER", "SINGLE", "Verdict", "verdicts"]
+__all__ = ["ACCURATE", "CONVERGED_PEER", "FASTER", "SINGLE", "Verdict", "own_best", "verdicts"]
 
 ACCURATE, FASTER = 2e-7, 10.0  # goal 1: this error, this many times faster than a peer reaches its own best
 SINGLE, CONVERGED_PEER = 1e-5, 1e-3  # goal 2: this error in float32, before any peer has that one
@@ -39,8 +38,7 @@ def verdicts(ours: Sequence[Point], peers: Sequence[Point]) -> list[Verdict]:
 
 
 def _accuracy(case: str, ours: Sequence[Point], peers: Sequence[Point]) -> Verdict:
-    """The peers that solve the same problem: a paraxial one is at its best with a handful of samples, and wrong."""
-    best = [min(points, key=_error) for points in _by_peer(point for point in peers if point.kind != "paraxial")]
+    best = own_best(peers)
     rival, mine = min(best, key=_seconds, default=None), _fastest(ours, ACCURATE)
     if rival is None:
         return Verdict(1, case, False, "no peer to compare with")
@@ -86,10 +84,13 @@ def _angular_spectra(case: str, ours: Sequence[Point], peers: Sequence[Point]) -
     return found
 
 
-def _by_peer(points: Iterable[Point]) -> list[list[Point]]:
-    found = defaultdict(list)
-    for point in points:
-        found[point.peer].append(point)
+def own_best(peers: Iterable[Point]) -> list[Point]:
+    """Each peer's point of least error, among those that solve the same problem: a paraxial method is at its best with
+    a handful of samples, and wrong."""
+    found: dict[str, Point] = {}
+    for point in peers:
+        if point.kind != "paraxial" and (point.peer not in found or point.error < found[point.peer].error):
+            found[point.peer] = point
     return list(found.values())
 
 

@@ -23,6 +23,7 @@ WAVELENGTH = 550e-9
 POINTS = 129  # across the window
 FOCAL_LENGTH = 300e-6
 FEWEST, MOST = 128, 1080  # samples across a grid; 1080 is the first fast length that puts 8 samples between outputs
+MOST_WIDE = 640  # of the wider grids; only codes without a band limit gain (near field: 7e-3, not 1.3e-2, at 1080)
 PER_OUTPUT = (1 / 6, 1 / 4, 1 / 3, 1 / 2, 1, 2, 4, 8)  # samples per output pitch
 CONVERGED = 1e-10
 
@@ -150,7 +151,8 @@ def grids(case: Case) -> list[SampleGrid]:
     for ratio in PER_OUTPUT:
         dx = case.window.dx / ratio
         n = 2 * next_fast_len(math.ceil((least / dx + 2) / 2), real=True)
-        found += [SampleGrid(times * n, dx) for times in (1, 2) if FEWEST <= times * n <= MOST]
+        found += [SampleGrid(n, dx)] if FEWEST <= n <= MOST else []
+        found += [SampleGrid(2 * n, dx)] if FEWEST <= 2 * n <= MOST_WIDE else []
     return sorted(found, key=lambda grid: (grid.n, grid.dx))
 
 
