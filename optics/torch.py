@@ -1,0 +1,86 @@
+"""PSFs inside a PyTorch graph: gradients flow from an image loss back to the relief.
+
+lens = optics.torch.PointSpread(radius=30e-6, sensor_distance=240e-6, wavelengths=[550e-9], dx=1e-6, shape=(33, 33))
+psf = lens()                    # torch tensor (wavelength, y, x)
+loss(psf).backward()            # fills lens.relief.grad
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+
+from optics.doe import BSplineRelief, HeightMap
+from optics.point_spread import psf as drjit_psf
+from optics.precision import precision
+from optics.pupil import Pupil
+
+__all__ = ["PointSpread", "psf"]
+
+
+def psf(
+    heights: torch.Tensor, *, radius: Any, n: Any = 1.5, pupil: dict[str, Any] | None = None, **view: Any
+) -> torch.Tensor:
+    """`optics.psf` of a relief, as a differentiable function of its heights.
+
+    heights: [m]; (4, 4) are the control points of a BSplineRelief, any other square the samples of a HeightMap.
+    radius [m] and n may be one-element tensors, through which gradients flow as well.
+    pupil: further arguments of `optics.Pupil`; view: arguments of `optics.psf` but for the pupil.
+    Returns (wavelength, y, x) [1/m²], float32 unless dtype="float64".
+
+    Raises:
+        ValueError, AccuracyError: see `optics.psf`.
+    """
+    import drjit as dr
+
+    precision(view.get("dtype", "float32"))  # proves the backend before Dr.Jit is asked for anything
+
+    @dr.wrap(source="torch", target="drjit")
+    def spread(heights: Any, radius: Any, n: Any) -> Any:
+        relief = BSplineRelief(heights) if heights.shape == (4, 4) else HeightMap(heights)
+        return drjit_psf(Pupil(radius, relief, n=n, **(pupil or {})), **view).tensor
+
+    tensor: torch.Tensor = spread(heights.double(), _double(radius), _double(n))
+    return tensor
+
+
+def _double(value: Any) -> Any:
+    return value.double() if isinstance(value, torch.Tensor) else value
+
+
+class PointSpread(torch.nn.Module):
+    """A pupil whose relief is learnt: forward() gives its PSF, (wavelength, y, x).
+
+    radius: [m]. wavelengths, sensor_distance, dx, shape, ...: see `optics.psf`.
+    heights: start [m], (4, 4) control points (default: flat) or (n, n) samples. unit: length [m] of one unit of the
+        learnt parameter, so that optimisers see numbers near 1.
+
+    Parameter:
+        relief: heights / unit.
+    """
+
+    def __init__(
+        self,
+        radius: float,
+        wavelengths: Sequence[float] = (550e-9,),
+        *,
+        heights: torch.Tensor | None = None,
+        n: float = 1.5,
+        unit: float = 1e-6,
+        **view: Any,
+    ) -> None:
+        super().__init__()
+        start = torch.zeros(4, 4, dtype=torch.float64) if heights is None else heights.detach().double()
+        self.relief = torch.nn.Parameter(start / unit)
+        self.radius, self.n, self.unit = radius, n, unit
+        self.view = {"wavelengths": tuple(wavelengths), **view}
+
+    @property
+    def heights(self) -> torch.Tensor:
+        """[m]"""
+        return self.relief * self.unit
+
+    def forward(self) -> torch.Tensor:
+        return psf(self.heights, radius=self.radius, n=self.n, **self.view)
