@@ -15,10 +15,11 @@ from optics.precision import Precision, opaque, precision
 from optics.problem import Problem
 from optics.radial import RadialLine
 
-__all__ = ["PAIRS_PER_SECOND", "NodeSampling", "direct_sum", "node_count", "nodes"]
+__all__ = ["MOST_DIGITS", "PAIRS_PER_SECOND", "NodeSampling", "direct_sum", "node_count", "nodes"]
 
 PAIRS_PER_SECOND = 2.5e8
-SPARE_DIGITS = 0.5
+MOST_DIGITS = 14.0  # of float64 sums
+SPARE_DIGITS = 0.5  # the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class NodeSampling:
     line: RadialLine | None
     seconds: float
     method: str = "rayleigh_sommerfeld"
+    model_error: float = 0.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Any:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
@@ -64,8 +66,8 @@ class NodeSampling:
 
 def nodes(problem: Problem) -> list[NodeSampling]:
     """Enough nodes for the cycles that pupil and path together turn through."""
-    cycles = problem.radius * problem.turning
-    digits = SPARE_DIGITS - math.log10(problem.ripple)
+    cycles = problem.radius * problem.turning_inside
+    digits = min(SPARE_DIGITS - math.log10(problem.tolerance), MOST_DIGITS)
     count = node_count(problem.aperture, cycles, digits)
     line, outputs = None, math.prod(problem.window.shape)
     if problem.symmetric:

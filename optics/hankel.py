@@ -38,6 +38,7 @@ class HankelSampling:
     line: RadialLine
     seconds: float
     method: str = "hankel"
+    model_error: float = 0.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Any:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
@@ -67,8 +68,8 @@ def hankel(problem: Problem) -> list[HankelSampling]:
 
 
 def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
-    digits = -math.log10(problem.ripple)
-    radii = gauss_legendre_count(problem.radius * (problem.phase_band + taper.end), digits)
+    digits = 0.5 - math.log10(problem.tolerance)
+    radii = gauss_legendre_count(problem.radius * (problem.phase_band_inside + taper.end), digits)
     outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
     steepest = math.hypot(problem.distance, problem.radius + outermost) / problem.wavelength
     angles = gauss_legendre_count(steepest * math.asin(min(1.0, taper.end * problem.wavelength)), digits)

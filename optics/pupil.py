@@ -144,20 +144,22 @@ class Slopes:
         """Largest slope over the disk alone."""
         return float(np.hypot(self.along_x, self.along_y)[self.distance_from_axis <= self.radius].max())
 
-    def turning(self, distance: float, outermost: float, medium_n: float) -> float:
+    def turning(self, distance: float, outermost: float, medium_n: float) -> tuple[float, float]:
         """Largest slope of the path through the pupil and on to any point within `outermost` [m] of the axis of a
-        plane at `distance` [m]: |∇L + n (ξ - x) / D|, over the disk and its soft edge."""
-        inside = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
-        x = np.broadcast_to(self.grid.x[None, :], inside.shape)[inside]
-        y = np.broadcast_to(self.grid.y[:, None], inside.shape)[inside]
+        plane at `distance` [m], |∇L + n (ξ - x) / D|: over the disk and its soft edge, and over the disk alone."""
+        soft = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
+        x = np.broadcast_to(self.grid.x[None, :], soft.shape)[soft]
+        y = np.broadcast_to(self.grid.y[:, None], soft.shape)[soft]
         angle = np.linspace(0, 2 * np.pi, 16, endpoint=False)
         targets = [(0.0, 0.0), *zip(outermost * np.cos(angle), outermost * np.sin(angle), strict=True)]
-        worst = 0.0
+        worst = np.zeros(x.size)
         for tx, ty in targets:
             scale = medium_n / np.sqrt((x - tx) ** 2 + (y - ty) ** 2 + distance**2)
-            slope = np.hypot(self.along_x[inside] + (x - tx) * scale, self.along_y[inside] + (y - ty) * scale)
-            worst = max(worst, float(slope.max()))
-        return worst
+            slope = np.hypot(self.along_x[soft] + (x - tx) * scale, self.along_y[soft] + (y - ty) * scale)
+            worst = np.maximum(worst, slope)
+        # A cell more than the disk, so that its rim is not missed.
+        inside = self.distance_from_axis[soft] <= self.radius + self.grid.dx
+        return float(worst.max()), float(worst[inside].max())
 
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
         """Where rays from the disk's points meet a plane at `distance` [m]; evanescent ones end at infinity."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from optics.beam import Beam
-from optics.direct_sum import PAIRS_PER_SECOND, direct_sum, node_count
+from optics.direct_sum import MOST_DIGITS, PAIRS_PER_SECOND, direct_sum, node_count
 from optics.planner import FLOAT_NOISE
 from optics.precision import precision
 from optics.problem import Problem
@@ -17,7 +17,8 @@ __all__ = ["CAUTION", "spot_check"]
 POINTS = 32
 # Of the estimate's own spread: a sample of 32 points sees the root mean square within a factor of about two.
 CAUTION = 2.5
-SPARE_DIGITS = 2.5
+# Digits that the check is better than the picture is asked to be: the more of them it can afford.
+SPARE_DIGITS = (7.0, 4.0)
 # A check may cost this share of the picture it checks, or this many seconds.
 SHARE, SECONDS = 0.3, 3e-3
 
@@ -38,10 +39,14 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     # Nodes err in proportion to the light of the whole aperture, and a window may be far darker.
     coherent = beam.pupil.area / (problem.wavelength * problem.distance) ** 2
     darkness = max(0.0, 0.5 * math.log10(coherent / math.sqrt(total / image.size)))
-    cycles, digits = problem.radius * problem.turning, SPARE_DIGITS - math.log10(problem.tolerance) + darkness
+    cycles = problem.radius * problem.turning_inside
     affordable = max(SHARE * seconds, SECONDS) * PAIRS_PER_SECOND
-    points = int(min(POINTS, image.size, affordable / node_count(problem.aperture, cycles, digits)))
-    if points < 8:
+    for spare in SPARE_DIGITS:
+        digits = min(spare - math.log10(problem.tolerance) + darkness, MOST_DIGITS)
+        points = int(min(POINTS, image.size, affordable / node_count(problem.aperture, cycles, digits)))
+        if points == min(POINTS, image.size):
+            break
+    if points < min(8, image.size):
         return None
     chance = 0.5 / image.size + 0.5 * np.square(image, dtype=np.float64) / total
     rungs = (np.arange(points) + 0.5) / points
