@@ -10,9 +10,9 @@ from optics.beam import Beam
 from optics.field import Field
 from optics.fourier import dft2, fast_length, predicted_seconds
 from optics.grid import Grid
+from optics.paraxial import paraxial_integral
 from optics.precision import Precision, opaque, precision
 from optics.problem import Problem, PupilEdge, Taper, tapers
-from optics.tracked import is_tracked
 
 __all__ = ["GridSampling", "split", "whole"]
 
@@ -32,6 +32,7 @@ class GridSampling:
     pupil_period: int
     output_period: int
     seconds: float = 0.0
+    model_error: float = 0.0
 
     @property
     def pupil(self) -> Grid:
@@ -122,8 +123,8 @@ def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Pr
     scale = (how.pupil.dx / how.period) ** 2
     if how.method == "angular_spectrum":
         window = problem.window
-        return dft2(spectrum, how.output_period, window.shape, +1, window.dx).scaled(scale)
-    return _paraxial_rest(spectrum, beam, problem, how, types).scaled(scale)
+        return dft2(spectrum, how.output_period, window.shape, +1, window.dx, window.centre).scaled(scale)
+    return _paraxial_rest(spectrum, beam, problem, how).scaled(scale)
 
 
 def _transfer(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
@@ -143,15 +144,7 @@ def _transfer(beam: Beam, problem: Problem, how: GridSampling, types: Precision)
     return Field.from_waves(how.taper.fade(f, types), waves, how.spectrum, types)
 
 
-def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
-    """Fresnel's integral of the relay field: quadratic phase, then one Fourier sum of free output pitch.
-
-    U(x) = 1/(iλz) e^{iπx²/λz} ∫ u(ξ) e^{iπξ²/λz} e^{-2πi xξ/λz} dξ (Goodman, eq. 4-17); the outer curvature is dropped.
-    """
-    relay, window = how.relay, problem.window
-    scale = opaque(types, beam.distance) * opaque(types, problem.wavelength)
-    u = dft2(spectrum, how.output_period, relay.shape, +1, relay.dx)
-    x, y = relay.coordinates(types)
-    u = u * Field.from_waves(1.0, (x * x + y * y) * (0.5 / scale), relay, types)
-    period = scale if is_tracked(beam.distance) else problem.wavelength * problem.distance
-    return dft2(u, period / (relay.dx * window.dx), window.shape, -1, window.dx).scaled(relay.dx**2 / scale)
+def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: GridSampling) -> Field:
+    """Fresnel's integral of the relay field."""
+    u = dft2(spectrum, how.output_period, how.relay.shape, +1, how.relay.dx)
+    return paraxial_integral(u, beam.distance, problem.wavelength, problem.window)

@@ -38,6 +38,7 @@ class FarFieldSampling:
     half_angle: float
     seconds: float
     method: str = "far_field"
+    model_error: float = 0.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Any:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""

@@ -24,8 +24,8 @@ MOST_ENTRIES = 4_000_000  # of the matrix between pupil and window
 
 @dataclass(frozen=True)
 class LowRankSampling:
-    """Pupil samples; `rank` Chebyshev points per axis of the window [m], and the distance c [m] of Fourier's kernel
-    e^{-ik ξ·x/c}."""
+    """Pupil samples; `rank` Chebyshev points per axis of the window, `half_width` [m] about its centre, and the distance
+    c [m] of Fourier's kernel e^{-ik ξ·x/c}."""
 
     edge: PupilEdge
     pupil: Grid
@@ -34,6 +34,7 @@ class LowRankSampling:
     scale: float
     seconds: float
     method: str = "low_rank"
+    model_error: float = 0.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Any:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
@@ -57,8 +58,8 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
     edge = problem.soft_edge(problem.turning)
     pitch = 1 / (problem.turning + edge.stopband)
     pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
-    half = max(problem.window.half_width, problem.window.dx)
-    scale = math.hypot(problem.distance, 0.6 * half)
+    half = max(problem.window.own_half_width, problem.window.dx)
+    scale = math.hypot(problem.distance, 0.6 * half, *problem.window.centre)
     most = math.isqrt(MOST_ENTRIES) // pupil.shape[0]
     rank = _rank(problem, edge.outermost, half, scale, most)
     if rank is None:
@@ -73,24 +74,38 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
 def _rank(problem: Problem, outermost: float, half: float, scale: float, most: int) -> int | None:
     """Chebyshev points along an axis that interpolate the slow rest, tried on the soft aperture's rim."""
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
-    rim_x, rim_y = outermost * np.cos(angle), outermost * np.sin(angle)
+    rim = outermost * np.cos(angle), outermost * np.sin(angle)
     test = half * np.linspace(-1, 1, 41)
+    centre = problem.window.centre
+    # On the axis both directions are alike, and so are both sides.
+    places = [(0, 0.0), (0, half)] if centre == (0.0, 0.0) else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
     for rank in RANKS:
         if rank > most:
             return None
         points = half * chebyshev_points(rank)
         weights = lagrange(test, points)
         worst = 0.0
-        for across in (0.0, half):
-            exact, known = (_rest(problem, scale, rim_x, rim_y, x, across) for x in (test, points))
+        for along, across in places:
+            exact, known = (_rest(problem, scale, rim, _line(centre, along, at, across)) for at in (test, points))
             worst = max(worst, float(np.abs(exact - known @ weights).max()))
         if worst < problem.ripple:
             return rank
     return None
 
 
-def _rest(problem: Problem, scale: float, xi: np.ndarray, eta: np.ndarray, x: np.ndarray, y: float) -> np.ndarray:
-    """(z/D)² e^{ik(D - ρ + ξ·x/c)} at points (x, y) of the window."""
+def _line(centre: tuple[float, float], along: int, at: np.ndarray, across: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (x, y) of a line through the window, along x (0) or y (1)."""
+    place = [centre[0] + 0 * at, centre[1] + 0 * at]
+    place[along] = place[along] + at
+    place[1 - along] = place[1 - along] + across
+    return place[0], place[1]
+
+
+def _rest(
+    problem: Problem, scale: float, pupil: tuple[np.ndarray, np.ndarray], window: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """(z/D)² e^{ik(D - ρ + ξ·x/c)} between points of pupil and window."""
+    (xi, eta), (x, y) = pupil, window
     z = problem.distance
     rho2 = x * x + y * y + z * z
     excess = xi**2 + eta**2 - 2 * (x * xi + y * eta)
@@ -108,7 +123,10 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
     """
     window = problem.window
     inner = _kernel(beam, problem, how, types)
-    across_x, across_y = (_fourier(at, beam, problem, how, types) for at in (window.x, window.y))
+    across_x, across_y = (
+        _fourier(at, middle, problem, how, types)
+        for at, middle in ((window.x, window.centre[0]), (window.y, window.centre[1]))
+    )
     re, im = _product(*inner, *across_x, transposed=True)
     re, im = _product(*across_y, re, im, transposed=False)
     return Field(re.array, im.array, window, types)
@@ -126,6 +144,7 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
     (a, i), (b, j) = (_split(place + middle, n, types) for place in (column, row))
     points = types.Float64(how.half_width * chebyshev_points(rank))
     x, y = (dr.gather(types.Float64, points, types.Index(index)) for index in (a, b))
+    x, y = x + opaque(types, problem.window.centre[0]), y + opaque(types, problem.window.centre[1])
     pitch, centre = opaque(types, how.pupil.dx), dr.opaque(types.Float64, n // 2)
     xi, eta = (i - centre) * pitch, (j - centre) * pitch
     z, wavelength = opaque(types, beam.distance), opaque(types, problem.wavelength)
@@ -151,11 +170,13 @@ def _split(index: Any, n: int, types: Precision) -> tuple[Any, Any]:
     return quotient, dr.fma(-quotient, by, index)
 
 
-def _fourier(at: np.ndarray, beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> tuple[Any, Any]:
+def _fourier(
+    at: np.ndarray, middle: float, problem: Problem, how: LowRankSampling, types: Precision
+) -> tuple[Any, Any]:
     """A[x, (a, ξ)] = L_a(x) e^{-ik ξ x/c} as two tensors."""
     rank, xi = how.rank, how.pupil.x
     waves = np.tile(np.outer(at, xi) / (-problem.wavelength * how.scale), rank)
-    weight = np.repeat(lagrange(at, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
+    weight = np.repeat(lagrange(at - middle, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
     wheel = weight * np.exp(2j * np.pi * waves)
     re, im = (np.ascontiguousarray(part, dtype=types.dtype) for part in (wheel.real, wheel.imag))
     return types.Tensor(re), types.Tensor(im)

@@ -12,10 +12,17 @@ Rayleigh-Sommerfeld integral); they differ in where they sample it:
 - "split_angular_spectrum": exp(ikz cos θ) is split into its paraxial part, whose Fourier transform is known, and the
   rest, whose spectrum is narrow. Period and samples no longer grow with the distance.
 - "rayleigh_sommerfeld": the direct sum over edge-fitted nodes; needs no grid, costs nodes x outputs. The reference.
+
+The cheap methods approximate it and predict by how much; "auto" takes them only where that fits the tolerance too,
+while by name they run always and their plan tells the error:
+
+- "fresnel": the paraxial integral. "fraunhofer": the paraxial far field.
+- "geometric": density of rays, for shadows and coarse windows. "pinhole": all light in one cell.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -25,11 +32,13 @@ from optics.angular_spectrum import split, whole
 from optics.beam import Beam
 from optics.direct_sum import nodes
 from optics.far_field import far_field
+from optics.fresnel import fraunhofer, fresnel
+from optics.geometric import geometric, pinhole
 from optics.hankel import hankel
 from optics.low_rank import low_rank
 from optics.problem import Problem
 
-__all__ = ["METHODS", "AccuracyError", "Option", "Plan", "Sampling", "choose"]
+__all__ = ["APPROXIMATE", "EXACT", "METHODS", "AccuracyError", "Option", "Plan", "Sampling", "choose"]
 
 
 class Sampling(Protocol):
@@ -49,6 +58,10 @@ class Sampling(Protocol):
     def largest(self) -> int:
         """Side of the largest square array."""
 
+    @property
+    def model_error(self) -> float:
+        """Relative L2 error of the intensity that the method would make with any number of samples: 0 if exact."""
+
     def intensity(self, beam: Beam, problem: Problem) -> Any:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
 
@@ -57,7 +70,7 @@ class Sampling(Protocol):
 
 
 # Each maps a problem to the samplings by which it meets the tolerance: none, one or several.
-METHODS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
+EXACT: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "hankel": hankel,
     "low_rank": low_rank,
     "far_field": far_field,
@@ -65,6 +78,13 @@ METHODS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "split_angular_spectrum": split,
     "rayleigh_sommerfeld": nodes,
 }
+APPROXIMATE: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
+    "fresnel": fresnel,
+    "fraunhofer": fraunhofer,
+    "geometric": geometric,
+    "pinhole": pinhole,
+}
+METHODS = EXACT | APPROXIMATE
 # Largest square array: 4096² complex64 is 134 MB, and a handful of such arrays live at once.
 MOST_SAMPLES = 4096
 FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}  # relative to the field's root mean square, see tests
@@ -122,19 +142,29 @@ class Plan:
 
 
 def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -> tuple[Plan, Sampling]:
-    """The cheapest sampling that meets the problem's tolerance, by the named method or by any.
+    """The cheapest sampling that meets the problem's tolerance.
+
+    method: "auto" weighs all, "exact" all that approximate nothing; a method's name asks for it alone, and then
+        only its sampling has to meet the tolerance, not its model.
 
     Raises:
         ValueError: unknown method.
         AccuracyError: nothing within the limits on memory and time meets the tolerance.
     """
-    if method not in ("auto", *METHODS):
-        raise ValueError(f"method = {method!r}: must be 'auto' or one of {', '.join(METHODS)}")
+    asked = {"auto": tuple(METHODS), "exact": tuple(EXACT)}.get(method, (method,))
+    if asked[0] not in METHODS:
+        raise ValueError(f"method = {method!r}: must be 'auto', 'exact' or one of {', '.join(METHODS)}")
     _check_dtype(problem)
-    cheapest = _weigh(problem, tuple(METHODS) if method == "auto" else (method,))
-    fitting = [option for option in cheapest.values() if option is not None and _within(option, most_seconds)]
+    cheapest = _weigh(problem, asked)
+    allowed = _model_tolerance(problem) if method == "auto" else math.inf
+    fitting = [
+        option
+        for option in cheapest.values()
+        if option is not None and _within(option, most_seconds) and option.model_error <= allowed
+    ]
     if not fitting:
-        raise AccuracyError(_refusal(problem, [option for option in cheapest.values() if option], most_seconds))
+        candidates = [option for option in cheapest.values() if option and option.model_error <= allowed]
+        raise AccuracyError(_refusal(problem, candidates, most_seconds))
     best = min(fitting, key=_seconds)
     return _plan(problem, best, cheapest, most_seconds), best
 
@@ -151,6 +181,15 @@ def _check_dtype(problem: Problem) -> None:
     if problem.tolerance < floor:
         remedy = f"; dtype='float64' carries {10 * FLOAT_NOISE['float64']:g}" if problem.dtype == "float32" else ""
         raise AccuracyError(f"tolerance = {problem.tolerance:g}: {problem.dtype} carries {floor:g}{remedy}")
+
+
+def _model_tolerance(problem: Problem) -> float:
+    """What sampling and rounding leave of the tolerance."""
+    return problem.tolerance - _sampling_error(problem)
+
+
+def _sampling_error(problem: Problem) -> float:
+    return problem.tolerance / 2 + FLOAT_NOISE[problem.dtype]
 
 
 def _seconds(option: Sampling) -> float:
@@ -171,7 +210,7 @@ def _size(samples: tuple[int, int]) -> str:
 
 def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None], most_seconds: float) -> Plan:
     options = [
-        Option(name, option.samples, option.seconds, _verdict(option, best, most_seconds))
+        Option(name, option.samples, option.seconds, _verdict(option, best, problem, most_seconds))
         for name, option in weighed.items()
         if option is not None
     ]
@@ -180,17 +219,19 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None],
         f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "
         f"{problem.band() * problem.wavelength:.2g}; cheapest at {best.seconds:.2g} s" + (f" ({lost})" if lost else "")
     )
-    error = problem.tolerance / 2 + FLOAT_NOISE[problem.dtype]
+    error = _sampling_error(problem) + best.model_error
     return Plan(best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options))
 
 
-def _verdict(option: Sampling, best: Sampling, most_seconds: float) -> str:
+def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:
     if option is best:
         return "chosen"
     if option.largest > MOST_SAMPLES:
         return f"too large: {option.largest} across, at most {MOST_SAMPLES}"
     if option.seconds > most_seconds:
         return f"too slow: at most {most_seconds:g} s"
+    if option.model_error > _model_tolerance(problem):
+        return f"approximates too much: errs by {option.model_error:.1g}"
     return f"{option.seconds / best.seconds:.1f} times as slow"
 
 

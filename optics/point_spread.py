@@ -17,6 +17,7 @@ from optics.planner import FLOAT_NOISE, AccuracyError, Plan, Sampling, choose
 from optics.precision import opaque, precision
 from optics.problem import Problem
 from optics.pupil import Pupil
+from optics.rays import Rays
 from optics.source import PointSource
 from optics.spot_check import spot_check
 from optics.tracked import number
@@ -26,7 +27,7 @@ __all__ = ["PSFResult", "plan", "problem", "psf", "spread"]
 
 @dataclass(frozen=True, eq=False)
 class PSFResult:
-    """PSF on a grid of sensor positions, sample n//2 on the axis, row and y growing together.
+    """PSF on a grid of sensor positions, sample n//2 at `centre` (x, y) [m], row and y growing together.
 
     tensor: the PSF as a Dr.Jit tensor (wavelength, y, x) that carries the derivatives of what it was made from.
     psf: the same as a NumPy array [1/m²]; its integral over an unbounded plane is the fraction of the pupil's power
@@ -40,6 +41,7 @@ class PSFResult:
     sensor_distance: Any
     pupil: Pupil
     plans: tuple[Plan, ...]
+    centre: tuple[float, float] = (0.0, 0.0)
 
     @cached_property
     def psf(self) -> np.ndarray:
@@ -51,11 +53,11 @@ class PSFResult:
 
     @property
     def x(self) -> np.ndarray:
-        return Grid(self.tensor.shape[1:], self.dx).x
+        return Grid(self.tensor.shape[1:], self.dx, self.centre).x
 
     @property
     def y(self) -> np.ndarray:
-        return Grid(self.tensor.shape[1:], self.dx).y
+        return Grid(self.tensor.shape[1:], self.dx, self.centre).y
 
     @property
     def power(self) -> np.ndarray:
@@ -74,20 +76,22 @@ def psf(
     tolerance: float = 1e-3,
     method: str = "auto",
     dtype: str = "float32",
+    centre: tuple[float, float] = (0.0, 0.0),
 ) -> PSFResult:
     """|U|² / (pupil area) of the field U that a unit-amplitude wave makes behind the pupil.
 
-    wavelengths: vacuum [m]. sensor_distance [m] behind the pupil. dx [m], shape (y, x): the window.
+    wavelengths: vacuum [m]. sensor_distance [m] behind the pupil. dx [m], shape (y, x), centre (x, y) [m]: the window.
     source_distance [m], source_angle [rad]: see PointSource.
     tolerance: relative L2 error of the intensity over the window.
-    method: "auto" or one of planner.METHODS.
+    method: "auto", "exact" (nothing approximate), or one of planner.METHODS. An approximation asked for by its name
+        answers however wrong it is: the tolerance is then that of its sampling, and the plan tells the error.
     Both distances, as what the pupil is made of, may be Dr.Jit arrays that carry derivatives: see PSFResult.tensor.
 
     Raises:
         ValueError: bad argument, named with its value and valid range.
         AccuracyError: no method meets the tolerance within the limits on memory and time.
     """
-    window = Grid(shape, dx)
+    window = Grid(shape, dx, centre)
     source = PointSource(source_distance, source_angle)
     lambdas = np.atleast_1d(np.asarray(wavelengths, dtype=np.float64))
     if lambdas.size == 0:
@@ -108,10 +112,11 @@ def plan(
     tolerance: float = 1e-3,
     method: str = "auto",
     dtype: str = "float32",
+    centre: tuple[float, float] = (0.0, 0.0),
 ) -> Plan:
     """What `psf` would do at one wavelength, without doing it: see there for arguments and errors."""
     beam = Beam(pupil, PointSource(source_distance, source_angle), positive("wavelength", wavelength), sensor_distance)
-    return choose(problem(beam, Grid(shape, dx), tolerance, dtype), method)[0]
+    return choose(problem(beam, Grid(shape, dx, centre), tolerance, dtype), method)[0]
 
 
 def problem(beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
@@ -128,7 +133,7 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
     pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
     slopes = pupil.slopes(wavelength, beam.source)
     detail = pupil.bandwidth(wavelength, tolerance / 10)
-    turning = slopes.turning(distance, window.half_diagonal, pupil.medium_n)
+    turning, inside = slopes.turning(distance, window, pupil.medium_n)
     return Problem(
         aperture=pupil.aperture,
         radius=pupil.radius,
@@ -136,10 +141,13 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
         distance=distance,
         window=window,
         phase_band=1.02 * slopes.steepest / wavelength + detail,
+        phase_band_inside=1.02 * slopes.steepest_inside / wavelength + detail,
         turning=1.02 * turning / wavelength + detail,
+        turning_inside=1.02 * inside / wavelength + detail,
         symmetric=pupil.rotationally_symmetric(wavelength) and beam.source.angle == (0.0, 0.0),
         tolerance=tolerance,
         dtype=dtype,
+        rays=Rays.of(slopes, pupil.aperture, distance, pupil.medium_n),
     )
 
 
@@ -160,14 +168,15 @@ def spread(beams: list[Beam], tasks: list[Problem], method: str = "auto", most_s
     flat, plans = zip(*found, strict=True)
     tensor = types.Tensor(flat[0] if len(flat) == 1 else dr.concat(flat), (len(flat), *window.shape))
     wavelengths = np.array([beam.wavelength for beam in beams])
-    return PSFResult(tensor, window.dx, wavelengths, beams[0].distance, beams[0].pupil, tuple(plans))
+    return PSFResult(tensor, window.dx, wavelengths, beams[0].distance, beams[0].pupil, tuple(plans), window.centre)
 
 
 def _checked(
     beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], asked: tuple[str, float], tries: int = 3
 ) -> tuple[Any, Plan]:
     """The PSF, flat, and the plan with the error that a spot check tells. What does not meet the tolerance is planned
-    again for a smaller one: a dark window needs more digits than a bright one.
+    again: by an exact method, and for a smaller tolerance, because a dark window needs more digits than a bright one.
+    An approximation asked for by its name stays, however wrong it is seen to be.
 
     Raises:
         AccuracyError: the check finds more than the tolerance all the same.
@@ -178,28 +187,34 @@ def _checked(
     area = beam.pupil.aperture.area * radius * radius
     image = sampling.intensity(beam, task) / types.Float(area)
     picture = image.numpy()
-    error = _predicted_error(picture, sampling.plane(task), task)
+    error = _predicted_error(picture, sampling, task)
     seen = spot_check(beam, task, picture, plan.seconds)
-    if seen is not None and seen > task.tolerance:
-        stricter = replace(task, tolerance=max(0.3 * task.tolerance**2 / seen, 10 * FLOAT_NOISE[task.dtype]))
-        if tries == 1 or stricter.tolerance >= task.tolerance:
-            raise AccuracyError(
-                f"tolerance = {task.tolerance:g}: a check against the direct sum finds an error of {seen:.1g} by "
-                f"{plan.method} in {task.dtype}; widen the tolerance or ask for another method or dtype"
-            )
-        return _checked(beam, stricter, choose(stricter, *asked), asked, tries - 1)
-    return image, replace(plan, predicted_error=error if seen is None else seen)
+    found = image, replace(plan, predicted_error=error if seen is None else seen)
+    if seen is None or seen <= task.tolerance or (sampling.model_error and asked[0] == plan.method):
+        return found
+    if sampling.model_error:
+        exactly = ("exact", asked[1])
+        return _checked(beam, task, choose(task, *exactly), exactly, tries)
+    stricter = replace(task, tolerance=max(0.3 * task.tolerance**2 / seen, 10 * FLOAT_NOISE[task.dtype]))
+    if tries == 1 or stricter.tolerance >= task.tolerance:
+        raise AccuracyError(
+            f"tolerance = {task.tolerance:g}: a check against the direct sum finds an error of {seen:.1g} by "
+            f"{plan.method} in {task.dtype}; widen the tolerance or ask for another method or dtype"
+        )
+    return _checked(beam, stricter, choose(stricter, *asked), asked, tries - 1)
 
 
-def _predicted_error(image: np.ndarray, plane: float, task: Problem) -> float:
+def _predicted_error(image: np.ndarray, sampling: Sampling, task: Problem) -> float:
     """The error that the picture itself tells: rounding is as large in a dark window as in a bright one, so there it
-    weighs more.
+    weighs more. A model that leaves the window dark misses all its light.
 
     Raises:
         AccuracyError: the window is so dark that rounding breaks the tolerance.
     """
     mean, mean_square = float(image.mean(dtype=np.float64)), float(np.mean(np.square(image, dtype=np.float64)))
-    bright = 1 / plane**2  # mean PSF over the plane that the transform spans
+    if mean_square == 0 and sampling.model_error:
+        return max(sampling.model_error, 1.0)
+    bright = 1 / sampling.plane(task) ** 2  # mean PSF over the plane that the transform spans
     noise = FLOAT_NOISE[task.dtype]
     rounding = 2 * noise * math.sqrt(bright * mean) + noise**2 * bright
     error = task.tolerance / 2 + rounding / math.sqrt(mean_square) if mean_square > 0 else math.inf
@@ -208,4 +223,4 @@ def _predicted_error(image: np.ndarray, plane: float, task: Problem) -> float:
             f"tolerance = {task.tolerance:g}: the window is so dark that {task.dtype} rounding reaches {error:.1g}"
             + ("; dtype='float64' has a 1e6 times lower floor" if task.dtype == "float32" else "")
         )
-    return error
+    return error + sampling.model_error

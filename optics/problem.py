@@ -9,6 +9,7 @@ from typing import Any
 from optics.aperture import EDGE_REACH, Aperture, SoftAperture
 from optics.grid import Grid
 from optics.precision import Precision, opaque
+from optics.rays import Rays
 
 __all__ = ["FADES", "STEEPEST_SINE", "Problem", "PupilEdge", "Taper", "tapers"]
 
@@ -29,11 +30,13 @@ class Problem:
     phase_band: highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge.
     turning: highest spatial frequency [1/m] in the phase of the pupil and of the path to any point of the window
         together; for a lens in focus far less than the sum of both.
-    detail: spatial frequency [1/m] of the relief's own bends, by which local frequencies are blurred.
+    phase_band_inside, turning_inside: the same over the disk without its soft edge, where a relief may bend steeply.
     symmetric: nothing depends on the azimuth.
     widest_band: frequencies beyond it may be dropped (infinite: whatever reaches the window counts).
     reach: given where all but a tolerance's share of the light stays within this distance of the axis [m]: what lies
         beyond may be wrong, and edge-diffracted light less exact (None: the window counts to its corners).
+    rays: where geometrical optics sends the light, by which approximations judge themselves (None: these are not
+        weighed).
     """
 
     aperture: Aperture
@@ -42,12 +45,15 @@ class Problem:
     distance: float
     window: Grid
     phase_band: float
+    phase_band_inside: float
     turning: float
+    turning_inside: float
     symmetric: bool
     tolerance: float
     dtype: str = "float32"
     widest_band: float = math.inf
     reach: float | None = None
+    rays: Rays | None = None
 
     @property
     def ripple(self) -> float:

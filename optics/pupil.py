@@ -116,8 +116,14 @@ def _slopes(pupil: Pupil, wavelength: float, distance: float, angle: tuple[float
     grid = Grid.square(n, 2 * (1 + EDGE_REACH) * pupil.radius / (n - 1))
     x, y = grid.coordinates(types)
     path = pupil.path(x, y, wavelength, PointSource(distance, angle), types).numpy().reshape(grid.shape)
-    along_y, along_x = np.gradient(path, grid.dx)
-    return Slopes(grid, along_x, along_y, pupil.radius)
+    return Slopes(grid, _derivative(path.T, grid.dx).T, _derivative(path, grid.dx), pupil.radius)
+
+
+def _derivative(values: np.ndarray, step: float) -> np.ndarray:
+    """Along axis 0, by central differences of fourth order (second order near the ends)."""
+    slope = np.gradient(values, step, axis=0)
+    slope[2:-2] = (8 * (values[3:-1] - values[1:-3]) - values[4:] + values[:-4]) / (12 * step)
+    return slope
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,14 +150,15 @@ class Slopes:
         """Largest slope over the disk alone."""
         return float(np.hypot(self.along_x, self.along_y)[self.distance_from_axis <= self.radius].max())
 
-    def turning(self, distance: float, outermost: float, medium_n: float) -> tuple[float, float]:
-        """Largest slope of the path through the pupil and on to any point within `outermost` [m] of the axis of a
-        plane at `distance` [m], |∇L + n (ξ - x) / D|: over the disk and its soft edge, and over the disk alone."""
+    def turning(self, distance: float, window: Grid, medium_n: float) -> tuple[float, float]:
+        """Largest slope of the path through the pupil and on to any point of the window in a plane at `distance` [m],
+        |∇L + n (ξ - x) / D|: over the disk and its soft edge, and over the disk alone."""
         soft = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
         x = np.broadcast_to(self.grid.x[None, :], soft.shape)[soft]
         y = np.broadcast_to(self.grid.y[:, None], soft.shape)[soft]
         angle = np.linspace(0, 2 * np.pi, 16, endpoint=False)
-        targets = [(0.0, 0.0), *zip(outermost * np.cos(angle), outermost * np.sin(angle), strict=True)]
+        (cx, cy), outermost = window.centre, window.own_half_diagonal
+        targets = [(cx, cy), *zip(cx + outermost * np.cos(angle), cy + outermost * np.sin(angle), strict=True)]
         worst = np.zeros(x.size)
         for tx, ty in targets:
             scale = medium_n / np.sqrt((x - tx) ** 2 + (y - ty) ** 2 + distance**2)

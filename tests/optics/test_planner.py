@@ -8,7 +8,7 @@ import pytest
 
 from optics import AccuracyError, BSplineRelief, Grid, PointSource, Pupil
 from optics.beam import Beam
-from optics.planner import METHODS, choose
+from optics.planner import APPROXIMATE, EXACT, METHODS, choose
 from optics.point_spread import problem
 
 
@@ -28,19 +28,36 @@ def test_auto_takes_the_cheapest(problem):
     plan, _ = choose(problem)
     for method in METHODS:
         try:
-            other, _ = choose(problem, method)
+            other, sampling = choose(problem, method)
         except AccuracyError:
             continue
-        assert plan.seconds <= other.seconds
         assert other.method == method
+        assert plan.seconds <= other.seconds or sampling.model_error > problem.tolerance / 3
 
 
 def test_method_follows_the_problem():
     symmetric = problem_of(Pupil(30e-6, thin_lens_focal_length=240e-6), 240e-6, Grid.square(65, 0.5e-6), 1e-3)
     assert choose(symmetric)[0].method in ("hankel", "rayleigh_sommerfeld")
     assert choose(LENS)[0].method == "low_rank"
-    assert choose(PINHOLE)[0].method in ("far_field", "rayleigh_sommerfeld", "low_rank")
+    assert choose(PINHOLE, "exact")[0].method in ("far_field", "rayleigh_sommerfeld", "low_rank")
+    assert choose(PINHOLE)[0].method in ("fresnel", "rayleigh_sommerfeld")
     assert choose(WIDE)[0].method == "angular_spectrum"
+
+
+@pytest.mark.parametrize("problem", [LENS, PINHOLE, WIDE])
+def test_auto_takes_no_approximation_that_errs_by_more_than_the_tolerance(problem):
+    for tolerance in (1e-1, 1e-2, 1e-3, 1e-4):
+        plan, sampling = choose(dataclasses.replace(problem, tolerance=tolerance))
+        assert sampling.model_error < tolerance / 2
+        assert plan.predicted_error <= tolerance
+        assert choose(dataclasses.replace(problem, tolerance=tolerance), "exact")[0].method in EXACT
+
+
+@pytest.mark.parametrize("method", APPROXIMATE)
+def test_an_approximation_by_name_says_how_wrong_it_is(method):
+    plan, sampling = choose(LENS, method)
+    assert plan.method == method
+    assert plan.predicted_error > sampling.model_error > LENS.tolerance
 
 
 @pytest.mark.parametrize("method", ["angular_spectrum", "split_angular_spectrum"])
