@@ -1,7 +1,7 @@
 """A lens found by gradient: from a flat relief to a focus, in seconds.
 
-The relief is the gene of rhabdom's eyes: 4 x 4 control points of one bicubic B-spline patch. Light on the axis is gathered
-into ever smaller spots; the derivative of the PSF with respect to every control point comes from Dr.Jit.
+The relief is the gene of rhabdom's eyes: 4 x 4 control points of one bicubic B-spline patch. Light on the axis is
+gathered into ever smaller spots; the derivative of the PSF with respect to every control point comes from Dr.Jit.
 
     python examples/02_lens_by_gradient.py
 """

@@ -7,7 +7,7 @@ import numpy as np
 
 from optics.tracked import number
 
-__all__ = ["finite", "in_range", "positive", "radiance_cube", "shape_2d"]
+__all__ = ["finite", "in_range", "point_2d", "positive", "radiance_cube", "shape_2d"]
 
 
 # Squares of lengths, and their ratios, must stay within double precision.
@@ -53,6 +53,15 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
     if not whole or height < 1 or width < 1:
         raise ValueError(f"{name} = {value!r}: must be two whole numbers (height, width), each at least 1")
     return height, width
+
+
+def point_2d(name: str, value: Any) -> tuple[float, float]:
+    """(x, y) as finite floats."""
+    try:
+        x, y = value
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {value!r}: must be two lengths (x, y) [m]") from None
+    return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
 
 
 def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:

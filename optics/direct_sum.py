@@ -15,7 +15,7 @@ from optics.precision import Precision, opaque, precision
 from optics.problem import Problem
 from optics.radial import RadialLine
 
-__all__ = ["MOST_DIGITS", "PAIRS_PER_SECOND", "NodeSampling", "direct_sum", "node_count", "nodes"]
+__all__ = ["MOST_DIGITS", "PAIRS_PER_SECOND", "NodeSampling", "cached_nodes", "direct_sum", "node_count", "nodes"]
 
 PAIRS_PER_SECOND = 2.5e8
 MOST_DIGITS = 14.0  # of float64 sums
@@ -81,12 +81,12 @@ def nodes(problem: Problem) -> list[NodeSampling]:
 def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
     """Number of nodes; beyond a hundred cycles it grows like their square, and is not worth counting."""
     most = 100.0
-    counted = len(_nodes(aperture, min(cycles, most), digits).weight)
+    counted = len(cached_nodes(aperture, min(cycles, most), digits).weight)
     return math.ceil(counted * max(cycles / most, 1.0) ** 2)
 
 
 @lru_cache(maxsize=16)
-def _nodes(aperture: Aperture, cycles: float, digits: float) -> Nodes:
+def cached_nodes(aperture: Aperture, cycles: float, digits: float) -> Nodes:
     return aperture.nodes(cycles, digits)
 
 
@@ -104,7 +104,7 @@ def direct_sum(beam: Beam, rule: tuple[Aperture, float, float], x: Any, y: Any, 
     """
     import drjit as dr
 
-    found = _nodes(*rule)
+    found = cached_nodes(*rule)
     radius = opaque(types, beam.radius)
     nodes_x, nodes_y = types.Float64(found.x) * radius, types.Float64(found.y) * radius
     weight = types.Float64(found.weight) * dr.square(radius)

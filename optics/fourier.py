@@ -31,17 +31,36 @@ def fast_length(least: float) -> int:
     return int(next_fast_len(max(1, int(np.ceil(least))), real=True))
 
 
-def dft2(field: Field, period: Any, shape: tuple[int, int], sign: int, pitch: float) -> Field:
+def dft2(
+    field: Field,
+    period: Any,
+    shape: tuple[int, int],
+    sign: int,
+    pitch: float,
+    centre: tuple[float, float] = (0.0, 0.0),
+) -> Field:
     """Fourier sum of a field onto `shape` samples (formula above), on a grid of the given output pitch.
+
+    centre: where the output's centre sample lies (x, y), in units of the pitch times its index (k = centre / pitch).
 
     sign: -1 forward (exp(-2πi...)), +1 inverse; neither is normalised.
     """
-    grid = Grid(shape, pitch)
+    grid = Grid(shape, pitch, centre)
+    if centre != (0.0, 0.0):
+        field = _turned(field, period, (sign * centre[0] / pitch, sign * centre[1] / pitch))
     if not is_tracked(period) and _fft_wins(field.grid.shape, period, shape):
         re, im = _fft(field, int(period), shape, sign)
     else:
         re, im = _matrix_dft(field, period, shape, sign)
     return Field(re, im, grid, field.types)
+
+
+def _turned(field: Field, period: Any, by: tuple[float, float]) -> Field:
+    """Field times exp(2πi j·by / period), which moves the sum's centre."""
+    types = field.types
+    x, y = Grid(field.grid.shape, 1.0).coordinates(types)
+    waves = (x * opaque(types, by[0]) + y * opaque(types, by[1])) / opaque(types, period)
+    return field * Field.from_waves(1.0, waves, field.grid, types)
 
 
 def predicted_seconds(shape_in: tuple[int, int], period: float, shape_out: tuple[int, int]) -> float:

@@ -1,4 +1,4 @@
-"""Sample positions: n samples at pitch dx with sample n//2 at the origin."""
+"""Sample positions: n samples at pitch dx with sample n//2 at the centre."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.arguments import positive, shape_2d
+from optics.arguments import point_2d, positive, shape_2d
 from optics.precision import Precision, opaque
 
 __all__ = ["Grid", "sample_positions"]
@@ -20,14 +20,16 @@ def sample_positions(n: int, dx: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Grid:
-    """A plane's samples, shape (y, x), pitch dx [m] (or [1/m] for spatial frequencies)."""
+    """A plane's samples, shape (y, x), pitch dx [m] (or [1/m] for spatial frequencies), sample n//2 at `centre` (x, y)."""
 
     shape: tuple[int, int]
     dx: float
+    centre: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", shape_2d("shape", self.shape))
         positive("dx", self.dx)
+        object.__setattr__(self, "centre", point_2d("centre", self.centre))
 
     @classmethod
     def square(cls, n: int, dx: float) -> Grid:
@@ -35,20 +37,30 @@ class Grid:
 
     @property
     def x(self) -> np.ndarray:
-        return sample_positions(self.shape[1], self.dx)
+        return self.centre[0] + sample_positions(self.shape[1], self.dx)
 
     @property
     def y(self) -> np.ndarray:
-        return sample_positions(self.shape[0], self.dx)
+        return self.centre[1] + sample_positions(self.shape[0], self.dx)
 
     @property
     def half_width(self) -> float:
         """Largest distance of a sample from the origin along an axis."""
-        return max(n // 2 for n in self.shape) * self.dx
+        return max(abs(middle) + n // 2 * self.dx for middle, n in zip(self.centre, self.shape[::-1], strict=True))
 
     @property
     def half_diagonal(self) -> float:
         """Largest distance of a sample from the origin."""
+        return float(np.hypot(*(abs(c) + n // 2 * self.dx for c, n in zip(self.centre, self.shape[::-1], strict=True))))
+
+    @property
+    def own_half_width(self) -> float:
+        """Largest distance of a sample from the centre along an axis."""
+        return max(n // 2 for n in self.shape) * self.dx
+
+    @property
+    def own_half_diagonal(self) -> float:
+        """Largest distance of a sample from the centre."""
         return float(np.hypot(self.shape[0] // 2, self.shape[1] // 2) * self.dx)
 
     def coordinates(self, precision: Precision) -> tuple[Any, Any]:
@@ -60,4 +72,7 @@ class Grid:
         columns, pitch = opaque(precision, width), opaque(precision, self.dx)
         row = dr.floor((index + 0.5) / columns)  # integer division would not vectorise
         column = dr.fma(-row, columns, index)
-        return (column - opaque(precision, width // 2)) * pitch, (row - opaque(precision, height // 2)) * pitch
+        x, y = (column - opaque(precision, width // 2)) * pitch, (row - opaque(precision, height // 2)) * pitch
+        if self.centre == (0.0, 0.0):
+            return x, y
+        return x + opaque(precision, self.centre[0]), y + opaque(precision, self.centre[1])

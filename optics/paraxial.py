@@ -27,4 +27,6 @@ def paraxial_integral(u: Field, distance: Any, wavelength: float, window: Grid, 
         x, y = grid.coordinates(types)
         u = u * Field.from_waves(1.0, (x * x + y * y) * (0.5 / scale), grid, types)
     period = scale if is_tracked(distance) else wavelength * number(distance)
-    return dft2(u, period / (grid.dx * window.dx), window.shape, -1, window.dx, window.centre).scaled(grid.dx**2 / scale)
+    return dft2(u, period / (grid.dx * window.dx), window.shape, -1, window.dx, window.centre).scaled(
+        grid.dx**2 / scale
+    )

@@ -24,6 +24,8 @@ from optics.tracked import number
 
 __all__ = ["PSFResult", "plan", "problem", "psf", "spread"]
 
+TRIES = 3
+
 
 @dataclass(frozen=True, eq=False)
 class PSFResult:
@@ -171,9 +173,7 @@ def spread(beams: list[Beam], tasks: list[Problem], method: str = "auto", most_s
     return PSFResult(tensor, window.dx, wavelengths, beams[0].distance, beams[0].pupil, tuple(plans), window.centre)
 
 
-def _checked(
-    beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], asked: tuple[str, float], tries: int = 3
-) -> tuple[Any, Plan]:
+def _checked(beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], asked: tuple[str, float]) -> tuple[Any, Plan]:
     """The PSF, flat, and the plan with the error that a spot check tells. What does not meet the tolerance is planned
     again: by an exact method, and for a smaller tolerance, because a dark window needs more digits than a bright one.
     An approximation asked for by its name stays, however wrong it is seen to be.
@@ -181,27 +181,31 @@ def _checked(
     Raises:
         AccuracyError: the check finds more than the tolerance all the same.
     """
-    plan, sampling = chosen
     types = precision(task.dtype)
     radius = opaque(types, beam.radius)
-    area = beam.pupil.aperture.area * radius * radius
-    image = sampling.intensity(beam, task) / types.Float(area)
-    picture = image.numpy()
-    error = _predicted_error(picture, sampling, task)
-    seen = spot_check(beam, task, picture, plan.seconds)
-    found = image, replace(plan, predicted_error=error if seen is None else seen)
-    if seen is None or seen <= task.tolerance or (sampling.model_error and asked[0] == plan.method):
-        return found
-    if sampling.model_error:
-        exactly = ("exact", asked[1])
-        return _checked(beam, task, choose(task, *exactly), exactly, tries)
-    stricter = replace(task, tolerance=max(0.3 * task.tolerance**2 / seen, 10 * FLOAT_NOISE[task.dtype]))
-    if tries == 1 or stricter.tolerance >= task.tolerance:
-        raise AccuracyError(
-            f"tolerance = {task.tolerance:g}: a check against the direct sum finds an error of {seen:.1g} by "
-            f"{plan.method} in {task.dtype}; widen the tolerance or ask for another method or dtype"
-        )
-    return _checked(beam, stricter, choose(stricter, *asked), asked, tries - 1)
+    area = types.Float(beam.pupil.aperture.area * radius * radius)
+    sampled = task
+    for _ in range(TRIES):
+        plan, sampling = chosen
+        image = sampling.intensity(beam, sampled) / area
+        picture = image.numpy()
+        seen = spot_check(beam, sampled, picture, plan.seconds)
+        if seen is None:
+            return image, replace(plan, predicted_error=_predicted_error(picture, sampling, sampled))
+        if seen <= task.tolerance or (sampling.model_error and asked[0] == plan.method):
+            return image, replace(plan, predicted_error=seen)
+        if sampling.model_error:
+            asked = ("exact", asked[1])
+        else:
+            least = max(0.3 * sampled.tolerance * task.tolerance / seen, 10 * FLOAT_NOISE[task.dtype])
+            if least >= sampled.tolerance:
+                break
+            sampled = replace(sampled, tolerance=least)
+        chosen = choose(sampled, *asked)
+    raise AccuracyError(
+        f"tolerance = {task.tolerance:g}: a check against the direct sum finds an error of {seen:.1g} by "
+        f"{plan.method} in {task.dtype}; widen the tolerance or ask for another method or dtype"
+    )
 
 
 def _predicted_error(image: np.ndarray, sampling: Sampling, task: Problem) -> float:

@@ -72,6 +72,7 @@ def propagate(
     distance: float,
     out_dx: float | None = None,
     out_shape: tuple[int, int] | None = None,
+    out_centre: tuple[float, float] = (0.0, 0.0),
     medium_n: float = 1.0,
     tolerance: float = 1e-3,
     method: str = "auto",
@@ -80,7 +81,7 @@ def propagate(
     """Field at `distance` [m] behind (or, negative, before) the plane in which it is u, carrier exp(ikz) included.
 
     u: complex (…, y, x), pitch dx [m], centre sample n//2. wavelength: vacuum [m].
-    out_dx, out_shape: pitch and shape (y, x) wanted; default as u's.
+    out_dx, out_shape, out_centre: pitch, shape (y, x) and centre (x, y) [m] wanted; default as u's, on the axis.
     tolerance: relative L2 error of the intensity over the window, beyond that of the sampling of u itself.
     method: "auto" and "angular_spectrum" are exact; "fresnel" is the paraxial approximation, only on request.
 
@@ -92,7 +93,7 @@ def propagate(
         raise ValueError(f"method = {method!r}: must be 'auto' or one of {', '.join(PROPAGATION_METHODS)}")
     field = _field(u)
     source = Grid(field.shape[-2:], dx)
-    window = Grid(out_shape or source.shape, dx if out_dx is None else out_dx)
+    window = Grid(out_shape or source.shape, dx if out_dx is None else out_dx, out_centre)
     in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5)
     how = _sampling(
         "angular_spectrum" if method == "auto" else method,
@@ -131,7 +132,10 @@ def _sampling(method: str, source: Grid, window: Grid, wavelength: float, distan
     if end >= nyquist or (not paraxial and end * wavelength >= STEEPEST_SINE):
         band, fade = math.inf, 0.0  # nothing to fade: all that the samples hold may matter
         end = nyquist if paraxial else min(nyquist, STEEPEST_SINE / wavelength)
-    halves = [(n // 2 + 1) * source.dx + (m // 2) * window.dx for n, m in zip(source.shape, window.shape, strict=True)]
+    halves = [
+        (n // 2 + 1) * source.dx + (m // 2) * window.dx + abs(middle)
+        for n, m, middle in zip(source.shape, window.shape, window.centre[::-1], strict=True)
+    ]
     walk = _walk(end, wavelength, z, paraxial)
     least = max(max(halves) + walk, 2 * (max(source.shape) // 2 + 1) * source.dx)
     samples = fast_length(least / source.dx)
@@ -182,7 +186,9 @@ def _one(plane: np.ndarray, how: _Sampling, types: Precision) -> tuple[np.ndarra
     if total == 0:
         return np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0
     sine = np.hypot(how.spectrum.x[None, :], how.spectrum.y[:, None]).ravel() * how.wavelength
-    out = dft2(spectrum * _transfer(how, types), how.period / how.window.dx, how.window.shape, +1, how.window.dx)
+    window = how.window
+    spectrum = spectrum * _transfer(how, types)
+    out = dft2(spectrum, how.period / window.dx, window.shape, +1, window.dx, window.centre)
     result = out.scaled((how.source.dx / how.period) ** 2).numpy()
     arrived = float(np.sum(np.abs(result) ** 2, dtype=np.float64)) * how.window.dx**2
     grazing = (

@@ -25,7 +25,7 @@ def prism(radius, sine, n=1.5, axis=1):
     return Pupil(radius, BSplineRelief(points), n=n)
 
 
-METHODS = ["angular_spectrum", "split_angular_spectrum", "far_field", "rayleigh_sommerfeld"]
+METHODS = ["angular_spectrum", "split_angular_spectrum", "far_field", "low_rank", "rayleigh_sommerfeld"]
 
 
 class TestOracles:
@@ -153,6 +153,34 @@ class TestConventions:
             for s in (1.0, 1.3, 1.5, 1.7, 2.0)
         ]
         assert np.argmax(peaks) == 2
+
+
+class TestWindow:
+    """A window off the axis shows what a larger one on the axis shows there."""
+
+    @pytest.mark.parametrize("method", METHODS)
+    def test_off_the_axis(self, method):
+        pupil = Pupil(12e-6, BSplineRelief(np.random.default_rng(3).random((4, 4)) * 3e-6))
+        asked = {"wavelengths": [550e-9], "sensor_distance": 150e-6, "method": method, "tolerance": 1e-4}
+        whole = optics.psf(pupil, dx=1e-6, shape=(81, 81), **asked)
+        part = optics.psf(pupil, dx=1e-6, shape=(21, 15), centre=(20e-6, -12e-6), **asked)
+        assert relative_l2(part.psf[0], whole.psf[0, 40 - 12 - 10 : 40 - 12 + 11, 40 + 20 - 7 : 40 + 20 + 8]) < 2e-3
+        np.testing.assert_allclose(part.x, whole.x[53:68], atol=1e-15)
+        np.testing.assert_allclose(part.y, whole.y[18:39], atol=1e-15)
+
+    def test_follows_an_oblique_wave_with_few_samples(self):
+        """The focus of a wave from 20° off the axis, 100 µm from it: a small window there needs no large transform."""
+        angle = math.radians(20)
+        place = 240e-6 * math.tan(angle)
+        result = optics.psf(
+            LENS, [550e-9], source_angle=(angle, 0.0), dx=1e-6, shape=(65, 65), centre=(place, 0.0), tolerance=1e-3
+        )
+        assert result.power[0] > 0.8
+        assert math.prod(result.plan.samples) < 2000
+
+    def test_must_be_a_point(self):
+        with pytest.raises(ValueError, match="centre = 3"):
+            optics.psf(LENS, centre=3)
 
 
 class TestPower:

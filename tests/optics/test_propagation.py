@@ -179,3 +179,13 @@ def test_bad_arguments_are_named(changed, message):
     arguments = {"u": np.ones((8, 8)), "dx": 1e-6, "wavelength": WAVELENGTH, "distance": 1e-5} | changed
     with pytest.raises(ValueError, match=message):
         optics.propagate(arguments.pop("u"), **arguments)
+
+
+def test_a_window_off_the_axis_shows_what_a_larger_one_does():
+    x = (np.arange(64) - 32) * 1e-6
+    u = np.exp(-(x[None, :] ** 2 + x[:, None] ** 2) / (2 * (5e-6) ** 2))
+    asked = {"dx": 1e-6, "wavelength": 550e-9, "distance": 300e-6, "tolerance": 1e-4}
+    whole = optics.propagate(u, out_shape=(101, 101), **asked)
+    part = optics.propagate(u, out_shape=(9, 11), out_centre=(-13e-6, 7e-6), **asked)
+    expected = whole.u[50 + 7 - 4 : 50 + 7 + 5, 50 - 13 - 5 : 50 - 13 + 6]
+    assert np.linalg.norm(part.u - expected) < 1e-4 * np.linalg.norm(expected)
