@@ -59,6 +59,10 @@ class GridSampling:
         return self.period if whole else problem.wavelength * problem.distance / self.relay.dx
 
     @property
+    def padding(self) -> float:
+        return self.pupil_period / self.pupil.shape[0]
+
+    @property
     def samples(self) -> tuple[int, int]:
         return self.pupil.shape
 

@@ -49,6 +49,10 @@ class FarFieldSampling:
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
+    def padding(self) -> float:
+        return self.period / self.pupil.shape[0]
+
+    @property
     def samples(self) -> tuple[int, int]:
         return self.pupil.shape
 

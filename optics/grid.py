@@ -20,7 +20,7 @@ def sample_positions(n: int, dx: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Grid:
-    """A plane's samples, shape (y, x), pitch dx [m] (or [1/m] for spatial frequencies), sample n//2 at `centre` (x, y)."""
+    """A plane's samples: shape (y, x), pitch dx [m] (or [1/m] for spatial frequencies), sample n//2 at centre (x, y)."""
 
     shape: tuple[int, int]
     dx: float

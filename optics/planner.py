@@ -96,10 +96,11 @@ class AccuracyError(ValueError):
 
 @dataclass(frozen=True)
 class Option:
-    """A method that was weighed: what it would take, and why it lost (or "chosen")."""
+    """A method that was weighed: what it would take, how wrong it would be, and why it lost (or "chosen")."""
 
     method: str
     samples: tuple[int, int]
+    predicted_error: float
     seconds: float
     verdict: str
 
@@ -109,6 +110,7 @@ class Plan:
     """What was chosen, and why.
 
     samples: (y, x) samples of the pupil; for nodes (radial, angular) or (count, 1).
+    padding: period of the pupil's transform over its samples, where there is one.
     predicted_error: relative L2 error of the intensity over the window.
     seconds: predicted time of a warm call on two cores.
     options: every method that was weighed.
@@ -121,11 +123,13 @@ class Plan:
     why: str
     seconds: float = 0.0
     options: tuple[Option, ...] = ()
+    padding: float = 1.0
 
     def __str__(self) -> str:
         rows = {
             "method": self.method,
-            "samples": f"{self.samples[0]} x {self.samples[1]}",
+            "samples": _size(self.samples),
+            "padding": f"{self.padding:.2f}",
             "dtype": self.dtype,
             "predicted error": f"{self.predicted_error:.1e}",
             "predicted time": f"{self.seconds:.2g} s",
@@ -135,7 +139,8 @@ class Plan:
         if not self.options:
             return "\n".join(head)
         others = [
-            f"  {option.method:<24}{_size(option.samples):>13}{option.seconds:>11.2g} s  {option.verdict}"
+            f"  {option.method:<24}{_size(option.samples):>13}{option.predicted_error:>10.1e}{option.seconds:>9.2g} s"
+            f"  {option.verdict}"
             for option in self.options
         ]
         return "\n".join([*head, "weighed", *others])
@@ -210,7 +215,13 @@ def _size(samples: tuple[int, int]) -> str:
 
 def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None], most_seconds: float) -> Plan:
     options = [
-        Option(name, option.samples, option.seconds, _verdict(option, best, problem, most_seconds))
+        Option(
+            name,
+            option.samples,
+            _sampling_error(problem) + option.model_error,
+            option.seconds,
+            _verdict(option, best, problem, most_seconds),
+        )
         for name, option in weighed.items()
         if option is not None
     ]
@@ -220,7 +231,9 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None],
         f"{problem.band() * problem.wavelength:.2g}; cheapest at {best.seconds:.2g} s" + (f" ({lost})" if lost else "")
     )
     error = _sampling_error(problem) + best.model_error
-    return Plan(best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options))
+    return Plan(
+        best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), getattr(best, "padding", 1.0)
+    )
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:
