@@ -225,10 +225,10 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None],
         for name, option in weighed.items()
         if option is not None
     ]
-    lost = ", ".join(f"{option.method} {option.seconds:.2g} s" for option in options if option.method != best.method)
     why = (
         f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "
-        f"{problem.band() * problem.wavelength:.2g}; cheapest at {best.seconds:.2g} s" + (f" ({lost})" if lost else "")
+        f"{problem.band() * problem.wavelength:.2g}; "
+        + ("cheapest of those that meet the tolerance" if len(options) > 1 else "asked for")
     )
     error = _sampling_error(problem) + best.model_error
     return Plan(
