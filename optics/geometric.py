@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from optics.aperture import Nodes
+from optics.aperture import Aperture
 from optics.beam import Beam
+from optics.direct_sum import cached_nodes, node_count
 from optics.precision import Precision, opaque, precision
 from optics.problem import Problem
 from optics.rays import brightness, mismatch
@@ -20,6 +21,7 @@ __all__ = ["PinholeSampling", "RaySampling", "geometric", "pinhole"]
 # Step of the central differences that give the local slope, in pupil radii: they err by its square times a cubic term.
 STEP = 1e-4
 MOST_RAYS = 4_000_000
+DIGITS = 1.0  # of the rule of nodes, for the fastest that the splats' spectra turn
 # Relative L2 of Fresnel's fringes behind an edge, over a disk of Fresnel number 1: they fall with its fourth root.
 FRINGES = 0.75
 SPLAT_CELLS = 3.3  # area of a splat, as its inverse mean square: (∫β²)⁻² of the quadratic B-spline β
@@ -29,7 +31,8 @@ SPLAT_CELLS = 3.3  # area of a splat, as its inverse mean square: (∫β²)⁻²
 class RaySampling:
     """Edge-fitted rays, and the error of the intensity that rays instead of waves make."""
 
-    nodes: Nodes
+    rule: tuple[Aperture, float, float]
+    count: int
     model_error: float
     seconds: float
     method: str = "geometric"
@@ -39,9 +42,9 @@ class RaySampling:
         import drjit as dr
 
         types = precision(problem.dtype)
-        radius = opaque(types, beam.radius)
-        x, y = types.Float64(self.nodes.x) * radius, types.Float64(self.nodes.y) * radius
-        weight = types.Float64(self.nodes.weight) * dr.square(radius)
+        radius, nodes = opaque(types, beam.radius), cached_nodes(*self.rule)
+        x, y = types.Float64(nodes.x) * radius, types.Float64(nodes.y) * radius
+        weight = types.Float64(nodes.weight) * dr.square(radius)
         x, y, propagates = _landings(beam, x, y, types)
         return _splat(x, y, dr.select(propagates, weight, 0), problem, types)
 
@@ -51,11 +54,11 @@ class RaySampling:
 
     @property
     def samples(self) -> tuple[int, int]:
-        return len(self.nodes), 1
+        return self.count, 1
 
     @property
     def largest(self) -> int:
-        return math.ceil(math.sqrt(len(self.nodes)))
+        return math.ceil(math.sqrt(self.count))
 
 
 @dataclass(frozen=True)
@@ -81,11 +84,11 @@ class PinholeSampling:
         x, y, propagates = _landings(beam, zero, zero, types)
         if dr.grad_enabled(x, y) or is_tracked(beam.radius):
             raise ValueError("method = 'pinhole': has no derivatives; ask for 'geometric' or a wave method")
-        height, width = problem.window.shape
-        column, row = (round(float(at[0]) / problem.window.dx) + n // 2 for at, n in ((x, width), (y, height)))
-        image = np.zeros(problem.window.shape, dtype=types.dtype)
-        if 0 <= row < height and 0 <= column < width and bool(propagates[0]):
-            image[row, column] = beam.pupil.area / problem.window.dx**2
+        window = problem.window
+        column, row = (round((float(at[0]) - first) / window.dx) for at, first in ((x, window.x[0]), (y, window.y[0])))
+        image = np.zeros(window.shape, dtype=types.dtype)
+        if 0 <= row < window.shape[0] and 0 <= column < window.shape[1] and bool(propagates[0]):
+            image[row, column] = beam.pupil.area / window.dx**2
         return types.Float(image.ravel())
 
     def plane(self, problem: Problem) -> float:
@@ -96,17 +99,19 @@ class PinholeSampling:
 def geometric(problem: Problem) -> list[RaySampling]:
     """Enough rays that their splats join to a smooth picture: node spacing after stretching below the window's pitch.
 
-    A quadratic B-spline's spectrum falls like (πf dx)⁻³, so beyond f = (tolerance/10)^(-1/3)/(π dx) it is negligible.
+    A quadratic B-spline's spectrum falls like (πf dx)⁻³: beyond f = error^(-1/3)/(π dx) it is negligible.
     """
-    rays, dx = problem.rays, problem.window.dx
+    rays = problem.rays
     if rays is None:
         return []
+    model = _ray_error(problem)
+    error = max(problem.tolerance, model / 10) / 10
     stretch = float(rays.most.max()) if len(rays) else 1.0
-    cycles = problem.radius * stretch / (math.pi * dx) * (problem.tolerance / 10) ** (-1 / 3)
-    if 4 * math.pi * cycles**2 > MOST_RAYS:
-        return []
-    nodes = problem.aperture.nodes(cycles, 1.0)
-    return [RaySampling(nodes, _ray_error(problem), 1e-3 + len(nodes) * 1e-7)]
+    cycles = problem.radius * stretch / (math.pi * problem.window.dx) * error ** (-1 / 3)
+    cycles = 2 ** (math.ceil(4 * math.log2(max(cycles, 1.0))) / 4)  # few different rules, so that they are found again
+    count = node_count(problem.aperture, cycles, DIGITS)
+    seconds = 1e-3 + count * 1e-7
+    return [RaySampling((problem.aperture, cycles, DIGITS), count, model, seconds)] if count < MOST_RAYS else []
 
 
 def pinhole(problem: Problem) -> list[PinholeSampling]:
@@ -141,8 +146,8 @@ def _splat(x: Any, y: Any, weight: Any, problem: Problem, types: Precision) -> A
     window, (height, width) = problem.window, problem.window.shape
     image = dr.zeros(types.Float64, height * width)
     places = []
-    for at, n in ((x, width), (y, height)):
-        place = at * opaque(types, 1 / window.dx) + opaque(types, n // 2)
+    for at, first, n in ((x, window.x[0], width), (y, window.y[0], height)):
+        place = (at - opaque(types, first)) * opaque(types, 1 / window.dx)
         place = dr.clip(place, -10, n + 10.0)  # far outside, and within the index type
         cell = dr.detach(dr.round(place))
         places.append((cell, _quadratic_basis(place - cell)))

@@ -62,8 +62,9 @@ class Rays:
         return disk_area(self.to_x, self.to_y)
 
     def some(self, most: int) -> Rays:
-        """About `most` of the rays, evenly."""
-        chosen = np.unique(np.linspace(0, len(self) - 1, min(most, len(self))).round().astype(int))
+        """`most` of the rays or all, evenly: steps of the golden section fall into step with no row."""
+        turns = (np.arange(min(most, len(self))) + 0.5) * (math.sqrt(5) - 1) / 2
+        chosen = ((turns % 1) * len(self)).astype(int) if most < len(self) else slice(None)
         parts = (self.x, self.y, self.to_x, self.to_y, self.least, self.most, self.sign)
         return Rays(*(part[chosen] for part in parts))
 

@@ -10,7 +10,8 @@ from optics.precision import precision
 WAVELENGTH, SHAPE = 550e-9, (17, 15)
 # Whole waves of defocus, an index step and a source nearby: every parameter moves the picture.
 PARAMETERS = {"radius": 12e-6, "distance": 120e-6, "n": 1.5, "focal_length": 140e-6, "source_distance": 1e-3}
-METHODS = ["low_rank", "far_field", "angular_spectrum", "split_angular_spectrum", "rayleigh_sommerfeld"]
+EXACT = ["low_rank", "far_field", "angular_spectrum", "split_angular_spectrum", "rayleigh_sommerfeld"]
+METHODS = [*EXACT, "fresnel", "fraunhofer", "geometric"]
 # Relative step of central differences: rounding (1e-10 of the PSF) over the step, and its square, both below 1e-4.
 STEP = 1e-5
 
