@@ -25,7 +25,7 @@ from optics.grid import Grid
 from optics.planner import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Plan
 from optics.precision import Precision, opaque, precision
 
-__all__ = ["PROPAGATION_METHODS", "PropagationResult", "propagate"]
+__all__ = ["PROPAGATION_METHODS", "RIPPLE_PER_TOLERANCE", "PropagationResult", "kept_band", "propagate"]
 
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 # Steepest light that the period makes room for, as sin θ; z tan θ has no bound beyond.
@@ -127,7 +127,8 @@ def _field(u: np.ndarray) -> np.ndarray:
 def _sampling(method: str, source: Grid, window: Grid, wavelength: float, distance: float, ripple: float) -> _Sampling:
     z, nyquist = abs(distance), math.sqrt(0.5) / source.dx  # along the diagonal
     paraxial = method == "fresnel"
-    band, fade = _band(source, window, wavelength, z, ripple, paraxial)
+    corner = source.half_diagonal + source.dx + window.half_diagonal
+    band, fade = kept_band(corner, wavelength, z, ripple, paraxial)
     end = band + fade
     if end >= nyquist or (not paraxial and end * wavelength >= STEEPEST_SINE):
         band, fade = math.inf, 0.0  # nothing to fade: all that the samples hold may matter
@@ -156,15 +157,13 @@ def _walk(frequency: float, wavelength: float, z: float, paraxial: bool) -> floa
     return z * (sine if paraxial else sine / math.sqrt(1 - sine * sine))
 
 
-def _band(
-    source: Grid, window: Grid, wavelength: float, z: float, ripple: float, paraxial: bool
-) -> tuple[float, float]:
-    """Band kept whole, and the width [1/m] of the fade beyond it, that need the shortest period.
+def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> tuple[float, float]:
+    """Band kept whole for light that may walk `corner` [m] to the side over z, and the width [1/m] of the fade beyond
+    it, that need the shortest period; (infinite, 0) where nothing may fade.
 
     A narrow fade blurs far, so that the band must reach as far outside the window; a wide one lets light walk far
     before it is gone. Either way the period has to hold what is not gone.
     """
-    corner = source.half_diagonal + source.dx + window.half_diagonal
     blur = 2 * math.log(1 / ripple) / math.pi
     if z == 0:
         return math.inf, 0.0
