@@ -67,13 +67,13 @@ def _single_precision(case: str, ours: Sequence[Point], peers: Sequence[Point]) 
 
 
 def _angular_spectra(case: str, ours: Sequence[Point], peers: Sequence[Point]) -> list[Verdict]:
-    """At equal samples: against the peer with the least error there, at its quickest."""
+    """At equal samples: errors against the least of the peers', times against the quickest of those as near to it."""
     found = []
     spectra = [[point for point in points if point.kind == "angular spectrum"] for points in (ours, peers)]
     for samples in sorted({point.samples for point in spectra[0]} & {point.samples for point in spectra[1]}):
         mine, others = ([point for point in points if point.samples == samples] for points in spectra)
         least = min(map(_error, others))
-        rival = min((point for point in others if point.error <= 1.01 * least), key=_seconds)
+        rival = min((point for point in others if point.error <= COMPARABLE * least), key=_seconds)
         good = [point for point in mine if point.error <= COMPARABLE * least]
         best = min(good or mine, key=_seconds)
         passed = bool(good) and best.seconds <= NO_SLOWER * rival.seconds
