@@ -14,13 +14,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from optics.arguments import finite, in_range, positive
 from optics.field import Field
-from optics.fourier import dft2, fast_length, predicted_seconds
+from optics.fourier import fast_length, fourier_sum, predicted_seconds
 from optics.grid import Grid
 from optics.planner import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Plan
 from optics.precision import Precision, opaque, precision
@@ -32,6 +33,9 @@ PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 STEEPEST_SINE = 0.995
 # Share of faded light that strays into the window: small, because the window may hold far less than is faded.
 RIPPLE_PER_TOLERANCE = 3e-3
+
+
+ONE = np.ones(1)  # the weight of what counts whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,32 +182,66 @@ def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxia
 
 def _one(plane: np.ndarray, how: _Sampling, types: Precision) -> tuple[np.ndarray, float, float]:
     """The propagated plane, the predicted error of its intensity, and the fraction of evanescent power."""
-    u = Field.from_numpy(plane, how.source.dx, types)
-    spectrum = dft2(u, round(how.period / how.source.dx), how.spectrum.shape, -1, how.spectrum.dx)
-    power = spectrum.intensity.numpy().astype(np.float64) * how.source.dx**4 / how.period**2
-    total = float(np.sum(np.abs(plane) ** 2, dtype=np.float64)) * how.source.dx**2
+    plane = np.ascontiguousarray(plane, dtype=types.complex_dtype)
+    spectrum = fourier_sum(plane, round(how.period / how.source.dx), how.spectrum.shape, -1)
+    total = _power(plane) * how.source.dx**2
     if total == 0:
         return np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0
-    sine = np.hypot(how.spectrum.x[None, :], how.spectrum.y[:, None]).ravel() * how.wavelength
-    window = how.window
-    spectrum = spectrum * _transfer(how, types)
-    out = dft2(spectrum, how.period / window.dx, window.shape, +1, window.dx, window.centre)
-    result = out.scaled((how.source.dx / how.period) ** 2).numpy()
-    arrived = float(np.sum(np.abs(result) ** 2, dtype=np.float64)) * how.window.dx**2
-    grazing = (
-        (sine > STEEPEST_SINE) & (sine < 1) & (math.isinf(how.band) and how.distance != 0 and how.method != "fresnel")
-    )
-    loose = power[grazing].sum()
-    rounding = FLOAT_NOISE[types.dtype] * math.sqrt(total / arrived) if arrived else math.inf
-    fading = 2 * how.ripple * math.sqrt(power[sine > how.band * how.wavelength].sum() / arrived) if arrived else 0.0
-    error = 2 * math.sqrt(loose / arrived) + rounding + fading if arrived else math.inf
+    space, window = _free_space(how, types.dtype), how.window
+    unit = how.source.dx**4 / how.period**2
+    shares = [_power(spectrum, weight) * unit for weight in (space.grazing, space.faded, space.evanescent)]
+    spectrum *= space.transfer
+    result = fourier_sum(spectrum, how.period / window.dx, window.shape, +1)
+    arrived = _power(result) * window.dx**2
+    loose, faded, evanescent = shares
+    if not arrived:
+        return result, math.inf, evanescent / total
+    rounding = FLOAT_NOISE[types.dtype] * math.sqrt(total / arrived)
+    error = 2 * math.sqrt(loose / arrived) + rounding + 2 * how.ripple * math.sqrt(faded / arrived)
+    return result, error, evanescent / total
+
+
+def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
+    """Σ w |u|² in float64; 0 without a weight."""
+    if weight is None:
+        return 0.0
+    flat = u.view(u.real.dtype)
+    if weight is ONE:
+        return float(np.einsum("ij,ij->", flat, flat, dtype=np.float64))
+    return float(np.dot((u.real**2 + u.imag**2).ravel(), weight.ravel()))
+
+
+@dataclass(frozen=True, eq=False)
+class _FreeSpace:
+    """Free space between two planes, over the spectrum: the transfer function, with everything that does not depend on
+    the field, and how much of each frequency is too near grazing, in the fade, or evanescent (None: nothing is)."""
+
+    transfer: np.ndarray
+    grazing: np.ndarray | None
+    faded: np.ndarray | None
+    evanescent: np.ndarray | None
+
+
+@lru_cache(maxsize=4)
+def _free_space(how: _Sampling, dtype: str) -> _FreeSpace:
+    """The same distance is often travelled again; the transfer function costs more than the transforms."""
+    types = precision(dtype)
+    sine = np.hypot(how.spectrum.x[None, :], how.spectrum.y[:, None]) * how.wavelength
+    every = math.isinf(how.band) and how.distance != 0 and how.method != "fresnel"
+    grazing = (sine > STEEPEST_SINE) & (sine < 1) if every else None
+    faded = sine > how.band * how.wavelength if how.fade else None
     # A frequency's cell on the circle f = n/λ counts by how far it reaches outside: the error falls with its width².
     outside = np.clip((sine - 1) / (how.spectrum.dx * how.wavelength) + 0.5, 0, 1)
-    return result, error, float(np.sum(power * outside) / total)
+    weights = (
+        None if weight is None or not weight.any() else np.ascontiguousarray(weight, dtype=dtype)
+        for weight in (grazing, faded, outside)
+    )
+    return _FreeSpace(_transfer(how, types), *weights)
 
 
-def _transfer(how: _Sampling, types: Precision) -> Field:
-    """H under the fade, over the spectrum's grid; whole waves are dropped in float64."""
+def _transfer(how: _Sampling, types: Precision) -> np.ndarray:
+    """H under the fade, over the spectrum's grid, with the sums' scale and the way to the window's centre; whole waves
+    are dropped in float64."""
     import drjit as dr
 
     fx, fy = how.spectrum.coordinates(types)
@@ -220,7 +258,9 @@ def _transfer(how: _Sampling, types: Precision) -> Field:
         steepness = 2 * math.sqrt(math.log(1 / how.ripple)) / how.fade
         middle = how.band + how.fade / 2
         decay *= (1 - dr.erf((dr.sqrt(f2) - opaque(types, middle)) * opaque(types, steepness))) / 2
-    return Field.from_waves(decay, waves, how.spectrum, types)
+    waves += fx * opaque(types, how.window.centre[0]) + fy * opaque(types, how.window.centre[1])
+    scale = opaque(types, (how.source.dx / how.period) ** 2)
+    return Field.from_waves(decay * scale, waves, how.spectrum, types).numpy()
 
 
 def _plan(how: _Sampling, error: float, dtype: str) -> Plan:
