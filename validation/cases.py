@@ -1,0 +1,91 @@
+"""Random pupils, distances, windows and tolerances over the whole domain that the planner is made for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import optics
+
+__all__ = ["WAVELENGTH", "Case", "draw_case"]
+
+WAVELENGTH = 550e-9
+FRESNEL_NUMBERS = (1e-2, 1e3)
+APERTURES = (1e-2, 0.7)
+TALLEST_RELIEF = 40e-6
+SIDES = (17, 129)
+LOOSEST = 3e-2
+TIGHTEST = {"float32": 1e-5, "float64": 1e-8}
+KINDS = {"flat": 0.1, "lens": 0.15, "B-spline": 0.35, "lens + B-spline": 0.3, "height map": 0.1}
+
+
+@dataclass(frozen=True)
+class Case:
+    """aperture: NA = R/√(R² + z²). relief: peak height of a relief [m], 0 without. window: dx and shape."""
+
+    kind: str
+    pupil: optics.Pupil
+    distance: float
+    window: dict[str, Any]
+    tolerance: float
+    dtype: str
+    fresnel_number: float
+    aperture: float
+    relief: float
+
+    def psf(self, method: str = "auto") -> optics.PSFResult:
+        asked = {"tolerance": self.tolerance, "dtype": self.dtype, "method": method}
+        return optics.psf(self.pupil, [WAVELENGTH], self.distance, **self.window, **asked)
+
+    def __str__(self) -> str:
+        height, width = self.window["shape"]
+        return (
+            f"{self.kind}, Fresnel number {self.fresnel_number:.3g}, NA {self.aperture:.3g}, "
+            f"relief {self.relief:.2g} m, n {self.pupil.n.a:.3g}, {height} x {width} at {self.window['dx']:.3g} m, "
+            f"tolerance {self.tolerance:.2g}, {self.dtype}"
+        )
+
+
+def draw_case(rng: np.random.Generator) -> Case:
+    """Fresnel number, NA, relief height and tolerance log-uniform; windows from a part of the light to all of it."""
+    fresnel_number, aperture = (_log_uniform(rng, *ends) for ends in (FRESNEL_NUMBERS, APERTURES))
+    tangent = aperture / math.sqrt(1 - aperture**2)
+    radius = fresnel_number * WAVELENGTH / tangent
+    distance = radius / tangent
+    kind = str(rng.choice(list(KINDS), p=list(KINDS.values())))
+    relief = _log_uniform(rng, 1e-7, TALLEST_RELIEF) if kind not in ("flat", "lens") else 0.0
+    surface: Any = None
+    if "B-spline" in kind:
+        surface = optics.BSplineRelief(rng.random((4, 4)) * relief)
+    elif kind == "height map":
+        surface = _hills(rng) * relief
+    lens = distance if "lens" in kind else None
+    pupil = optics.Pupil(radius, surface, n=rng.uniform(1.05, 2.0), thin_lens_focal_length=lens)
+    window = _window(rng, radius, distance, lens is not None)
+    dtype = str(rng.choice(["float32", "float64"]))
+    tolerance = _log_uniform(rng, TIGHTEST[dtype], LOOSEST)
+    return Case(kind, pupil, distance, window, tolerance, dtype, fresnel_number, aperture, relief)
+
+
+def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(10 ** rng.uniform(math.log10(low), math.log10(high)))
+
+
+def _hills(rng: np.random.Generator) -> np.ndarray:
+    """A tilted, wavy surface of peak height 1, 12 x 12 samples."""
+    y, x = np.mgrid[-1:1:12j, -1:1:12j]
+    c = rng.normal(size=6)
+    surface = c[0] * x + c[1] * y + c[2] * x * y + c[3] * np.sin(3 * x + c[4]) * np.cos(2 * y + c[5])
+    return (surface - surface.min()) / np.ptp(surface)
+
+
+def _window(rng: np.random.Generator, radius: float, distance: float, focused: bool) -> dict[str, Any]:
+    """Half its width: part of the pupil's shadow or some Airy radii, whichever is wider; at most 50° off the axis."""
+    shadow = radius * rng.uniform(0.3, 1.5) * (0.1 if focused else 1.0)
+    rings = rng.uniform(3, 12) * WAVELENGTH * distance / (2 * radius)
+    half = min(max(shadow, rings), 1.2 * distance)
+    shape = tuple(int(n) for n in rng.integers(SIDES[0], SIDES[1] + 1, 2))
+    return {"dx": half / (max(shape) / 2), "shape": shape}
