@@ -200,7 +200,7 @@ def _checked(beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], asked: tu
             least = max(0.3 * sampled.tolerance * task.tolerance / seen, 10 * FLOAT_NOISE[task.dtype])
             if least >= sampled.tolerance:
                 break
-            sampled = replace(sampled, tolerance=least)
+            sampled = problem(beam, task.window, least, task.dtype)  # fine detail counts for more, too
         chosen = choose(sampled, *asked)
     raise AccuracyError(
         f"tolerance = {task.tolerance:g}: a check against the direct sum finds an error of {seen:.1g} by "
