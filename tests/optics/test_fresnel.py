@@ -98,7 +98,7 @@ def test_predicted_error_bounds_the_actual_one(method, close):
 
 
 def test_auto_takes_fresnel_where_it_is_right_and_cheaper():
-    """A wide window far behind a small bent pupil at a loose tolerance: the exact methods cost several times as much."""
+    """A wide window far behind a small bent pupil at a loose tolerance: exact methods cost several times as much."""
     bent = Pupil(60e-6, BSplineRelief(2e-6 * np.random.default_rng(0).random((4, 4))))
     case = {"dx": 4e-6, "shape": (129, 129), "tolerance": 0.05}
     found = optics.psf(bent, [WAVELENGTH], 6e-3, **case)
