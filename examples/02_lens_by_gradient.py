@@ -8,6 +8,7 @@ gathered into ever smaller spots; the derivative of the PSF with respect to ever
 
 from __future__ import annotations
 
+import sys
 import time
 
 import numpy as np
@@ -67,3 +68,5 @@ if __name__ == "__main__":
         print(f"spot {spot * 1e6:4g} µm  {calls:4d} PSFs  Strehl ratio {ratio:.4f}")
     print(f"paraboloid, for comparison  Strehl ratio {strehl(paraboloid()):.4f}")
     print(f"{time.perf_counter() - start:.1f} s")
+    if stages[-1][1] < 0.8:
+        sys.exit("the search did not find a lens")
