@@ -13,6 +13,7 @@ _CONTENTS = {
     "FreeSpace": "stack",
     "Grid": "grid",
     "HeightMap": "doe",
+    "PSFBatch": "batch",
     "PSFResult": "point_spread",
     "PhotonBudget": "photon_budget",
     "Plan": "planner",
@@ -32,6 +33,7 @@ _CONTENTS = {
     "propagate": "propagation",
     "propagate_through": "stack",
     "psf": "point_spread",
+    "psf_batch": "batch",
     "require": "backend",
     "strehl_ratio": "quality",
 }

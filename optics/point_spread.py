@@ -22,7 +22,7 @@ from optics.source import PointSource
 from optics.spot_check import spot_check
 from optics.tracked import number
 
-__all__ = ["PSFResult", "plan", "problem", "psf", "spread"]
+__all__ = ["PSFResult", "pictures", "plan", "problem", "psf", "spread"]
 
 TRIES = 3
 
@@ -161,19 +161,41 @@ def spread(beams: list[Beam], tasks: list[Problem], method: str = "auto", most_s
     """
     import drjit as dr
 
-    chosen = [choose(task, method, most_seconds) for task in tasks]  # refused before anything is computed
+    flat, plans = zip(*pictures(beams, tasks, method, most_seconds), strict=True)
     window, types = tasks[0].window, precision(tasks[0].dtype)
-    found = [
-        _checked(beam, task, choice, (method, most_seconds))
-        for beam, task, choice in zip(beams, tasks, chosen, strict=True)
-    ]
-    flat, plans = zip(*found, strict=True)
     tensor = types.Tensor(flat[0] if len(flat) == 1 else dr.concat(flat), (len(flat), *window.shape))
     wavelengths = np.array([beam.wavelength for beam in beams])
     return PSFResult(tensor, window.dx, wavelengths, beams[0].distance, beams[0].pupil, tuple(plans), window.centre)
 
 
-def _checked(beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], asked: tuple[str, float]) -> tuple[Any, Plan]:
+def pictures(
+    beams: Sequence[Beam], tasks: Sequence[Problem], method: str = "auto", most_seconds: float = 60.0
+) -> list[tuple[Any, Plan]]:
+    """PSFs, flat, and their plans: all are refused before anything is computed, and all started before any is waited
+    for.
+
+    Raises:
+        AccuracyError: see `spread`.
+    """
+    import drjit as dr
+
+    chosen = [choose(task, method, most_seconds) for task in tasks]
+    started = [_picture(beam, task, sampling) for beam, task, (_, sampling) in zip(beams, tasks, chosen, strict=True)]
+    for image in started:
+        dr.eval(image)  # one launch each: together they would be one kernel, compiled anew for every number of them
+    asked = method, most_seconds
+    return [_checked(*each, asked) for each in zip(beams, tasks, chosen, started, strict=True)]
+
+
+def _picture(beam: Beam, task: Problem, sampling: Sampling) -> Any:
+    types = precision(task.dtype)
+    radius = opaque(types, beam.radius)
+    return sampling.intensity(beam, task) / types.Float(beam.pupil.aperture.area * radius * radius)
+
+
+def _checked(
+    beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], image: Any, asked: tuple[str, float]
+) -> tuple[Any, Plan]:
     """The PSF, flat, and the plan with the error that a spot check tells. What does not meet the tolerance is planned
     again: by an exact method, and for a smaller tolerance, because a dark window needs more digits than a bright one.
     An approximation asked for by its name stays, however wrong it is seen to be.
@@ -181,13 +203,9 @@ def _checked(beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], asked: tu
     Raises:
         AccuracyError: the check finds more than the tolerance all the same.
     """
-    types = precision(task.dtype)
-    radius = opaque(types, beam.radius)
-    area = types.Float(beam.pupil.aperture.area * radius * radius)
     sampled = task
     for _ in range(TRIES):
         plan, sampling = chosen
-        image = sampling.intensity(beam, sampled) / area
         picture = image.numpy()
         seen = spot_check(beam, sampled, picture, plan.seconds)
         if seen is None:
@@ -202,6 +220,7 @@ def _checked(beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], asked: tu
                 break
             sampled = problem(beam, task.window, least, task.dtype)  # fine detail counts for more, too
         chosen = choose(sampled, *asked)
+        image = _picture(beam, sampled, chosen[1])
     raise AccuracyError(
         f"tolerance = {task.tolerance:g}: a check against the direct sum finds an error of {seen:.1g} by "
         f"{plan.method} in {task.dtype}; widen the tolerance or ask for another method or dtype"
