@@ -1,0 +1,125 @@
+"""Rays through a real surface z = h(x), glass below, vacuum above, light along +z: what a thin element cannot know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = [
+    "Corrugation",
+    "RealLens",
+    "caught_again",
+    "corrugation",
+    "deviation_glass_first",
+    "deviation_relief_first",
+    "real_lens",
+    "refract",
+    "thin_deviation",
+    "transmission",
+]
+
+
+@dataclass(frozen=True)
+class RealLens:
+    """strehl: of the real surface at its best focus; spread: paraxial less marginal focus over λ/NA²."""
+
+    aperture: float
+    height: float
+    strehl: float
+    spread: float
+
+
+@dataclass(frozen=True)
+class Corrugation:
+    """Shares of the light; the mask lets everything through once."""
+
+    depth: float
+    reflected: float
+    caught: float
+
+
+def refract(slope: np.ndarray, n: float) -> tuple[np.ndarray, np.ndarray]:
+    """Direction (x, z) of a ray that leaves glass of index n where h has this slope; NaN where it is totally reflected.
+
+    Snell's law as a vector: t = n d + (√(1 - n²(1 - c²)) - n c) N, c = d·N, N = (-h', 1)/√(1 + h'²)
+    (Born & Wolf, Principles of Optics, §3.2.2).
+    """
+    slope = np.asarray(slope, dtype=np.float64)
+    c = 1 / np.sqrt(1 + slope**2)
+    inside = 1 - n**2 * (1 - c**2)
+    along = np.where(inside > 0, np.sqrt(np.maximum(inside, 0)), np.nan) - n * c
+    return -along * slope * c, n + along * c
+
+
+def deviation_glass_first(angle: float, n: float) -> float:
+    """[rad] of a ray that leaves through a surface tilted by α: arcsin(n sin α) - α; NaN where totally reflected."""
+    sine = n * np.sin(angle)
+    return float(np.arcsin(sine) - angle) if sine < 1 else float("nan")
+
+
+def deviation_relief_first(angle: float, n: float) -> float:
+    """[rad] of a ray that enters through a surface tilted by `angle` and leaves through a flat one."""
+    return float(np.arcsin(n * np.sin(angle - np.arcsin(np.sin(angle) / n))))
+
+
+def thin_deviation(angle: float, n: float) -> float:
+    """[rad] by the thin element exp(ik(n - 1)h): sin θ = (n - 1) tan α; NaN where evanescent."""
+    sine = (n - 1) * np.tan(angle)
+    return float(np.arcsin(sine)) if sine < 1 else float("nan")
+
+
+def transmission(angle: float, n: float) -> float:
+    """Share of unpolarised power that leaves glass through a tilted surface (Fresnel; Born & Wolf §1.5.3)."""
+    cos_in, sine = np.cos(angle), n * np.sin(angle)
+    if sine >= 1:
+        return 0.0
+    cos_out = np.sqrt(1 - sine**2)
+    s = (n * cos_in - cos_out) / (n * cos_in + cos_out)
+    p = (cos_in - n * cos_out) / (cos_in + n * cos_out)
+    return float(1 - (s**2 + p**2) / 2)
+
+
+def caught_again(height: Callable[[np.ndarray], np.ndarray], slope: np.ndarray, x: np.ndarray, n: float) -> np.ndarray:
+    """Which rays, leaving z = height(x) at these places of these slopes, meet the surface a second time.
+
+    The surface must stay below its highest sampled place: beyond it a ray is free.
+    """
+    tx, tz = refract(slope, n)
+    start = height(x)
+    climb = start.max() - start
+    caught = np.zeros(x.shape, dtype=bool)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        reach = np.where(tz > 0, climb / tz, 0)  # a ray is followed until it has risen above everything
+        for share in np.linspace(0.002, 1, 500):
+            caught |= start + share * reach * tz < height(x + share * reach * tx) - 1e-12 * np.ptp(start)
+    return caught
+
+
+def real_lens(aperture: float, focal_length: float, n: float, wavelength: float) -> RealLens:
+    """The relief whose mask is an ideal lens, flat side to the light, rim in the plane z = 0."""
+    radius = focal_length * aperture / np.sqrt(1 - aperture**2)
+    height = (np.hypot(radius, focal_length) - focal_length) / (n - 1)
+    nodes, weights = np.polynomial.legendre.leggauss(300)
+    r2 = radius**2 * (nodes + 1) / 2
+    h = height - (np.sqrt(r2 + focal_length**2) - focal_length) / (n - 1)
+
+    # |mean of exp(ikL)|² over the pupil's area, L the path through each point of the surface to a focus at z
+    depth = wavelength / aperture**2
+    z = focal_length + depth * np.linspace(-40, 40, 801)[:, None]
+    path = n * h + np.sqrt(r2 + (z - h) ** 2)
+    strehl = np.abs(np.exp(2j * np.pi / wavelength * (path - path[:, -1:])) @ weights / 2) ** 2
+    tx, tz = refract(np.array(-aperture / (n - 1)), n)
+    return RealLens(
+        aperture, float(height), float(strehl.max()), float((height + focal_length + radius * tz / tx) / depth)
+    )
+
+
+def corrugation(depth: float, n: float) -> Corrugation:
+    """h = (d/2) sin(2πx), period 1."""
+    x = (np.arange(4000) + 0.5) / 4000
+    slope = np.pi * depth * np.cos(2 * np.pi * x)
+    lost = np.isnan(refract(slope, n)[0])
+    again = caught_again(lambda at: depth / 2 * np.sin(2 * np.pi * at), slope, x, n)
+    return Corrugation(depth, float(lost.mean()), float(again.mean()))
