@@ -23,12 +23,14 @@ class Spheres:
     frames    rotation from the sphere's frame to the world's, (k, 3, 3)
     offsets   of the sphere's centre from the body's origin, in the world's frame [m], (k, 3)
     bsdfs     one Mitsuba BSDF each; kept here, since a BSDFPtr does not keep its objects alive
+    geoms     ids of the geoms, (k,)
     """
 
     radii: np.ndarray
     frames: np.ndarray
     offsets: np.ndarray
     bsdfs: tuple[Any, ...]
+    geoms: tuple[int, ...]
 
     def __len__(self) -> int:
         return len(self.radii)

@@ -17,11 +17,11 @@ import mitsuba as mi
 import numpy as np
 
 import optics
-from sim import lighting, movers
-from sim.agent import BODY_RADIUS, EYE_HEIGHT, Eyes, eye_positions, eye_rotations
+from sim.agent import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.sensor import build_sensor
 from sim.stage import Stage, build_stage
 from sim.state import WorldState
+from sim.tracer import Tracer, tracer_of
 from sim.variant import variant
 from sim.world import World
 
@@ -36,15 +36,21 @@ class BatchedRenderer:
     n_envs             number of worlds in a state
     rays_per_receptor  samples of each receptor (perfect lens), or per receptor on average (behind a pupil)
 
-    Raises ValueError for less than one world or ray, and for lights other than directional ones.
+    tracer             "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto";
+                       the one in use is in `.tracer.name`, why in `.tracer.why`
+
+    Raises ValueError for less than one world or ray, for lights other than directional ones, and for a world that has
+    no closed form where that is asked for.
     """
 
-    def __init__(self, world: World, eyes: Eyes, n_envs: int, rays_per_receptor: int = 4) -> None:
+    def __init__(self, world: World, eyes: Eyes, n_envs: int, rays_per_receptor: int = 4, tracer: str = "auto") -> None:
         self.world, self.eyes = world, eyes
         self.eye = eyes.eye()
         self.sensor = build_sensor(self.eye, rays_per_receptor)
         self.bands: optics.SpectralBands = self.eye.spectral_bands
         self._stage = build_stage(world)
+        with variant(self._stage.variant):
+            self.tracer: Tracer = tracer_of(world, self._stage, self.bands.wavelengths, tracer)
         self._set_width(n_envs)
 
     def resized(self, n_envs: int) -> BatchedRenderer:
@@ -63,10 +69,9 @@ class BatchedRenderer:
             self._inputs = {
                 "directions": mi.Float(_in_agent_frame(self.eyes, self.sensor.directions)),
                 "origins": mi.Float(_eye_origins(self.eyes)),
-                # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.
-                "bsdfs": mi.BSDFPtr([*stage.spheres.bsdfs, stage.scene.shapes()[0].bsdf()]),
+                **self.tracer.inputs,
             }
-            wavefront = _Wavefront(self, stage)
+            wavefront = _Wavefront(self)
             # Read lane by lane, so that a replay has the width that was recorded. With tables alone as inputs, Dr.Jit
             # 1.5 took it from one that changes with what else the process has loaded: 126 lanes replayed out of 128,
             # the last receptors silently dark (tests/test_parameters.py runs each life twice and has met it).
@@ -78,13 +83,16 @@ class BatchedRenderer:
 
     def radiance(self, state: WorldState) -> np.ndarray:
         """Spectral radiance along every ray, (env, eye, ray, band) float32."""
-        rays = self._launch(self._rays, state).reshape(len(self.bands.wavelengths), self.n_envs, self.eyes.n_eyes, -1)
-        return np.ascontiguousarray(np.moveaxis(rays, 0, -1))
+        components = self._launch(self._rays, state).reshape(len(self.tracer.basis), -1)
+        rays = np.einsum("kn,kb->nb", components, self.tracer.basis.astype(np.float32))
+        return rays.reshape(self.n_envs, self.eyes.n_eyes, -1, len(self.bands.wavelengths))
 
     def receptor_radiance(self, state: WorldState) -> np.ndarray:
         """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
         bands, (height, width) = len(self.bands.wavelengths), self.eye.resolution
-        sums = self._launch(self._sums, state).reshape(bands, self.n_envs * self.eyes.n_eyes, -1)
+        components = self._launch(self._sums, state).reshape(len(self.tracer.basis), -1)
+        sums = np.einsum("kn,kb->bn", components, self.tracer.basis.astype(np.float32))
+        sums = sums.reshape(bands, self.n_envs * self.eyes.n_eyes, -1)
         return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, self.eyes.n_eyes, height, width)
 
     def signals(self, state: WorldState) -> np.ndarray:
@@ -109,7 +117,7 @@ class BatchedRenderer:
         with variant(self._stage.variant), _garbage_kept():
             poses = mi.Float(self._poses.pack(state, self._stage))
             # numpy() waits for the kernel: only then may the buffer, whose memory Dr.Jit shares, be written again.
-            return np.array(frozen(self._stage.scene, poses, self._inputs).numpy())
+            return np.array(frozen(self.tracer.scene, poses, self._inputs).numpy())
 
 
 @contextmanager
@@ -126,10 +134,12 @@ def _garbage_kept() -> Iterator[None]:
 
 
 class _PoseBuffer:
-    """The kernel's only changing input: one aligned row of floats per world (x, y, cos, sin, objects' centres)."""
+    """The kernel's only changing input: one aligned row of floats per world, (x, y, cos, sin) and, in fours as well,
+    the objects' centres."""
 
     def __init__(self, n_envs: int, n_spheres: int) -> None:
-        self.stride = -(-(4 + 3 * n_spheres) // ALIGNMENT) * ALIGNMENT
+        self.n_spheres = n_spheres
+        self.stride = -(-4 * (1 + n_spheres) // ALIGNMENT) * ALIGNMENT
         raw = np.zeros(n_envs * self.stride + ALIGNMENT, np.float32)
         first = (-raw.ctypes.data % 64) // 4
         self._rows = raw[first : first + n_envs * self.stride].reshape(n_envs, self.stride)
@@ -138,92 +148,64 @@ class _PoseBuffer:
         rows = self._rows
         rows[:, :2] = state.position
         rows[:, 2], rows[:, 3] = np.cos(state.heading), np.sin(state.heading)
-        centres = state.objects + stage.spheres.offsets
-        rows[:, 4 : 4 + centres[0].size] = centres.reshape(len(rows), -1)
+        places = rows[:, 4 : 4 * (1 + self.n_spheres)].reshape(len(rows), self.n_spheres, 4)
+        places[..., :3] = state.objects + stage.spheres.offsets
         return rows.reshape(-1)
 
 
 class _Wavefront:
     """The kernel's body. Everything here is traced once; only arrays passed as arguments may change."""
 
-    def __init__(self, renderer: BatchedRenderer, stage: Stage) -> None:
+    def __init__(self, renderer: BatchedRenderer) -> None:
         self.n_rays = len(renderer.sensor.directions)
         self.n_eyes = renderer.eyes.n_eyes
         self.lanes = renderer.n_envs * self.n_eyes * self.n_rays
         self.stride = renderer._poses.stride
-        self.spheres = stage.spheres
-        lighting.check_lambertian([*stage.spheres.bsdfs, *(shape.bsdf() for shape in stage.scene.shapes())])
-        self.lights = lighting.directional_lights(stage.scene, renderer.bands.wavelengths)
-        self.n_bands = len(renderer.bands.wavelengths)
-        self.bands = lighting.spectra(renderer.bands.wavelengths)
+        self.n_spheres = renderer._poses.n_spheres
+        self.tracer = renderer.tracer
 
     def __call__(self, scene: Any, poses: Any, inputs: dict[str, Any], reduced: int) -> Any:
         lane = inputs["lanes"]
         view = lane // self.n_rays
         world = view // self.n_eyes
         ray, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, lane - view * self.n_rays)
-        si, bsdf = self._first_hit(scene, ray, centres, inputs)
-        radii = [BODY_RADIUS, *map(float, self.spheres.radii)]
-
-        def occluded(shadow: Any, active: Any) -> Any:
-            blocked = movers.blocks(radii, [agent, *centres], shadow)
-            return blocked | scene.ray_test(shadow, active & ~blocked)
-
-        radiance = lighting.direct_light(si, bsdf, self.lights, self.bands, occluded)
-        out = dr.zeros(mi.Float, self.lanes * self.n_bands)
-        for band in range(self.n_bands):
-            value = radiance[band // lighting.LANES][band % lighting.LANES]
-            dr.scatter(out, value, lane + band * self.lanes, mode=dr.ReduceMode.Permute)
-        # One reduction of one array: a reduction per band would trace the rays once per band.
+        components = self.tracer.radiance(scene, ray, agent, centres, inputs)
+        if len(components) == 1:
+            out = components[0]
+        else:
+            out = dr.zeros(mi.Float, self.lanes * len(components))
+            for k, value in enumerate(components):
+                dr.scatter(out, value, lane + k * self.lanes, mode=dr.ReduceMode.Permute)
+        # One reduction of one array: a reduction per component would trace the rays once per component.
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
 
     def _ray(self, poses: Any, inputs: dict[str, Any], world: Any, eye: Any, ray: Any) -> tuple[Any, Any, list[Any]]:
         """The lane's ray, and the centres of the agent and of the spheres of its world."""
 
-        def pose(column: int) -> Any:
-            return dr.gather(mi.Float, poses, world * self.stride + column)
+        def row(name: str, index: Any) -> Any:
+            return dr.gather(mi.Vector4f, inputs[name] if name else poses, index)
 
-        def table(name: str, row: Any) -> Any:
-            return dr.gather(mi.Vector3f, inputs[name], row)
-
-        cos, sin = pose(2), pose(3)
+        x, y, cos, sin = row("", world * (self.stride // 4))
 
         def turned(v: Any) -> Any:
             return mi.Vector3f(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
 
-        agent = mi.Point3f(pose(0), pose(1), EYE_HEIGHT)
-        origin = agent + turned(table("origins", eye))
-        direction = turned(table("directions", eye * self.n_rays + ray))
-        centres = [mi.Point3f(*(pose(4 + 3 * k + axis) for axis in range(3))) for k in range(len(self.spheres))]
-        out = mi.Ray3f(origin, direction)
-        out.wavelengths = self.bands[0]
-        return out, agent, centres
-
-    def _first_hit(self, scene: Any, ray: Any, centres: list[Any], inputs: dict[str, Any]) -> tuple[Any, Any]:
-        """Where the ray meets the static scene or a sphere first, and the BSDF there."""
-        preliminary = scene.ray_intersect_preliminary(ray)
-        si = preliminary.compute_surface_interaction(ray, mi.RayFlags.All)
-        bsdf = si.bsdf()
-        if not centres:
-            return si, bsdf
-        t, which = movers.nearest(self.spheres, centres, ray, si.t)
-        on_sphere = which < len(centres)
-        point = ray(t)
-        normal, uv = movers.normal_and_uv(self.spheres, centres, which, point)
-        si.t = t
-        si.p = dr.select(on_sphere, point, si.p)
-        si.n = dr.select(on_sphere, normal, si.n)
-        si.uv = dr.select(on_sphere, uv, si.uv)
-        si.sh_frame = dr.select(on_sphere, mi.Frame3f(normal), si.sh_frame)
-        si.wi = si.to_local(-ray.d)
-        return si, dr.select(on_sphere, dr.gather(mi.BSDFPtr, inputs["bsdfs"], which, on_sphere), bsdf)
+        agent = mi.Point3f(x, y, EYE_HEIGHT)
+        origin = agent + turned(row("origins", eye))
+        direction = turned(row("directions", eye * self.n_rays + ray))
+        centres = [mi.Point3f(*list(row("", world * (self.stride // 4) + (1 + k)))[:3]) for k in range(self.n_spheres)]
+        return mi.Ray3f(origin, direction), agent, centres
 
 
 def _in_agent_frame(eyes: Eyes, directions: np.ndarray) -> np.ndarray:
-    """Every eye's directions in the agent's frame, flat (eye, ray, 3)."""
-    turned = np.einsum("eij,rj->eri", eye_rotations(eyes.azimuths()), directions)
-    return np.ascontiguousarray(turned, np.float32).ravel()
+    """Every eye's directions in the agent's frame, flat (eye, ray, 4)."""
+    return _in_fours(np.einsum("eij,rj->eri", eye_rotations(eyes.azimuths()), directions))
 
 
 def _eye_origins(eyes: Eyes) -> np.ndarray:
-    return np.ascontiguousarray(eye_positions(eyes.azimuths()), np.float32).ravel()
+    return _in_fours(eye_positions(eyes.azimuths()))
+
+
+def _in_fours(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) flat, each followed by a 0: four aligned floats are gathered at once."""
+    return np.pad(vectors, [(0, 0)] * (vectors.ndim - 1) + [(0, 1)]).astype(np.float32).ravel()

@@ -7,6 +7,7 @@ shape costs time in every launch of the kernel.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,9 +26,15 @@ from sim.world import World
 
 @dataclass(frozen=True)
 class Stage:
-    """scene: mi.Scene of the world's own geoms · spheres: the objects', in the order of World.objects · variant"""
+    """scene    mi.Scene of the world's own geoms
+    geoms    their ids · bsdfs: of each, by id
+    spheres  the objects', in the order of World.objects
+    variant  of Mitsuba
+    """
 
     scene: Any
+    geoms: tuple[int, ...]
+    bsdfs: Mapping[int, Any]
     spheres: Spheres
     variant: str
 
@@ -48,9 +55,12 @@ def build_stage(world: World) -> Stage:
         frames=np.array([frame for frame, _ in poses]).reshape(-1, 3, 3),
         offsets=np.array([offset for _, offset in poses]).reshape(-1, 3),
         bsdfs=tuple(static.bsdf(geom) for geom in geoms),
+        geoms=tuple(geoms),
     )
+    standing = tuple(map(int, static.geoms))
     with in_variant(static.variant):
-        return Stage(_static_scene(static), spheres, static.variant)
+        scene = _static_scene(static)
+        return Stage(scene, standing, {g: static.bsdf(g) for g in standing}, spheres, static.variant)
 
 
 def _static_scene(static: Mirror) -> Any:

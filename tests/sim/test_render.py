@@ -77,8 +77,8 @@ class Disagreement:
         return self.mean > LARGEST_MEAN_Z or self.beyond > SHARE_BEYOND_3 or self.spectrum > SPECTRUM
 
 
-def disagreement(world, state, images):
-    renderer = sim.BatchedRenderer(world, EYES, state.n, rays_per_receptor=RAYS)
+def disagreement(world, state, images, tracer):
+    renderer = sim.BatchedRenderer(world, EYES, state.n, rays_per_receptor=RAYS, tracer=tracer)
     ours = np.moveaxis(renderer.receptor_radiance(state), 0, 2)
     means, theirs = ours.mean(axis=(3, 4)), images.mean(axis=(4, 5))
     shares = [m / m.sum(axis=-1, keepdims=True) for m in (means, theirs.mean(axis=0))]
@@ -103,9 +103,13 @@ SHARE_BEYOND_3 = 0.04
 SPECTRUM = 1e-4
 
 
+both_tracers = pytest.mark.parametrize("tracer", ["closed_form", "mitsuba"])
+
+
+@both_tracers
 @pytest.mark.parametrize("task", ["detection", "navigation"])
-def test_agrees_with_mitsubas_direct_integrator(references, task):
-    found = disagreement(*references[task])
+def test_agrees_with_mitsubas_direct_integrator(references, task, tracer):
+    found = disagreement(*references[task], tracer)
     assert not found.significant, found
 
 
@@ -151,6 +155,7 @@ def no_mover_shadows(original):
     return lambda radii, centres, ray: dr.zeros(type(original(radii, centres, ray)))
 
 
+@both_tracers
 @pytest.mark.parametrize(
     ("module", "name", "sabotage"),
     [
@@ -162,9 +167,9 @@ def no_mover_shadows(original):
     ],
     ids=lambda value: getattr(value, "__name__", None),
 )
-def test_parity_is_lost_when_something_is_wrong(references, monkeypatch, module, name, sabotage):
+def test_parity_is_lost_when_something_is_wrong(references, monkeypatch, module, name, sabotage, tracer):
     monkeypatch.setattr(module, name, sabotage(getattr(module, name)))
-    assert disagreement(*references["detection"]).significant
+    assert disagreement(*references["detection"], tracer).significant
 
 
 def test_signals_weight_the_bands(references):
@@ -177,9 +182,11 @@ def test_signals_weight_the_bands(references):
     np.testing.assert_allclose(renderer.signals(state), expected, rtol=1e-5, atol=1e-7)
 
 
-def test_kernels_are_recorded_once_and_results_do_not_alias(references):
-    world, state, _ = references["detection"]
-    renderer = sim.BatchedRenderer(world, EYES, state.n)
+@both_tracers
+@pytest.mark.parametrize("task", ["detection", "navigation"])
+def test_kernels_are_recorded_once_and_results_do_not_alias(references, task, tracer):
+    world, state, _ = references[task]
+    renderer = sim.BatchedRenderer(world, EYES, state.n, tracer=tracer)
     first = renderer.signals(state)
     kept = first.copy()
     for step in range(20):
@@ -190,9 +197,11 @@ def test_kernels_are_recorded_once_and_results_do_not_alias(references):
     assert renderer.recordings == 1
 
 
-def test_a_world_looks_the_same_among_any_number_of_neighbours(references):
-    world, state, _ = references["detection"]
-    alone = sim.BatchedRenderer(world, EYES, 1)
+@both_tracers
+@pytest.mark.parametrize("task", ["detection", "navigation"])
+def test_a_world_looks_the_same_among_any_number_of_neighbours(references, task, tracer):
+    world, state, _ = references[task]
+    alone = sim.BatchedRenderer(world, EYES, 1, tracer=tracer)
     many = alone.resized(16)
     crowd = state.take(np.arange(16) % 2)
     np.testing.assert_array_equal(many.signals(crowd)[3], alone.signals(state.take(np.array([1])))[0])

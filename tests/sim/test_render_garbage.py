@@ -7,7 +7,7 @@ import sys
 PROGRAM = """
 import gc
 import sim
-from sim import lighting
+from sim import movers
 
 def environment(seed):
     return sim.make_vec_env("detection", sim.Eyes(n_eyes=1, resolution=(3, 3)), 2, seed=seed, rays_per_receptor=1)
@@ -20,15 +20,15 @@ del first
 second = environment(1)
 gc.set_threshold(10**9)
 gc.enable()
-direct_light = lighting.direct_light
+blocks = movers.blocks
 
 def collection_falls_due(*arguments):
     gc.set_threshold(1, 1, 1)
     kept = [[] for _ in range(10_000)]
     gc.set_threshold(10**9)
-    return direct_light(*arguments)
+    return blocks(*arguments)
 
-lighting.direct_light = collection_falls_due
+movers.blocks = collection_falls_due
 second.reset()
 assert gc.isenabled()
 print("survived")
