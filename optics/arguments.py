@@ -7,7 +7,7 @@ import numpy as np
 
 from optics.tracked import number
 
-__all__ = ["finite", "in_range", "point_2d", "positive", "radiance_cube", "shape_2d"]
+__all__ = ["finite", "in_range", "point_2d", "positive", "radiance_cube", "shape_2d", "whole"]
 
 
 # Squares of lengths, and their ratios, must stay within double precision.
@@ -79,6 +79,17 @@ def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
     if not np.isfinite(radiance).all():
         raise ValueError("radiance holds NaN or infinity: must be finite")
     return radiance
+
+
+def whole(name: str, value: Any, low: int, high: int) -> int:
+    """`value` as int; ValueError unless it is whole and in [low, high]."""
+    try:
+        fits = int(value) == value and low <= value <= high
+    except (TypeError, ValueError, OverflowError):
+        fits = False
+    if not fits:
+        raise ValueError(f"{name} = {value!r}: must be a whole number in [{low}, {high}]")
+    return int(value)
 
 
 def _number(name: str, value: Any) -> float:

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from optics.arguments import in_range, positive, radiance_cube, shape_2d
-from optics.imaging import blur, receptor_average
-from optics.photoreceptor import gaussian_noise, quantum_catch, throughput
+from optics.arguments import in_range, positive, radiance_cube, shape_2d, whole
+from optics.imaging import blur, centred, receptor_average
+from optics.photon_budget import PhotonBudget
+from optics.photoreceptor import gaussian_noise, photon_noise, quantum_catch, throughput
 from optics.point_spread import PSFResult
+from optics.precision import precision
 from optics.pupil import Pupil
 from optics.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
+from optics.sight import Sight, prepare
 from optics.spectrum import SpectralBands
+from optics.tracked import at_border, is_tracked, number, plain
+
+if TYPE_CHECKING:
+    from optics.description import Description
 
 __all__ = ["Eye"]
+
+CELLS_FOR_BANDS = 2  # per receptor, along an axis
 
 
 @dataclass(frozen=True)
@@ -24,9 +34,17 @@ class Eye:
 
     pupil: None is the perfect lens: no blur, full throughput.
     resolution: receptors (height, width); square, pitch = sensor_width / width.
-    fov_deg: horizontal field of view, in [1, 170]; the retina lies at f = L / (2 tan(fov/2)).
-    sensor_width: L [m]. bands: spectral bands. noise_sigma: standard deviation of a receptor's noise, in signal units.
-    tolerance: relative L2 error asked of the PSF.
+    fov_deg: horizontal field of view, in [1e-3, 170]; the retina lies at f = L / (2 tan(fov/2)).
+    sensor_width: L [m].
+    bands: spectral bands, 1 to 64, or "auto": as few as keep a receptor's predicted error within the tolerance; that
+        takes PSFs of many bands, so it is for an eye that will be used often. The field then holds what was chosen.
+    noise_sigma: standard deviation of a receptor's Gaussian noise, in signal units.
+    photon_budget: the light there is; its shot noise comes before the Gaussian noise (None: no shot noise).
+    tolerance: relative L2 error asked of the PSF; signal error, relative to white's, of whatever else is chosen.
+    dtype: "float32" or "float64", of PSF, kernel and signals.
+
+    Whatever the pupil is made of, fov_deg and distances z may be Dr.Jit arrays that carry derivatives; what comes of
+    them is then a Dr.Jit tensor, otherwise a NumPy array.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -34,11 +52,13 @@ class Eye:
 
     pupil: Pupil | None = None
     resolution: tuple[int, int] = (15, 15)
-    fov_deg: float = 45.0
+    fov_deg: Any = 45.0
     sensor_width: float = 200e-6
-    bands: int = 4
+    bands: Any = 4
     noise_sigma: float = 0.01
     tolerance: float = 1e-2
+    dtype: str = "float32"
+    photon_budget: PhotonBudget | None = None
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -47,16 +67,26 @@ class Eye:
         positive("sensor_width", self.sensor_width)
         in_range("noise_sigma", self.noise_sigma, 0, 1e6)
         in_range("tolerance", self.tolerance, 1e-6, 0.5)
-        object.__setattr__(self, "spectral_bands", SpectralBands.uniform(self.bands))
-        if self.pupil is not None and self.relative_aperture > 1 + 1e-9:
+        if self.dtype not in ("float32", "float64"):
+            raise ValueError(f"dtype = {self.dtype!r}: must be 'float32' or 'float64'")
+        if not isinstance(self.photon_budget, PhotonBudget | None):
+            raise ValueError(f"photon_budget = {self.photon_budget!r}: must be a PhotonBudget or None")
+        if self.pupil is not None and number(self.relative_aperture) > 1 + 1e-9:
             raise ValueError(
                 f"pupil.aperture_radius = {self.pupil.radius:g}: must be at most sensor_width / 2 = "
                 f"{self.sensor_width / 2:g} m"
             )
+        spectral = self._chosen_bands() if self.bands == "auto" else SpectralBands.uniform(self.bands)
+        object.__setattr__(self, "spectral_bands", spectral)
+        object.__setattr__(self, "bands", len(spectral.wavelengths))
 
     @property
-    def sensor_distance(self) -> float:
+    def sensor_distance(self) -> Any:
         """f [m], from pupil to retina."""
+        if is_tracked(self.fov_deg):
+            import drjit as dr
+
+            return self.sensor_width / (2 * dr.tan(dr.deg2rad(self.fov_deg) / 2))
         return self.sensor_width / (2 * math.tan(math.radians(self.fov_deg) / 2))
 
     @property
@@ -65,16 +95,24 @@ class Eye:
         return self.sensor_width / self.resolution[1]
 
     @property
-    def relative_aperture(self) -> float:
+    def relative_aperture(self) -> Any:
         """a = 2 R / L; 1 for the perfect lens."""
-        return 1.0 if self.pupil is None else 2 * self.pupil.radius / self.sensor_width
+        return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.sensor_width
 
     @property
-    def throughput(self) -> float:
-        """a²"""
-        return throughput(min(self.relative_aperture, 1.0))
+    def throughput(self) -> Any:
+        """a², times the open share of the aperture's disk."""
+        return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
 
-    def psf(self, z: float = math.inf) -> PSFResult:
+    @property
+    def photons(self) -> np.ndarray | None:
+        """Photons that a signal of 1 stands for, (channel,); None without a photon budget."""
+        if self.photon_budget is None:
+            return None
+        etendue = math.pi / 4 * (self.sensor_width * self.receptor_pitch / number(self.sensor_distance)) ** 2
+        return self.photon_budget.photons(self.spectral_bands, etendue)
+
+    def psf(self, z: Any = math.inf) -> PSFResult:
         """PSF on the retina (sensor orientation) of a point on the axis at distance z [m], over the kernel's window.
 
         The perfect lens has one sample that holds all power.
@@ -87,54 +125,117 @@ class Eye:
             return perfect_psf(self._retina(1), self.sensor_width / 2)
         return retinal_psf(self.pupil, self._retina(4), z)
 
-    def kernel(self, samples_per_receptor: int, z: float = math.inf) -> np.ndarray:
-        """Receptive kernel (band, ky, kx) float32: the PSF integrated over square cells of pitch /
-        samples_per_receptor, in visual-field orientation (the PSF turned by 180°), ky and kx odd.
+    def kernel(
+        self, samples_per_receptor: int, z: Any = math.inf, direction_deg: tuple[float, float] = (0.0, 0.0)
+    ) -> Any:
+        """Receptive kernel (band, ky, kx): the PSF integrated over square cells of pitch / samples_per_receptor, in
+        visual-field orientation (the PSF turned by 180°), ky and kx odd.
 
-        z: the scene's distance [m]. The sum is the fraction of the pupil's power that lands inside; the window is as
-        wide as it must be to lose less than the tolerance (limits: see `receptive_field`). The perfect
-        lens has the 1 x 1 kernel 1. Signals are a² Σ_b weights[c, b] (kernel_b ⊗ radiance_b).
+        z: the scene's distance along the axis [m]. direction_deg: (right, up) from the axis where the light comes
+        from; the centre cell is its geometric image. The sum is the fraction of the pupil's power that lands inside;
+        the window is as wide as it must be to lose less than the tolerance (limits: see `receptive_field`). The
+        perfect lens has the 1 x 1 kernel 1. Signals are a² Σ_b weights[c, b] (kernel_b ⊗ radiance_b).
 
         Raises:
             AccuracyError: see `optics.psf`.
         """
         positive("z", z, infinite=True)
-        retina = self._retina(_whole(samples_per_receptor))
+        right, up = (math.tan(math.radians(in_range("direction_deg", at, -80, 80))) for at in direction_deg)
+        return at_border(self._kernel(_whole(samples_per_receptor), z, (right, -up)))
+
+    def _kernel(self, samples_per_receptor: int, z: Any, direction: tuple[float, float]) -> Any:
+        """direction: (right, down), tangents."""
         if self.pupil is None:
-            return np.ones((self.bands, 1, 1), dtype=np.float32)
-        return visual_kernel(self.pupil, retina, z)
+            return precision(self.dtype).Tensor(np.ones((len(self.spectral_bands.wavelengths), 1, 1)))
+        return visual_kernel(self.pupil, self._retina(samples_per_receptor), z, direction)
 
     def _retina(self, samples_per_receptor: int) -> Retina:
         cell = self.receptor_pitch / samples_per_receptor
-        return Retina(self.sensor_distance, self.spectral_bands.wavelengths, cell, self.tolerance)
+        return Retina(self.sensor_distance, self.spectral_bands.wavelengths, cell, self.tolerance, self.dtype)
+
+    def _chosen_bands(self) -> SpectralBands:
+        pupil, cell = self.pupil, self.receptor_pitch / CELLS_FOR_BANDS
+        if pupil is None:
+            return SpectralBands.for_tolerance(self.tolerance)
+
+        def kernels(wavelengths: np.ndarray) -> np.ndarray:
+            retina = Retina(self.sensor_distance, wavelengths, cell, self.tolerance, self.dtype)
+            return plain(visual_kernel(pupil, retina, math.inf))
+
+        return SpectralBands.for_tolerance(self.tolerance, kernels, CELLS_FOR_BANDS)
+
+    def sight(
+        self,
+        samples_per_receptor: int,
+        z: Any = math.inf,
+        depth_layers: int | str = "auto",
+        field_zones: int | str = 1,
+        tolerance: float | None = None,
+    ) -> Sight:
+        """Kernels for a scene in depth and over the field of view; printed, it says what was chosen and why.
+
+        z: distances [m] that occur: one, or an array whose nearest and farthest count.
+        depth_layers: kernels between nearest and farthest, evenly spaced in 1/z; field_zones: kernels across the
+            field's width (1: the axis serves the whole retina). "auto": as few as the tolerance allows.
+        tolerance: of a receptor's signal, in units of white's, for any scene no brighter than white (None: the eye's).
+
+        Raises:
+            AccuracyError: see `optics.psf`, or the tolerance needs more kernels than any eye is given.
+        """
+        within = self.tolerance if tolerance is None else in_range("tolerance", tolerance, 1e-6, 0.5)
+        s = _whole(samples_per_receptor)
+        half = self.sensor_width / (2 * number(self.sensor_distance))
+        tangents = (half, half * self.resolution[0] / self.resolution[1])
+
+        def kernel_at(distance: Any, right: float, down: float) -> Any:
+            return self._kernel(s, distance, (right * tangents[0], down * tangents[1]))
+
+        return prepare(kernel_at, self.resolution, s, z, (depth_layers, field_zones), within)
 
     def see(
         self,
         radiance: np.ndarray,
         samples_per_receptor: int,
         rng: np.random.Generator | None = None,
-        z: float = math.inf,
-    ) -> np.ndarray:
-        """Signals (channel, h, w) float32 of a scene in the tangent plane, by convolution (the reference).
+        z: Any = math.inf,
+        sight: Sight | None = None,
+    ) -> Any:
+        """Signals (channel, h, w) of a scene in the tangent plane, by convolution (the reference).
 
         radiance: (band, Y, X), cells of pitch / samples_per_receptor, centred on the axis, at least h s x w s cells
             and larger by even numbers; dark outside.
-        rng: None for signals without noise.
+        rng: None for signals without noise. Noise carries no derivative.
+        z: distance of the scene along the axis [m], a number or one per cell (Y, X).
+        sight: what `sight` made for these samples_per_receptor; None makes it.
 
         Raises:
             ValueError: radiance of another shape, or not finite.
         """
         s = _whole(samples_per_receptor)
-        h, w = self.resolution
-        scene = radiance_cube(radiance, self.bands, (h * s, w * s))
-        irradiance = receptor_average(blur(scene, self.kernel(s, z)), self.resolution, s)
-        signal = self.throughput * quantum_catch(irradiance, self.spectral_bands.weights)
-        if rng is not None:
-            signal = gaussian_noise(signal, self.noise_sigma, rng)
-        return signal.astype(np.float32)
+        shape = self.resolution[0] * s, self.resolution[1] * s
+        scene = radiance_cube(radiance, self.bands, shape)
+        centred(scene, shape)
+        prepared = self.sight(s, z) if sight is None else sight.of(shape)
+        types = precision(self.dtype)
+        scenes = [scene * share for share in prepared.shares(scene.shape[1:], z)]
+        image = blur(scenes, list(prepared.kernels.values()), shape, types)
+        irradiance = receptor_average(image, s, types)
+        signal = quantum_catch(irradiance, self.spectral_bands.weights, self.throughput, types)
+        return at_border(signal) if rng is None else at_border(signal + types.Tensor(self._noise(signal, rng)))
+
+    def _noise(self, signal: Any, rng: np.random.Generator) -> np.ndarray:
+        """What noise adds to the signal."""
+        clean = plain(signal)
+        photons = self.photons
+        caught = clean if photons is None else photon_noise(np.maximum(clean, 0), photons, rng)
+        return gaussian_noise(caught, self.noise_sigma, rng) - clean
+
+    def describe(self, z: Any = math.inf) -> Description:
+        """What limits the eye, as a table: see `description.Description`."""
+        from optics.description import describe
+
+        return describe(self, z)
 
 
 def _whole(samples_per_receptor: int) -> int:
-    if int(samples_per_receptor) != samples_per_receptor or not 1 <= samples_per_receptor <= 64:
-        raise ValueError(f"samples_per_receptor = {samples_per_receptor!r}: must be a whole number in [1, 64]")
-    return int(samples_per_receptor)
+    return whole("samples_per_receptor", samples_per_receptor, 1, 64)

@@ -1,20 +1,36 @@
 """What a photoreceptor makes of the light on it: throughput, spectral weighting, noise."""
 
+from __future__ import annotations
+
+from typing import Any
+
 import numpy as np
 
 from optics.arguments import in_range, positive
+from optics.precision import Precision, opaque
 
 __all__ = ["gaussian_noise", "photon_noise", "quantum_catch", "throughput"]
 
-
-def throughput(relative_aperture: float) -> float:
-    """Light gathered, a²: the pupil's area against that of the widest pupil (diameter = sensor width)."""
-    return in_range("relative_aperture", relative_aperture, 0.0, 1.0) ** 2
+MOST_PHOTONS = 1e18  # a count must fit a 64-bit integer
 
 
-def quantum_catch(irradiance: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Σ_b weights[c, b] irradiance[b]: (band, y, x) -> (channel, y, x)."""
-    return np.tensordot(weights, irradiance, axes=(1, 0))
+def throughput(relative_aperture: Any, open_share: float = 1.0) -> Any:
+    """Light gathered, a² times the share of the disk that is open: the pupil's area against that of the widest disk
+    (diameter = sensor width). A Dr.Jit array where relative_aperture is one."""
+    a = in_range("relative_aperture", relative_aperture, 0.0, 1.0 + 1e-9)
+    if a > 1:  # by rounding
+        relative_aperture = relative_aperture * (1 / a)
+    return relative_aperture * relative_aperture * open_share
+
+
+def quantum_catch(irradiance: Any, weights: np.ndarray, gathered: Any, types: Precision) -> Any:
+    """a² Σ_b weights[c, b] irradiance[b]: Dr.Jit (band, y, x) -> (channel, y, x); gathered: a²."""
+    import drjit as dr
+
+    matmul: Any = dr.matmul
+    bands, height, width = irradiance.shape
+    flat = matmul(types.Tensor(weights), types.Tensor(irradiance.array, (bands, height * width)))
+    return types.Tensor(flat.array * types.Float(opaque(types, gathered)), (len(weights), height, width))
 
 
 def gaussian_noise(signal: np.ndarray, sigma: float, rng: np.random.Generator) -> np.ndarray:
@@ -23,9 +39,16 @@ def gaussian_noise(signal: np.ndarray, sigma: float, rng: np.random.Generator) -
     return signal + sigma * rng.standard_normal(signal.shape)
 
 
-def photon_noise(signal: np.ndarray, photons: float, rng: np.random.Generator) -> np.ndarray:
-    """Poisson noise where a signal of 1 is `photons` absorbed photons: standard deviation √(signal/photons)."""
-    budget = positive("photons", photons, "1")
-    if np.any(signal < 0):
+def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Poisson noise where a signal of 1 is `photons` absorbed photons: standard deviation √(signal/photons).
+
+    signal: (channel, y, x); photons: one number, or one per channel.
+    """
+    budget = np.atleast_1d(np.asarray(photons, dtype=np.float64))
+    positive("photons", float(budget.min()), "1")
+    if not np.all(signal >= 0):
         raise ValueError(f"signal = {np.min(signal):g} at its least: must not be negative")
-    return rng.poisson(signal * budget) / budget
+    budget = budget.reshape(-1, *(1,) * (np.ndim(signal) - 1))
+    expected = np.asarray(signal, dtype=np.float64) * budget
+    in_range("signal x photons", float(expected.max(initial=0.0)), 0, MOST_PHOTONS)
+    return rng.poisson(expected) / budget

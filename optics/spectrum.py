@@ -6,14 +6,17 @@ of the visual pigment template", Visual Neuroscience 17:509-528, equations 1, 2 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
 
 import numpy as np
 
-from optics.arguments import in_range
+from optics.arguments import in_range, whole
+from optics.ladder import worst_difference
+from optics.planner import AccuracyError
 
 __all__ = ["DEFAULT_LAMBDA_MAX_NM", "SpectralBands", "cie_1931", "daylight", "pigment_absorptance"]
 
@@ -21,6 +24,7 @@ __all__ = ["DEFAULT_LAMBDA_MAX_NM", "SpectralBands", "cie_1931", "daylight", "pi
 # far enough apart to tell colours as three RGB channels do, which human cones (566, 541, 441 nm) are not.
 DEFAULT_LAMBDA_MAX_NM = (600.0, 520.0, 460.0)
 VISIBLE_NM = (400.0, 700.0)
+CANDIDATES, FINEST = (1, 2, 4, 8, 16, 32), 64
 
 
 @lru_cache(maxsize=1)
@@ -80,10 +84,13 @@ class SpectralBands:
     wavelengths: (band,) [m], the bands' centres.
     weights: (channel, band); Σ_b weights[c, b] daylight(wavelengths[b]) = 1 for every channel c, so that a white
         surface in unit daylight gives 1.
+    white_catch: (channel,) ∫ daylight(λ) λ S_c(λ) dλ [m²], S_c the pigment's quantal sensitivity with peak 1: what a
+        white surface in unit daylight is worth before the weights are normalised.
     """
 
     wavelengths: np.ndarray
     weights: np.ndarray
+    white_catch: np.ndarray
 
     @classmethod
     def uniform(
@@ -94,10 +101,8 @@ class SpectralBands:
 
         Receptors count photons, radiance is energy: hence the factor λ beside the pigment's quantal sensitivity.
         """
-        if int(bands) != bands or not 1 <= bands <= 64:
-            raise ValueError(f"bands = {bands!r}: must be a whole number in [1, 64]")
         low, high = range_nm
-        edges = np.linspace(low, high, int(bands) + 1)
+        edges = np.linspace(low, high, whole("bands", bands, 1, FINEST) + 1)
         centres = (edges[:-1] + edges[1:]) / 2
         nm = np.arange(low, high + 0.5)
         light = daylight(nm * 1e-9)
@@ -105,4 +110,58 @@ class SpectralBands:
         catch[:, [0, -1]] /= 2  # trapezoid rule
         hats = np.stack([np.interp(nm, centres, row) for row in np.eye(len(centres))])
         weights = (catch @ hats.T) / catch.sum(axis=1, keepdims=True) / daylight(centres * 1e-9)
-        return cls(centres * 1e-9, weights)
+        return cls(centres * 1e-9, weights, catch.sum(axis=1) * 1e-18)
+
+    @classmethod
+    def for_tolerance(
+        cls,
+        tolerance: float,
+        kernels: Callable[[np.ndarray], np.ndarray] | None = None,
+        samples_per_receptor: int = 1,
+        lambda_max_nm: Sequence[float] = DEFAULT_LAMBDA_MAX_NM,
+        range_nm: Sequence[float] = VISIBLE_NM,
+    ) -> SpectralBands:
+        """The fewest bands, a power of two, that keep the predicted error of a receptor's signal within the tolerance,
+        in units of white's signal. It is the sum of two:
+
+        - reflectances (1 + cos(2π λ/Λ + φ))/2 of any phase φ, Λ the whole range: what the bands make of them against
+          quadrature to 1 nm;
+        - kernels(wavelengths) (wave, k, k), cells of 1/samples_per_receptor (None: the same for all wavelengths):
+          the worst scene's difference between white light's kernel from n and from 2n bands.
+
+        Raises:
+            AccuracyError: 32 bands do not.
+        """
+        in_range("tolerance", tolerance, 1e-6, 0.5)
+        total, coarse = math.inf, None
+        for bands in CANDIDATES:
+            chosen, finer = (cls.uniform(n, lambda_max_nm, range_nm) for n in (bands, 2 * bands))
+            total = _reflectance_error(chosen, cls.uniform(FINEST, lambda_max_nm, range_nm), range_nm)
+            if total > tolerance:
+                continue
+            if kernels is None:
+                return chosen
+            coarse = chosen.white_light(kernels(chosen.wavelengths)) if coarse is None else coarse
+            fine = finer.white_light(kernels(finer.wavelengths))
+            total += worst_difference([(1, coarse), (-1, fine)], samples_per_receptor)
+            if total <= tolerance:
+                return chosen
+            coarse = fine
+        raise AccuracyError(
+            f"tolerance = {tolerance:g}: {CANDIDATES[-1]} bands leave a predicted error of {total:.1e} of white's "
+            "signal; widen the tolerance or give a number of bands"
+        )
+
+    def white_light(self, kernels: np.ndarray) -> np.ndarray:
+        """(channel, k, k): what a scene without colour in daylight has of kernels (band, k, k)."""
+        return np.tensordot(self.weights * daylight(self.wavelengths), kernels, axes=1)
+
+
+def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: Sequence[float]) -> float:
+    """Worst over phases and channels: half of |Σ w d e^{2πiλ/Λ}|'s error."""
+    period = (range_nm[1] - range_nm[0]) * 1e-9
+
+    def catch(bands: SpectralBands) -> np.ndarray:
+        return bands.weights @ (daylight(bands.wavelengths) * np.exp(2j * np.pi * bands.wavelengths / period))
+
+    return float(np.abs(catch(chosen) - catch(exact)).max() / 2)

@@ -240,3 +240,57 @@ def test_bad_samples_per_receptor(samples):
 def test_bad_distance():
     with pytest.raises(ValueError, match=r"z = -1\.0"):
         Eye().kernel(4, z=-1.0)
+
+
+class TestBands:
+    """bands="auto", held against the same eye with 64."""
+
+    @pytest.mark.parametrize(("tolerance", "seed"), [(0.1, 0), (0.05, 1)])
+    def test_signals_are_those_of_64_bands(self, tolerance, seed):
+        """Random patches of smooth colours behind random glass, whose speckle differs from band to band."""
+        rng = np.random.default_rng(seed)
+        pupil = Pupil(15e-6, BSplineRelief(rng.random((4, 4)) * 10e-6))
+        few, many = (Eye(pupil, (6, 6), bands=bands, tolerance=tolerance, noise_sigma=0) for bands in ("auto", 64))
+        assert 1 < few.bands < 64
+        phase = rng.uniform(0, 2 * np.pi, (28, 28))
+
+        def seen(eye):
+            nm = eye.spectral_bands.wavelengths[:, None, None] * 1e9
+            reflectance = (1 + np.cos(2 * np.pi * nm / 300 + phase)) / 2
+            return eye.see(reflectance * daylight(nm[:, 0, 0] * 1e-9)[:, None, None], 2) / eye.throughput
+
+        assert np.abs(seen(few) - seen(many)).max() <= tolerance
+
+    def test_a_finer_tolerance_takes_more_bands(self):
+        assert Eye(bands="auto", tolerance=0.1).bands < Eye(bands="auto", tolerance=0.003).bands
+
+    @pytest.mark.parametrize("bands", ["all", 0, 2.5, None, math.nan])
+    def test_bad_bands(self, bands):
+        with pytest.raises(ValueError, match=r"bands = .*must be a whole number in \[1, 64\]"):
+            Eye(bands=bands)
+
+
+class TestDtype:
+    def test_float64_carries_what_float32_cannot(self):
+        lens = Pupil(20e-6, thin_lens_focal_length=Eye().sensor_distance)
+        single, double = (Eye(lens, bands=1, tolerance=1e-3, dtype=dtype).kernel(S) for dtype in ("float32", "float64"))
+        assert (single.dtype, double.dtype) == (np.float32, np.float64)
+        np.testing.assert_allclose(single, double, atol=1e-5 * double.max())
+        with pytest.raises(AccuracyError, match="float32"):
+            Eye(lens, bands=1, tolerance=3e-6).kernel(S)
+
+    def test_bad_dtype(self):
+        with pytest.raises(ValueError, match="dtype = 'float16'"):
+            Eye(dtype="float16")
+
+
+def test_an_annulus_lets_in_what_is_open():
+    from optics import Annulus
+
+    eye = Eye(Pupil(50e-6, aperture=Annulus(0.5)))
+    assert eye.throughput == pytest.approx(0.25 * 0.75)
+
+
+def test_bad_photon_budget():
+    with pytest.raises(ValueError, match="photon_budget = 1000"):
+        Eye(photon_budget=1000)

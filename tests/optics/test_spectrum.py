@@ -68,3 +68,54 @@ def test_bad_bands(bands):
 def test_wavelength_outside_the_tables():
     with pytest.raises(ValueError, match="wavelengths"):
         daylight(np.array([900e-9]))
+
+
+def scene_signal(bands, reflectance):
+    return bands.weights @ (reflectance(bands.wavelengths) * daylight(bands.wavelengths))
+
+
+@pytest.mark.parametrize("tolerance", [0.1, 0.02, 0.005, 0.002])
+def test_bands_for_a_tolerance_against_64(tolerance):
+    """Reflectances of one cycle over the visible range, all phases: within the tolerance, and half as many are not."""
+    chosen = SpectralBands.for_tolerance(tolerance)
+    count, fine = len(chosen.wavelengths), SpectralBands.uniform(64)
+
+    def worst(bands):
+        phases = np.linspace(0, 2 * np.pi, 60)
+        waves = [lambda at, p=phase: (1 + np.cos(2 * np.pi * at / 300e-9 + p)) / 2 for phase in phases]
+        return max(np.abs(scene_signal(bands, wave) - scene_signal(fine, wave)).max() for wave in waves)
+
+    assert worst(chosen) <= tolerance
+    assert count == 1 or worst(SpectralBands.uniform(count // 2)) > tolerance
+
+
+def test_more_bands_for_a_smaller_tolerance():
+    counts = [len(SpectralBands.for_tolerance(tolerance).wavelengths) for tolerance in (0.3, 0.05, 0.01, 0.003)]
+    assert counts == sorted(counts)
+    assert counts[0] < counts[-1]
+
+
+def test_coloured_blur_needs_more_bands():
+    """A kernel that hops from cell to cell as the wavelength grows: bands must resolve the hops."""
+
+    def hopping(wavelengths):
+        kernels = np.zeros((len(wavelengths), 1, 41))
+        place = (np.asarray(wavelengths) - 400e-9) / 300e-9 * 12 + 14
+        cell = np.floor(place).astype(int)
+        kernels[np.arange(len(place)), 0, cell] = 1 - (place - cell)
+        kernels[np.arange(len(place)), 0, cell + 1] = place - cell
+        return np.repeat(kernels, 41, axis=1) / 41
+
+    plain, coloured = SpectralBands.for_tolerance(0.1), SpectralBands.for_tolerance(0.1, hopping)
+    assert len(coloured.wavelengths) > len(plain.wavelengths)
+    mine, fine = (b.white_light(hopping(b.wavelengths)) for b in (coloured, SpectralBands.uniform(64)))
+    difference = mine - fine
+    worst = max(np.maximum(sign * difference, 0).sum(axis=(1, 2)).max() for sign in (1, -1))
+    assert worst <= 0.1
+
+
+def test_tolerances_that_no_bands_meet():
+    with pytest.raises(ValueError, match="32 bands leave a predicted error of"):
+        SpectralBands.for_tolerance(1e-6)
+    with pytest.raises(ValueError, match="tolerance = 0"):
+        SpectralBands.for_tolerance(0)

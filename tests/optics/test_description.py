@@ -1,0 +1,122 @@
+"""The table of an eye's limits, against closed forms for an ideal lens."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from optics import Eye, PhotonBudget, Pupil
+
+F = Eye().sensor_distance
+
+
+def lens(radius=25e-6, **options):
+    return Eye(Pupil(radius, thin_lens_focal_length=F), bands=1, **options)
+
+
+def circular_mtf(s):
+    """2/π (arccos s - s √(1 - s²)), s = f / cutoff (Goodman, eq. 6-32)."""
+    return 2 / math.pi * (math.acos(s) - s * math.sqrt(1 - s * s))
+
+
+def test_angles_and_light():
+    found = lens().describe()
+    assert found.f_number == pytest.approx(F / 50e-6)
+    assert found.relative_aperture == pytest.approx(0.25)
+    assert found.throughput == pytest.approx(0.0625)
+    assert found.strehl_ratio == pytest.approx(1, abs=0.02)
+    assert found.interommatidial_angle_deg == pytest.approx(math.degrees(200e-6 / 15 / F))
+    assert found.wavelength == pytest.approx(550e-9)
+
+
+def test_diffraction_limit_is_the_apertures_width_in_wavelengths():
+    """D/λ cycles per radian in small angles; exactly 2 sin θ f/λ on a flat retina."""
+    found = lens(5e-6).describe()
+    assert found.diffraction_cpd == pytest.approx(10e-6 / 550e-9 * math.pi / 180, rel=1e-3)
+
+
+def test_sampling_limit_is_half_a_cycle_per_receptor():
+    found = lens().describe()
+    assert found.sampling_cpd == pytest.approx(1 / (2 * found.interommatidial_angle_deg))
+    twice = lens(resolution=(30, 30)).describe()
+    assert twice.sampling_cpd == pytest.approx(2 * found.sampling_cpd)
+
+
+@pytest.mark.parametrize("sigma", [0.1, 0.4])
+def test_noise_limit_inverts_the_circular_mtf(sigma):
+    """σ / a² = MTF(f). The lens is slow, so that its PSF's window is many fringes wide and the MTF finely sampled."""
+    eye = lens(50e-6, noise_sigma=sigma * 0.25, tolerance=1e-3)
+    found = eye.describe()
+    expected = brentq(lambda s: circular_mtf(s) - sigma, 1e-6, 1)
+    assert found.noise == pytest.approx(sigma * 0.25)
+    assert found.noise_cpd / found.diffraction_cpd == pytest.approx(expected, rel=0.02)
+
+
+def test_each_limit_can_bind():
+    assert lens().describe().binding == "sampling"
+    assert lens(0.5e-6, noise_sigma=0.0).describe().binding == "diffraction"
+    loud = lens(noise_sigma=0.06).describe()
+    assert loud.binding == "noise"
+    assert loud.acuity_cpd == loud.noise_cpd
+    assert lens(noise_sigma=0.1).describe().acuity_cpd == 0  # 0.1 > a² = 0.0625: drowned
+
+
+def test_photons_set_the_noise():
+    """√(σ² + T/N): N photons at a signal of 1, of which white leaves T N to each receptor."""
+    eye = lens(noise_sigma=0.0, photon_budget=PhotonBudget(illuminance=0.1))
+    found = eye.describe()
+    assert found.photons == pytest.approx(found.throughput * eye.photons.mean())
+    assert found.noise == pytest.approx(found.throughput / math.sqrt(found.photons))
+    assert replace(eye, noise_sigma=0.02).describe().noise == pytest.approx(math.hypot(found.noise, 0.02))
+
+
+def test_quality_is_the_area_between_mtf_and_noise():
+    """T/f_N ∫ max(MTF - σ/T, 0) df by quadrature of the closed form."""
+    eye = lens(12e-6, resolution=(90, 90), noise_sigma=1.8e-3, tolerance=2e-3)
+    found = eye.describe()
+    light, s = 0.0144, np.linspace(0, 1, 20001)
+    reach = found.sampling_cpd / found.diffraction_cpd
+    contrast = np.array([circular_mtf(min(at * reach, 1.0)) for at in s])
+    expected = light * np.maximum(contrast - 1.8e-3 / light, 0).mean()
+    assert found.image_quality == pytest.approx(expected, rel=0.01)
+
+
+def test_acceptance_angle_of_a_sharp_eye_is_its_receptors():
+    found = lens(50e-6).describe()
+    assert found.acceptance_angle_deg == pytest.approx(found.interommatidial_angle_deg, rel=0.02)
+    assert Eye().describe().acceptance_angle_deg == pytest.approx(Eye().describe().interommatidial_angle_deg)
+
+
+def test_acceptance_angle_of_a_small_pupil_is_the_airy_disks():
+    """1.029 λ/D, wider by (0.3 λ/D receptors of) a narrow receptor: variances add (Snyder 1977)."""
+    eye = lens(4e-6, resolution=(100, 100))
+    airy, receptor = 1.029 * 550e-9 / 8e-6, 2e-6 / F
+    found = math.radians(eye.describe().acceptance_angle_deg)
+    assert airy < found < math.hypot(airy, receptor) * 1.02
+
+
+def test_perfect_lens():
+    found = Eye(noise_sigma=0.05).describe()
+    assert found.diffraction_cpd == math.inf
+    assert (found.strehl_ratio, found.image_quality) == (1.0, pytest.approx(0.95))
+    assert found.binding == "sampling"
+
+
+def test_the_table_names_every_limit():
+    table = str(lens(photon_budget=PhotonBudget()).describe())
+    for word in (
+        "f/4.83",
+        "Strehl",
+        "diffraction",
+        "sampling",
+        "noise",
+        "binding",
+        "photons",
+        "apart",
+        "PSF",
+        "predicted",
+    ):
+        assert word in table
+    assert max(map(len, table.splitlines())) < 120

@@ -1,0 +1,107 @@
+"""Whatever is asked of an eye: a finite answer, or one line that says what is wrong. Nothing else."""
+
+import math
+
+import numpy as np
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from optics import Eye, PhotonBudget, Pupil
+from optics.spectrum import SpectralBands
+
+QUIETLY = settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+ODD = [0, -1, 0.5, math.nan, math.inf, -math.inf, 1e-300, 1e300, "auto", "much", None, (1, 2), [], b"x"]
+# The first few are what people mean.
+numbers = st.one_of(st.floats(0.01, 50), st.integers(1, 20), st.sampled_from(ODD))
+
+
+def refused(error):
+    text = str(error)
+    assert text
+    assert "\n" not in text
+    assert "=" in text or "holds" in text or "has" in text
+    return True
+
+
+@QUIETLY
+@given(
+    resolution=st.one_of(st.tuples(st.integers(1, 12), st.integers(1, 12)), numbers),
+    fov_deg=numbers,
+    sensor_width=st.one_of(st.floats(1e-5, 1e-3), numbers),
+    bands=numbers,
+    noise_sigma=numbers,
+    tolerance=st.one_of(st.floats(0.01, 0.3), numbers),
+    dtype=st.sampled_from(["float32", "float64", "float16", None]),
+    photon_budget=st.sampled_from([None, PhotonBudget(), 5, "dim"]),
+)
+def test_any_eye_sees_or_is_refused(**arguments):
+    try:
+        eye = Eye(**arguments)
+        scene = np.ones((eye.bands, *(2 * n for n in eye.resolution)))
+        seen = eye.see(scene, 2, np.random.default_rng(0))
+        table = eye.describe()
+    except ValueError as error:
+        refused(error)
+        return
+    assert seen.shape == (3, *eye.resolution)
+    assert np.isfinite(seen).all()
+    assert table.acuity_cpd >= 0
+    assert str(table)
+
+
+@settings(QUIETLY, max_examples=10)
+@given(a=st.floats(0.02, 1), defocus=st.floats(0.3, 3), fov_deg=st.floats(5, 100), sigma=st.floats(0, 1))
+def test_any_lens_is_described_or_refused(a, defocus, fov_deg, sigma):
+    distance = Eye(fov_deg=fov_deg).sensor_distance
+    lens = Pupil(a * 100e-6, thin_lens_focal_length=defocus * distance)
+    try:
+        found = Eye(lens, (4, 6), fov_deg, bands=1, tolerance=0.05, noise_sigma=sigma).describe()
+    except ValueError as error:
+        refused(error)
+        return
+    assert 0 <= found.acuity_cpd <= found.diffraction_cpd
+    assert 0 <= found.image_quality <= 1.001 * found.throughput
+    assert 0 < found.strehl_ratio < 1.1
+    assert found.acceptance_angle_deg > 0.9 * found.interommatidial_angle_deg
+
+
+@QUIETLY
+@given(
+    z=st.one_of(st.lists(st.floats(1e-4, 10), max_size=5), numbers),
+    depth_layers=numbers,
+    field_zones=numbers,
+    tolerance=st.one_of(st.none(), st.floats(0.05, 0.5), numbers),
+)
+def test_any_perfect_sight_or_a_refusal(z, depth_layers, field_zones, tolerance):
+    """Behind a perfect lens, where kernels cost nothing: arguments are checked all the same."""
+    try:
+        sight = Eye(resolution=(2, 3), bands=1).sight(2, z, depth_layers, field_zones, tolerance)
+    except ValueError as error:
+        refused(error)
+        return
+    assert len(str(sight).splitlines()) == 2
+
+
+@QUIETLY
+@given(samples=numbers, z=numbers, right=numbers, up=numbers)
+def test_any_kernel_or_a_refusal(samples, z, right, up):
+    lens = Pupil(2e-6, thin_lens_focal_length=Eye().sensor_distance)
+    try:
+        kernel = Eye(lens, (3, 3), bands=1, tolerance=0.1).kernel(samples, z, (right, up))
+    except ValueError as error:
+        refused(error)
+        return
+    assert np.isfinite(kernel).all()
+    assert 0 < kernel.sum() < 1.02
+
+
+@QUIETLY
+@given(tolerance=numbers, illuminance=numbers, time=numbers, efficiency=numbers)
+def test_any_light_or_a_refusal(tolerance, illuminance, time, efficiency):
+    try:
+        photons = PhotonBudget(illuminance, time, efficiency).photons(SpectralBands.for_tolerance(tolerance), 1e-10)
+    except ValueError as error:
+        refused(error)
+        return
+    assert (photons > 0).all()
+    assert np.isfinite(photons).all()

@@ -1,0 +1,225 @@
+"""Levels of depth and field: each held against the more exact one; errors predicted before they are seen."""
+
+import math
+
+import numpy as np
+import pytest
+
+from optics import AccuracyError, BSplineRelief, Eye, Pupil
+from optics.ladder import Ladder, checks, hats, worst_difference
+from optics.sight import Sight
+
+S = 2
+NEAR, FAR = 0.6e-3, 5e-3
+LENS = Eye(Pupil(25e-6, thin_lens_focal_length=Eye().sensor_distance), (7, 9), bands=1)
+
+
+def flat_scene(rng, eye, margin=4):
+    h, w = (n * S + margin for n in eye.resolution)
+    return rng.random((eye.bands, h, w))
+
+
+def reference(eye, radiance, kernel_of):
+    """Every cell of the scene spread by a kernel of its own."""
+    total = np.zeros((eye.bands, *radiance.shape[1:]))
+    height, width = radiance.shape[1:]
+    for i, j in np.ndindex(height, width):
+        kernel = kernel_of(i, j)
+        half = kernel.shape[-1] // 2
+        padded = np.zeros((eye.bands, height + 2 * half, width + 2 * half))
+        padded[:, i : i + 2 * half + 1, j : j + 2 * half + 1] = kernel * radiance[:, i : i + 1, j : j + 1]
+        total += padded[:, half : half + height, half : half + width]
+    (h, w), margin = eye.resolution, (height - eye.resolution[0] * S) // 2
+    seen = total[:, margin : margin + h * S, margin : margin + w * S].reshape(eye.bands, h, S, w, S).mean(axis=(2, 4))
+    return eye.throughput * np.tensordot(eye.spectral_bands.weights, seen, axes=1)
+
+
+class TestDepth:
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def scene():
+        """A slanted wall: the left side near, the right side far."""
+        radiance = flat_scene(np.random.default_rng(0), LENS)
+        z = np.broadcast_to(1 / np.linspace(1 / NEAR, 1 / FAR, radiance.shape[2]), radiance.shape[1:])
+        kernels = {d: LENS.kernel(S, d) for d in np.unique(z)}
+        return radiance, z, reference(LENS, radiance, lambda i, j: kernels[z[i, j]])
+
+    def test_error_falls_with_the_square_of_the_layers(self, scene):
+        radiance, z, exact = scene
+        errors = []
+        for layers in (1, 3, 5, 9):
+            sight = LENS.sight(S, z, depth_layers=layers)
+            assert len(sight.kernels) == layers
+            errors.append(np.abs(LENS.see(radiance, S, z=z, sight=sight) - exact).max() / LENS.throughput)
+        assert errors[0] > 0.03
+        assert np.log2(errors[1] / errors[2]) > 1.5
+        assert errors[3] < errors[0] / 20
+
+    @pytest.mark.parametrize("tolerance", [0.3, 0.05, 0.01])
+    def test_predicted_error_holds_and_is_not_cowardly(self, scene, tolerance):
+        radiance, z, exact = scene
+        sight = LENS.sight(S, z, tolerance=tolerance)
+        (layers,), predicted = sight.choices[0].counts, sight.choices[0].predicted_error
+        assert predicted <= tolerance
+        weight = LENS.spectral_bands.weights.max()  # scene cells here reach 1, not white's daylight
+        actual = np.abs(LENS.see(radiance, S, z=z, sight=sight) - exact).max() / LENS.throughput
+        assert actual <= predicted * max(weight, 1)
+        assert layers == {0.3: 1, 0.05: 5, 0.01: 9}[tolerance] or layers < {0.3: 4, 0.05: 6, 0.01: 18}[tolerance]
+
+    def test_one_distance_is_one_kernel(self):
+        sight = LENS.sight(S, 2e-3)
+        assert len(sight.kernels) == 1
+        assert sight.choices[0].predicted_error == 0
+        rng = np.random.default_rng(0)
+        scene = flat_scene(rng, LENS)
+        everywhere = np.full(scene.shape[1:], 2e-3)
+        np.testing.assert_array_equal(LENS.see(scene, S, z=everywhere), LENS.see(scene, S, z=2e-3))
+
+    def test_far_scenes_need_one_layer(self):
+        """From 10 m on the light is as good as parallel: R² / (2 z λ) = 6e-5 waves."""
+        sight = LENS.sight(S, (10.0, math.inf))
+        assert sight.choices[0].counts == (1,)
+        assert sight.choices[0].predicted_error < 1e-3
+
+    def test_a_wrong_depth_is_noticed(self, scene):
+        radiance, z, exact = scene
+        error = np.abs(LENS.see(radiance, S, z=z[:, ::-1], sight=LENS.sight(S, z, 9)) - exact).max() / LENS.throughput
+        assert error > 0.03
+
+
+class TestField:
+    WIDE = Eye(Pupil(30e-6, thin_lens_focal_length=240e-6), (1, 15), 45.0, bands=1)
+
+    def test_light_from_the_side_lands_on_its_geometric_image(self):
+        """A slow ideal lens: the kernel off the axis is centred where the direction says, for all four quadrants."""
+        eye = Eye(Pupil(8e-6, thin_lens_focal_length=Eye().sensor_distance), bands=1)
+        for direction in ((10, 0), (0, 10), (-15, 5), (12, -12)):
+            kernel = eye.kernel(8, direction_deg=direction)[0]
+            at = np.arange(len(kernel)) - len(kernel) // 2
+            centre = np.array([kernel.sum(axis=1) @ at, kernel.sum(axis=0) @ at]) / kernel.sum()
+            assert np.abs(centre).max() < 0.3
+            assert kernel.sum() == pytest.approx(1, abs=0.02)
+
+    def test_a_prism_turns_light_from_its_side_onto_the_axis(self):
+        """Which side is which: a relief thick on the right of row and column order deflects towards +x, so that its
+        off-axis kernel keeps the same shift, and a tilted source alone does not."""
+        ramp = 0.1 / 0.5 * (2 * np.arange(4) - 3) * 15e-6
+        eye = Eye(Pupil(15e-6, BSplineRelief(np.broadcast_to(ramp, (4, 4)))), bands=1)
+
+        def shift(direction):
+            kernel = eye.kernel(4, direction_deg=direction)[0]
+            return kernel.sum(axis=0) @ (np.arange(len(kernel)) - len(kernel) // 2) / kernel.sum()
+
+        cell = eye.receptor_pitch / 4 / eye.sensor_distance
+        for degrees in (-15, 0, 15):
+            tangent = math.tan(math.radians(degrees))
+            sine = 0.1 - math.sin(math.radians(degrees))  # deflected towards +x; from the right, light heads to -x
+            image = sine / math.sqrt(1 - sine**2)
+            assert shift((degrees, 0)) == pytest.approx(-(image + tangent) / cell, abs=1.0)
+
+    def test_error_falls_with_the_zones(self):
+        eye = self.WIDE
+        radiance = flat_scene(np.random.default_rng(3), eye, margin=0)
+        height, width = radiance.shape[1:]
+        cell = eye.receptor_pitch / S / eye.sensor_distance
+
+        def kernel_of(i, j):
+            right, down = (j - (width - 1) / 2) * cell, (i - (height - 1) / 2) * cell
+            return eye.kernel(S, direction_deg=tuple(math.degrees(math.atan(t)) for t in (right, -down)))
+
+        exact = reference(eye, radiance, kernel_of)
+        errors = []
+        for zones in (1, 3, 5, 9):
+            seen = eye.see(radiance, S, sight=eye.sight(S, field_zones=zones))
+            errors.append(np.abs(seen - exact).max() / eye.throughput)
+        assert errors[0] > 0.02
+        assert errors == sorted(errors, reverse=True)
+        assert errors[3] < errors[0] / 8
+
+    def test_predicted_error_is_within_the_tolerance_and_printed(self):
+        sight = self.WIDE.sight(S, field_zones="auto", tolerance=0.1)
+        depth, wide = sight.choices
+        assert wide.stage == "field"
+        assert 0 < wide.predicted_error <= 0.1
+        assert math.prod(wide.counts) == len(sight.kernels) > 1
+        assert "tolerance of 0.1" in str(sight)
+        assert len(str(sight).splitlines()) == 2
+        assert depth.counts == (1,)
+
+    def test_mirror_images(self):
+        """A symmetric eye sees a mirrored scene mirrored, zones and all."""
+        eye = self.WIDE
+        scene = flat_scene(np.random.default_rng(1), eye)
+        sight = eye.sight(S, field_zones=3)
+        there = eye.see(scene, S, sight=sight)
+        back = eye.see(scene[:, ::-1, ::-1], S, sight=sight)[:, ::-1, ::-1]
+        np.testing.assert_allclose(back, there, atol=2e-3 * there.max())
+
+
+class TestLadder:
+    @pytest.mark.parametrize("rung", [(1,), (3,), (9,), (1, 1), (3, 3), (3, 5), (9, 9), (1, 5)])
+    def test_checks_lie_between_nodes(self, rung):
+        places = checks(rung)
+        assert 1 <= len(places) <= 8
+        assert len(set(places)) == len(places)
+        assert all(-1 <= at <= 1 for place in places for at in place)
+
+    def test_hats_sum_to_one(self):
+        at = np.linspace(-1.5, 1.5, 31)
+        for count in (1, 2, 3, 5):
+            np.testing.assert_allclose(hats(at, count).sum(axis=0), 1)
+
+    def test_the_worst_scene_reaches_the_worst_difference(self):
+        """Light only where the receptive field grew."""
+        rng = np.random.default_rng(0)
+        a, b = rng.random((1, 5, 5)), rng.random((1, 7, 7))
+        padded = b - np.pad(a, ((0, 0), (1, 1), (1, 1)))
+        box = np.zeros((8, 8))
+        for i, j in np.ndindex(2, 2):
+            box[i : i + 7, j : j + 7] += padded[0] / 4
+        expected = max(box[box > 0].sum(), -box[box < 0].sum())
+        assert worst_difference([(1, b), (-1, a)], 2) == pytest.approx(expected)
+
+    def test_a_quadratic_family_errs_as_predicted(self):
+        """Kernels linear in t² between nodes at distance h: error h²/4 halfway."""
+        ladder = Ladder("test", lambda at: np.full((1, 1, 1), at[0] ** 2), [(3,), (5,), (9,)], 1)
+        assert [ladder.error((n,)) for n in (3, 5, 9)] == pytest.approx([1 / 4, 1 / 16, 1 / 64])
+        assert ladder.choose(0.1).counts == (5,)
+        with pytest.raises(AccuracyError, match=r"9 test nodes leave 2\.0e-02"):
+            ladder.choose(0.001)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"z": -1.0}, "z = -1"),
+        ({"z": []}, "z is empty"),
+        ({"z": [1.0, math.nan]}, "z is empty or holds NaN"),
+        ({"z": "far"}, "z = 'far'"),
+        ({"depth_layers": 0}, r"depth_layers = 0: must be a whole number in \[1, 64\]"),
+        ({"depth_layers": "many"}, "depth_layers = 'many'"),
+        ({"field_zones": 2.5}, "field_zones = 2.5"),
+        ({"tolerance": 0.0}, "tolerance = 0"),
+    ],
+)
+def test_bad_sights(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        LENS.sight(S, **arguments)
+
+
+def test_a_sight_of_another_eye():
+    sight = Eye().sight(S)
+    assert isinstance(sight, Sight)
+    with pytest.raises(ValueError, match="sight is for a retina of 30 x 30 cells"):
+        LENS.see(np.zeros((1, 14, 18)), S, sight=sight)
+
+
+def test_depths_of_another_shape():
+    with pytest.raises(ValueError, match="z has shape"):
+        LENS.see(np.zeros((1, 14, 18)), S, z=np.full((3, 4), 1.0) + np.arange(4))
+
+
+@pytest.mark.parametrize("direction", [(90.0, 0.0), (0.0, math.nan)])
+def test_bad_directions(direction):
+    with pytest.raises(ValueError, match="direction_deg"):
+        LENS.kernel(S, direction_deg=direction)
