@@ -82,12 +82,10 @@ def regions(peers: Sequence[Point]) -> list[Region]:
     found = []
     converged = [point.seconds for point in peers if point.error <= CONVERGED_PEER]
     if converged:
-        label = f"goal: {_power(SINGLE)} before a peer has {_power(CONVERGED_PEER)}"
-        found.append(Region(label, min(converged), SINGLE))
+        found.append(Region("goal 2", min(converged), SINGLE))
     best = own_best(peers)
     if best:
-        label = f"goal: {_power(ACCURATE)}, {FASTER:g}x faster than a peer's best"
-        found.append(Region(label, min(point.seconds for point in best) / FASTER, ACCURATE))
+        found.append(Region("goal 1", min(point.seconds for point in best) / FASTER, ACCURATE))
     return found
 
 
@@ -111,12 +109,17 @@ def draw(ours: Sequence[Point], peers: Sequence[Point], path: Path, caption: str
     for axes in every[len(cases) :]:
         axes.set_visible(False)
     figure.suptitle("Error against time: lower left is better", fontsize=13)
-    figure.supxlabel(f"{LEGEND}\n{caption}", fontsize=8, color="#666666")
+    figure.supxlabel(f"{LEGEND}\n{caption}", fontsize=8.5, color="#444444")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
 
 
-LEGEND = "thick lines: the method that the planner chooses; dots: each method asked for by name; green: goals"
+LEGEND = (
+    "thick lines: the method that the planner chooses; dots: each exact method asked for by name; "
+    "grey: the best of each peer's methods\n"
+    f"goal 1: {_power(ACCURATE)} at least {FASTER:g}x faster than the first peer to reach its own best; "
+    f"goal 2: {_power(SINGLE)} in float32 before any peer has {_power(CONVERGED_PEER)}"
+)
 TITLES = {
     case.name: f"ideal lens {case.name}, window ±10 λ f/#" if case.has_lens else "circular aperture, near field"
     for case in CASES
@@ -138,7 +141,7 @@ def main(arguments: list[str] | None = None) -> int:
         write_points([*others, *peers], options.stored)
         print(f"written: {options.stored}")
     path = options.out / "D0_work_precision_propagation.png"
-    draw(ours, peers, path, f"one thread of {options.machine}; peers: best of each one's methods, {source}")
+    draw(ours, peers, path, f"one thread of {options.machine}; peers {source}, overall scale fitted")
     print(f"figure: {path}")
     found = verdicts(ours, peers)
     print("\n".join(map(str, found)))

@@ -92,10 +92,9 @@ def _shade(axes: Any, region: Region, low: np.ndarray, shade: int) -> None:
     from matplotlib.patches import Rectangle
 
     width, height = region.seconds - low[0], region.error - low[1]
-    axes.add_patch(
-        Rectangle((low[0], low[1]), width, height, color="#009E73", alpha=0.10 + 0.06 * shade, lw=0, zorder=0)
-    )
-    axes.text(low[0] * 1.12, region.error * 0.82, region.label, fontsize=7, color="#00694D", va="top")
+    fill = (0, 0.62, 0.45, 0.10 + 0.05 * shade)
+    axes.add_patch(Rectangle((low[0], low[1]), width, height, fc=fill, ec="#009E73", lw=0.8, zorder=0))
+    axes.text(low[0] * 1.12, region.error * 0.75, region.label, fontsize=7.5, color="#00694D", va="top")
 
 
 def _line(axes: Any, curve: Curve) -> None:

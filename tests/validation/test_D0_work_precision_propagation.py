@@ -214,7 +214,7 @@ def test_every_peer_has_an_adapter_and_only_installed_ones_run():
 @pytest.fixture
 def few(monkeypatch):
     monkeypatch.setattr("validation.peers.rhabdom.TOLERANCES", (1e-3, 1e-6))
-    monkeypatch.setattr("validation.peers.rhabdom.METHODS", {"rayleigh_sommerfeld": None})
+    monkeypatch.setattr("validation.peers.rhabdom.EXACT", {"rayleigh_sommerfeld": None})
     monkeypatch.setattr("validation.peers.measure.grids", lambda case: grids(case)[:1])
 
 
