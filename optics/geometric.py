@@ -20,7 +20,6 @@ __all__ = ["PinholeSampling", "RaySampling", "geometric", "pinhole"]
 
 # Step of the central differences that give the local slope, in pupil radii: they err by its square times a cubic term.
 STEP = 1e-4
-MOST_RAYS = 4_000_000
 DIGITS = 1.0  # of the rule of nodes, for the fastest that the splats' spectra turn
 # Relative L2 of Fresnel's fringes behind an edge, over a disk of Fresnel number 1: they fall with its fourth root.
 FRINGES = 0.75
@@ -58,7 +57,8 @@ class RaySampling:
 
     @property
     def largest(self) -> int:
-        return math.ceil(math.sqrt(self.count))
+        """Each ray has four numbers."""
+        return 2 * math.ceil(math.sqrt(self.count))
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def geometric(problem: Problem) -> list[RaySampling]:
     cycles = 2 ** (math.ceil(4 * math.log2(max(cycles, 1.0))) / 4)  # few different rules, so that they are found again
     count = node_count(problem.aperture, cycles, DIGITS)
     seconds = 1e-3 + count * 1e-7
-    return [RaySampling((problem.aperture, cycles, DIGITS), count, model, seconds)] if count < MOST_RAYS else []
+    return [RaySampling((problem.aperture, cycles, DIGITS), count, model, seconds)]
 
 
 def pinhole(problem: Problem) -> list[PinholeSampling]:

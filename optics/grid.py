@@ -20,7 +20,7 @@ def sample_positions(n: int, dx: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Grid:
-    """A plane's samples: shape (y, x), pitch dx [m] (or [1/m] for spatial frequencies), sample n//2 at centre (x, y)."""
+    """A plane's samples: shape (y, x), pitch dx [m] (or [1/m] for spatial frequencies), n//2 at centre (x, y)."""
 
     shape: tuple[int, int]
     dx: float
@@ -28,7 +28,7 @@ class Grid:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", shape_2d("shape", self.shape))
-        positive("dx", self.dx)
+        object.__setattr__(self, "dx", positive("dx", self.dx))  # a NumPy scalar would take a Dr.Jit array for its own
         object.__setattr__(self, "centre", point_2d("centre", self.centre))
 
     @classmethod
