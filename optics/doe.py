@@ -71,6 +71,8 @@ class BSplineRelief(Relief):
     def paraboloid(cls, height: float, curvature: float, radius: float) -> BSplineRelief:
         """h = height - curvature (x² + y²)/2 [m], curvature in 1/m, over a pupil of the given radius [m].
 
+        With curvature medium_n / ((n - medium_n) f) it is the paraxial lens exp(-ikr²/2f), to the phase of `height`.
+
         On uniform knots the polar form gives x² the control values X_i² - δ²/3, X_i = (2i - 3) a the Greville
         abscissae and δ = 2a the knot spacing.
         """
