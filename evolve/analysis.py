@@ -160,7 +160,7 @@ def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:
     weights = bands.weights.mean(axis=0) * daylight(bands.wavelengths)
     image = np.tensordot(weights / weights.sum(), psf.psf.astype(np.float64), axes=1)
     mean = np.average(bands.wavelengths, weights=weights)
-    return replace(psf, psf=image[None], wavelengths=np.array([mean]), plans=(psf.plan,))
+    return replace(psf, tensor=image[None], wavelengths=np.array([mean]), plans=(psf.plan,))
 
 
 def image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
