@@ -51,6 +51,8 @@ class BatchedRenderer:
         self._stage = build_stage(world)
         with variant(self._stage.variant):
             self.tracer: Tracer = tracer_of(world, self._stage, self.bands.wavelengths, tracer)
+        mixing = self.eye.throughput * self.bands.weights
+        self._readout = self.sensor.readout(mixing, self.tracer.basis)
         self._set_width(n_envs)
 
     def resized(self, n_envs: int) -> BatchedRenderer:
@@ -98,13 +100,9 @@ class BatchedRenderer:
     def signals(self, state: WorldState) -> np.ndarray:
         """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
         a² sum_b weights[channel, b] radiance_b."""
-        radiance = self.receptor_radiance(state)
-        weights = (self.eye.throughput * self.bands.weights).astype(np.float32)
-        signals = np.zeros((*radiance.shape[1:3], len(weights), *radiance.shape[3:]), np.float32)
-        # One addition per band, in order: the same rounding for any number of worlds.
-        for band, plane in enumerate(radiance):
-            signals += weights[:, band, None, None] * plane[:, :, None]
-        return signals
+        components = self._launch(self._sums, state).reshape(len(self.tracer.basis), state.n * self.eyes.n_eyes, -1)
+        signals = self._readout(components)
+        return signals.reshape(state.n, self.eyes.n_eyes, len(self.bands.weights), *self.eye.resolution)
 
     @property
     def recordings(self) -> int:

@@ -14,16 +14,14 @@ import numpy as np
 import scipy.sparse
 
 import optics
+from sim.readout import Readout, RowProduct, of_bands, of_components, of_receptors, within_stretches
 
 # Below this many rays a receptive field wider than the eye is sampled too coarsely, however few its receptors.
 MIN_RAYS = 64
 # Cells across the eye, at least, on which receptive fields are tabulated.
 MIN_CELLS = 32
-# A sparse product beats the dense one below about this share of non-zero weights.
-SPARSE_DENSITY = 0.03
-# Columns of one dense product. The width never depends on the number of worlds, so that a world's signals are
-# bit-identical whatever the number of its neighbours: BLAS rounds differently for different shapes.
-BLOCK = 32
+# Weights that together change no signal by more than this share of the receptors' noise are left out.
+NEGLIGIBLE = 0.1
 
 
 @dataclass(frozen=True)
@@ -42,6 +40,10 @@ class BoxSensor:
         """Mean radiance of each receptor from the sums over its rays: (band, view, receptor), both ways."""
         return sums * np.float32(1.0 / self.rays_per_receptor)
 
+    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> Readout:
+        """Signals from sums of components over receptors' rays, see sim.readout."""
+        return of_receptors(mixing @ basis.T / self.rays_per_receptor)
+
 
 @dataclass(frozen=True)
 class ReceptiveFieldSensor:
@@ -53,31 +55,39 @@ class ReceptiveFieldSensor:
     with RF the turned PSF kernel convolved with the receptor's square, q the density that directions were drawn from
     and power_b the fraction of the pupil's power inside the kernel.
 
+    Weights far above and below a row of receptors are 0 where they are too small to matter: together they are less than
+    the tolerance asked of the PSF, and change no signal of a scene up to white in full daylight by more than
+    NEGLIGIBLE of the receptors' noise.
+
     directions  unit vectors in the eye's frame, (ray, 3) float32
-    weights     per band (receptor, ray): a dense array, or a sparse one where fields are small against the eye
+    weights     per band, sparse (receptor, ray)
+    resolution  receptors (height, width)
     """
 
     directions: np.ndarray
-    weights: tuple[np.ndarray | scipy.sparse.csr_array, ...]
+    weights: tuple[scipy.sparse.csr_array, ...]
+    resolution: tuple[int, int]
     rays_per_receptor: int = 1  # summed in the kernel: none
 
     def receptor_radiance(self, radiance: np.ndarray) -> np.ndarray:
         """(band, view, ray) -> (band, view, receptor)."""
-        return np.stack([self._gather(w, band) for w, band in zip(self.weights, radiance, strict=True)])
+        planes = [product(plane) for product, plane in zip(self._products, radiance, strict=True)]
+        return np.stack([plane.reshape(len(plane), -1) for plane in planes])
 
-    def _gather(self, weights: np.ndarray | scipy.sparse.csr_array, radiance: np.ndarray) -> np.ndarray:
-        if scipy.sparse.issparse(weights):
-            return (weights @ radiance.T).T
-        views = len(radiance)
-        padded = np.zeros((-(-views // BLOCK) * BLOCK, radiance.shape[1]), np.float32)
-        padded[:views] = radiance
-        blocks = padded.reshape(-1, BLOCK, radiance.shape[1])
-        return np.concatenate([block @ weights.T for block in blocks])[:views]
+    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> Readout:
+        """Signals from components along rays, see sim.readout."""
+        if len(mixing) * len(basis) > len(self.weights):
+            return of_bands(self._products, mixing, basis)
+        return of_components(self.weights, self.resolution, mixing, basis)
 
     @cached_property
+    def _products(self) -> list[RowProduct]:
+        return [RowProduct.of([w], self.resolution) for w in self.weights]
+
+    @property
     def density(self) -> float:
         """Share of weights that are not zero."""
-        return float(np.mean([np.count_nonzero(_dense(w)) / np.prod(w.shape) for w in self.weights]))
+        return float(np.mean([w.nnz / np.prod(w.shape) for w in self.weights]))
 
 
 Sensor = BoxSensor | ReceptiveFieldSensor
@@ -127,8 +137,9 @@ def receptive_field_sensor(eye: optics.Eye, rays: int, cells: int) -> ReceptiveF
     positions, ys, xs = _draw(density, rays)
     margin = (np.array(density.shape) - cells * np.array(eye.resolution)) // 2
     weights = _weights(fields, density, (ys - margin[0], xs - margin[1]), (ys, xs), eye.resolution, cells)
+    weights = within_stretches(weights, eye.resolution, negligible_share(eye))
     plane = positions / cells - np.array(density.shape)[::-1] / (2 * cells)
-    return ReceptiveFieldSensor(directions_of(eye, plane), weights)
+    return ReceptiveFieldSensor(directions_of(eye, plane), weights, eye.resolution)
 
 
 def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
@@ -200,7 +211,7 @@ def _weights(
     cell: tuple[np.ndarray, np.ndarray],
     resolution: tuple[int, int],
     cells: int,
-) -> tuple[np.ndarray | scipy.sparse.csr_array, ...]:
+) -> tuple[scipy.sparse.csr_array, ...]:
     """W per band, (receptor, ray); `from_first` is each ray's cell counted from receptor (0, 0)'s first cell."""
     margin = [(size - cells) // 2 for size in fields.shape[1:]]
     probability = density[cell]
@@ -217,10 +228,9 @@ def _weights(
             if not (total > 0).all():
                 raise ValueError("rays_per_receptor: a receptor has no ray in its receptive field; use more rays")
             rows[band].append(scipy.sparse.csr_array((w * (power[band] / total)).astype(np.float32)))
-    sparse = [scipy.sparse.vstack(band, format="csr") for band in rows]
-    density_of_w = np.mean([w.nnz / np.prod(w.shape) for w in sparse])
-    return tuple(sparse) if density_of_w < SPARSE_DENSITY else tuple(_dense(w) for w in sparse)
+    return tuple(scipy.sparse.vstack(band, format="csr") for band in rows)
 
 
-def _dense(weights: np.ndarray | scipy.sparse.csr_array) -> np.ndarray:
-    return weights if isinstance(weights, np.ndarray) else weights.toarray()
+def negligible_share(eye: optics.Eye) -> float:
+    """Share of a receptor's weights that can be left out: a share s changes a signal by a² s at most."""
+    return min(NEGLIGIBLE * eye.noise_sigma / eye.throughput, eye.tolerance)

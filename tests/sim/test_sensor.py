@@ -109,14 +109,44 @@ def test_white_light_gives_the_kernels_power():
         np.testing.assert_allclose(weights.sum(axis=1), p, rtol=1e-5)
 
 
-def test_dense_and_sparse_weights_agree(monkeypatch):
-    e = eye(pupil=focused())
-    dense = receptive_field_sensor(e, 400, 4)
-    monkeypatch.setattr("sim.sensor.SPARSE_DENSITY", 1.1)
-    sparse = receptive_field_sensor(e, 400, 4)
-    assert not isinstance(sparse.weights[0], np.ndarray)
-    light = np.random.default_rng(0).random((3, 37, 400), dtype=np.float32)
-    np.testing.assert_allclose(sparse.receptor_radiance(light), dense.receptor_radiance(light), rtol=2e-5)
+def dense(sensor):
+    """Weights as one array, (band, receptor, ray)."""
+    return np.stack([w.toarray() for w in sensor.weights]).astype(float)
+
+
+@pytest.mark.parametrize("components", [1, 2, 3])
+def test_signals_are_the_weighted_sums(components):
+    """Whichever way is taken: bands multiplied into the weights (few components) or one after the other."""
+    e = eye(pupil=focused(), resolution=(4, 5))
+    sensor = receptive_field_sensor(e, 400, 4)
+    rng = np.random.default_rng(0)
+    light = rng.random((components, 37, 400), dtype=np.float32)
+    basis = np.eye(3) if components == 3 else rng.random((components, 3))
+    mixing = rng.random((2, 3))
+    expected = np.einsum("cb,kb,brp,kvp->vcr", mixing, basis, dense(sensor), light)
+    found = sensor.readout(mixing, basis)(light)
+    np.testing.assert_allclose(found.reshape(37, 2, 20), expected, rtol=2e-5)
+    bands = np.einsum("kb,kvp->bvp", basis, light).astype(np.float32)
+    np.testing.assert_allclose(
+        sensor.receptor_radiance(bands), np.einsum("brp,bvp->bvr", dense(sensor), bands), rtol=2e-5
+    )
+
+
+def test_what_is_left_out_is_less_than_a_tenth_of_the_noise():
+    """No scene between black and white in full daylight gives a signal that departs by more, and a uniform one none."""
+    sigma = 0.005
+    exact, cut = (
+        receptive_field_sensor(
+            optics.Eye(pupil=focused(), resolution=(9, 9), sensor_width=L, bands=3, noise_sigma=noise), 400, 4
+        )
+        for noise in (0.0, sigma)
+    )
+    assert cut.density < 0.7 * exact.density
+    before, after = dense(exact), dense(cut)
+    np.testing.assert_allclose(after.sum(axis=2), before.sum(axis=2), rtol=1e-5)
+    worst = np.maximum(after - before, 0).sum(axis=2)  # the scene that is white exactly where weights have grown
+    throughput = 0.3**2
+    assert 0.02 * sigma < throughput * worst.max() <= 0.1 * sigma
 
 
 def test_perfect_lens_averages_over_each_receptor():
