@@ -128,6 +128,7 @@ def _field(u: np.ndarray) -> np.ndarray:
     return field
 
 
+@lru_cache(maxsize=64)
 def _sampling(method: str, source: Grid, window: Grid, wavelength: float, distance: float, ripple: float) -> _Sampling:
     z, nyquist = abs(distance), math.sqrt(0.5) / source.dx  # along the diagonal
     paraxial = method == "fresnel"
