@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -162,6 +163,7 @@ def _cells_within(half: float, cell: float) -> int:
     return 2 * math.ceil(max(half / cell - 0.5, 0) - 1e-6) + 1
 
 
+@lru_cache(maxsize=8)
 def _cell_integrals(samples: int, pitch: float, tiles: tuple[int, float], centre: float) -> np.ndarray:
     """(cell, sample): integrals over tiles = (cells, their size [m]) around `centre` of the spline through the samples,
     one axis. At three samples per cycle a cubic errs by 4e-4, degree seven by 4e-6."""
