@@ -178,7 +178,8 @@ def _error(steps: list[Step], tolerance: float, light: Light) -> float:
     if last == 0:
         return 0.0
     error = sum(step.plan.predicted_error * math.sqrt(max(step.power_out / last, 1)) for step in steps)
-    error += sum(4 * light.ripple * math.sqrt(max(step.power_in / last, 1)) for step in steps)
+    edges = 8 * light.ripple + 4 * FLOAT_NOISE[light.dtype]
+    error += sum(edges * math.sqrt(max(step.power_in / last, 1)) for step in steps)
     if error > tolerance:
         raise AccuracyError(
             f"tolerance = {tolerance:g}: so little of the light meets the last window that the error reaches "
