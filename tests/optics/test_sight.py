@@ -64,7 +64,7 @@ class TestDepth:
         weight = LENS.spectral_bands.weights.max()  # scene cells here reach 1, not white's daylight
         actual = np.abs(LENS.see(radiance, S, z=z, sight=sight) - exact).max() / LENS.throughput
         assert actual <= predicted * max(weight, 1)
-        assert layers == {0.3: 1, 0.05: 5, 0.01: 9}[tolerance] or layers < {0.3: 4, 0.05: 6, 0.01: 18}[tolerance]
+        assert layers <= {0.3: 3, 0.05: 5, 0.01: 9}[tolerance]
 
     def test_one_distance_is_one_kernel(self):
         sight = LENS.sight(S, 2e-3)
