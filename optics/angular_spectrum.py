@@ -115,7 +115,7 @@ def _split(problem: Problem, taper: Taper) -> GridSampling:
 def _timed(sampling: GridSampling, last: float) -> GridSampling:
     pupil, spectrum = sampling.pupil.shape, sampling.spectrum.shape
     seconds = predicted_seconds(pupil, sampling.pupil_period, spectrum) + last
-    seconds += pupil[0] ** 2 * 6e-8 + spectrum[0] ** 2 * 2e-8 + 2e-3
+    seconds += pupil[0] ** 2 * (5e-8 + sampling.edge.seconds_per_point) + spectrum[0] ** 2 * 2e-8 + 2e-3
     return replace(sampling, seconds=seconds)
 
 

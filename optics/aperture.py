@@ -48,6 +48,11 @@ class SoftAperture(ABC):
     def reach(self) -> float:
         return self.edge.reach
 
+    @property
+    def seconds_per_point(self) -> float:
+        """What `transmittance` takes for a point, roughly."""
+        return 1e-8
+
     @abstractmethod
     def transmittance(self, x: Any, y: Any, types: Precision) -> Any:
         """At points (x, y), flat Dr.Jit Float64 arrays; differentiable in both."""

@@ -81,7 +81,7 @@ def far_field(problem: Problem) -> list[FarFieldSampling]:
     step = problem.wavelength / (period * pitch)
     directions = Grid.square(2 * (math.ceil(sine / step) + TAPS) + 1, step)
     once = predicted_seconds(pupil.shape, period, directions.shape) + 2e-3
-    once += pupil.shape[0] ** 2 * 6e-8 + directions.shape[0] ** 2 * 2e-8
+    once += pupil.shape[0] ** 2 * (5e-8 + edge.seconds_per_point / nodes**2) + directions.shape[0] ** 2 * 2e-8
     seconds = nodes**2 * once + math.prod(problem.window.shape) * 1e-7
     return [FarFieldSampling(edge, pupil, directions, period, nodes, math.atan2(half, problem.distance), seconds)]
 

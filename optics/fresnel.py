@@ -78,7 +78,11 @@ def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSam
     edge = problem.soft_edge(turning)
     pitch = 1 / (turning + edge.stopband)
     pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
-    seconds = 3e-4 + predicted_seconds(pupil.shape, 0.5, problem.window.shape) + pupil.shape[0] ** 2 * 6e-8
+    seconds = (
+        3e-4
+        + predicted_seconds(pupil.shape, 0.5, problem.window.shape)
+        + pupil.shape[0] ** 2 * (5e-8 + edge.seconds_per_point)
+    )
     return [ParaxialSampling(method, edge, pupil, seconds, model_error(problem, method == "fresnel"))]
 
 

@@ -51,7 +51,8 @@ class Grid:
     @property
     def half_diagonal(self) -> float:
         """Largest distance of a sample from the origin."""
-        return float(np.hypot(*(abs(c) + n // 2 * self.dx for c, n in zip(self.centre, self.shape[::-1], strict=True))))
+        x, y = (abs(middle) + n // 2 * self.dx for middle, n in zip(self.centre, self.shape[::-1], strict=True))
+        return float(np.hypot(x, y))
 
     @property
     def own_half_width(self) -> float:

@@ -24,8 +24,8 @@ MOST_ENTRIES = 4_000_000  # of the matrix between pupil and window
 
 @dataclass(frozen=True)
 class LowRankSampling:
-    """Pupil samples; `rank` Chebyshev points per axis of the window, `half_width` [m] about its centre, and the distance
-    c [m] of Fourier's kernel e^{-ik ξ·x/c}."""
+    """Pupil samples; `rank` Chebyshev points per axis of the window, `half_width` [m] about its centre, and the
+    distance c [m] of Fourier's kernel e^{-ik ξ·x/c}."""
 
     edge: PupilEdge
     pupil: Grid
@@ -67,7 +67,13 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
     inner = rank * pupil.shape[0]
     height, width = problem.window.shape
     flops = 8 * (inner * inner * width + height * inner * width)
-    seconds = 1.5e-3 + flops / FLOPS[problem.dtype] + inner * inner * 2e-8 + inner * (height + width) * 1e-8
+    seconds = (
+        1.5e-3
+        + flops / FLOPS[problem.dtype]
+        + inner * inner * 2e-8
+        + pupil.shape[0] ** 2 * edge.seconds_per_point
+        + inner * (height + width) * 1e-8
+    )
     return [LowRankSampling(edge, pupil, rank, half, scale, seconds)]
 
 

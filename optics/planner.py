@@ -231,9 +231,8 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None],
         + ("cheapest of those that meet the tolerance" if len(options) > 1 else "asked for")
     )
     error = _sampling_error(problem) + best.model_error
-    return Plan(
-        best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), getattr(best, "padding", 1.0)
-    )
+    padding = getattr(best, "padding", 1.0)
+    return Plan(best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), padding)
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:

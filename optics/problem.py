@@ -100,6 +100,10 @@ class PupilEdge:
         """Frequency [1/m] beyond which its spectrum is below the ripple."""
         return self.aperture.stopband / self.radius
 
+    @property
+    def seconds_per_point(self) -> float:
+        return self.aperture.seconds_per_point
+
 
 @dataclass(frozen=True)
 class Taper:

@@ -34,6 +34,10 @@ class SoftPolygon(SoftAperture):
     edge: SoftEdge
     vertices: np.ndarray
 
+    @property
+    def seconds_per_point(self) -> float:
+        return len(self.vertices) * 1e-8 * (1 + self.edge.cycles)
+
     def transmittance(self, x: Any, y: Any, types: Precision) -> Any:
         import drjit as dr
 
