@@ -13,9 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse
 
-# Views of one product. The number never depends on that of worlds, so that a world's signals are bit-identical whatever
-# the number of its neighbours: BLAS rounds differently for different shapes.
+# Views of one product, at most. Their number never depends on that of worlds, so that a world's signals are
+# bit-identical whatever the number of its neighbours: BLAS rounds differently for different shapes.
 BLOCK = 32
+# Multiplications of one product that OpenBLAS certainly leaves to one thread. Its threads wait for each other spinning;
+# where Dr.Jit's or another process's want the cores, that has taken a hundred times as long as the product.
+ONE_THREAD = 2**18
 
 
 @dataclass(frozen=True)
@@ -48,12 +51,17 @@ class RowProduct:
         n_blocks = -(-views // BLOCK)
         if views % BLOCK:
             radiance = np.concatenate([radiance, np.zeros((n_blocks * BLOCK - views, rays), np.float32)])
-        blocks = radiance.reshape(n_blocks, BLOCK, rays)
         out = np.empty((n_blocks * BLOCK, self.channels, len(self.stretches), self.width), np.float32)
         for row, (first, weights) in enumerate(self.stretches):
+            blocks = radiance.reshape(-1, _views_at_once(weights), rays)
             product = blocks[:, :, first : first + len(weights)] @ weights
             out[:, :, row] = product.reshape(-1, self.channels, self.width)
         return out[:views]
+
+
+def _views_at_once(weights: np.ndarray) -> int:
+    """As many as one thread may do; where that is next to nothing, the products are large enough for several."""
+    return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights.size <= ONE_THREAD), BLOCK)
 
 
 # What turns components of light, (component, view, ...), into signals, (view, channel, ...), as matrices say:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import gc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -97,10 +97,11 @@ class BatchedRenderer:
         sums = sums.reshape(bands, self.n_envs * self.eyes.n_eyes, -1)
         return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, self.eyes.n_eyes, height, width)
 
-    def signals(self, state: WorldState) -> np.ndarray:
+    def signals(self, state: WorldState, meanwhile: Callable[[], None] | None = None) -> np.ndarray:
         """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
-        a² sum_b weights[channel, b] radiance_b."""
-        components = self._launch(self._sums, state).reshape(len(self.tracer.basis), state.n * self.eyes.n_eyes, -1)
+        a² sum_b weights[channel, b] radiance_b. `meanwhile` is called while the kernel runs."""
+        light = self._launch(self._sums, state, meanwhile)
+        components = light.reshape(len(self.tracer.basis), state.n * self.eyes.n_eyes, -1)
         signals = self._readout(components)
         return signals.reshape(state.n, self.eyes.n_eyes, len(self.bands.weights), *self.eye.resolution)
 
@@ -109,13 +110,19 @@ class BatchedRenderer:
         """How often the kernels were recorded: once per kernel in use."""
         return int(self._rays.n_recordings + self._sums.n_recordings)
 
-    def _launch(self, frozen: Any, state: WorldState) -> np.ndarray:
+    def _launch(self, frozen: Any, state: WorldState, meanwhile: Callable[[], None] | None = None) -> np.ndarray:
         if state.n != self.n_envs:
             raise ValueError(f"state has {state.n} worlds, this renderer was built for n_envs = {self.n_envs}")
         with variant(self._stage.variant), _garbage_kept():
             poses = mi.Float(self._poses.pack(state, self._stage))
-            # numpy() waits for the kernel: only then may the buffer, whose memory Dr.Jit shares, be written again.
-            return np.array(frozen(self.tracer.scene, poses, self._inputs).numpy())
+            running = frozen(self.tracer.scene, poses, self._inputs)
+            try:
+                if meanwhile is not None:
+                    meanwhile()
+            finally:
+                # numpy() waits for the kernel: only then may the buffer, whose memory Dr.Jit shares, be written again.
+                result = np.array(running.numpy())
+            return result
 
 
 @contextmanager

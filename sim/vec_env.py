@@ -10,7 +10,7 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
 from sim.agent import Eyes
-from sim.observation import STANDING, Memory, action_space, add_noise, observation_space
+from sim.observation import STANDING, Memory, Noise, action_space, add_noise, observation_space
 from sim.render import BatchedRenderer
 from sim.simulation import Simulation, Step
 from sim.state import WorldState
@@ -92,17 +92,19 @@ class EyesVecEnv(VecEnv):
     # --- observations
 
     def _observe(self, fresh: np.ndarray, contact: np.ndarray) -> dict[str, np.ndarray]:
-        frame = add_noise(self.renderer.signals(self.state), self.eyes.noise_sigma, self.simulation.streams.noise)
+        shape = (self.num_envs, *self.observation_space["eyes"].shape[1:])
+        noise = Noise(shape, self.eyes.noise_sigma, self.simulation.streams.noise)
+        signals = self.renderer.signals(self.state, meanwhile=noise.draw)
         return {
-            "eyes": self._memory.remember(frame, fresh),
+            "eyes": self._memory.remember(add_noise(signals, noise), fresh),
             "contact": contact.astype(np.float32)[:, None],
             "previous_action": np.where(fresh[:, None], np.array(STANDING, np.float32), self._actions),
         }
 
     def _add_terminal_observations(self, infos: list[dict[str, Any]], step: Step, ended: np.ndarray) -> None:
-        noise = self.simulation.streams.noise
         signals = self._terminal_signals(step.state, ended)
-        frame = add_noise(signals, self.eyes.noise_sigma, [noise[i] for i in ended])
+        streams = self.simulation.streams.noise
+        frame = add_noise(signals, Noise(signals.shape, self.eyes.noise_sigma, [streams[i] for i in ended]))
         stacks = self._memory.preview(frame, ended)
         for stack, world in zip(stacks, ended, strict=True):
             infos[world]["terminal_observation"] = {

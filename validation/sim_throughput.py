@@ -4,6 +4,7 @@
 
 Medians over repeated calls after warm-up, in agent-steps per second (one step of one agent: all its eyes once):
     render         every eye of every world, perfect lens
+    render_mitsuba the same where Mitsuba traces the rays, and not the closed form that a world of walls has
     render_optics  the same behind a pupil: receptive fields, weights, bands
     step           the whole VecEnv step behind that pupil: physics, rewards, rendering, optics, noise, infos
     mujoco         mujoco.Renderer drawing the same eyes of one world, one after the other (RGB, no optics, no shadows)
@@ -80,15 +81,29 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
         return replace(state, heading=rng.uniform(-np.pi, np.pi, n_envs))
 
     rates: dict[str, float | None] = {}
-    for name, eyes in (("render", case.eyes), ("render_optics", with_pupil(case.eyes))):
-        renderer = sim.BatchedRenderer(world, eyes, n_envs, RAYS_PER_RECEPTOR)
+    tracers = {}
+    for name, eyes, tracer in (
+        ("render", case.eyes, "auto"),
+        ("render_mitsuba", case.eyes, "mitsuba"),
+        ("render_optics", with_pupil(case.eyes), "auto"),
+    ):
+        renderer = sim.BatchedRenderer(world, eyes, n_envs, RAYS_PER_RECEPTOR, tracer)
+        tracers[name] = renderer.tracer.name
         rates[name] = n_envs / seconds(lambda renderer=renderer: renderer.signals(moved()), budget)  # type: ignore[misc]
     rates["step"] = n_envs / _step_seconds(case, n_envs, budget)
     for name, shadows in (("mujoco", False), ("mujoco_shadows", True)):
         rates[name] = _mujoco_rate(world, case.eyes, state, budget, shadows)
     base = rates["mujoco"]
-    ratios = {name: rates[name] / base for name in ("render", "render_optics", "step")} if base else None
-    return {"task": case.task, "n_envs": n_envs, "agent_steps_per_second": rates, "ratio_to_mujoco": ratios}
+    ratios = (
+        {name: rates[name] / base for name in ("render", "render_mitsuba", "render_optics", "step")} if base else None
+    )
+    return {
+        "task": case.task,
+        "n_envs": n_envs,
+        "tracers": tracers,
+        "agent_steps_per_second": rates,
+        "ratio_to_mujoco": ratios,
+    }
 
 
 def _step_seconds(case: Case, n_envs: int, budget: float) -> float:
