@@ -15,11 +15,21 @@ from optics.precision import Precision, opaque, precision
 from optics.problem import Problem
 from optics.radial import RadialLine
 
-__all__ = ["MOST_DIGITS", "PAIRS_PER_SECOND", "NodeSampling", "cached_nodes", "direct_sum", "node_count", "nodes"]
+__all__ = [
+    "MOST_DIGITS",
+    "PAIRS_PER_SECOND",
+    "NodeSampling",
+    "cached_nodes",
+    "direct_sum",
+    "node_count",
+    "nodes",
+    "turns",
+]
 
 PAIRS_PER_SECOND = 2.5e8
 MOST_DIGITS = 14.0  # of float64 sums
 SPARE_DIGITS = 0.5  # the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
+FAR = 0.25  # radius over distance below which the kernel is smooth enough for any nodes
 
 
 @dataclass(frozen=True)
@@ -66,16 +76,26 @@ class NodeSampling:
 
 def nodes(problem: Problem) -> list[NodeSampling]:
     """Enough nodes for the cycles that pupil and path together turn through."""
-    cycles = problem.radius * problem.turning_inside
     digits = min(SPARE_DIGITS - math.log10(problem.tolerance), MOST_DIGITS)
+    cycles = turns(problem, digits)
     count = node_count(problem.aperture, cycles, digits)
     line, outputs = None, math.prod(problem.window.shape)
     if problem.symmetric:
         outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
         line = RadialLine.resolving(outermost, _intensity_band(problem), problem.distance, problem.ripple)
-        outputs = line.points
+        line = line if line.pays(outputs) else None
+        outputs = line.points if line else outputs
     seconds = 1e-3 + count * outputs / PAIRS_PER_SECOND + count * 4e-9
     return [NodeSampling(problem.aperture, cycles, digits, count, line, seconds)]
+
+
+def turns(problem: Problem, digits: float) -> float:
+    """Cycles per radius for which the nodes must be enough: the phase's, and near the pupil those that stand for the
+    kernel's poles at height z above the plane: Gauss-Legendre over [0, R] and the trapezoid rule around a ring of
+    radius R converge like e^{-4nz/R} and e^{-nz/R}.
+    """
+    nearness = max(problem.radius / problem.distance - FAR, 0.0)
+    return problem.radius * problem.turning_inside + digits * math.log(10) / (2 * math.pi) * nearness
 
 
 def node_count(aperture: Aperture, cycles: float, digits: float) -> int:

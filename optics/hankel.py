@@ -64,7 +64,8 @@ def hankel(problem: Problem) -> list[HankelSampling]:
     if not problem.symmetric:
         return []
     found = [_sampling(problem, taper) for taper in tapers(problem)]
-    return [sampling for sampling in found if sampling.largest <= MOST_NODES]
+    outputs = math.prod(problem.window.shape)
+    return [sampling for sampling in found if sampling.largest <= MOST_NODES and sampling.line.pays(outputs)]
 
 
 def _sampling(problem: Problem, taper: Taper) -> HankelSampling:

@@ -16,6 +16,8 @@ from optics.quadrature import harmonics
 __all__ = ["TAPS", "RadialLine", "lagrange_weights"]
 
 TAPS = 8
+# Entries of the matrix from points to table: 128 MB in float64.
+LARGEST_MATRIX = 2**24
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,12 @@ class RadialLine:
         table = math.ceil(1 / step) + TAPS
         radius = rim * (1 + TAPS / (2 * (table - 1)))
         degree = int(harmonics(np.array(2 * math.pi * band * radius), digits))
-        degree += math.ceil(digits * math.log(10) / math.asinh(distance / radius) / 2)
+        degree += math.ceil(digits * math.log(10) / math.asinh(distance / radius))
         return cls(rim, radius, math.ceil(degree / 2) + 2, table)
+
+    def pays(self, outputs: int) -> bool:
+        """Whether it saves anything: a window far off the axis is a short piece of a long line."""
+        return self.points < outputs and self.points * self.table <= LARGEST_MATRIX
 
     @property
     def positions(self) -> np.ndarray:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from optics.beam import Beam
-from optics.direct_sum import MOST_DIGITS, PAIRS_PER_SECOND, direct_sum, node_count
+from optics.direct_sum import MOST_DIGITS, PAIRS_PER_SECOND, direct_sum, node_count, turns
 from optics.planner import FLOAT_NOISE
 from optics.precision import precision
 from optics.problem import Problem
@@ -24,8 +24,9 @@ SHARE, SECONDS = 0.3, 3e-3
 
 
 def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) -> float | None:
-    """Relative L2 error of the intensity over the window, from the direct sum at points drawn half evenly and half in
-    proportion to the squared intensity; None where that would cost too much.
+    """Relative L2 error of the intensity over the window, from the direct sum at points drawn a third each evenly, in
+    proportion to the intensity and to its square; None where that would cost too much. An even error of the amplitude
+    weighs as the intensity's root: the second third sees it where a focus leaves the others blind.
 
     image: flat, |U|² / (pupil area); seconds: what it took. Σ (δI)² is estimated by Σ (δI_k)² / (n p_k).
     """
@@ -39,16 +40,17 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     # Nodes err in proportion to the light of the whole aperture, and a window may be far darker.
     coherent = beam.pupil.area / (problem.wavelength * problem.distance) ** 2
     darkness = max(0.0, 0.5 * math.log10(coherent / math.sqrt(total / image.size)))
-    cycles = problem.radius * problem.turning_inside
     affordable = max(SHARE * seconds, SECONDS) * PAIRS_PER_SECOND
     for spare in SPARE_DIGITS:
         digits = min(spare - math.log10(problem.tolerance) + darkness, MOST_DIGITS)
+        cycles = turns(problem, digits)
         points = int(min(POINTS, image.size, affordable / node_count(problem.aperture, cycles, digits)))
         if points == min(POINTS, image.size):
             break
     if points < min(8, image.size):
         return None
-    chance = 0.5 / image.size + 0.5 * np.square(image, dtype=np.float64) / total
+    bright = image.astype(np.float64)
+    chance = (1 / image.size + bright / bright.sum() + np.square(bright) / total) / 3
     rungs = (np.arange(points) + 0.5) / points
     drawn = np.searchsorted(np.cumsum(chance), rungs).clip(max=image.size - 1)
     row, column = np.divmod(drawn, problem.window.shape[1])
@@ -59,4 +61,5 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     squared = float(np.mean(np.square(image[drawn] - exact) / chance[drawn]))
     if squared > 0.01 * total:  # an approximation, perhaps much brighter than the truth
         total = min(total, float(np.mean(np.square(exact) / chance[drawn])))
-    return CAUTION * math.sqrt(squared / total) + FLOAT_NOISE["float64"] + 2 * 10.0 ** (darkness - digits)
+    rounding = max(FLOAT_NOISE["float64"], float(np.finfo(precision(problem.dtype).dtype).eps))
+    return CAUTION * math.sqrt(squared / total) + rounding + 2 * 10.0 ** (darkness - digits)
