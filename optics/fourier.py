@@ -12,7 +12,7 @@ runs is decided here by predicted time on one core: Dr.Jit's matrix product does
 from __future__ import annotations
 
 from functools import lru_cache
-from math import log2
+from math import ceil, log2
 from typing import Any
 
 import numpy as np
@@ -24,12 +24,16 @@ from optics.tracked import is_tracked
 
 __all__ = ["dft2", "fast_length", "fourier_sum", "predicted_seconds"]
 
+LONGEST_FFT = 2**31
+
 
 def fast_length(least: float) -> int:
     """Smallest 5-smooth integer >= least: the FFT is fast there."""
     from scipy.fft import next_fast_len
 
-    return int(next_fast_len(max(1, int(np.ceil(least))), real=True))
+    if least > LONGEST_FFT:
+        return ceil(least)  # no FFT will be that long
+    return int(next_fast_len(max(1, ceil(least)), real=True))
 
 
 def dft2(
