@@ -51,6 +51,8 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
         return None
     bright = image.astype(np.float64)
     chance = (1 / image.size + bright / bright.sum() + np.square(bright) / total) / 3
+    if points == image.size:
+        chance = np.full(points, 1 / points)  # every point once
     rungs = (np.arange(points) + 0.5) / points
     drawn = np.searchsorted(np.cumsum(chance), rungs).clip(max=image.size - 1)
     row, column = np.divmod(drawn, problem.window.shape[1])

@@ -1,0 +1,45 @@
+"""The spot check sees the errors that a focus or a small window could hide from it."""
+
+import numpy as np
+import pytest
+
+from optics import Grid, PointSource, Pupil
+from optics.beam import Beam
+from optics.planner import choose
+from optics.point_spread import problem
+from optics.spot_check import CAUTION, spot_check
+
+
+def picture(shape, dx, tolerance=1e-4):
+    """Beam, problem and PSF of a lens at its focus, and of a window of this shape."""
+    beam = Beam(Pupil(50e-6, thin_lens_focal_length=250e-6), PointSource(), 550e-9, 250e-6)
+    task = problem(beam, Grid(shape, dx), tolerance, "float64")
+    image = choose(task, "rayleigh_sommerfeld")[1].intensity(beam, task).numpy() / beam.pupil.area
+    return beam, task, image
+
+
+@pytest.mark.parametrize("dx", [0.2e-6, 1e-6, 4e-6])
+def test_an_even_error_of_the_amplitude_is_seen_at_any_concentration(dx):
+    """Rounding spreads evenly: δI = 2 Re(U* δU). At the coarse pitch nearly all the light is in one sample."""
+    beam, task, image = picture((61, 61), dx)
+    noise = np.random.default_rng(0).normal(size=image.size) * 1e-4 * np.sqrt(image.max())
+    wrong = (np.sqrt(image) + noise) ** 2
+    actual = np.linalg.norm(wrong - image) / np.linalg.norm(image)
+    seen = spot_check(beam, task, wrong, 1.0)
+    assert actual <= seen <= 5 * CAUTION * actual
+
+
+@pytest.mark.parametrize("sample", range(5))
+def test_in_a_small_window_every_sample_is_looked_at(sample):
+    beam, task, image = picture((1, 5), 3e-6)
+    wrong = image.copy()
+    wrong[sample] += 1e-3 * image.max()
+    actual = 1e-3 * image.max() / np.linalg.norm(image)
+    assert spot_check(beam, task, wrong, 1.0) == pytest.approx(CAUTION * actual, rel=0.05)
+
+
+def test_single_precision_is_never_promised_more_than_it_carries():
+    beam, task, image = picture((9, 9), 1e-6, 1e-10)
+    single = problem(beam, task.window, 1e-4, "float32")
+    assert spot_check(beam, single, image, 1.0) >= np.finfo(np.float32).eps
+    assert spot_check(beam, task, image, 1.0) < 1e-9
