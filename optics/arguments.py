@@ -7,18 +7,28 @@ import numpy as np
 
 from optics.tracked import number
 
-__all__ = ["finite", "in_range", "point_2d", "positive", "radiance_cube", "shape_2d", "whole"]
+__all__ = ["finite", "in_range", "point_2d", "positive", "radiance_cube", "shape_2d", "shown", "whole"]
 
 
 # Squares of lengths, and their ratios, must stay within double precision.
 SMALLEST, LARGEST = 1e-15, 1e15
 
 
+def shown(value: Any) -> str:
+    """`value` as a reader would type it, whatever NumPy's print options are (colour-science alters them)."""
+    if isinstance(value, np.generic):
+        return repr(value.item())
+    if isinstance(value, (tuple, list)):
+        ends = "()" if isinstance(value, tuple) else "[]"
+        return f"{ends[0]}{', '.join(map(shown, value))}{',' if ends == '()' and len(value) == 1 else ''}{ends[1]}"
+    return repr(value)
+
+
 def finite(name: str, value: float) -> float:
     """`value` as float; ValueError unless it is a finite number."""
     number = _number(name, value)
     if not math.isfinite(number):
-        raise ValueError(f"{name} = {value!r}: must be finite")
+        raise ValueError(f"{name} = {shown(value)}: must be finite")
     return number
 
 
@@ -30,7 +40,7 @@ def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False
     if not SMALLEST <= number <= LARGEST:
         size = f" (at least {SMALLEST:g})" if 0 < number < SMALLEST else ""
         upper = ", or infinite" if infinite else f" and at most {LARGEST:g}"
-        raise ValueError(f"{name} = {value!r}: must be greater than 0{size}{upper}, in {unit}")
+        raise ValueError(f"{name} = {shown(value)}: must be greater than 0{size}{upper}, in {unit}")
     return number
 
 
@@ -38,7 +48,7 @@ def in_range(name: str, value: float, low: float, high: float) -> float:
     """`value` as float; ValueError unless low <= value <= high."""
     number = _number(name, value)
     if not low <= number <= high:
-        raise ValueError(f"{name} = {value!r}: must lie in [{low:g}, {high:g}]")
+        raise ValueError(f"{name} = {shown(value)}: must lie in [{low:g}, {high:g}]")
     return number
 
 
@@ -51,7 +61,7 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
         height = width = 0
         whole = False
     if not whole or height < 1 or width < 1:
-        raise ValueError(f"{name} = {value!r}: must be two whole numbers (height, width), each at least 1")
+        raise ValueError(f"{name} = {shown(value)}: must be two whole numbers (height, width), each at least 1")
     return height, width
 
 
@@ -60,7 +70,7 @@ def point_2d(name: str, value: Any) -> tuple[float, float]:
     try:
         x, y = value
     except (TypeError, ValueError):
-        raise ValueError(f"{name} = {value!r}: must be two lengths (x, y) [m]") from None
+        raise ValueError(f"{name} = {shown(value)}: must be two lengths (x, y) [m]") from None
     return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
 
 
@@ -88,7 +98,7 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
     except (TypeError, ValueError, OverflowError):
         fits = False
     if not fits:
-        raise ValueError(f"{name} = {value!r}: must be a whole number in [{low}, {high}]")
+        raise ValueError(f"{name} = {shown(value)}: must be a whole number in [{low}, {high}]")
     return int(value)
 
 
@@ -96,4 +106,4 @@ def _number(name: str, value: Any) -> float:
     try:
         return number(value)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} = {value!r}: must be a number") from None
+        raise ValueError(f"{name} = {shown(value)}: must be a number") from None

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from optics.aperture import Aperture, Nodes, SoftAperture
-from optics.arguments import in_range
+from optics.arguments import in_range, shown
 from optics.precision import Precision
 from optics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
 from optics.soft_edge import SoftEdge
@@ -57,7 +57,7 @@ class Annulus(Aperture):
 
     def __post_init__(self) -> None:
         if not 0 < in_range("inner", self.inner, 0.0, 1.0) < 1:
-            raise ValueError(f"inner = {self.inner!r}: must lie between 0 and 1, both excluded")
+            raise ValueError(f"inner = {shown(self.inner)}: must lie between 0 and 1, both excluded")
 
     @property
     def area(self) -> float:

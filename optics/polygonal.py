@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from optics.aperture import Aperture, Nodes, SoftAperture
-from optics.arguments import finite, positive
+from optics.arguments import finite, positive, shown
 from optics.quadrature import gauss_legendre, gauss_legendre_count
 from optics.soft_edge import SoftEdge
 from optics.soft_polygon import SoftPolygon
@@ -47,7 +47,7 @@ class Polygon(Aperture):
             ValueError: n not a whole number of at least 3, or rotation_deg not finite.
         """
         if not isinstance(n, int | np.integer) or n < 3:
-            raise ValueError(f"n = {n!r}: must be a whole number of vertices, at least 3")
+            raise ValueError(f"n = {shown(n)}: must be a whole number of vertices, at least 3")
         angle = np.deg2rad(finite("rotation_deg", rotation_deg)) + 2 * np.pi * np.arange(n) / n
         return cls(np.column_stack([np.cos(angle), np.sin(angle)]))
 
@@ -104,7 +104,7 @@ class Slit(Aperture):
         positive("height", self.height, "pupil radii")
         if np.hypot(self.width, self.height) > 2 * RIM:
             raise ValueError(
-                f"(width, height) = ({self.width!r}, {self.height!r}): must fit into the unit circle, "
+                f"(width, height) = ({shown(self.width)}, {shown(self.height)}): must fit into the unit circle, "
                 "width² + height² at most 4"
             )
 
@@ -146,7 +146,7 @@ def _checked(value: Any) -> np.ndarray:
     try:
         vertices = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"vertices = {value!r}: must be numbers of shape (n, 2)") from None
+        raise ValueError(f"vertices = {shown(value)}: must be numbers of shape (n, 2)") from None
     if vertices.ndim != 2 or vertices.shape[1] != 2 or len(vertices) < 3:
         raise ValueError(f"vertices has shape {vertices.shape}: must be (n, 2) with n at least 3")
     if not np.isfinite(vertices).all():

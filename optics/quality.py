@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.arguments import in_range, positive
+from optics.arguments import in_range, positive, shown
 from optics.field import Field
 from optics.fourier import dft2
 from optics.grid import Grid
@@ -137,7 +137,7 @@ def encircled_energy(
     x, y = result.x[None, :] - centre[0], result.y[:, None] - centre[1]
     edge = min(-x[0, 0], x[0, -1], -y[0, 0], y[-1, 0])
     if not ((wanted >= 0) & (wanted <= edge)).all():
-        raise ValueError(f"radii = {radii!r}: must be in [0, {edge:g}] m, inside the PSF's window")
+        raise ValueError(f"radii = {shown(radii)}: must be in [0, {edge:g}] m, inside the PSF's window")
     distance = np.hypot(x, y)
     inside = np.clip((wanted[:, None, None] - distance) / result.dx + 0.5, 0, 1)
     return np.einsum("ryx,wyx->wr", inside, np.asarray(result.psf, dtype=np.float64)) * result.dx**2

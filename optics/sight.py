@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.arguments import positive, whole
+from optics.arguments import positive, shown, whole
 from optics.ladder import Choice, Ladder, hats, nodes
 from optics.tracked import is_tracked, number, plain
 
@@ -142,7 +142,7 @@ def _distances(z: Any) -> np.ndarray:
     try:
         distances = np.atleast_1d(np.asarray(z, dtype=np.float64))
     except (TypeError, ValueError):
-        raise ValueError(f"z = {z!r}: must be a distance [m], or an array of them") from None
+        raise ValueError(f"z = {shown(z)}: must be a distance [m], or an array of them") from None
     if distances.size == 0 or np.isnan(distances).any():
         raise ValueError("z is empty or holds NaN: must be distances greater than 0, in m, or infinite")
     positive("z", float(distances.min()), infinite=True)

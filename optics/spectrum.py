@@ -55,8 +55,9 @@ def cie_1931(wavelengths: np.ndarray) -> np.ndarray:
 def _nanometres(wavelengths: np.ndarray) -> np.ndarray:
     nm = np.asarray(wavelengths, dtype=np.float64) * 1e9
     low, high = _tables()[[0, -1], 0]
-    if not np.all((nm > low - 1e-6) & (nm < high + 1e-6)):
-        raise ValueError(f"wavelengths = {np.asarray(wavelengths)} m: must lie in [{low:g}e-9, {high:g}e-9]")
+    outside = nm[~((nm > low - 1e-6) & (nm < high + 1e-6))]
+    if outside.size:
+        raise ValueError(f"wavelengths hold {outside[0] * 1e-9:g} m: must lie in [{low:g}e-9, {high:g}e-9]")
     return nm
 
 
