@@ -1,17 +1,20 @@
 """The batched MuJoCo step: every world one action further, on as many threads as this process owns.
 
 The agent is a heavy body on two slide joints driven by velocity actuators; its heading is set, not simulated.
-Objects are mocap bodies that collide with nothing, so that physics need not know where they are.
+Objects are mocap bodies that collide with nothing, so that physics need not know where they are. Agents that surely
+touch nothing during the action glide (`sim.glide`); the others' worlds are MuJoCo's.
 """
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import mujoco
 import mujoco.rollout
 import numpy as np
 
+from sim.glide import glide_of
 from sim.state import WorldState
 from sim.world import MAX_SPEED, World
 
@@ -37,11 +40,14 @@ class Motion:
 class Physics:
     """Batched physics of one world's model.
 
+    threads  of MuJoCo's batched step
+    gliding  whether agents out of reach of everything move in closed form (`.glide`: how, None where they cannot)
+
     Raises ValueError for a model without the agent's joints, actuators and touch sensor, and for objects that
     could collide.
     """
 
-    def __init__(self, world: World, threads: int) -> None:
+    def __init__(self, world: World, threads: int, gliding: bool = True) -> None:
         model = world.model
         self._model = model
         self._data = [mujoco.MjData(model) for _ in range(max(threads, 1))]
@@ -53,18 +59,49 @@ class Physics:
         self._start = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
         mujoco.mj_getState(model, self._data[0], self._start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         self.seconds = SUBSTEPS * model.opt.timestep
+        agent = int(model.jnt_bodyid[_joint(model, "agent_x")])
+        self.glide = glide_of(model, agent, self._untouched, MAX_SPEED) if gliding else None
 
     def step(self, state: WorldState, velocity: np.ndarray) -> Motion:
         """One action: SUBSTEPS with the commanded velocity [m/s] (n, 2) held."""
-        columns = self._columns
-        initial = np.repeat(self._start[None], state.n, axis=0)
-        initial[:, columns.position] = state.position - columns.origin
-        initial[:, columns.heading] = state.heading
-        initial[:, columns.velocity] = state.velocity
-        control = np.zeros((state.n, SUBSTEPS, self._model.nu))
+        if self.glide is None:
+            return self._simulate(state, velocity)
+        path, speed = self.glide(state.velocity, velocity)
+        free = self.glide.touches_nothing(state.position, path, velocity)
+        free &= (np.abs(state.velocity) < UNSTABLE_SPEED).all(axis=-1)  # false for NaN: MuJoCo says what comes of it
+        motion = Motion(state.position[:, None] + path, speed, np.zeros(state.n, bool), np.zeros(state.n, bool))
+        near = np.flatnonzero(~free)
+        if len(near):
+            simulated = self._simulate(state.take(near), velocity[near])
+            for name, array in vars(motion).items():
+                array[near] = getattr(simulated, name)
+        return motion
+
+    def _simulate(self, state: WorldState, velocity: np.ndarray) -> Motion:
+        initial = self._initial(state.n)
+        initial[:, self._columns.position] = state.position - self._columns.origin
+        initial[:, self._columns.heading] = state.heading
+        initial[:, self._columns.velocity] = state.velocity
+        return self._motion(state, *self._rollout.rollout(self._model, self._data, initial, self._control(velocity)))
+
+    def _initial(self, n: int) -> np.ndarray:
+        return np.repeat(self._start[None], n, axis=0)
+
+    def _control(self, velocity: np.ndarray) -> np.ndarray:
+        control = np.zeros((len(velocity), SUBSTEPS, self._model.nu))
         control[:, :, self._actuators] = velocity[:, None]
-        states, sensors = self._rollout.rollout(self._model, self._data, initial, control)
-        return self._motion(state, states, sensors)
+        return control
+
+    def _untouched(self, speed: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What MuJoCo makes of speeds and commands (n, 2) with contacts off: see sim.glide.Run."""
+        model = copy.copy(self._model)
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+        initial = self._initial(len(speed))
+        initial[:, self._columns.velocity] = speed
+        data = [mujoco.MjData(model)]
+        states, _ = mujoco.rollout.Rollout(nthread=0).rollout(model, data, initial, self._control(command))
+        path = states[:, :, self._columns.position] - initial[:, None, self._columns.position]
+        return path, states[:, :, self._columns.velocity]
 
     def close(self) -> None:
         """Stop the thread pool."""
