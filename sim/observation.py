@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from gymnasium import spaces
 
@@ -59,33 +57,3 @@ class Memory:
 
 
 STANDING = (-1.0, 0.0)  # the "previous action" of an agent that has not moved yet: no speed, no turn
-
-
-class Noise:
-    """Every receptor's Gaussian noise, each world's from its own stream; it can be drawn before there are signals.
-
-    shape  (env, ...) · sigma: its standard deviation · rngs: one per world
-    """
-
-    def __init__(self, shape: tuple[int, ...], sigma: float, rngs: list[np.random.Generator]) -> None:
-        self._shape, self._sigma, self._rngs = shape, sigma, rngs
-
-    def draw(self) -> None:
-        """Draw it, if it was not drawn before."""
-        _ = self.values
-
-    @cached_property
-    def values(self) -> np.ndarray | None:
-        """(env, ...); None without noise."""
-        if self._sigma == 0.0:
-            return None
-        values = np.empty(self._shape, np.float32)
-        for world, rng in zip(values, self._rngs, strict=True):
-            rng.standard_normal(dtype=np.float32, out=world)
-        values *= np.float32(self._sigma)
-        return values
-
-
-def add_noise(signals: np.ndarray, noise: Noise) -> np.ndarray:
-    """Noisy signals (env, ...)."""
-    return signals if noise.values is None else signals + noise.values

@@ -7,9 +7,6 @@ wavelengths are fixed, so a call does nothing but upload poses and launch the ke
 from __future__ import annotations
 
 import copy
-import gc
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import drjit as dr
@@ -18,6 +15,7 @@ import numpy as np
 
 import optics
 from sim.agent import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
+from sim.recording import aligned, garbage_kept
 from sim.sensor import build_sensor
 from sim.stage import Stage, build_stage
 from sim.state import WorldState
@@ -25,7 +23,7 @@ from sim.tracer import Tracer, tracer_of
 from sim.variant import variant
 from sim.world import World
 
-ALIGNMENT = 16  # floats: rows of the pose buffer, and the buffer itself, start on 64 bytes
+ROW = 16  # floats: rows of the pose buffer start on 64 bytes
 
 
 class BatchedRenderer:
@@ -97,10 +95,10 @@ class BatchedRenderer:
         sums = sums.reshape(bands, self.n_envs * self.eyes.n_eyes, -1)
         return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, self.eyes.n_eyes, height, width)
 
-    def signals(self, state: WorldState, meanwhile: Callable[[], None] | None = None) -> np.ndarray:
+    def signals(self, state: WorldState) -> np.ndarray:
         """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
-        a² sum_b weights[channel, b] radiance_b. `meanwhile` is called while the kernel runs."""
-        light = self._launch(self._sums, state, meanwhile)
+        a² sum_b weights[channel, b] radiance_b."""
+        light = self._launch(self._sums, state)
         components = light.reshape(len(self.tracer.basis), state.n * self.eyes.n_eyes, -1)
         signals = self._readout(components)
         return signals.reshape(state.n, self.eyes.n_eyes, len(self.bands.weights), *self.eye.resolution)
@@ -110,32 +108,13 @@ class BatchedRenderer:
         """How often the kernels were recorded: once per kernel in use."""
         return int(self._rays.n_recordings + self._sums.n_recordings)
 
-    def _launch(self, frozen: Any, state: WorldState, meanwhile: Callable[[], None] | None = None) -> np.ndarray:
+    def _launch(self, frozen: Any, state: WorldState) -> np.ndarray:
         if state.n != self.n_envs:
             raise ValueError(f"state has {state.n} worlds, this renderer was built for n_envs = {self.n_envs}")
-        with variant(self._stage.variant), _garbage_kept():
+        with variant(self._stage.variant), garbage_kept():
             poses = mi.Float(self._poses.pack(state, self._stage))
-            running = frozen(self.tracer.scene, poses, self._inputs)
-            try:
-                if meanwhile is not None:
-                    meanwhile()
-            finally:
-                # numpy() waits for the kernel: only then may the buffer, whose memory Dr.Jit shares, be written again.
-                result = np.array(running.numpy())
-            return result
-
-
-@contextmanager
-def _garbage_kept() -> Iterator[None]:
-    """Hold off Python's garbage collection: if it frees another renderer's kernels or scene while this one's kernel is
-    being recorded, Dr.Jit aborts the process."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
+            # numpy() waits for the kernel: only then may the buffer, whose memory Dr.Jit shares, be written again.
+            return np.array(frozen(self.tracer.scene, poses, self._inputs).numpy())
 
 
 class _PoseBuffer:
@@ -144,10 +123,8 @@ class _PoseBuffer:
 
     def __init__(self, n_envs: int, n_spheres: int) -> None:
         self.n_spheres = n_spheres
-        self.stride = -(-4 * (1 + n_spheres) // ALIGNMENT) * ALIGNMENT
-        raw = np.zeros(n_envs * self.stride + ALIGNMENT, np.float32)
-        first = (-raw.ctypes.data % 64) // 4
-        self._rows = raw[first : first + n_envs * self.stride].reshape(n_envs, self.stride)
+        self.stride = -(-4 * (1 + n_spheres) // ROW) * ROW
+        self._rows = aligned(n_envs * self.stride, np.float32).reshape(n_envs, self.stride)
 
     def pack(self, state: WorldState, stage: Stage) -> np.ndarray:
         rows = self._rows

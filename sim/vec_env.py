@@ -10,7 +10,8 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
 from sim.agent import Eyes
-from sim.observation import STANDING, Memory, Noise, action_space, add_noise, observation_space
+from sim.noise import ReceptorNoise, add_noise
+from sim.observation import STANDING, Memory, action_space, observation_space
 from sim.render import BatchedRenderer
 from sim.simulation import Simulation, Step
 from sim.state import WorldState
@@ -34,6 +35,8 @@ class EyesVecEnv(VecEnv):
         self._memory = Memory(memory)
         channels = len(renderer.bands.weights)
         super().__init__(simulation.n, observation_space(self.eyes, channels, memory), action_space())
+        frame = self.observation_space["eyes"].shape[1:]
+        self._noise = ReceptorNoise(simulation.streams.noise_keys, frame) if self.eyes.noise_sigma > 0 else None
         self._actions = np.zeros((self.num_envs, 2), np.float32)
         self._returns, self._lengths = np.zeros(self.num_envs), np.zeros(self.num_envs, int)
 
@@ -45,6 +48,8 @@ class EyesVecEnv(VecEnv):
     def reset(self) -> dict[str, np.ndarray]:
         if self._seeds[0] is not None:
             self.simulation.seed(self._seeds[0])
+            if self._noise:
+                self._noise.restart(self.simulation.streams.noise_keys)
         self.simulation.reset()
         self._reset_seeds()
         self._reset_options()
@@ -92,19 +97,18 @@ class EyesVecEnv(VecEnv):
     # --- observations
 
     def _observe(self, fresh: np.ndarray, contact: np.ndarray) -> dict[str, np.ndarray]:
-        shape = (self.num_envs, *self.observation_space["eyes"].shape[1:])
-        noise = Noise(shape, self.eyes.noise_sigma, self.simulation.streams.noise)
-        signals = self.renderer.signals(self.state, meanwhile=noise.draw)
+        running = self._noise.begin() if self._noise else None  # it is drawn while the state is packed
+        signals = self.renderer.signals(self.state)
+        frame = add_noise(signals, self.eyes.noise_sigma, running.values()) if running else signals
         return {
-            "eyes": self._memory.remember(add_noise(signals, noise), fresh),
+            "eyes": self._memory.remember(frame, fresh),
             "contact": contact.astype(np.float32)[:, None],
             "previous_action": np.where(fresh[:, None], np.array(STANDING, np.float32), self._actions),
         }
 
     def _add_terminal_observations(self, infos: list[dict[str, Any]], step: Step, ended: np.ndarray) -> None:
         signals = self._terminal_signals(step.state, ended)
-        streams = self.simulation.streams.noise
-        frame = add_noise(signals, Noise(signals.shape, self.eyes.noise_sigma, [streams[i] for i in ended]))
+        frame = add_noise(signals, self.eyes.noise_sigma, self._noise.of(ended)) if self._noise else signals
         stacks = self._memory.preview(frame, ended)
         for stack, world in zip(stacks, ended, strict=True):
             infos[world]["terminal_observation"] = {

@@ -44,6 +44,51 @@ def test_batch_equals_single_data(world):
             np.testing.assert_allclose(motion.path[i, substep], data.qpos[:2], atol=1e-9)
 
 
+@pytest.mark.parametrize("task", ["detection", "navigation"])
+def test_gliding_is_what_mujoco_does(task):
+    """Everywhere, near walls and away from them, to rounding: 1e-12 m on metres over ten substeps."""
+    world = build_world(task)
+    gliding, simulating = Physics(world, 1), Physics(world, 1, gliding=False)
+    simulation = Simulation(world, 32, 0, "training", 1)
+    simulation.reset()
+    rng = np.random.default_rng(0)
+    free = 0
+    for _ in range(40):
+        state, command = simulation.state, rng.uniform(-10, 10, (32, 2))
+        ours, mujocos = gliding.step(state, command), simulating.step(state, command)
+        np.testing.assert_allclose(ours.path, mujocos.path, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(ours.velocity, mujocos.velocity, rtol=0, atol=1e-11)
+        np.testing.assert_array_equal(ours.contact, mujocos.contact)
+        path, _ = gliding.glide(state.velocity, command)
+        free += gliding.glide.touches_nothing(state.position, path, command).sum()
+        simulation.step(rng.uniform(-1, 1, (32, 2)))
+    assert free > 50  # or nothing was compared
+
+
+def test_an_agent_that_glides_through_a_wall_would_be_noticed(world):
+    """Blind to the walls, the same glide departs from MuJoCo: the test above can fail."""
+    physics = Physics(world, 1)
+    physics.glide = dataclasses.replace(physics.glide, lower=np.empty((0, 2)), upper=np.empty((0, 2)))
+    state = dataclasses.replace(begun(world, 1), position=np.array([[10.5, 0.0]]), velocity=np.array([[9.0, 0.0]]))
+    command = np.array([[10.0, 0.0]])
+    apart = physics.step(state, command).path - Physics(world, 1).step(state, command).path
+    assert np.abs(apart).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("field", "glides"), [("dof_damping", True), ("dof_frictionloss", False), ("jnt_stiffness", False)]
+)
+def test_models_glide_as_far_as_they_are_linear(field, glides):
+    """A spring's pull depends on the place, dry friction on the direction: such agents are left to MuJoCo."""
+    world = build_world("detection")
+    getattr(world.model, field)[0] = 0.3
+    assert (Physics(world, 1).glide is not None) == glides
+    state = dataclasses.replace(begun(world, 4), position=np.array([[3.0, 1.0]] * 4))
+    command = np.random.default_rng(0).uniform(-10, 10, (4, 2))
+    ours, mujocos = (Physics(world, 1, gliding).step(state, command) for gliding in (True, False))
+    np.testing.assert_allclose(ours.path, mujocos.path, rtol=0, atol=1e-12)
+
+
 def test_walls_hold_and_are_felt(world):
     state = begun(world, 1)
     physics = Physics(world, 1)

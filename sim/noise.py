@@ -1,0 +1,106 @@
+"""Receptor noise for all worlds at once: standard normal numbers by Philox, in one frozen kernel.
+
+A counter-based generator (Salmon et al. 2011) needs no state but a key per world and the number of frames it has drawn,
+so a world's noise depends on its own seed and history alone, whatever its neighbours do.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from sim.recording import aligned, garbage_kept
+from sim.variant import variant
+
+PER_DRAW = 4  # normal numbers from one evaluation of Philox4x32
+FEW = 8  # worlds of the narrower kernel that serves a few of them
+
+
+class ReceptorNoise:
+    """Standard normal numbers, `shape` of them per world and frame.
+
+    keys   one per world, (n,) uint64 · shape: of one world's receptors
+    """
+
+    def __init__(self, keys: np.ndarray, shape: tuple[int, ...]) -> None:
+        self._shape = shape
+        self.restart(keys)
+        self._draws = -(-math.prod(shape) // PER_DRAW)
+        self._kernels: dict[int, _Kernel] = {}
+
+    def restart(self, keys: np.ndarray) -> None:
+        """Draw from the first frame on, under these keys (n,)."""
+        self._keys, self._frames = keys, np.zeros(len(keys), np.uint32)
+
+    def begin(self) -> Running:
+        """Start drawing the next frame of all worlds; it runs beside whatever comes next."""
+        return self._launch(np.arange(len(self._keys)))
+
+    def of(self, worlds: np.ndarray) -> np.ndarray:
+        """The next frame of these worlds alone, (len(worlds), *shape) float32."""
+        return self._launch(worlds).values()
+
+    def _launch(self, worlds: np.ndarray) -> Running:
+        n = len(self._keys)
+        width = FEW if len(worlds) <= FEW < n else n
+        if width not in self._kernels:
+            self._kernels[width] = _Kernel(width, self._draws)
+        padded = np.resize(worlds, width)
+        running = self._kernels[width](self._keys[padded], self._frames[padded])
+        self._frames[worlds] += 1
+        return Running(running, len(worlds), self._shape)
+
+
+class Running:
+    """A frame that is being drawn."""
+
+    def __init__(self, normals: Any, n: int, shape: tuple[int, ...]) -> None:
+        self._normals, self._n, self._shape = normals, n, shape
+
+    def values(self) -> np.ndarray:
+        """Wait for it: (n, *shape) float32."""
+        drawn = np.empty((self._n, math.prod(self._shape)), np.float32)
+        per_world = -(-drawn.shape[1] // PER_DRAW)
+        for k, part in enumerate(self._normals):
+            mine = drawn[:, k * per_world : (k + 1) * per_world]
+            mine[:] = part.numpy().reshape(-1, per_world)[: self._n, : mine.shape[1]]
+        return drawn.reshape(self._n, *self._shape)
+
+
+class _Kernel:
+    """Recorded once per width; keys and frame numbers come in buffers of its own, always at the same alignment."""
+
+    def __init__(self, worlds: int, draws: int) -> None:
+        self._key_buffer, self._frame_buffer = aligned(worlds, np.uint64), aligned(worlds, np.uint32)
+        with variant():
+            lanes = dr.arange(dr.uint32_array_t(dr.detached_t(mi.Float)), worlds * draws)
+            dr.eval(lanes)
+        self._lanes = lanes
+
+        def normals(keys: Any, frames: Any, lane: Any) -> Any:
+            module = sys.modules[type(lane).__module__]
+            world = lane // draws
+            random = module.Philox4x32(
+                dr.gather(type(keys), keys, world), dr.gather(type(frames), frames, world), lane - world * draws
+            )
+            return list(random.next_float32x4_normal())
+
+        self._normals: Any = dr.freeze(normals)
+
+    def __call__(self, keys: np.ndarray, frames: np.ndarray) -> Any:
+        self._key_buffer[:], self._frame_buffer[:] = keys, frames
+        module = sys.modules[type(self._lanes).__module__]
+        with variant(), garbage_kept():
+            return self._normals(module.UInt64(self._key_buffer), module.UInt32(self._frame_buffer), self._lanes)
+
+
+def add_noise(signals: np.ndarray, sigma: float, normals: np.ndarray) -> np.ndarray:
+    """Signals (n, ...) with Gaussian noise of standard deviation sigma; `normals` of the same shape are used up."""
+    normals *= np.float32(sigma)
+    normals += signals
+    return normals
