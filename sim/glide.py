@@ -16,9 +16,9 @@ import numpy as np
 # A model counts as linear where superposition holds to this many metres: rounding, over ten substeps of metres.
 ROUNDING = 1e-11
 
-# Path (run, substep, 2) [m] from the origin, and velocity after each substep, of runs that start at speeds
-# (run, 2) [m/s] under commands (run, 2), with all contacts off.
-Run = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+# Path (run, substep, 2) [m] from where it begins, and velocity after each substep, of runs that start at speeds
+# (run, 2) [m/s] under commands (run, 2), (run, 2) [m] from where the model has its agent, with all contacts off.
+Run = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,10 @@ class Glide:
         """Path from where the agents are (n, substep, 2) [m], and their velocity at its end (n, 2) [m/s]."""
         forces = np.stack([velocity, command], axis=1)
         # Summed by hand: a product of matrices rounds differently with the number of worlds.
-        path, speed = (response[:, 0] * forces[:, None, 0] + response[:, 1] * forces[:, None, 1]
-                       for response in (self.response[0], self.response[1, -1:]))
+        path, speed = (
+            response[:, 0] * forces[:, None, 0] + response[:, 1] * forces[:, None, 1]
+            for response in (self.response[0], self.response[1, -1:])
+        )
         return path, speed[:, 0]
 
     def touches_nothing(self, position: np.ndarray, path: np.ndarray, command: np.ndarray) -> np.ndarray:
@@ -63,15 +65,15 @@ def glide_of(model: mujoco.MjModel, agent: int, run: Run, strongest: float) -> G
     if obstacles is None:
         return None
     unit, none = np.ones((1, 2)), np.zeros((1, 2))
-    trial = np.random.default_rng(0).uniform(-1, 1, (2, 4, 2)) * strongest
-    responses = [run(unit, none), run(none, unit)]
+    trial = np.random.default_rng(0).uniform(-1, 1, (3, 4, 2)) * strongest
+    responses = [run(unit, none, none), run(none, unit, none)]
     response = np.stack([np.stack([r[kind][0] for r in responses], axis=1) for kind in (0, 1)])
     geoms = np.flatnonzero(model.geom_bodyid == agent)
     reach = float((np.linalg.norm(model.geom_pos[geoms], axis=1) + model.geom_rbound[geoms]).max())
     margin = model.geom_margin[geoms].max() + model.geom_gap[geoms].max() + obstacles[2]
     glide = Glide(response, obstacles[0], obstacles[1], reach + float(margin), strongest)
     actual = run(*trial)
-    path, velocity = glide(*trial)
+    path, velocity = glide(*trial[:2])
     linear = np.abs(path - actual[0]).max() < ROUNDING and np.abs(velocity - actual[1][:, -1]).max() < ROUNDING
     return glide if linear else None
 

@@ -78,9 +78,9 @@ class _Kernel:
     def __init__(self, worlds: int, draws: int) -> None:
         self._key_buffer, self._frame_buffer = aligned(worlds, np.uint64), aligned(worlds, np.uint32)
         with variant():
-            lanes = dr.arange(dr.uint32_array_t(dr.detached_t(mi.Float)), worlds * draws)
-            dr.eval(lanes)
-        self._lanes = lanes
+            index: Any = dr.uint32_array_t(dr.detached_t(mi.Float))
+            self._lanes = dr.arange(index, worlds * draws)
+            dr.eval(self._lanes)
 
         def normals(keys: Any, frames: Any, lane: Any) -> Any:
             module = sys.modules[type(lane).__module__]

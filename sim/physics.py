@@ -92,11 +92,14 @@ class Physics:
         control[:, :, self._actuators] = velocity[:, None]
         return control
 
-    def _untouched(self, speed: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _untouched(
+        self, speed: np.ndarray, command: np.ndarray, displacement: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """What MuJoCo makes of speeds and commands (n, 2) with contacts off: see sim.glide.Run."""
         model = copy.copy(self._model)
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         initial = self._initial(len(speed))
+        initial[:, self._columns.position] += displacement
         initial[:, self._columns.velocity] = speed
         data = [mujoco.MjData(model)]
         states, _ = mujoco.rollout.Rollout(nthread=0).rollout(model, data, initial, self._control(command))

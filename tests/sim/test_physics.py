@@ -82,6 +82,7 @@ def test_models_glide_as_far_as_they_are_linear(field, glides):
     """A spring's pull depends on the place, dry friction on the direction: such agents are left to MuJoCo."""
     world = build_world("detection")
     getattr(world.model, field)[0] = 0.3
+    world.model.qpos_spring[:] = world.model.qpos0  # at rest where the agent starts, and nowhere else
     assert (Physics(world, 1).glide is not None) == glides
     state = dataclasses.replace(begun(world, 4), position=np.array([[3.0, 1.0]] * 4))
     command = np.random.default_rng(0).uniform(-10, 10, (4, 2))
