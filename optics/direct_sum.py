@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from optics.aperture import Aperture, Nodes
 from optics.beam import Beam
 from optics.field import Field
@@ -29,7 +31,11 @@ __all__ = [
 PAIRS_PER_SECOND = 2.5e8
 MOST_DIGITS = 14.0  # of float64 sums
 SPARE_DIGITS = 0.5  # the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
+ON_AXIS = 1e-9  # of the radius
 FAR = 0.25  # radius over distance below which the kernel is smooth enough for any nodes
+
+
+Rule = tuple[Aperture, float, float, bool]
 
 
 @dataclass(frozen=True)
@@ -62,8 +68,8 @@ class NodeSampling:
         return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.count / math.pi)
 
     @property
-    def rule(self) -> tuple[Aperture, float, float]:
-        return self.aperture, self.cycles, self.digits
+    def rule(self) -> Rule:
+        return self.aperture, self.cycles, self.digits, self.line is not None
 
     @property
     def samples(self) -> tuple[int, int]:
@@ -85,6 +91,7 @@ def nodes(problem: Problem) -> list[NodeSampling]:
         line = RadialLine.resolving(outermost, _intensity_band(problem), problem.distance, problem.ripple)
         line = line if line.pays(outputs) else None
         outputs = line.points if line else outputs
+        count = count if line is None else math.ceil(count / 2)
     seconds = 1e-3 + count * outputs / PAIRS_PER_SECOND + count * 4e-9
     return [NodeSampling(problem.aperture, cycles, digits, count, line, seconds)]
 
@@ -106,8 +113,14 @@ def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
 
 
 @lru_cache(maxsize=16)
-def cached_nodes(aperture: Aperture, cycles: float, digits: float) -> Nodes:
-    return aperture.nodes(cycles, digits)
+def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool = False) -> Nodes:
+    """halved: on one side of the x axis, for sums that are the same on both, at points on that axis."""
+    found = aperture.nodes(cycles, digits)
+    if not halved:
+        return found
+    weight = np.where(np.abs(found.y) < ON_AXIS, 1, 2) * found.weight
+    kept = found.y > -ON_AXIS
+    return Nodes(found.x[kept], found.y[kept], weight[kept])
 
 
 def _intensity_band(problem: Problem) -> float:
@@ -117,8 +130,8 @@ def _intensity_band(problem: Problem) -> float:
     return min(2 * steepest, 2 * problem.radius / (problem.wavelength * problem.distance))
 
 
-def direct_sum(beam: Beam, rule: tuple[Aperture, float, float], x: Any, y: Any, types: Precision) -> Field:
-    """First Rayleigh-Sommerfeld integral at points (x, y) [m], nodes after rule = (aperture, cycles, digits):
+def direct_sum(beam: Beam, rule: Rule, x: Any, y: Any, types: Precision) -> Field:
+    """First Rayleigh-Sommerfeld integral at points (x, y) [m], nodes after rule = (aperture, cycles, digits, halved):
 
     U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ikD} dξ (Goodman, §3.5). D - z = d²/(D + z) loses its whole waves in float64.
     """

@@ -22,7 +22,15 @@ from optics.grid import Grid
 from optics.precision import Precision, opaque
 from optics.tracked import is_tracked
 
-__all__ = ["dft2", "fast_length", "fourier_sum", "predicted_seconds"]
+__all__ = [
+    "dft2",
+    "fast_length",
+    "fourier_sum",
+    "kept_indices",
+    "periodic_spectrum",
+    "periodic_sum",
+    "predicted_seconds",
+]
 
 LONGEST_FFT = 2**31
 
@@ -83,6 +91,36 @@ def _turned(field: Field, period: Any, by: tuple[float, float]) -> Field:
     x, y = Grid(field.grid.shape, 1.0).coordinates(types)
     waves = (x * opaque(types, by[0]) + y * opaque(types, by[1])) / opaque(types, period)
     return field * Field.from_waves(1.0, waves, field.grid, types)
+
+
+def periodic_spectrum(u: np.ndarray, period: int, across: int) -> np.ndarray:
+    """Σ_j u[j] exp(-2πi j·k / period) of a complex NumPy array no larger than a period, (period, across): rows and
+    columns in FFT order, of the columns only those of `kept_indices(period, across)`."""
+    from scipy import fft
+
+    rows = fft.fft(_wrap(u, period, 1), axis=1, overwrite_x=True)
+    if across < period:
+        rows = rows[:, kept_indices(period, across)]
+    return fft.fft(_wrap(rows, period, 0), axis=0, overwrite_x=True)  # type: ignore[no-any-return]
+
+
+def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int, int]) -> np.ndarray:
+    """Σ_k U[k] exp(2πi j·k / period) of what `periodic_spectrum` returns, at every `step`-th j around the centre."""
+    from scipy import fft
+
+    rows, columns = ((np.arange(n) - n // 2) * step % period for n in shape)
+    lines = fft.ifft(spectrum, axis=0, norm="forward", overwrite_x=True)[rows]
+    if spectrum.shape[1] < period:
+        whole = np.zeros((len(rows), period), spectrum.dtype)
+        whole[:, kept_indices(period, spectrum.shape[1])] = lines
+        lines = whole
+    return fft.ifft(lines, axis=1, norm="forward", overwrite_x=True)[:, columns]  # type: ignore[no-any-return]
+
+
+def kept_indices(period: int, across: int) -> np.ndarray:
+    """The `across` indices nearest 0, in FFT order: 0, 1, …, -2, -1."""
+    kept = np.arange(across) - across // 2
+    return np.roll(kept, -(across // 2))
 
 
 def predicted_seconds(shape_in: tuple[int, int], period: float, shape_out: tuple[int, int]) -> float:

@@ -13,10 +13,11 @@ import numpy as np
 
 from optics.aperture import EDGE_REACH, SoftAperture
 from optics.beam import Beam
+from optics.free_space import kept_band, kept_square
 from optics.grid import Grid
 from optics.planner import MOST_SAMPLES, AccuracyError
 from optics.precision import precision
-from optics.propagation import RIPPLE_PER_TOLERANCE, PropagationResult, kept_band, propagate
+from optics.propagation import RIPPLE_PER_TOLERANCE, PropagationResult, propagate
 from optics.pupil import Pupil
 from optics.source import PointSource
 
@@ -69,9 +70,12 @@ class Light:
         z, wavelength = abs(distance), self.wavelength / self.medium_n
         if z == 0:
             return math.inf
-        band, fade = kept_band(1.02 * math.sqrt(2) * half_widths, wavelength, z, self.ripple)
-        if math.isfinite(band):
-            return band + fade
+        round_, square = (
+            kept(1.02 * widths, wavelength, z, self.ripple)
+            for kept, widths in ((kept_band, math.sqrt(2) * half_widths), (kept_square, half_widths))
+        )
+        if math.isfinite(round_.kept):
+            return max(round_.end, square.diagonal(wavelength) if math.isfinite(square.kept) else 0)
         return math.hypot(1 / wavelength, math.log(1 / self.ripple) / (2 * math.pi * z))
 
     def carried(self, field: PlaneField, distance: float, window: Grid) -> PropagationResult:

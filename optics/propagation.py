@@ -3,7 +3,7 @@
 The samples stand for the band-limited function through them, zero outside. Their spectrum is multiplied by the transfer
 function of free space and summed again wherever the result is wanted:
 
-    U(x, y; z) = F⁻¹{F{U₀} H},   H = exp(2πi z √((n/λ)² - fx² - fy²))     (Goodman, §3.10.2)
+    U(x, y; z) = F⁻¹{F{U₀} H}     (Goodman, §3.10.2; H in optics.free_space)
 
 A finite transform repeats the field every period. The period is chosen so that light aimed anywhere near the window
 lands there once; light aimed farther is faded out before it can wrap around, and what the spectrum holds too near to
@@ -20,19 +20,26 @@ from typing import Any
 import numpy as np
 
 from optics.arguments import finite, in_range, positive
-from optics.field import Field
-from optics.fourier import fast_length, fourier_sum, predicted_seconds
+from optics.fourier import (
+    fast_length,
+    fourier_sum,
+    kept_indices,
+    periodic_spectrum,
+    periodic_sum,
+    predicted_seconds,
+)
+from optics.free_space import EVERYTHING, STEEPEST_SINE, FreeSpace, Passage, kept_band, kept_square, walk
 from optics.grid import Grid
 from optics.planner import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Plan
-from optics.precision import Precision, opaque, precision
+from optics.precision import Precision, precision
 
-__all__ = ["PROPAGATION_METHODS", "RIPPLE_PER_TOLERANCE", "PropagationResult", "kept_band", "propagate"]
+__all__ = ["PROPAGATION_METHODS", "RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
 
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
-# Steepest light that the period makes room for, as sin θ; z tan θ has no bound beyond.
-STEEPEST_SINE = 0.995
 # Share of faded light that strays into the window: small, because the window may hold far less than is faded.
 RIPPLE_PER_TOLERANCE = 3e-3
+# Pitches are one and the same where they differ by less than this share of a sample over the whole window.
+SAME_PITCH = 1e-9
 
 
 ONE = np.ones(1)  # the weight of what counts whole
@@ -54,18 +61,19 @@ class PropagationResult:
 
 @dataclass(frozen=True)
 class _Sampling:
-    """period [m]; spectrum: the grid of frequencies; band, fade [1/m]: kept up to band, gone at band + fade."""
+    """period: in samples of the source; across: frequencies kept along each axis; step: the window's pitch in samples
+    of the source where it is a whole number of them, else 0."""
 
-    method: str
+    passage: Passage
     source: Grid
     window: Grid
-    wavelength: float
-    distance: float
-    period: float
-    spectrum: Grid
-    band: float
-    fade: float
-    ripple: float
+    period: int
+    across: int
+    step: int
+
+    @property
+    def method(self) -> str:
+        return "fresnel" if self.passage.paraxial else "angular_spectrum"
 
 
 def propagate(
@@ -130,145 +138,97 @@ def _field(u: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def _sampling(method: str, source: Grid, window: Grid, wavelength: float, distance: float, ripple: float) -> _Sampling:
-    z, nyquist = abs(distance), math.sqrt(0.5) / source.dx  # along the diagonal
-    paraxial = method == "fresnel"
-    corner = source.half_diagonal + source.dx + window.half_diagonal
-    band, fade = kept_band(corner, wavelength, z, ripple, paraxial)
-    end = band + fade
-    if end >= nyquist or (not paraxial and end * wavelength >= STEEPEST_SINE):
-        band, fade = math.inf, 0.0  # nothing to fade: all that the samples hold may matter
-        end = nyquist if paraxial else min(nyquist, STEEPEST_SINE / wavelength)
+    z, nyquist, paraxial = abs(distance), math.sqrt(0.5) / source.dx, method == "fresnel"  # along the diagonal
     halves = [
         (n // 2 + 1) * source.dx + (m // 2) * window.dx + abs(middle)
         for n, m, middle in zip(source.shape, window.shape, window.centre[::-1], strict=True)
     ]
-    walk = _walk(end, wavelength, z, paraxial)
-    least = max(max(halves) + walk, 2 * (max(source.shape) // 2 + 1) * source.dx)
+    corner = source.half_diagonal + source.dx + window.half_diagonal
+    bands = (
+        kept_square(max(halves), wavelength, z, ripple, paraxial),
+        kept_band(corner, wavelength, z, ripple, paraxial),
+    )
+    band = min(bands, key=lambda band: band.walk)
+    far = band.walk
+    if band.end >= (
+        0.5 / source.dx if band.square else nyquist
+    ):  # nothing to fade: all that the samples hold may matter
+        end = nyquist if paraxial else min(nyquist, STEEPEST_SINE / wavelength)
+        band, far = EVERYTHING, walk(end, wavelength, z, paraxial) * (math.sqrt(0.5) if end == nyquist else 1)
+    least = max(max(halves) + far, 2 * (max(source.shape) // 2 + 1) * source.dx)
     samples = fast_length(least / source.dx)
-    period = samples * source.dx
-    across = samples if math.isinf(band) else min(samples, 2 * math.ceil(end * period) + 1)
+    # Evanescent waves are kept for their power, which is reported.
+    highest = max(band.end, 0 if paraxial else 1 / wavelength)
+    across = min(samples, 2 * math.ceil(highest * samples * source.dx) + 1) if band.fade else samples
     if max(across, *window.shape) > MOST_SAMPLES:
         raise AccuracyError(
             f"distance = {distance:g} m over a window of {2 * window.half_width:.3g} m needs {across} samples across; "
             f"the limit is {MOST_SAMPLES}: shrink the window, or sample u more coarsely if it allows"
         )
-    spectrum = Grid.square(across, 1 / period)
-    return _Sampling(method, source, window, wavelength, distance, period, spectrum, band, fade, ripple)
-
-
-def _walk(frequency: float, wavelength: float, z: float, paraxial: bool) -> float:
-    """How far [m] to the side light of a spatial frequency [1/m] travels."""
-    sine = frequency * wavelength
-    return z * (sine if paraxial else sine / math.sqrt(1 - sine * sine))
-
-
-def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> tuple[float, float]:
-    """Band kept whole for light that may walk `corner` [m] to the side over z, and the width [1/m] of the fade beyond
-    it, that need the shortest period; (infinite, 0) where nothing may fade.
-
-    A narrow fade blurs far, so that the band must reach as far outside the window; a wide one lets light walk far
-    before it is gone. Either way the period has to hold what is not gone.
-    """
-    blur = 2 * math.log(1 / ripple) / math.pi
-    if z == 0:
-        return math.inf, 0.0
-    best = (math.inf, math.inf, 0.0)
-    for fade in np.geomspace(0.003, 0.6, 33) / wavelength:
-        reach = corner + blur / fade
-        band = reach / (z if paraxial else math.hypot(reach, z)) / wavelength
-        if paraxial or (band + fade) * wavelength < STEEPEST_SINE:
-            best = min(best, (_walk(band + fade, wavelength, z, paraxial), band, float(fade)))
-    return best[1:]
+    step = round(window.dx / source.dx)
+    exactly = abs(window.dx - step * source.dx) <= SAME_PITCH * source.dx / max(window.shape)
+    passage = Passage(wavelength, distance, paraxial, band, ripple, window.centre)
+    return _Sampling(passage, source, window, samples, across, step if exactly else 0)
 
 
 def _one(plane: np.ndarray, how: _Sampling, types: Precision) -> tuple[np.ndarray, float, float]:
     """The propagated plane, the predicted error of its intensity, and the fraction of evanescent power."""
     plane = np.ascontiguousarray(plane, dtype=types.complex_dtype)
-    spectrum = fourier_sum(plane, round(how.period / how.source.dx), how.spectrum.shape, -1)
-    total = _power(plane) * how.source.dx**2
+    total = _power(plane)
     if total == 0:
         return np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0
-    space, window = _free_space(how, types.dtype), how.window
-    unit = how.source.dx**4 / how.period**2
-    shares = [_power(spectrum, weight) * unit for weight in (space.grazing, space.faded, space.evanescent)]
+    space = _free_space(how, types.dtype)
+    if how.step:
+        spectrum = periodic_spectrum(plane, how.period, how.across)
+    else:
+        spectrum = fourier_sum(plane, how.period, (how.across, how.across), -1)
+    grazing, evanescent = (_power(spectrum, weight) / how.period**2 for weight in (space.grazing, space.evanescent))
     spectrum *= space.transfer
-    result = fourier_sum(spectrum, how.period / window.dx, window.shape, +1)
-    arrived = _power(result) * window.dx**2
-    loose, faded, evanescent = shares
+    # Parseval: what neither passes nor is evanescent was faded. In float32 the difference is rounding, which is little
+    # beside what the fade leaves of it.
+    faded = max(total - _power(spectrum) * how.period**2 - evanescent, 0.0) if how.passage.band.fade else 0.0
+    if how.step:
+        result = periodic_sum(spectrum, how.period, how.step, how.window.shape)
+    else:
+        result = fourier_sum(spectrum, how.period * how.source.dx / how.window.dx, how.window.shape, +1)
+    arrived = _power(result) * (how.window.dx / how.source.dx) ** 2
     if not arrived:
-        return result, math.inf, evanescent / total
+        return result, math.inf, min(evanescent / total, 1.0)
     rounding = FLOAT_NOISE[types.dtype] * math.sqrt(total / arrived)
-    error = 2 * math.sqrt(loose / arrived) + rounding + 2 * how.ripple * math.sqrt(faded / arrived)
-    return result, error, evanescent / total
+    error = 2 * math.sqrt(grazing / arrived) + rounding + 2 * how.passage.ripple * math.sqrt(faded / arrived)
+    return result, error, min(evanescent / total, 1.0)
 
 
 def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
-    """Σ w |u|² in float64; 0 without a weight."""
+    """Σ w |u|²; 0 without a weight."""
     if weight is None:
         return 0.0
-    flat = u.view(u.real.dtype)
     if weight is ONE:
-        return float(np.einsum("ij,ij->", flat, flat, dtype=np.float64))
+        return float(np.vdot(u, u).real)
     return float(np.dot((u.real**2 + u.imag**2).ravel(), weight.ravel()))
 
 
-@dataclass(frozen=True, eq=False)
-class _FreeSpace:
-    """Free space between two planes, over the spectrum: the transfer function, with everything that does not depend on
-    the field, and how much of each frequency is too near grazing, in the fade, or evanescent (None: nothing is)."""
-
-    transfer: np.ndarray
-    grazing: np.ndarray | None
-    faded: np.ndarray | None
-    evanescent: np.ndarray | None
-
-
 @lru_cache(maxsize=4)
-def _free_space(how: _Sampling, dtype: str) -> _FreeSpace:
-    """The same distance is often travelled again; the transfer function costs more than the transforms."""
-    types = precision(dtype)
-    sine = np.hypot(how.spectrum.x[None, :], how.spectrum.y[:, None]) * how.wavelength
-    every = math.isinf(how.band) and how.distance != 0 and how.method != "fresnel"
-    grazing = (sine > STEEPEST_SINE) & (sine < 1) if every else None
-    faded = sine > how.band * how.wavelength if how.fade else None
-    # A frequency's cell on the circle f = n/λ counts by how far it reaches outside: the error falls with its width².
-    outside = np.clip((sine - 1) / (how.spectrum.dx * how.wavelength) + 0.5, 0, 1)
-    weights = (
-        None if weight is None or not weight.any() else np.ascontiguousarray(weight, dtype=dtype)
-        for weight in (grazing, faded, outside)
-    )
-    return _FreeSpace(_transfer(how, types), *weights)
-
-
-def _transfer(how: _Sampling, types: Precision) -> np.ndarray:
-    """H under the fade, over the spectrum's grid, with the sums' scale and the way to the window's centre; whole waves
-    are dropped in float64."""
-    import drjit as dr
-
-    fx, fy = how.spectrum.coordinates(types)
-    f2 = fx * fx + fy * fy
-    s2 = f2 * opaque(types, how.wavelength**2)
-    z = opaque(types, how.distance / how.wavelength)
-    if how.method == "fresnel":
-        waves, decay = z * (1 - s2 / 2), types.Float64(1)
+def _free_space(how: _Sampling, dtype: str) -> FreeSpace:
+    """Over the spectrum, with the sums' scale. The same distance is often travelled again; the transfer function costs
+    more than the transforms."""
+    step = 1 / (how.period * how.source.dx)
+    if how.step:
+        fx, fy = (kept_indices(how.period, n) * step for n in (how.across, how.period))
     else:
-        waves = z * dr.sqrt(dr.maximum(1 - s2, 0))
-        gone = dr.exp(-2 * math.pi * dr.abs(z) * dr.sqrt(dr.maximum(s2 - 1, 0)))
-        decay = dr.select(s2 < 1, 1, gone if how.distance >= 0 else 0)
-    if how.fade:
-        steepness = 2 * math.sqrt(math.log(1 / how.ripple)) / how.fade
-        middle = how.band + how.fade / 2
-        decay *= (1 - dr.erf((dr.sqrt(f2) - opaque(types, middle)) * opaque(types, steepness))) / 2
-    waves += fx * opaque(types, how.window.centre[0]) + fy * opaque(types, how.window.centre[1])
-    scale = opaque(types, (how.source.dx / how.period) ** 2)
-    return Field.from_waves(decay * scale, waves, how.spectrum, types).numpy()
+        fx = fy = Grid.square(how.across, step).x
+    space = how.passage.over(fx, fy, precision(dtype))
+    space.transfer[:] *= 1 / how.period**2
+    return space
 
 
 def _plan(how: _Sampling, error: float, dtype: str) -> Plan:
-    kept = f"band {how.band * how.wavelength:.2g} n/λ" if how.fade else "the whole spectrum of u"
-    why = f"period {how.period:.3g} m, {kept}" + ("; paraxial, as asked" if how.method == "fresnel" else "")
-    samples = round(how.period / how.source.dx)
-    seconds = predicted_seconds(how.source.shape, samples, how.spectrum.shape)
-    seconds += predicted_seconds(how.spectrum.shape, how.period / how.window.dx, how.window.shape)
-    any_samples: Any = (samples, samples)
+    band = how.passage.band
+    kept = f"band {band.kept * how.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
+    period = how.period * how.source.dx
+    why = f"period {period:.3g} m, {kept}" + ("; paraxial, as asked" if how.passage.paraxial else "")
+    spectrum = how.across, how.across
+    seconds = predicted_seconds(how.source.shape, how.period, spectrum)
+    seconds += predicted_seconds(spectrum, period / how.window.dx, how.window.shape)
+    any_samples: Any = (how.period, how.period)
     return Plan(how.method, any_samples, dtype, error, why, seconds)
