@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,7 @@ def _live(phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress
     """Training, and the evaluation episodes after it, in worlds never seen before."""
     weights, worlds, evaluation = (int(s) for s in np.random.SeedSequence(seed).generate_state(3))
     eyes = phenotype.eyes(config.eye)
-    common = {"memory": phenotype.memory_frames, "rays_per_receptor": config.eye.rays_per_receptor}
+    common: dict[str, Any] = {"memory": phenotype.memory_frames, "rays_per_receptor": config.eye.rays_per_receptor}
     training_worlds = sim.make_vec_env(config.task, eyes, config.learning.n_envs, worlds, mode="training", **common)
     evaluation_worlds = sim.make_vec_env(
         config.task, eyes, config.evaluation.episodes, evaluation, mode="evaluation", **common

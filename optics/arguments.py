@@ -1,13 +1,15 @@
 """Bad input ends in one line that names the argument, its value and the valid range."""
 
+import difflib
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from optics.tracked import number
 
-__all__ = ["finite", "in_range", "point_2d", "positive", "radiance_cube", "shape_2d", "shown", "whole"]
+__all__ = ["finite", "in_range", "one_of", "point_2d", "positive", "radiance_cube", "shape_2d", "shown", "whole"]
 
 
 # Squares of lengths, and their ratios, must stay within double precision.
@@ -63,6 +65,17 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
     if not whole or height < 1 or width < 1:
         raise ValueError(f"{name} = {shown(value)}: must be two whole numbers (height, width), each at least 1")
     return height, width
+
+
+def one_of(name: str, value: Any, options: Iterable[str]) -> str:
+    """`value`; ValueError, with the nearest option, unless it is one of them."""
+    known = tuple(options)
+    if value not in known:
+        plain = {option.lower(): option for option in known}
+        near = difflib.get_close_matches(str(value).lower(), plain, n=1, cutoff=0.5)
+        hint = f"; did you mean {plain[near[0]]!r}?" if near else ""
+        raise ValueError(f"{name} = {shown(value)}: must be one of {', '.join(map(repr, known))}{hint}")
+    return str(value)
 
 
 def point_2d(name: str, value: Any) -> tuple[float, float]:

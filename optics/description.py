@@ -11,7 +11,7 @@ import numpy as np
 from optics.planner import Plan
 from optics.point_spread import PSFResult
 from optics.quality import image_quality, mtf, strehl_ratio
-from optics.spectrum import daylight
+from optics.tabulated import daylight
 from optics.tracked import number, plain
 
 if TYPE_CHECKING:

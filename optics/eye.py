@@ -11,11 +11,12 @@ import numpy as np
 from optics.arguments import in_range, positive, radiance_cube, shape_2d, whole
 from optics.imaging import blur, centred, receptor_average
 from optics.photon_budget import PhotonBudget
-from optics.photoreceptor import gaussian_noise, photon_noise, quantum_catch, throughput
+from optics.photoreceptor import gaussian_noise, own_type, photon_noise, quantum_catch, throughput
 from optics.point_spread import PSFResult
 from optics.precision import precision
 from optics.pupil import Pupil
 from optics.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
+from optics.receptors import receptors_of
 from optics.sight import Sight, prepare
 from optics.spectrum import SpectralBands
 from optics.tracked import at_border, is_tracked, number, plain
@@ -40,6 +41,8 @@ class Eye:
         takes PSFs of many bands, so it is for an eye that will be used often. The field then holds what was chosen.
     noise_sigma: standard deviation of a receptor's Gaussian noise, in signal units.
     photon_budget: the light there is; its shot noise comes before the Gaussian noise (None: no shot noise).
+    receptors: types of receptor: "rgb" (three channels, red, green, blue), "lms" (human cones), "honeybee", "goldfish",
+        wavelengths of pigments' peaks [nm], or `Receptors`, which can be a mosaic. The field then holds `Receptors`.
     tolerance: relative L2 error asked of the PSF; signal error, relative to white's, of whatever else is chosen.
     dtype: "float32" or "float64", of PSF, kernel and signals.
 
@@ -59,6 +62,7 @@ class Eye:
     tolerance: float = 1e-2
     dtype: str = "float32"
     photon_budget: PhotonBudget | None = None
+    receptors: Any = "rgb"
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -71,12 +75,13 @@ class Eye:
             raise ValueError(f"dtype = {self.dtype!r}: must be 'float32' or 'float64'")
         if not isinstance(self.photon_budget, PhotonBudget | None):
             raise ValueError(f"photon_budget = {self.photon_budget!r}: must be a PhotonBudget or None")
+        object.__setattr__(self, "receptors", receptors_of(self.receptors))
         if self.pupil is not None and number(self.relative_aperture) > 1 + 1e-9:
             raise ValueError(
                 f"pupil.aperture_radius = {self.pupil.radius:g}: must be at most sensor_width / 2 = "
                 f"{self.sensor_width / 2:g} m"
             )
-        spectral = self._chosen_bands() if self.bands == "auto" else SpectralBands.uniform(self.bands)
+        spectral = self._chosen_bands() if self.bands == "auto" else SpectralBands.uniform(self.bands, self.receptors)
         object.__setattr__(self, "spectral_bands", spectral)
         object.__setattr__(self, "bands", len(spectral.wavelengths))
 
@@ -105,8 +110,18 @@ class Eye:
         return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
 
     @property
+    def channels(self) -> int:
+        """Signals at each place of the retina: as many as types of receptor, or one in a mosaic."""
+        return self.receptors.channels
+
+    @property
+    def mosaic(self) -> np.ndarray | None:
+        """Type of every receptor, (h, w) int; None where every receptor has all types."""
+        return self.receptors.layout(self.resolution)
+
+    @property
     def photons(self) -> np.ndarray | None:
-        """Photons that a signal of 1 stands for, (channel,); None without a photon budget."""
+        """Photons that a signal of 1 stands for, per type of receptor (type,); None without a photon budget."""
         if self.photon_budget is None:
             return None
         etendue = math.pi / 4 * (self.sensor_width * self.receptor_pitch / number(self.sensor_distance)) ** 2
@@ -156,13 +171,13 @@ class Eye:
     def _chosen_bands(self) -> SpectralBands:
         pupil, cell = self.pupil, self.receptor_pitch / CELLS_FOR_BANDS
         if pupil is None:
-            return SpectralBands.for_tolerance(self.tolerance)
+            return SpectralBands.for_tolerance(self.tolerance, receptors=self.receptors)
 
         def kernels(wavelengths: np.ndarray) -> np.ndarray:
             retina = Retina(self.sensor_distance, wavelengths, cell, self.tolerance, self.dtype)
             return plain(visual_kernel(pupil, retina, math.inf))
 
-        return SpectralBands.for_tolerance(self.tolerance, kernels, CELLS_FOR_BANDS)
+        return SpectralBands.for_tolerance(self.tolerance, kernels, CELLS_FOR_BANDS, self.receptors)
 
     def sight(
         self,
@@ -221,12 +236,16 @@ class Eye:
         image = blur(scenes, list(prepared.kernels.values()), shape, types)
         irradiance = receptor_average(image, s, types)
         signal = quantum_catch(irradiance, self.spectral_bands.weights, self.throughput, types)
+        if self.mosaic is not None:
+            signal = own_type(signal, self.mosaic, types)
         return at_border(signal) if rng is None else at_border(signal + types.Tensor(self._noise(signal, rng)))
 
     def _noise(self, signal: Any, rng: np.random.Generator) -> np.ndarray:
         """What noise adds to the signal."""
         clean = plain(signal)
         photons = self.photons
+        if photons is not None and self.mosaic is not None:
+            photons = photons[self.mosaic][None]
         caught = clean if photons is None else photon_noise(np.maximum(clean, 0), photons, rng)
         return gaussian_noise(caught, self.noise_sigma, rng) - clean
 

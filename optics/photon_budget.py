@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from optics.arguments import in_range, positive
-from optics.spectrum import SpectralBands, cie_1931, daylight
+from optics.spectrum import SpectralBands
+from optics.tabulated import cie_1931, daylight
 
 __all__ = ["PhotonBudget"]
 

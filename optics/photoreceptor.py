@@ -9,7 +9,7 @@ import numpy as np
 from optics.arguments import in_range, positive
 from optics.precision import Precision, opaque
 
-__all__ = ["gaussian_noise", "photon_noise", "quantum_catch", "throughput"]
+__all__ = ["gaussian_noise", "own_type", "photon_noise", "quantum_catch", "throughput"]
 
 MOST_PHOTONS = 1e18  # a count must fit a 64-bit integer
 
@@ -33,6 +33,15 @@ def quantum_catch(irradiance: Any, weights: np.ndarray, gathered: Any, types: Pr
     return types.Tensor(flat.array * types.Float(opaque(types, gathered)), (len(weights), height, width))
 
 
+def own_type(signals: Any, mosaic: np.ndarray, types: Precision) -> Any:
+    """What each receptor of a mosaic (y, x) reports, of the signals that every type would give there: Dr.Jit
+    (type, y, x) -> (1, y, x)."""
+    import drjit as dr
+
+    mine = mosaic == np.arange(signals.shape[0])[:, None, None]
+    return types.Tensor(dr.sum(signals * types.Tensor(mine.astype(np.float64)), axis=0).array, (1, *mosaic.shape))
+
+
 def gaussian_noise(signal: np.ndarray, sigma: float, rng: np.random.Generator) -> np.ndarray:
     """Signal plus noise of fixed standard deviation `sigma` [signal units]: a dim eye is a noisy eye."""
     sigma = in_range("sigma", sigma, 0.0, 1e6)
@@ -42,13 +51,14 @@ def gaussian_noise(signal: np.ndarray, sigma: float, rng: np.random.Generator) -
 def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Poisson noise where a signal of 1 is `photons` absorbed photons: standard deviation √(signal/photons).
 
-    signal: (channel, y, x); photons: one number, or one per channel.
+    signal: (channel, y, x); photons: one number, one per channel, or one per receptor (channel, y, x).
     """
     budget = np.atleast_1d(np.asarray(photons, dtype=np.float64))
     positive("photons", float(budget.min()), "1")
     if not np.all(signal >= 0):
         raise ValueError(f"signal = {np.min(signal):g} at its least: must not be negative")
-    budget = budget.reshape(-1, *(1,) * (np.ndim(signal) - 1))
+    if budget.ndim == 1:
+        budget = budget.reshape(-1, *(1,) * (np.ndim(signal) - 1))
     expected = np.asarray(signal, dtype=np.float64) * budget
     in_range("signal x photons", float(expected.max(initial=0.0)), 0, MOST_PHOTONS)
     return rng.poisson(expected) / budget

@@ -3,8 +3,10 @@
 Eyes, build_world, World            what there is to see, and with which eyes
 mirror, Mirror                      any MuJoCo model as a Mitsuba scene
 BatchedRenderer                     all eyes of all worlds as one wavefront
+choose_fidelity, Fidelity           how finely: as the receptors' noise allows
+ReferenceRenderer                   the same, slowly: Mitsuba's integrators and optics' convolution
 make_vec_env, make_env              the environments, natively batched or single
-                                    (also gymnasium.make("rhabdom/Detection-v0"), Navigation-v0, Tracking-v0)
+                                    (also gymnasium.make("rhabdom/Detection-v0"), Foraging, Navigation, Tracking)
 View, write_exr, read_exr           what was seen, on disk
 """
 
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from sim.agent import Eyes
     from sim.env import make_env
     from sim.exr import View, read_exr, write_exr
+    from sim.fidelity import Fidelity, choose_fidelity
+    from sim.reference import ReferenceRenderer
     from sim.render import BatchedRenderer
     from sim.scene.mirror import Mirror, mirror
     from sim.vec_env import make_vec_env
@@ -32,6 +36,9 @@ _HOME = {
     "Mirror": "sim.scene.mirror",
     "mirror": "sim.scene.mirror",
     "BatchedRenderer": "sim.render",
+    "ReferenceRenderer": "sim.reference",
+    "Fidelity": "sim.fidelity",
+    "choose_fidelity": "sim.fidelity",
     "make_env": "sim.env",
     "make_vec_env": "sim.vec_env",
     "View": "sim.exr",
@@ -43,10 +50,13 @@ __all__ = [
     "TASKS",
     "BatchedRenderer",
     "Eyes",
+    "Fidelity",
     "Mirror",
+    "ReferenceRenderer",
     "View",
     "World",
     "build_world",
+    "choose_fidelity",
     "make_env",
     "make_vec_env",
     "mirror",

@@ -7,10 +7,13 @@ Azimuths are measured in the agent's frame (x forward, y left, z up), positive t
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from optics.receptors import receptors_of
 
 if TYPE_CHECKING:
     from optics import Eye, Pupil
@@ -31,8 +34,11 @@ class Eyes:
     sensor_width         width of the retina [m]
     noise_sigma          standard deviation of a receptor's noise, in units of its signal
     bands                spectral bands
+    receptors            types of receptor: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish",
+                         wavelengths of visual pigments' peaks [nm] such as (350, 440, 530), or `optics.Receptors`,
+                         which can be a mosaic; the field then holds optics.Receptors
 
-    Raises ValueError for values outside these ranges.
+    Raises ValueError for values outside these ranges and for unknown receptors, with the nearest name.
     """
 
     n_eyes: int = 2
@@ -43,19 +49,33 @@ class Eyes:
     sensor_width: float = 200e-6
     noise_sigma: float = 0.01
     bands: int = 4
+    receptors: Any = "rgb"
 
     def __post_init__(self) -> None:
-        def check(name: str, valid: bool, range_: str) -> None:
-            if not valid:
-                raise ValueError(f"Eyes: {name} = {getattr(self, name)!r}, must be {range_}")
+        def check(name: str, valid: Callable[[Any], bool], range_: str) -> None:
+            value = getattr(self, name)
+            try:
+                fits = bool(valid(value))
+            except (TypeError, ValueError, OverflowError):
+                fits = False
+            if not fits:
+                raise ValueError(f"Eyes: {name} = {value!r}, must be {range_}")
 
-        check("n_eyes", self.n_eyes >= 1, "at least 1")
-        check("resolution", len(self.resolution) == 2 and min(self.resolution) >= 1, "(height, width), each >= 1")
-        check("fov_deg", 0.0 < self.fov_deg < 180.0, "in (0, 180)")
-        check("placement_range_deg", 0.0 <= self.placement_range_deg <= 360.0, "in [0, 360]")
-        check("sensor_width", 0.0 < self.sensor_width < math.inf, "positive and finite")
-        check("noise_sigma", 0.0 <= self.noise_sigma < math.inf, "non-negative and finite")
-        check("bands", self.bands >= 1, "at least 1")
+        def counts(value: Any) -> bool:
+            return value == int(value) >= 1
+
+        check("n_eyes", counts, "a whole number, at least 1")
+        check(
+            "resolution",
+            lambda r: len(r) == 2 and all(map(counts, r)),
+            "(height, width), whole numbers, each at least 1",
+        )
+        check("fov_deg", lambda x: 0.0 < x < 180.0, "in (0, 180)")
+        check("placement_range_deg", lambda x: 0.0 <= x <= 360.0, "in [0, 360]")
+        check("sensor_width", lambda x: 0.0 < x < math.inf, "positive and finite")
+        check("noise_sigma", lambda x: 0.0 <= x < math.inf, "non-negative and finite")
+        check("bands", counts, "a whole number, at least 1")
+        object.__setattr__(self, "receptors", receptors_of(self.receptors))
 
     def eye(self) -> Eye:
         """One eye's optics and retina."""
@@ -68,6 +88,7 @@ class Eyes:
             sensor_width=self.sensor_width,
             bands=self.bands,
             noise_sigma=self.noise_sigma,
+            receptors=self.receptors,
         )
 
     def azimuths(self) -> np.ndarray:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
+
+from optics.tabulated import Spectrum
 
 CELL = 2.0  # [m] side of a grid cell
 WALL_HEIGHT = 1.0  # [m]: as high as the objects; a receptor row of 11° sees nothing but wall up to 8 m away
@@ -22,12 +25,14 @@ class Layout:
     objects       names of mocap sphere bodies
     agent_spawn   (n, 2) [m];  object_spawn (m, 2) [m]
     goal_region   (x_min, y_min, x_max, y_max) [m] or None
+    spectra       reflectances of materials, by name, where a colour would not do
     """
 
     objects: tuple[str, ...]
     agent_spawn: np.ndarray
     object_spawn: np.ndarray
     goal_region: np.ndarray | None
+    spectra: Mapping[str, Spectrum] = field(default_factory=dict)
 
 
 def cell_centers(columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

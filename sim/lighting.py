@@ -45,6 +45,13 @@ def directional_lights(scene: Any, wavelengths: np.ndarray) -> tuple[Directional
     return tuple(lights)
 
 
+def white_radiance(scene: Any, wavelengths: np.ndarray) -> np.ndarray:
+    """Of a white surface that faced all of the scene's lights at once, per band (band,): no surface sends out more of
+    their direct light."""
+    lights = directional_lights(scene, wavelengths)
+    return sum((light.irradiance for light in lights), np.zeros(len(wavelengths))) / np.pi
+
+
 def check_lambertian(bsdfs: Sequence[Any]) -> None:
     """Raise ValueError for a BSDF that is not a Lambertian reflector, on one side or both."""
     sides = int(mi.BSDFFlags.FrontSide) | int(mi.BSDFFlags.BackSide)

@@ -7,11 +7,14 @@ MuJoCo's colours are display-referred (sRGB), so reflectances are encoded here a
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
+from optics.tabulated import Spectrum, daylight
 from sim.color import encode_srgb
+from sim.exr import preview
 
 WHITE = 0.9  # reflectance of a light stripe
 BLACK = 0.05  # reflectance of a dark stripe
@@ -50,11 +53,27 @@ def add_texture(spec: mujoco.MjSpec, name: str, image: np.ndarray) -> None:
 
 
 def add_textured(
-    spec: mujoco.MjSpec, name: str, texture: str, repeat: tuple[float, float] = (1, 1), uniform: bool = False
+    spec: mujoco.MjSpec,
+    name: str,
+    texture: str,
+    repeat: tuple[float, float] = (1, 1),
+    uniform: bool = False,
+    color: Sequence[float] = (1.0, 1.0, 1.0),
 ) -> None:
-    """Add a matte material with a 2-D texture, repeated over the geom (or, `uniform`, per 2 m of it)."""
-    material = spec.add_material(name=name, texrepeat=list(repeat), texuniform=uniform, specular=0, shininess=0)
+    """Add a matte material with a 2-D texture, repeated over the geom (or, `uniform`, per 2 m of it) and multiplied by
+    a display-referred colour."""
+    material = spec.add_material(
+        name=name, texrepeat=list(repeat), texuniform=uniform, specular=0, shininess=0, rgba=[*color, 1.0]
+    )
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = texture
+
+
+def display_color(reflectance: Spectrum) -> tuple[float, float, float]:
+    """Display-referred colour (sRGB) of a reflectance in daylight, for renderers that know no spectra."""
+    nm = np.arange(380.0, 781.0, 5.0)
+    radiance = reflectance.at(nm * 1e-9) * daylight(nm * 1e-9)
+    r, g, b = encode_srgb(np.clip(preview(radiance[:, None, None], nm)[0, 0], 0, 1)).tolist()
+    return r, g, b
 
 
 def add_daylight(spec: mujoco.MjSpec) -> None:

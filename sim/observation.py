@@ -7,13 +7,19 @@ from gymnasium import spaces
 
 from sim.agent import Eyes
 
+# Standard deviations of noise within which signals are said to stay: 1 in 1e23 draws does not.
+SIGMAS = 10.0
+ROUNDING = 1e-4  # of float32, as a share of the brightest signal
 
-def observation_space(eyes: Eyes, channels: int, memory: int) -> spaces.Dict:
-    """Space of one world's observation; signals are unbounded, since noise is Gaussian."""
+
+def observation_space(eyes: Eyes, channels: int, memory: int, brightest: float) -> spaces.Dict:
+    """Space of one world's observation. brightest: what a receptor reports of white facing all lights at once; as much
+    again may come from its surroundings."""
     shape = (memory, eyes.n_eyes, channels, *eyes.resolution)
+    margin = SIGMAS * eyes.noise_sigma + ROUNDING * brightest
     return spaces.Dict(
         {
-            "eyes": spaces.Box(-np.inf, np.inf, shape, np.float32),
+            "eyes": spaces.Box(-margin, 2 * brightest + margin, shape, np.float32),
             "contact": spaces.Box(0.0, 1.0, (1,), np.float32),
             "previous_action": spaces.Box(-1.0, 1.0, (2,), np.float32),
         }

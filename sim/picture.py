@@ -1,12 +1,14 @@
-"""Pictures for people: the agent seen from behind, in the mirror of its world."""
+"""Pictures for people: the agent seen from behind, in the mirror of its world, and where its eyes look."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
 
+from sim.agent import Eyes
 from sim.color import encode_srgb
 from sim.exr import preview
+from sim.overlay import draw_fields
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import mirror
 from sim.state import WorldState
@@ -17,24 +19,33 @@ BEHIND, ABOVE, AHEAD = 4.0, 5.0, 3.0
 FOVY_DEG = 50.0
 WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m]
 SPP = 16
+SIZE = (360, 480)  # pixels (height, width)
 
 
 class Onlooker:
-    """A camera that follows the agent; it holds its own mirror of the world."""
+    """A camera that follows the agent; it holds its own mirror of the world.
 
-    def __init__(self, world: World) -> None:
-        self.world = world
+    eyes  whose fields of view are drawn; None: no one's
+    """
+
+    def __init__(self, world: World, eyes: Eyes | None = None) -> None:
+        self.world, self.eyes = world, eyes
         self._data = mujoco.MjData(world.model)
-        self._mirror = mirror(world.model)
+        self._mirror = mirror(world.model, spectra=world.spectra)
 
-    def picture(self, state: WorldState, index: int = 0, size: tuple[int, int] = (240, 320)) -> np.ndarray:
+    def picture(self, state: WorldState, index: int = 0, size: tuple[int, int] = SIZE) -> np.ndarray:
         """sRGB picture (height, width, 3) uint8 of one world of a state."""
         pose(self._data, self.world, state, index)
         self._mirror.sync(self._data)
         height, width = size
-        radiance = self._mirror.render(_follow(state, index), width, height, spp=SPP, wavelengths=WAVELENGTHS)
+        view = _follow(state, index)
+        radiance = self._mirror.render(view, width, height, spp=SPP, wavelengths=WAVELENGTHS)
         linear = np.clip(preview(radiance, WAVELENGTHS * 1e9), 0.0, 1.0)
-        return np.rint(255 * encode_srgb(linear)).astype(np.uint8)
+        picture = np.rint(255 * encode_srgb(linear)).astype(np.uint8)
+        if self.eyes is None:
+            return picture
+        depth = self._mirror.render_depth(view, width, height)
+        return draw_fields(picture, view, depth, self.eyes, self.world.model, self._data)
 
 
 def pose(data: mujoco.MjData, world: World, state: WorldState, index: int = 0) -> None:

@@ -1,4 +1,7 @@
-"""Gymnasium ids: `gymnasium.make("rhabdom/Detection-v0")`, Navigation-v0, Tracking-v0. `import sim` registers them."""
+"""Gymnasium ids: `gymnasium.make("rhabdom/Detection-v0")`, Foraging-v0, Navigation-v0, Tracking-v0.
+
+`import sim` registers them.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import gymnasium
 # Spelled out rather than taken from sim.world, which would load MuJoCo whenever Gymnasium is imported.
 IDS = {
     "rhabdom/Detection-v0": "detection",
+    "rhabdom/Foraging-v0": "foraging",
     "rhabdom/Navigation-v0": "navigation",
     "rhabdom/Tracking-v0": "tracking",
 }

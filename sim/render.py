@@ -7,6 +7,7 @@ wavelengths are fixed, so a call does nothing but upload poses and launch the ke
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -14,9 +15,12 @@ import mitsuba as mi
 import numpy as np
 
 import optics
+from sim import lighting
 from sim.agent import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
+from sim.fidelity import Fidelity, chosen
+from sim.pilot import Pilot
 from sim.recording import aligned, garbage_kept
-from sim.sensor import build_sensor
+from sim.sensor import sampling_of
 from sim.stage import Stage, build_stage
 from sim.state import WorldState
 from sim.tracer import Tracer, tracer_of
@@ -32,8 +36,10 @@ class BatchedRenderer:
     world              geometry, materials and lights; shared by all worlds
     eyes               of every agent
     n_envs             number of worlds in a state
-    rays_per_receptor  samples of each receptor (perfect lens), or per receptor on average (behind a pupil)
-
+    rays_per_receptor  samples of each receptor (a whole number, perfect lens), or per receptor on average (behind a
+                       pupil); "auto": as few as the receptors' noise allows in this world, see `sim.choose_fidelity`;
+                       or a whole Fidelity. The one in use is in `.fidelity`
+    brightest          signal of a white surface that faced all lights at once
     tracer             "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto";
                        the one in use is in `.tracer.name`, why in `.tracer.why`
 
@@ -41,15 +47,29 @@ class BatchedRenderer:
     no closed form where that is asked for.
     """
 
-    def __init__(self, world: World, eyes: Eyes, n_envs: int, rays_per_receptor: int = 4, tracer: str = "auto") -> None:
-        self.world, self.eyes = world, eyes
-        self.eye = eyes.eye()
-        self.sensor = build_sensor(self.eye, rays_per_receptor)
+    def __init__(
+        self,
+        world: World,
+        eyes: Eyes,
+        n_envs: int,
+        rays_per_receptor: float | str | Fidelity = "auto",
+        tracer: str = "auto",
+    ) -> None:
+        asked = _asked(rays_per_receptor, eyes)
+        self.world, self.eyes = world, eyes if asked is None else replace(eyes, bands=asked.bands)
+        self.eye = self.eyes.eye()
         self.bands: optics.SpectralBands = self.eye.spectral_bands
         self._stage = build_stage(world)
         with variant(self._stage.variant):
             self.tracer: Tracer = tracer_of(world, self._stage, self.bands.wavelengths, tracer)
+            white = lighting.white_radiance(self._stage.scene, self.bands.wavelengths)
+        if asked is None:
+            self.fidelity, sampling = chosen(Pilot(world, self._stage, self.tracer, eyes, self.eye), eyes, self.eye)
+        else:
+            self.fidelity, sampling = asked, sampling_of(self.eye, asked.depth)
+        self.sensor = sampling.sensor(self.fidelity.rays_per_receptor)
         mixing = self.eye.throughput * self.bands.weights
+        self.brightest = float((mixing @ white).max())
         self._readout = self.sensor.readout(mixing, self.tracer.basis)
         self._set_width(n_envs)
 
@@ -68,7 +88,7 @@ class BatchedRenderer:
         with variant(self._stage.variant):
             self._inputs = {
                 "directions": mi.Float(_in_agent_frame(self.eyes, self.sensor.directions)),
-                "origins": mi.Float(_eye_origins(self.eyes)),
+                "origins": mi.Float(_in_fours(eye_positions(self.eyes.azimuths()), 0.0)),
                 **self.tracer.inputs,
             }
             wavefront = _Wavefront(self)
@@ -83,38 +103,52 @@ class BatchedRenderer:
 
     def radiance(self, state: WorldState) -> np.ndarray:
         """Spectral radiance along every ray, (env, eye, ray, band) float32."""
-        components = self._launch(self._rays, state).reshape(len(self.tracer.basis), -1)
-        rays = np.einsum("kn,kb->nb", components, self.tracer.basis.astype(np.float32))
+        layers = self._components(self._rays, state)
+        rays = np.einsum("lkn,kb->nb", layers, self.tracer.basis.astype(np.float32))
         return rays.reshape(self.n_envs, self.eyes.n_eyes, -1, len(self.bands.wavelengths))
 
     def receptor_radiance(self, state: WorldState) -> np.ndarray:
         """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
         bands, (height, width) = len(self.bands.wavelengths), self.eye.resolution
-        components = self._launch(self._sums, state).reshape(len(self.tracer.basis), -1)
-        sums = np.einsum("kn,kb->bn", components, self.tracer.basis.astype(np.float32))
-        sums = sums.reshape(bands, self.n_envs * self.eyes.n_eyes, -1)
+        layers = self._components(self._sums, state)
+        sums = np.einsum("lkn,kb->lbn", layers, self.tracer.basis.astype(np.float32))
+        sums = sums.reshape(len(layers) * bands, self.n_envs * self.eyes.n_eyes, -1)
         return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, self.eyes.n_eyes, height, width)
 
     def signals(self, state: WorldState) -> np.ndarray:
         """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
         a² sum_b weights[channel, b] radiance_b."""
-        light = self._launch(self._sums, state)
-        components = light.reshape(len(self.tracer.basis), state.n * self.eyes.n_eyes, -1)
-        signals = self._readout(components)
-        return signals.reshape(state.n, self.eyes.n_eyes, len(self.bands.weights), *self.eye.resolution)
+        light = self._components(self._sums, state)
+        signals = self._readout(light.reshape(len(light) * len(self.tracer.basis), state.n * self.eyes.n_eyes, -1))
+        signals = signals.reshape(state.n, self.eyes.n_eyes, len(self.bands.weights), *self.eye.resolution)
+        mosaic = self.eye.mosaic
+        return signals if mosaic is None else np.take_along_axis(signals, mosaic[None, None, None], axis=2)
 
     @property
     def recordings(self) -> int:
         """How often the kernels were recorded: once per kernel in use."""
         return int(self._rays.n_recordings + self._sums.n_recordings)
 
-    def _launch(self, frozen: Any, state: WorldState) -> np.ndarray:
+    def _components(self, frozen: Any, state: WorldState) -> np.ndarray:
+        """(layer, component, all rays of all views, or their sums)"""
         if state.n != self.n_envs:
             raise ValueError(f"state has {state.n} worlds, this renderer was built for n_envs = {self.n_envs}")
         with variant(self._stage.variant), garbage_kept():
             poses = mi.Float(self._poses.pack(state, self._stage))
             # numpy() waits for the kernel: only then may the buffer, whose memory Dr.Jit shares, be written again.
-            return np.array(frozen(self.tracer.scene, poses, self._inputs).numpy())
+            light = np.array(frozen(self.tracer.scene, poses, self._inputs).numpy())
+        return light.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)
+
+
+def _asked(rays_per_receptor: float | str | Fidelity, eyes: Eyes) -> Fidelity | None:
+    """What was asked for; None: to be chosen."""
+    if isinstance(rays_per_receptor, Fidelity):
+        return rays_per_receptor
+    if isinstance(rays_per_receptor, str):
+        if rays_per_receptor != "auto":
+            raise ValueError(f"rays_per_receptor = {rays_per_receptor!r}, must be positive, or 'auto'")
+        return None
+    return Fidelity(rays_per_receptor, eyes.bands)
 
 
 class _PoseBuffer:
@@ -144,14 +178,19 @@ class _Wavefront:
         self.lanes = renderer.n_envs * self.n_eyes * self.n_rays
         self.stride = renderer._poses.stride
         self.n_spheres = renderer._poses.n_spheres
-        self.tracer = renderer.tracer
+        self.tracer, self.depth = renderer.tracer, renderer.sensor.depth
 
     def __call__(self, scene: Any, poses: Any, inputs: dict[str, Any], reduced: int) -> Any:
         lane = inputs["lanes"]
         view = lane // self.n_rays
         world = view // self.n_eyes
-        ray, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, lane - view * self.n_rays)
-        components = self.tracer.radiance(scene, ray, agent, centres, inputs)
+        ray, cosine, agent, centres = self._ray(
+            poses, inputs, world, view - world * self.n_eyes, lane - view * self.n_rays
+        )
+        components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs)
+        if self.depth.count > 1:
+            shares = self.depth.shares(dr.rcp(distance * cosine))
+            components = [component * share for share in shares for component in components]
         if len(components) == 1:
             out = components[0]
         else:
@@ -161,8 +200,10 @@ class _Wavefront:
         # One reduction of one array: a reduction per component would trace the rays once per component.
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
 
-    def _ray(self, poses: Any, inputs: dict[str, Any], world: Any, eye: Any, ray: Any) -> tuple[Any, Any, list[Any]]:
-        """The lane's ray, and the centres of the agent and of the spheres of its world."""
+    def _ray(
+        self, poses: Any, inputs: dict[str, Any], world: Any, eye: Any, ray: Any
+    ) -> tuple[Any, Any, Any, list[Any]]:
+        """The lane's ray, its cosine with the eye's axis, and the centres of the agent and of its world's spheres."""
 
         def row(name: str, index: Any) -> Any:
             return dr.gather(mi.Vector4f, inputs[name] if name else poses, index)
@@ -174,20 +215,18 @@ class _Wavefront:
 
         agent = mi.Point3f(x, y, EYE_HEIGHT)
         origin = agent + turned(row("origins", eye))
-        direction = turned(row("directions", eye * self.n_rays + ray))
+        direction = row("directions", eye * self.n_rays + ray)
         centres = [mi.Point3f(*list(row("", world * (self.stride // 4) + (1 + k)))[:3]) for k in range(self.n_spheres)]
-        return mi.Ray3f(origin, direction), agent, centres
+        return mi.Ray3f(origin, turned(direction)), direction.w, agent, centres
 
 
 def _in_agent_frame(eyes: Eyes, directions: np.ndarray) -> np.ndarray:
-    """Every eye's directions in the agent's frame, flat (eye, ray, 4)."""
-    return _in_fours(np.einsum("eij,rj->eri", eye_rotations(eyes.azimuths()), directions))
+    """Every eye's directions in the agent's frame, and their cosines with its axis, flat (eye, ray, 4)."""
+    return _in_fours(np.einsum("eij,rj->eri", eye_rotations(eyes.azimuths()), directions), directions[:, 2])
 
 
-def _eye_origins(eyes: Eyes) -> np.ndarray:
-    return _in_fours(eye_positions(eyes.azimuths()))
-
-
-def _in_fours(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) flat, each followed by a 0: four aligned floats are gathered at once."""
-    return np.pad(vectors, [(0, 0)] * (vectors.ndim - 1) + [(0, 1)]).astype(np.float32).ravel()
+def _in_fours(vectors: np.ndarray, fourth: np.ndarray | float) -> np.ndarray:
+    """Vectors (..., 3) flat, each followed by a fourth number: four aligned floats are gathered at once."""
+    rows = np.empty((*vectors.shape[:-1], 4), np.float32)
+    rows[..., :3], rows[..., 3] = vectors, fourth
+    return rows.ravel()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sim.observation import STANDING
 from sim.physics import Physics
 from sim.reward import MODES, reward_terms
 from sim.state import WorldState, concatenate, wrap_angle
@@ -17,6 +18,7 @@ EPISODE_STEPS = 256  # actions, then the episode is truncated
 MAX_TURN = np.pi / 4  # [rad] change of heading per action
 
 UNSTABLE = "unstable physics"
+NO_ACTION = "action is not finite"
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Step:
     state         after the action; where `failure` is set, the last good one
     reward_terms  name -> (n,)
     terminated, truncated, contact, success  (n,) bool; success: the goal was reached in this episode
-    failure       why the simulation of a world broke down, or None, per world
+    failure       why a world could not go on ("unstable physics", "action is not finite"), or None, per world
     """
 
     state: WorldState
@@ -101,27 +103,32 @@ class Simulation:
     def step(self, actions: np.ndarray) -> Step:
         """Advance all worlds by one action; actions (n, 2) in [-1, 1]: forward speed, change of heading."""
         before = self.state
-        moved, velocity = self._steer(before, actions)
+        acted = np.isfinite(actions).all(axis=-1)
+        moved, velocity = self._steer(before, np.where(acted[:, None], actions, STANDING))
         motion = self._physics.step(moved, velocity)
         after = replace(moved, position=motion.path[:, -1].copy(), velocity=motion.velocity, steps=before.steps + 1)
+        broken = motion.unstable | ~after.finite
+        good = acted & ~broken
         outcome = self.task.judge(before, after, motion.path, ends=self.mode == "training")
-        good = ~motion.unstable
         goal, adversary = outcome.goal & good, outcome.adversary & good
         after = replace(
             after,
             goals_reached=before.goals_reached + goal,
             adversaries_reached=before.adversaries_reached + adversary,
         )
-        self._state = final = respawned(self.task, after, outcome.respawn & good[:, None], self.streams.placement)
-        terminated = (outcome.terminated & good) | motion.unstable
+        final = respawned(self.task, after, outcome.respawn & good[:, None], self.streams.placement)
+        self._state = final = final.repaired() if broken.any() else final
+        terminated = (outcome.terminated & good) | ~good
         return Step(
             state=final,
-            reward_terms=reward_terms(MODES[self.mode], outcome.progress * good, goal, adversary, motion.contact),
+            reward_terms=reward_terms(
+                MODES[self.mode], np.where(good, outcome.progress, 0.0), goal, adversary, motion.contact
+            ),
             terminated=terminated,
             truncated=(final.steps >= EPISODE_STEPS) & ~terminated,
             contact=motion.contact,
             success=final.goals_reached > 0,
-            failure=tuple(UNSTABLE if bad else None for bad in motion.unstable),
+            failure=tuple(_reason(*flags) for flags in zip(acted, broken, strict=True)),
         )
 
     def _steer(self, state: WorldState, actions: np.ndarray) -> tuple[WorldState, np.ndarray]:
@@ -150,3 +157,10 @@ class Simulation:
             goals_reached=np.zeros(1, int),
             adversaries_reached=np.zeros(1, int),
         )
+
+
+def _reason(acted: bool, broken: bool) -> str | None:
+    """Why a world cannot go on, if it cannot."""
+    if not acted:
+        return NO_ACTION
+    return UNSTABLE if broken else None

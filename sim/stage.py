@@ -43,7 +43,7 @@ def build_stage(world: World) -> Stage:
     """The stage of a world. Raises ValueError for an object that is not one sphere, for moving geoms that are
     neither the agent's nor an object's, and for geoms that glow."""
     model = world.model
-    static = mirror(model, bodies=["world"])
+    static = mirror(model, bodies=["world"], spectra=world.spectra)
     geoms = [_sphere_of(model, name) for name in world.objects]
     known = {0, model.body("agent").id, *(model.geom_bodyid[g] for g in geoms)}
     others = set(model.geom_bodyid.tolist()) - known
@@ -83,7 +83,7 @@ def _static_scene(static: Mirror) -> Any:
     for i, (bsdf, triangles) in enumerate(meshes.values()):
         whole = Part(triangles=tessellation.join(triangles))
         description[f"mesh_{i}"] = shapes.build(whole, np.eye(4), f"mesh_{i}", bsdf, None)
-    for emitter in lights.emitters(model, data)[0]:
+    for emitter in lights.emitters(model, data, static.spectra)[0]:
         description[emitter.name] = emitter.description
     return mi.load_dict(description, optimize=False)
 

@@ -37,6 +37,15 @@ class WorldState:
         """Number of worlds."""
         return len(self.position)
 
+    @property
+    def finite(self) -> np.ndarray:
+        """Worlds in which every number is one, (n,) bool."""
+        return np.logical_and.reduce([np.isfinite(a).reshape(self.n, -1).all(axis=1) for a in vars(self).values()])
+
+    def repaired(self) -> WorldState:
+        """The same worlds with 0 for whatever is not finite."""
+        return WorldState(**{name: np.nan_to_num(array, posinf=0.0, neginf=0.0) for name, array in vars(self).items()})
+
     def take(self, worlds: np.ndarray) -> WorldState:
         """These worlds alone (copies)."""
         return WorldState(**{name: array[worlds] for name, array in vars(self).items()})

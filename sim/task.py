@@ -1,7 +1,7 @@
-"""The three tasks: where episodes start, what moves, what counts as progress, what ends an episode.
+"""The tasks: where episodes start, what moves, what counts as progress, what ends an episode.
 
-Rewards follow DESIGN: progress to the goal (detection, tracking) or away from the start (navigation), an event
-reward for reaching the goal or an adversary, and a penalty per action in contact with a wall.
+Rewards follow DESIGN: progress to the goal (detection, foraging, tracking) or away from the start (navigation), an
+event reward for reaching the goal or an adversary, and a penalty per action in contact with a wall.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from sim.motion import wander
 from sim.placement import REACH, free_spot, place
 from sim.state import WorldState
-from sim.world import World
+from sim.world import TASKS, World
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Task(Protocol):
 
 @dataclass(frozen=True)
 class FindGoal:
-    """Detection and tracking: reach the goal, avoid the adversaries.
+    """Detection, foraging and tracking: reach the goal, avoid the adversaries.
 
     Progress is the decrease of the distance to the goal; an object is reached when the agent comes within REACH
     of its centre at any substep. An event ends the episode in training, and then only the first one counts; in
@@ -125,11 +125,11 @@ class LeaveMaze:
 
 def task_of(world: World) -> Task:
     """The rules that go with a world. Raises ValueError for a world of no known task."""
-    if world.task in ("detection", "tracking"):
+    if world.task in ("detection", "foraging", "tracking"):
         return FindGoal(world, moving=world.task == "tracking")
     if world.task == "navigation":
         return LeaveMaze(world)
-    raise ValueError(f"task = {world.task!r}, must be one of 'navigation', 'detection', 'tracking'")
+    raise ValueError(f"task = {world.task!r}, must be one of {', '.join(map(repr, TASKS))}")
 
 
 def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: np.ndarray) -> np.ndarray:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import drjit as dr
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
+from optics.tabulated import Spectrum
 from sim.agent import Eyes
 from sim.noise import ReceptorNoise, add_noise
 from sim.observation import STANDING, Memory, action_space, observation_space
@@ -33,11 +34,13 @@ class EyesVecEnv(VecEnv):
         self.render_mode: str | None = None
         self._terminal_renderer: BatchedRenderer | None = None
         self._memory = Memory(memory)
-        channels = len(renderer.bands.weights)
-        super().__init__(simulation.n, observation_space(self.eyes, channels, memory), action_space())
+        channels = renderer.eye.channels
+        super().__init__(
+            simulation.n, observation_space(self.eyes, channels, memory, renderer.brightest), action_space()
+        )
         frame = self.observation_space["eyes"].shape[1:]
         self._noise = ReceptorNoise(simulation.streams.noise_keys, frame) if self.eyes.noise_sigma > 0 else None
-        self._actions = np.zeros((self.num_envs, 2), np.float32)
+        self._commanded = self._actions = np.zeros((self.num_envs, 2), np.float32)
         self._returns, self._lengths = np.zeros(self.num_envs), np.zeros(self.num_envs, int)
 
     @property
@@ -64,7 +67,10 @@ class EyesVecEnv(VecEnv):
         return self._seeds
 
     def step_async(self, actions: np.ndarray) -> None:
-        self._actions = np.clip(np.asarray(actions, np.float32).reshape(self.num_envs, 2), -1, 1)
+        actions = np.asarray(actions, np.float32)
+        if actions.shape != (self.num_envs, 2):
+            raise ValueError(f"actions have shape {actions.shape}, must be ({self.num_envs}, 2)")
+        self._commanded, self._actions = actions, np.clip(np.nan_to_num(actions), -1, 1)
 
     def step_once(
         self, actions: np.ndarray
@@ -72,14 +78,14 @@ class EyesVecEnv(VecEnv):
         """One action without starting ended worlds anew, as a single environment wants it: observation, reward,
         terminated, truncated, info."""
         self.step_async(actions)
-        step = self.simulation.step(self._actions)
+        step = self.simulation.step(self._commanded)
         reward = step.reward
         infos = self._infos(step, reward)
         observation = self._observe(np.zeros(self.num_envs, bool), step.contact)
         return observation, reward, step.terminated, step.truncated, infos
 
     def step_wait(self) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        step = self.simulation.step(self._actions)
+        step = self.simulation.step(self._commanded)
         reward = step.reward
         infos = self._infos(step, reward)
         done = step.done
@@ -185,26 +191,28 @@ def make_vec_env(
     *,
     memory: int = 1,
     mode: str = "training",
-    rays_per_receptor: int = 4,
+    rays_per_receptor: float | str = "auto",
     world_seed: int = 0,
+    spectra: Mapping[str, Spectrum | str] | None = None,
 ) -> EyesVecEnv:
     """A batched environment of one task.
 
-    task               "detection", "navigation" or "tracking"
+    task               "detection", "foraging", "navigation" or "tracking"
     eyes               of every agent; default Eyes()
     n_envs             number of worlds
     seed               of episodes and noise; None draws one
     memory             frames in an observation
     mode               "training", or "evaluation" (objects respawn; rewards weighted as fitness)
-    rays_per_receptor  samples of each receptor
+    rays_per_receptor  rays traced for each receptor; "auto": as few as its noise allows, see `sim.BatchedRenderer`
     world_seed         of the layout that all worlds share: navigation's maze
+    spectra            of materials and lights, by name, in the place of their colours: see `sim.build_world`
 
     Physics takes as many threads as Dr.Jit has: limit both with drjit.set_thread_count.
     Raises ValueError for a bad argument.
     """
     eyes = Eyes() if eyes is None else eyes
     Memory(memory)  # complains before the scene is built
-    world = build_world(task, seed=world_seed)
+    world = build_world(task, seed=world_seed, spectra=spectra)
     simulation = Simulation(world, n_envs, seed, mode, threads=min(dr.thread_count(), n_envs))
     renderer = BatchedRenderer(world, eyes, n_envs, rays_per_receptor)
     return EyesVecEnv(simulation, renderer, memory)

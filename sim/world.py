@@ -1,24 +1,28 @@
 """A task's world: what stands where, as a MuJoCo model, and where agent and objects may start.
 
 `build_world` compiles one. What all worlds have in common is added here; what is special about one is in
-`sim.tasks.navigation`, `sim.tasks.detection`, `sim.tasks.tracking`.
+the modules of `sim.tasks`.
 """
 
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
 
+from optics.tabulated import Spectrum
 from sim import materials
 from sim.agent import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.layout import WALL_CONAFFINITY
-from sim.tasks import detection, navigation, tracking
+from sim.scene.spectra import resolve
+from sim.tasks import detection, foraging, navigation, tracking
 
 _LAYOUTS = {
     "detection": detection.add_layout,
+    "foraging": foraging.add_layout,
     "navigation": navigation.add_layout,
     "tracking": tracking.add_layout,
 }
@@ -44,6 +48,7 @@ class World:
     objects       mocap sphere bodies: ("goal", "adversary_0", "adversary_1"), or () for navigation
     agent_spawn   (n, 2) cell centres [m];  object_spawn (m, 2) cell centres [m]
     goal_region   navigation: (x_min, y_min, x_max, y_max) [m]
+    spectra       measured spectra of materials and lights, by name: what the renderers use instead of their colours
     """
 
     task: str
@@ -52,16 +57,21 @@ class World:
     agent_spawn: np.ndarray
     object_spawn: np.ndarray
     goal_region: np.ndarray | None
+    spectra: Mapping[str, Spectrum] = field(default_factory=dict)
 
 
-def build_world(task: str, *, seed: int = 0, eyes: Eyes | None = None) -> World:
+def build_world(
+    task: str, *, seed: int = 0, eyes: Eyes | None = None, spectra: Mapping[str, Spectrum | str] | None = None
+) -> World:
     """Build the world of a task.
 
-    task   "detection", "navigation" or "tracking"
-    seed   draws the maze of navigation; the field of the other two is always the same
-    eyes   if given, the agent carries cameras eye_0 ..., left to right
+    task     "detection", "foraging", "navigation" or "tracking"
+    seed     draws the maze of navigation; the field of the others is always the same
+    eyes     if given, the agent carries cameras eye_0 ..., left to right
+    spectra  of materials and lights, by name ("wall", "floor", "light_0" ...), in addition to or instead of the task's
+             own: `optics.Spectrum`, or names out of `optics.reflectance` and `optics.illuminant`
 
-    Raises ValueError for an unknown task or a negative seed.
+    Raises ValueError for an unknown task, a negative seed, or spectra of what is not there.
     """
     if task not in TASKS:
         near = difflib.get_close_matches(task, TASKS, n=1)
@@ -72,13 +82,15 @@ def build_world(task: str, *, seed: int = 0, eyes: Eyes | None = None) -> World:
     spec = _empty_world()
     layout = _LAYOUTS[task](spec, np.random.default_rng(seed))
     _add_agent(spec, layout.agent_spawn[0], eyes)
+    model = spec.compile()
     return World(
         task=task,
-        model=spec.compile(),
+        model=model,
         objects=layout.objects,
         agent_spawn=layout.agent_spawn,
         object_spawn=layout.object_spawn,
         goal_region=layout.goal_region,
+        spectra=resolve(model, {**layout.spectra, **(spectra or {})}),
     )
 
 

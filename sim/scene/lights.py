@@ -16,10 +16,10 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from optics.spectrum import daylight
+from optics.tabulated import Spectrum, daylight
+from sim.scene.spectra import HEADLIGHT, Spectra, described
 
-WAVELENGTHS_NM = np.arange(360.0, 781.0, 5.0)
-HEADLIGHT = "headlight"
+WAVELENGTHS_NM = np.arange(300.0, 781.0, 5.0)
 _TYPES = mujoco.mjtLightType
 
 
@@ -32,10 +32,12 @@ class Emitter:
     description: dict[str, Any]
 
 
-def emission(rgb: np.ndarray, scale: float) -> dict[str, Any]:
-    """Spectrum scale · rgb · daylight(λ) on 360-780 nm; a grey rgb is exactly that, a coloured one goes by the
-    reflectance spectrum of its hue (Jakob and Hanika 2019)."""
+def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) -> dict[str, Any]:
+    """Spectrum scale · rgb · daylight(λ) on 300-780 nm; a grey rgb is exactly that, a coloured one goes by the
+    reflectance spectrum of its hue (Jakob and Hanika 2019). `measured` takes the place of daylight and hue."""
     level = float(np.max(rgb))
+    if measured is not None:
+        return described(measured, scale * level)
     values = scale * level * daylight(WAVELENGTHS_NM * 1e-9)
     if level > 0 and np.ptp(rgb) > 0:
         values = values * _hue(rgb / level)
@@ -60,7 +62,7 @@ def _evaluate(texture: Any, nm: Any) -> np.ndarray:
     return np.atleast_1d(np.array(texture.eval(si)[0]))
 
 
-def emitters(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[Emitter], list[str]]:
+def emitters(model: mujoco.MjModel, data: mujoco.MjData, spectra: Spectra) -> tuple[list[Emitter], list[str]]:
     """All active lights, and what of them could not be mirrored, in words."""
     found, left_out = [], []
     for light in range(model.nlight):
@@ -74,13 +76,13 @@ def emitters(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[list[Emitter],
         elif np.any(model.light_diffuse[light] > 0):
             if model.light_type[light] != _TYPES.mjLIGHT_DIRECTIONAL:
                 left_out.append(f"absent attenuation of {name!r} (mirrored with 1/r², equal at the model's center)")
-            found.append(Emitter(f"light_{light}", light, _describe(model, data, light)))
+            found.append(Emitter(f"light_{light}", light, _describe(model, data, light, spectra)))
     headlight = model.vis.headlight
     if headlight.active:
         if np.any(headlight.ambient > 0):
             left_out.append("ambient part of the headlight")
         if np.any(headlight.diffuse > 0):
-            spectrum = emission(headlight.diffuse, math.pi)
+            spectrum = emission(headlight.diffuse, math.pi, spectra.get(HEADLIGHT))
             found.append(Emitter(HEADLIGHT, -1, {"type": "directional", "irradiance": spectrum}))
     return found, left_out
 
@@ -101,13 +103,14 @@ def aimed(origin: np.ndarray, direction: np.ndarray) -> Any:
     return mi.ScalarTransform4f(matrix.tolist())
 
 
-def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int) -> dict[str, Any]:
+def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int, spectra: Spectra) -> dict[str, Any]:
     diffuse, kind = model.light_diffuse[light], model.light_type[light]
+    measured = spectra.get(model.light(light).name)
     if kind == _TYPES.mjLIGHT_DIRECTIONAL:
-        spectrum = emission(diffuse, math.pi)
+        spectrum = emission(diffuse, math.pi, measured)
         return {"type": "directional", "irradiance": spectrum, "to_world": pose(data, light)}
     distance = max(float(np.linalg.norm(data.light_xpos[light] - model.stat.center)), 1e-3)
-    spectrum = emission(diffuse, math.pi * distance**2)
+    spectrum = emission(diffuse, math.pi * distance**2, measured)
     if kind == _TYPES.mjLIGHT_POINT or model.light_cutoff[light] >= 90:
         return {"type": "point", "intensity": spectrum, "to_world": pose(data, light)}
     cutoff = float(model.light_cutoff[light])

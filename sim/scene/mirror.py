@@ -14,8 +14,10 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
+from optics.tabulated import Spectrum
 from sim.scene import cameras, lights, rays, shapes, surfaces
 from sim.scene.cameras import Viewpoint
+from sim.scene.spectra import of_geom, resolve
 from sim.variant import DEFAULT_VARIANT
 from sim.variant import variant as in_variant
 
@@ -33,6 +35,7 @@ def mirror(
     bodies: Sequence[str] | None = None,
     groups: Sequence[int] = VISIBLE_GROUPS,
     variant: str = DEFAULT_VARIANT,
+    spectra: Mapping[str, Spectrum | str] | None = None,
 ) -> Mirror:
     """Mirror a MuJoCo model.
 
@@ -40,10 +43,14 @@ def mirror(
     bodies   names of the bodies whose geoms are wanted ("world" is the static one); None: all
     groups   geom groups that are visible; a geom of alpha 0 never is
     variant  a spectral Mitsuba variant; scalar_spectral runs without LLVM, slowly
+    spectra  reflectances of materials and emission of lights, by name, in the place of their colours:
+             `optics.Spectrum`, or what `optics.reflectance` and `optics.illuminant` know by name; {"headlight": "A"} is
+             the camera's
 
-    Raises ValueError for an unknown body, a variant without spectra, or a model without visible geoms.
+    Raises ValueError for an unknown body, a variant without spectra, a model without visible geoms, or spectra of what
+    the model does not have.
     """
-    return Mirror(model, data, bodies=bodies, groups=groups, variant=variant)
+    return Mirror(model, data, bodies=bodies, groups=groups, variant=variant, spectra=spectra)
 
 
 class Mirror:
@@ -52,6 +59,7 @@ class Mirror:
     model, variant   as given
     scene            mi.Scene; shape ids are "geom_<geom id>_<part>"
     geoms            ids of the geoms in the scene, (n,)
+    spectra          of materials and lights, by name
     """
 
     def __init__(
@@ -62,10 +70,12 @@ class Mirror:
         bodies: Sequence[str] | None,
         groups: Sequence[int],
         variant: str,
+        spectra: Mapping[str, Spectrum | str] | None,
     ) -> None:
         if not variant.endswith("spectral"):
             raise ValueError(f"mirror: variant = {variant!r}, must be a spectral one such as {DEFAULT_VARIANT!r}")
         self.model, self.variant = model, variant
+        self.spectra = resolve(model, spectra)
         visible = _visible(model, bodies, groups)
         self.geoms = np.array([g for g in visible if surfaces.geom_type(model, g) in shapes.MIRRORED], dtype=int)
         if not len(self.geoms):
@@ -75,7 +85,7 @@ class Mirror:
         self._poses = {g: shapes.pose(self._data, g) for g in self._parts}
         self._bsdfs: dict[Any, Any] = {}
         with in_variant(variant):
-            self._emitters, left_out = lights.emitters(model, self._data)
+            self._emitters, left_out = lights.emitters(model, self._data, self.spectra)
             self.scene = self._build()
             self._params = mi.traverse(self.scene)
         left_out = _left_out(model, visible) + left_out
@@ -179,7 +189,7 @@ class Mirror:
             surfaces.is_open(self.model, geom),
         )
         if key not in self._bsdfs:
-            self._bsdfs[key] = surfaces.bsdf(self.model, geom, to_uv)
+            self._bsdfs[key] = surfaces.bsdf(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
         return self._bsdfs[key]
 
     def _move(self, geom: int, parts: list[shapes.Part], pose: np.ndarray) -> None:

@@ -9,7 +9,9 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
+from optics.tabulated import Spectrum
 from sim.color import decode_srgb
+from sim.scene import spectra
 
 # MuJoCo's own sign that a geom's rgba was not set, and its material's counts.
 _UNSET_RGBA = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
@@ -69,6 +71,11 @@ def reflectance(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = Non
         linear = pixels * decode_srgb(color)
     else:
         linear = decode_srgb(pixels * color)
+    return _bitmap(linear, to_uv)
+
+
+def _bitmap(linear: np.ndarray, to_uv: np.ndarray | None) -> dict[str, Any]:
+    """Mitsuba texture of an image (height, width, 1 or 3), row 0 on top, that repeats."""
     # Given as an object, a bitmap has its first row at v = 0, as in MuJoCo (a bitmap's `data` would be taken as
     # coefficients of spectra, not as RGB).
     bitmap = mi.Bitmap(np.ascontiguousarray(linear, dtype=np.float32))
@@ -77,15 +84,36 @@ def reflectance(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = Non
     return {"type": "bitmap", "bitmap": bitmap, "wrap_mode": "repeat", "to_uv": transform}
 
 
+def _measured(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, spectrum: Spectrum) -> dict[str, Any]:
+    """Mitsuba BSDF of a measured reflectance, multiplied by the geom's texture if it has one."""
+    whole = {"type": "diffuse", "reflectance": spectra.described(spectrum)}
+    texture = texture_id(model, geom)
+    if texture < 0 or model.tex_type[texture] != mujoco.mjtTexture.mjTEXTURE_2D:
+        return whole
+    pixels = image(model, texture)
+    if np.ptp(pixels, axis=2).max() > 0:
+        name = model.material(int(model.geom_matid[geom])).name
+        raise ValueError(f"spectra: material {name!r} has a coloured texture: must be grey beside a spectrum")
+    is_linear = model.tex_colorspace[texture] == mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
+    share = pixels[..., :1] if is_linear else decode_srgb(pixels[..., :1])
+    # Mitsuba multiplies no textures: black and the whole reflectance are mixed instead, pixel by pixel.
+    black = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.0}}
+    return {"type": "blendbsdf", "weight": _bitmap(share, to_uv) | {"raw": True}, "bsdf_0": black, "bsdf_1": whole}
+
+
 def is_open(model: mujoco.MjModel, geom: int) -> bool:
     """Whether the inner side of a geom's surface can be seen."""
     return geom_type(model, geom) in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_MESH)
 
 
-def bsdf(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> Any:
+def bsdf(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None, measured: Spectrum | None = None) -> Any:
     """A geom's BSDF (a Mitsuba object of the variant in force): Lambertian; both sides of planes and meshes, which
-    may be open; see-through by its rgba's alpha."""
-    description: dict[str, Any] = {"type": "diffuse", "reflectance": reflectance(model, geom, to_uv)}
+    may be open; see-through by its rgba's alpha. `measured`: a reflectance that takes the place of its colour."""
+    description = (
+        {"type": "diffuse", "reflectance": reflectance(model, geom, to_uv)}
+        if measured is None
+        else _measured(model, geom, to_uv, measured)
+    )
     if is_open(model, geom):
         description = {"type": "twosided", "inside": description}
     alpha = float(rgba(model, geom)[3])

@@ -16,7 +16,24 @@ OBJECT_MARGIN = 2  # cells between the wall and the nearest place of an object
 
 
 def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
-    """Add field and objects. The agent starts in the outermost ring of cells, objects in the field's middle."""
+    """Add field and objects.
+
+    Goal: stripes along meridians (upright); adversary: along parallels (level), the same pattern turned by 90°.
+
+    16 sectors of 22.5° around the vertical axis, of which a viewer sees 8, against 8 bands of 22.5° of latitude:
+    across its centre, an object looks the same along the horizontal as the other kind along the vertical. Either
+    has as much white as black, so that no single receptor tells them apart by brightness.
+    """
+    materials.add_texture(spec, "upright_stripes", materials.stripes((8, 512), 2 * STRIPES, axis=1))
+    materials.add_texture(spec, "level_stripes", materials.stripes((256, 8), STRIPES, axis=0))
+    materials.add_textured(spec, "goal", "upright_stripes")
+    materials.add_textured(spec, "adversary", "level_stripes")
+    return furnished_field(spec)
+
+
+def furnished_field(spec: mujoco.MjSpec) -> Layout:
+    """Add the field, and the objects in the materials "goal" and "adversary". The agent starts in the outermost ring of
+    cells, objects in the field's middle."""
     _add_field(spec)
     _add_objects(spec)
     rows, columns = (a.ravel() for a in np.indices(FIELD))
@@ -41,16 +58,6 @@ def _add_field(spec: mujoco.MjSpec) -> None:
 
 
 def _add_objects(spec: mujoco.MjSpec) -> None:
-    """Goal: stripes along meridians (upright); adversary: along parallels (level), the same pattern turned by 90°.
-
-    16 sectors of 22.5° around the vertical axis, of which a viewer sees 8, against 8 bands of 22.5° of latitude:
-    across its centre, an object looks the same along the horizontal as the other kind along the vertical. Either
-    has as much white as black, so that no single receptor tells them apart by brightness.
-    """
-    materials.add_texture(spec, "upright_stripes", materials.stripes((8, 512), 2 * STRIPES, axis=1))
-    materials.add_texture(spec, "level_stripes", materials.stripes((256, 8), STRIPES, axis=0))
-    materials.add_textured(spec, "goal", "upright_stripes")
-    materials.add_textured(spec, "adversary", "level_stripes")
     for name, center in zip(OBJECTS, ((0, 0), (2 * CELL, 0), (-2 * CELL, 0)), strict=True):
         body = spec.worldbody.add_body(name=name, mocap=True, pos=[*center, OBJECT_RADIUS])
         body.add_geom(

@@ -57,15 +57,15 @@ def test_picture_follows_the_agent():
     env = sim.make_env("detection", EYES, render_mode="rgb_array")
     env.reset(seed=0)
     first = env.render()
-    assert first.shape == (240, 320, 3)
+    assert first.shape == (360, 480, 3)
     assert first.dtype == np.uint8
     env.step(np.array([-1.0, 1.0]))  # turns on the spot: the body stays, the world turns
     second = env.render()
     state, mirror = env.state, env._onlooker._mirror
-    ids = mirror.render_ids(_follow(state, 0), 320, 240)
+    ids = mirror.render_ids(_follow(state, 0), 480, 360)
     y, x = np.nonzero(ids == mirror.model.geom("agent").id)
     assert len(y) > 50
-    assert abs(x.mean() - 159.5) < 1
+    assert abs(x.mean() - 239.5) < 1
     assert (np.abs(first.astype(int) - second) > 30).mean() > 0.05
 
 

@@ -1,0 +1,64 @@
+"""Measured spectra in the place of colours: reflectances of materials, emission of lights, by their names in the model.
+
+A material's spectrum takes the place of its rgba; a texture, which must be grey, still multiplies it. A light's takes
+the place of daylight's and of its colour; how bright it is stays the largest of its diffuse's components.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from optics.tabulated import LIMITS_NM, Spectrum, illuminant, reflectance
+
+HEADLIGHT = "headlight"
+Spectra = Mapping[str, Spectrum]
+
+
+def resolve(model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None) -> Spectra:
+    """Spectra by name, where names of optics' own (`optics.REFLECTANCES`, `optics.ILLUMINANTS`) stand for theirs.
+
+    Raises ValueError for a name that the model has neither as a material nor as a light, or has as both; for a value
+    that is no spectrum; and for reflectances above 1.
+    """
+    materials = [model.material(i).name for i in range(model.nmat)]
+    lights = [*(model.light(i).name for i in range(model.nlight)), HEADLIGHT]
+    return {name: _resolved(name, value, materials, lights) for name, value in (spectra or {}).items()}
+
+
+def _resolved(name: str, value: Any, materials: list[str], lights: list[str]) -> Spectrum:
+    known = [known for known in (*materials, *lights) if known]
+    if name not in known:
+        near = difflib.get_close_matches(str(name), known, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else f"; it has {', '.join(map(repr, known))}"
+        raise ValueError(f"spectra: the model has no material or light {name!r}{hint}")
+    if name in materials and name in lights:
+        raise ValueError(f"spectra: {name!r} is a material and a light: rename one of them")
+    if isinstance(value, str):
+        value = (reflectance if name in materials else illuminant)(value)
+    if not isinstance(value, Spectrum):
+        raise ValueError(f"spectra: {name!r} has {value!r}: must be an optics.Spectrum or the name of one")
+    if name in materials and max(value.values) > 1:
+        raise ValueError(f"spectra: material {name!r} reflects {max(value.values):g}: must lie in [0, 1]")
+    return value
+
+
+def of_geom(model: mujoco.MjModel, geom: int, spectra: Spectra) -> Spectrum | None:
+    """The reflectance of a geom's material; None where there is only a colour."""
+    material = int(model.geom_matid[geom])
+    return spectra.get(model.material(material).name) if material >= 0 else None
+
+
+def described(spectrum: Spectrum, scale: float = 1.0) -> dict[str, Any]:
+    """Mitsuba's description of scale · spectrum on 300-780 nm: `rgb` and `d65` would be dark in the ultraviolet."""
+    inside = [nm for nm in spectrum.wavelengths_nm if LIMITS_NM[0] < nm < LIMITS_NM[1]]
+    nm = np.array([LIMITS_NM[0], *inside, LIMITS_NM[1]])
+    return {
+        "type": "irregular",
+        "wavelengths": ",".join(f"{x:.9g}" for x in nm),
+        "values": ",".join(f"{scale * v:.9g}" for v in spectrum.at(nm * 1e-9)),
+    }
