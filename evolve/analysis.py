@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evolve.development import Phenotype
-from evolve.genotype import DOE_SHAPE
 
 if TYPE_CHECKING:
     import optics
@@ -132,10 +131,12 @@ def gene_values(phenotype: Phenotype) -> dict[str, float]:
     if phenotype.relative_aperture is not None:
         values["relative_aperture"] = phenotype.relative_aperture
     if phenotype.relief is not None:
-        relief = np.reshape(phenotype.relief, DOE_SHAPE)
+        side = math.isqrt(len(phenotype.relief))
+        relief = np.reshape(phenotype.relief, (side, side))
         values |= {f"doe_{i}{j}": float(height) for (i, j), height in np.ndenumerate(relief)}
     if phenotype.refractive_index is not None:
         values["refractive_index"] = phenotype.refractive_index
+        values |= {"dispersion": phenotype.dispersion, "aperture_shape": float(phenotype.aperture_shape)}
     return values | {"memory_frames": float(phenotype.memory_frames), "neurons": float(phenotype.neurons)}
 
 

@@ -7,6 +7,9 @@ import math
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from evolve.development import Phenotype
 from evolve.evaluation import Evaluation
 
@@ -15,7 +18,10 @@ __all__ = ["Candidate"]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A genome, the animal it became, and how that one fared; see `Evaluation` for the fields it has in common."""
+    """A genome, the animal it became, and how that one fared; see `Evaluation` for the fields it has in common.
+
+    parents  ids of the candidates from which the search made it; () where it drew from none
+    """
 
     id: int
     generation: int
@@ -30,6 +36,12 @@ class Candidate:
     seconds: float
     curve: tuple[tuple[int, float], ...]
     failure: str | None
+    parents: tuple[int, ...] = ()
+
+    @property
+    def vector(self) -> NDArray[np.float64]:
+        """The genome as an array."""
+        return np.array(self.genome)
 
     @classmethod
     def of(
@@ -39,11 +51,13 @@ class Candidate:
         phenotype: Phenotype,
         seed: int,
         outcome: Evaluation,
+        parents: tuple[int, ...] = (),
     ) -> Candidate:
         """Candidate at `place` (id, generation, index) with its outcome; a fitness that is no number is a failure."""
         if outcome.failure is None and not math.isfinite(outcome.fitness):
             outcome = Evaluation.failed(f"fitness is {outcome.fitness}", outcome.seconds)
-        return cls(*place, genome, phenotype, seed, **{f.name: getattr(outcome, f.name) for f in fields(Evaluation)})
+        found = {f.name: getattr(outcome, f.name) for f in fields(Evaluation)}
+        return cls(*place, genome, phenotype, seed, **found, parents=parents)
 
     def to_line(self) -> str:
         """One line of JSON; numbers are written so that they read back bit for bit, and what is no number as null."""
@@ -54,6 +68,8 @@ class Candidate:
     def from_line(cls, line: str) -> Candidate:
         """Inverse of `to_line`; raises ValueError that says what is wrong with the line."""
         record = json.loads(line)
+        if isinstance(record, dict):
+            record.setdefault("parents", [])  # not written by the first runs
         names = [f.name for f in fields(cls)]
         if not isinstance(record, dict) or sorted(record) != sorted(names):
             raise ValueError(f"must hold exactly {', '.join(names)}")
@@ -72,6 +88,7 @@ class Candidate:
                 seconds=float(record["seconds"]),
                 curve=tuple((int(steps), _number(value)) for steps, value in record["curve"]),
                 failure=None if record["failure"] is None else str(record["failure"]),
+                parents=tuple(int(parent) for parent in record["parents"]),
             )
         except (TypeError, AttributeError, KeyError) as error:
             raise ValueError(f"a value has the wrong type ({error})") from error

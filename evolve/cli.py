@@ -72,8 +72,15 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--seed", type=int, help="same as --set seed=N")
     run.add_argument("--workers", type=int, metavar="N", help="same as --set workers=N (0: one per core)")
     run.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/TASK-PRESET-N)")
-
-    _command(commands, "resume", "run.resume", "continue a run that was interrupted", directory=True)
+    run.add_argument(
+        "--from", dest="ancestor", metavar="RUN[:ID]", help="start from an animal of another run (default: its best)"
+    )
+    run.add_argument(
+        "--dry-run", action="store_true", help="print the plan, hours and disk that it takes, and begin nothing"
+    )
+    resume = _command(commands, "resume", "run.resume", "continue a run that was interrupted", directory=True)
+    for command in (run, resume):
+        command.add_argument("--json", action="store_true", help="for machines: a line of JSON per event")
     status = _command(commands, "status", "status.status", "how a run stands", directory=True)
     status.add_argument("--json", action="store_true", help="for machines")
     for name, meaning in (
@@ -89,7 +96,8 @@ def _parser() -> argparse.ArgumentParser:
     doctor = _command(commands, "doctor", "checks.doctor", "what is installed, and whether it works")
     doctor.add_argument("--json", action="store_true", help="for machines")
     _command(commands, "tasks", "tables.tasks", "list the tasks")
-    _command(commands, "genes", "tables.genes", "list the genes")
+    genes = _command(commands, "genes", "tables.genes", "list the genes")
+    genes.add_argument("--json", action="store_true", help="for machines")
     return parser
 
 

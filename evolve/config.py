@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from evolve.genotype import GENES, Gene, GeneConfig
+from evolve import anatomy
+from evolve.genes import GENES, RELIEF_POINTS, Gene, GeneConfig, gene_table
 from evolve.interval import Interval
 
 __all__ = [
@@ -28,11 +29,19 @@ TASKS: Mapping[str, str] = {
     "navigation": "get as far as possible through a maze of striped corridors",
     "detection": "reach the goal sphere, avoid two adversaries that differ in stripe orientation only",
     "tracking": "detection with goal and adversaries that move",
+    "foraging": "reach the goal sphere, avoid an adversary that differs below 400 nm only",
 }
 
 
 class ConfigError(ValueError):
-    """A setting that cannot be used; the message is one line naming key, value and what is allowed."""
+    """A setting that cannot be used; the message is one line naming key, value and what is allowed.
+
+    keys  dotted names of the settings to blame, so that whoever knows where they were set can say so
+    """
+
+    def __init__(self, message: str, *keys: str) -> None:
+        super().__init__(message)
+        self.keys = keys
 
 
 def _setting(default: Any, valid: Interval | None, meaning: str) -> Any:
@@ -51,13 +60,26 @@ class EyeConfig:
     relief_height: float = _setting(
         100e-6, Interval(0, 1e-2, open_low=True), "height that a relief gene of 1 means [m]"
     )
+    relief_points: int = _setting(
+        4, RELIEF_POINTS, "genes of the relief along one side; 4: a bicubic patch, more: a cubic spline through as many"
+    )
     rays_per_receptor: int = _setting(4, Interval(1, 4096), "rays traced per receptor and frame")
+    head_radius: float = _setting(
+        1e-3, Interval(0, 10, open_low=True), "radius of the head [m]; eyes on it do not overlap"
+    )
+    receptor_width: float = _setting(
+        1e-6, Interval(0, 1e-2, open_low=True), "least width of a receptor [m]; receptors do not overlap"
+    )
 
 
 @dataclass(frozen=True)
 class SearchConfig:
-    """CMA-ES."""
+    """Who proposes candidates, how many at a time, and when it is told how they fared."""
 
+    optimizer: str = _setting("CMA", None, "CMA, mutation, or any optimizer of nevergrad by its name")
+    steady_state: bool = _setting(
+        False, None, "propose the next candidate as soon as one is evaluated; off: generation by generation"
+    )
     population: int = _setting(16, Interval(2, 10_000), "candidates per generation")
     generations: int = _setting(50, Interval(1, 100_000), "generations")
     sigma: float = _setting(0.2, Interval(0, 1, open_low=True), "initial step, as a part of each gene's range")
@@ -112,17 +134,48 @@ class RunConfig:
 
     def __post_init__(self) -> None:
         if self.task not in TASKS:
-            raise ConfigError(f"task = {self.task!r}: must be one of {', '.join(TASKS)}")
-        for name, gene in GENES.items():
+            raise ConfigError(f"task = {self.task!r}: must be one of {', '.join(TASKS)}", "task")
+        for name, gene in gene_table(self.eye.relief_points).items():
             _check_gene_use(gene, self.genome[name])
-        if not self.eye.optics and any(self.genome[name].open for name, g in GENES.items() if g.cluster == "optical"):
-            raise ConfigError("eye.optics = false leaves no optical gene to evolve: set genome.optical.open = false")
-        if not any(use.open for use in self.genome.values()):
-            raise ConfigError("genome: every gene is frozen; open at least one (genome.NAME.open = true)")
+        self._check_clusters()
+        self._check_phases()
         rollout = self.learning.n_envs * self.learning.n_steps
         if self.learning.batch_size > rollout:
             raise ConfigError(
-                f"learning.batch_size = {self.learning.batch_size}: must be at most n_envs x n_steps = {rollout}"
+                f"learning.batch_size = {self.learning.batch_size}: must be at most n_envs x n_steps = {rollout}",
+                *("learning.batch_size", "learning.n_envs", "learning.n_steps"),
+            )
+        if (cramped := anatomy.contradiction(self.genome, self.eye)) is not None:
+            message, keys = cramped
+            raise ConfigError(message, *keys)
+
+    def _check_clusters(self) -> None:
+        """Something must be open, and nothing that the run leaves out."""
+        genes = gene_table(self.eye.relief_points)
+        optical = [name for name, gene in genes.items() if gene.cluster == "optical" and self.genome[name].open]
+        if not self.eye.optics and optical:
+            raise ConfigError(
+                "eye.optics = false leaves no optical gene to evolve: set genome.optical.open = false",
+                *("eye.optics", *(f"genome.{name}.open" for name in optical)),
+            )
+        if not any(use.open for use in self.genome.values()):
+            keys = [f"genome.{name}.open" for name in self.genome]
+            raise ConfigError("genome: every gene is frozen; open at least one (genome.NAME.open = true)", *keys)
+
+    def _check_phases(self) -> None:
+        """Every open gene must open within the run, and one of them at its beginning."""
+        opening = {name: use.opens_at for name, use in self.genome.items() if use.open}
+        for name, generation in opening.items():
+            if generation >= self.search.generations:
+                raise ConfigError(
+                    f"genome.{name}.opens_at = {generation}: must be below search.generations = "
+                    f"{self.search.generations}, else the gene never opens",
+                    *(f"genome.{name}.opens_at", "search.generations"),
+                )
+        if min(opening.values()) > 0:
+            raise ConfigError(
+                f"genome: no gene opens before generation {min(opening.values())}; one must open at 0",
+                *(f"genome.{name}.opens_at" for name in opening),
             )
 
     @property
@@ -139,9 +192,11 @@ def check_value(cls: type, name: str, value: Any, key: str) -> Any:
 
 
 def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
-    """`value` as a gene's "open", "low", "high" or "start" takes it; raises ConfigError."""
+    """`value` as a gene's "open", "low", "high", "start" or "opens_at" takes it; raises ConfigError."""
     if name == "open":
         return _checked(value, bool, None, key)
+    if name == "opens_at":
+        return _checked(value, int, Interval(0, 100_000), key)
     return float(_checked(value, int if gene.kind == "integer" else float, gene.range, key))
 
 
@@ -151,10 +206,11 @@ def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> A
     shown = str(value).lower() if isinstance(value, bool) else repr(value)
     if kind is float and type(value) is int:
         value = float(value)
+    allowed = names[kind] if valid is None else f"{names[kind]} in {valid}"
     if type(value) is not kind:
-        raise ConfigError(f"{key} = {shown}: must be {names[kind]}")
+        raise ConfigError(f"{key} = {shown}: must be {allowed}", key)
     if valid is not None and value not in valid:
-        raise ConfigError(f"{key} = {shown}: must be in {valid}")
+        raise ConfigError(f"{key} = {shown}: must be in {valid}", key)
     return value
 
 
@@ -162,10 +218,13 @@ def _check_gene_use(gene: Gene, use: GeneConfig) -> None:
     """A gene's search range must be one, and hold its start."""
     key = f"genome.{gene.name}"
     if use.start not in gene.range or math.isnan(use.start):
-        raise ConfigError(f"{key}.start = {use.start:g}: must be in {gene.range}")
+        raise ConfigError(f"{key}.start = {use.start:g}: must be in {gene.range}", f"{key}.start")
     if not use.open:
         return
+    keys = (f"{key}.low", f"{key}.high", f"{key}.start")
     if not use.low < use.high:
-        raise ConfigError(f"{key}: open, but low = {use.low:g} is not below high = {use.high:g}")
+        raise ConfigError(f"{key}: open, but low = {use.low:g} is not below high = {use.high:g}", *keys[:2])
     if not use.low <= use.start <= use.high:
-        raise ConfigError(f"{key}.start = {use.start:g}: must be in the searched range [{use.low:g}, {use.high:g}]")
+        raise ConfigError(
+            f"{key}.start = {use.start:g}: must be in the searched range [{use.low:g}, {use.high:g}]", *keys
+        )

@@ -1,4 +1,5 @@
-"""Where a run's configuration comes from: defaults, preset, task, TOML file, `--set key=value`; later ones win."""
+"""Where a run's configuration comes from: defaults, preset, task, TOML file, another run's animal, `--set key=value`;
+later ones win."""
 
 from __future__ import annotations
 
@@ -11,39 +12,56 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from evolve.config import SECTIONS, TASKS, ConfigError, RunConfig, check_gene_value, check_value
-from evolve.genotype import CLUSTERS, GENES, GeneConfig, group_members
+import numpy as np
 
-__all__ = ["assemble", "from_toml", "nearest", "parse_assignment", "preset_names", "read_toml", "to_toml"]
+from evolve.config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig, check_gene_value, check_value
+from evolve.config_lines import Source
+from evolve.genes import ALL_GENES, CLUSTERS, GENES, GeneConfig, gene_table, group_members
+from evolve.relief import doe_names, refined
+
+__all__ = ["assemble", "from_toml", "nearest", "parse_assignment", "preset_names", "to_toml"]
 
 Tree = dict[str, Any]
 GENE_FIELDS = tuple(f.name for f in fields(GeneConfig))
 TOP_LEVEL = ("task", "seed", "workers")
+SETTINGS = (*TOP_LEVEL, *(f"{section}.{f.name}" for section, cls in SECTIONS.items() for f in fields(cls)))
 # A maze's walls say the same at every height, so navigators' eyes are one row of receptors unless told otherwise.
 TASK_TREES: Mapping[str, Tree] = {
-    "navigation": {"genome": {"resolution_height": {"open": False, "low": 1.0, "high": 1.0, "start": 1.0}}}
+    "navigation": {"genome": {"resolution_height": {"open": False, "low": 1, "high": 1, "start": 1}}}
 }
 
 
 def assemble(
-    task: str | None = None, preset: str | None = None, file: Path | None = None, assignments: Iterable[str] = ()
+    task: str | None = None,
+    preset: str | None = None,
+    file: Path | None = None,
+    assignments: Iterable[str] = (),
+    starts: Source | None = None,
 ) -> RunConfig:
     """A run's configuration from all its sources; `task` and `assignments` ("search.population=8") win.
 
+    starts  where the genes start instead, as `evolve.ancestor` reads it from another run
+
     Raises:
-        ConfigError: unknown key, wrong type, value out of range, contradiction, unreadable file.
+        ConfigError: unknown key, wrong type, value out of range, contradiction, unreadable file; one line that names
+            key, value, what is allowed, and where it was set.
     """
-    layers: list[Tree] = []
-    if file is not None:
-        layers.append(_checked_tree(read_toml(file), str(file)))
-    layers += [_checked_tree(parse_assignment(text), "--set") for text in assignments]
+    asked = [_read(file)] if file is not None else []
+    if starts is not None:
+        asked.append(starts)
+    asked += [Source(f"--set {text.strip()}", parse_assignment(text)) for text in assignments]
     if task is not None:
-        layers.append(_checked_tree({"task": task}, ""))
-    asked: Tree = reduce(_merge, layers, {})
-    if "task" not in asked:
+        asked.append(Source("", {"task": task}))
+    known_task = [source.tree["task"] for source in asked if "task" in source.tree]
+    if not known_task:
         raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
-    below = [_checked_tree(_preset_tree(preset), f"preset {preset}")] if preset else []
-    return _build(reduce(_merge, [*below, TASK_TREES.get(asked["task"], {}), asked], {}))
+    below = [_preset(preset)] if preset else []
+    layers = [*below, Source("", TASK_TREES.get(str(known_task[-1]), {})), *asked]
+    trees = [_checked(source) for source in layers]
+    try:
+        return _build(trees, layers)
+    except ConfigError as error:
+        raise ConfigError(f"{error}{_blamed(error, layers)}", *error.keys) from None
 
 
 def from_toml(path: Path) -> RunConfig:
@@ -57,21 +75,9 @@ def to_toml(config: RunConfig) -> str:
 
     tree = asdict(config)
     for name, use in tree["genome"].items():
-        if GENES[name].kind == "integer":
+        if ALL_GENES[name].kind == "integer":
             use.update({key: int(use[key]) for key in ("low", "high", "start")})
     return tomli_w.dumps(tree)
-
-
-def read_toml(path: Path) -> Tree:
-    """A TOML file's content; raises ConfigError naming file and line."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: is not UTF-8 text") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: is not valid TOML: {error}") from error
 
 
 def parse_assignment(text: str) -> Tree:
@@ -94,43 +100,73 @@ def preset_names() -> list[str]:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """ "; did you mean X?" where a known word is near, else the list of them."""
+    """ "did you mean X?" where a known word, or the last part of one, is near; else the list of them."""
     known = list(known)
-    close = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    whole = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    by_last = {name.rpartition(".")[2]: name for name in known}
+    last = difflib.get_close_matches(word.rpartition(".")[2], by_last, n=1, cutoff=0.75)
+    close = whole or [by_last[name] for name in last]
     return f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
 
 
-def _preset_tree(name: str) -> Tree:
+def _read(path: Path) -> Source:
+    """A TOML file; raises ConfigError naming file and, where there is one to name, line."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        return Source(str(path), tomllib.loads(text), text)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 text") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: is not valid TOML: {error}") from error
+
+
+def _preset(name: str) -> Source:
     if name not in preset_names():
         raise ConfigError(f"unknown preset {name!r}; {nearest(name, preset_names())}")
-    return tomllib.loads((resources.files("evolve") / "presets" / f"{name}.toml").read_text(encoding="utf-8"))
+    text = (resources.files("evolve") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    return Source(f"preset {name}", tomllib.loads(text), text)
 
 
-def _checked_tree(tree: Tree, source: str) -> Tree:
-    """`tree`, every key known, every value in range, gene groups spelled out; else a ConfigError naming `source`."""
+def _checked(source: Source) -> Tree:
+    """The source's tree, every key known, every value in range, groups of genes spelled out; else a ConfigError that
+    names the source and line."""
     try:
-        return {key: _checked_entry(key, value) for key, value in tree.items()}
+        return {key: _checked_entry(key, value) for key, value in source.tree.items()}
     except ConfigError as error:
-        raise ConfigError(f"{source}: {error}" if source else str(error)) from None
+        places = [place for key in error.keys if (place := source.place(key))] or [source.name]
+        name = "--set" if places[0].startswith("--set") else places[0]
+        raise ConfigError(f"{name}: {error}" if name else str(error), *error.keys) from None
+
+
+def _blamed(error: ConfigError, layers: Iterable[Source]) -> str:
+    """ " (mine.toml, line 3; --set ...)": where the settings that contradict each other were set, the ones that won."""
+    won = [next((at for s in reversed(list(layers)) if (at := s.place(key))), None) for key in error.keys]
+    places = list(dict.fromkeys(place for place in won if place))
+    return f" ({'; '.join(places)})" if places else ""
 
 
 def _checked_entry(key: str, value: Any) -> Any:
     if key == "task":
         if not isinstance(value, str) or value not in TASKS:
-            raise ConfigError(f"unknown task {str(value)!r}; {nearest(str(value), TASKS)}")
+            raise ConfigError(f"unknown task {str(value)!r}; {nearest(str(value), TASKS)}", key)
         return value
     if key in TOP_LEVEL:
         return check_value(RunConfig, key, value, key)
     if key not in (*SECTIONS, "genome"):
-        raise ConfigError(f"unknown key {key!r}; {nearest(key, (*TOP_LEVEL, *SECTIONS, 'genome'))}")
+        known = (*TOP_LEVEL, *SECTIONS, "genome") if isinstance(value, dict) else SETTINGS
+        raise ConfigError(f"unknown key {key!r}; {nearest(key, known)}", key)
     if not isinstance(value, dict):
-        raise ConfigError(f"{key} = {value!r}: is a section; set {key}.NAME")
+        raise ConfigError(f"{key} = {value!r}: is a section; set {key}.NAME", key)
     if key == "genome":
         return _checked_genome(value)
     names = [f.name for f in fields(SECTIONS[key])]
     for name in value:
         if name not in names:
-            raise ConfigError(f"unknown key '{key}.{name}'; {nearest(name, names)}")
+            hint = nearest(name, names)
+            hint = hint if hint.startswith("did") else nearest(name, SETTINGS)
+            raise ConfigError(f"unknown key '{key}.{name}'; {hint}", f"{key}.{name}")
     return {name: check_value(SECTIONS[key], name, leaf, f"{key}.{name}") for name, leaf in value.items()}
 
 
@@ -138,18 +174,24 @@ def _checked_genome(section: Tree) -> Tree:
     """Per-gene settings; a cluster's name or "doe" stands for its genes, and the narrower name wins."""
     result: Tree = {}
     for group in sorted(section, key=lambda name: -len(group_members(name))):
-        members, use = group_members(group), section[group]
+        key, members, use = f"genome.{group}", group_members(group), section[group]
         if not members:
-            raise ConfigError(f"unknown gene {group!r}; {nearest(group, (*GENES, *CLUSTERS, 'doe'))}")
+            raise ConfigError(f"unknown gene {group!r}; {nearest(group, (*GENES, *CLUSTERS, 'doe'))}", key)
         if not isinstance(use, dict):
-            raise ConfigError(f"genome.{group} = {use!r}: set genome.{group}.open, .low, .high or .start")
+            raise ConfigError(f"{key} = {use!r}: set {key}.open, .low, .high, .start or .opens_at", key)
         for name in use:
             if name not in GENE_FIELDS:
-                raise ConfigError(f"unknown key 'genome.{group}.{name}'; {nearest(name, GENE_FIELDS)}")
+                raise ConfigError(f"unknown key '{key}.{name}'; {nearest(name, GENE_FIELDS)}", f"{key}.{name}")
         for gene in members:
-            checked = {k: check_gene_value(GENES[gene], k, v, f"genome.{group}.{k}") for k, v in use.items()}
+            checked = {k: check_gene_value(ALL_GENES[gene], k, v, f"{key}.{k}") for k, v in use.items()}
             result[gene] = {**result.get(gene, {}), **checked}
     return result
+
+
+def _merged(trees: Iterable[Tree]) -> Tree:
+    """All trees as one; later ones win."""
+    empty: Tree = {}
+    return reduce(_merge, trees, empty)
 
 
 def _merge(below: Tree, above: Tree) -> Tree:
@@ -161,14 +203,37 @@ def _merge(below: Tree, above: Tree) -> Tree:
     return merged
 
 
-def _build(tree: Tree) -> RunConfig:
-    """RunConfig from a checked tree, defaults filled in."""
+def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
+    """RunConfig from checked trees, later ones winning, defaults filled in."""
+    points = _merged(trees).get("eye", {}).get("relief_points", EyeConfig.relief_points)
+    table = gene_table(points)
+    for source in layers:
+        for name in source.tree.get("genome", {}):
+            if name in ALL_GENES and name not in table:
+                raise ConfigError(
+                    f"genome.{name}: the relief has {points} x {points} genes; set eye.relief_points for more",
+                    *(f"genome.{name}", "eye.relief_points"),
+                )
+    tree = _merged([_with_relief(tree, points) for tree in trees])
     sections = {name: cls(**tree.get(name, {})) for name, cls in SECTIONS.items()}
     genes = tree.get("genome", {})
     genome = {}
-    for name, gene in GENES.items():
+    for name, gene in table.items():
         # With optics off the optical genes are frozen, unless someone asks for the contradiction in so many words.
         off = gene.cluster == "optical" and not sections["eye"].optics
         genome[name] = replace(gene.default, **{**({"open": False} if off else {}), **genes.get(name, {})})
     top = {name: tree[name] for name in TOP_LEVEL if name in tree}
     return RunConfig(**top, **sections, genome=genome)
+
+
+def _with_relief(tree: Tree, points: int) -> Tree:
+    """`tree`, whose starts for a relief of 4 x 4 genes, if it spells them out, become the same surface's for more."""
+    genes = tree.get("genome", {})
+    given = [genes[name]["start"] for name in doe_names(4) if "start" in genes.get(name, {})]
+    if points == 4 or len(given) != 16 or "start" in genes.get("doe_44", {}):
+        return tree
+    finer = refined(np.array(given), points)
+    starts = {
+        name: {**genes.get(name, {}), "start": float(u)} for name, u in zip(doe_names(points), finer, strict=True)
+    }
+    return {**tree, "genome": {**genes, **starts}}

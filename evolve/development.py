@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evolve.anatomy import fitted
 from evolve.config import EyeConfig, RunConfig
-from evolve.genotype import DOE_SHAPE, Genotype
+from evolve.genes import APERTURE_SHAPES
+from evolve.genotype import Genotype
 
 if TYPE_CHECKING:
     import optics
     import sim
 
-__all__ = ["Phenotype", "develop"]
+__all__ = ["Phenotype", "develop", "repaired"]
+
+ANNULUS_INNER = 0.5  # radius of what an annulus leaves out, in pupil radii
+SLIT_ASPECT = 4.0  # height of an upright slit / its width
 
 
 @dataclass(frozen=True)
@@ -24,7 +30,9 @@ class Phenotype:
     """An animal: its eyes and its brain.
 
     `relative_aperture`, `relief` and `refractive_index` are None together: optics off, a perfect lens.
-    `relief` holds the 4 x 4 control points in [0, 1], row-major (y, x).
+    `relief` holds N x N heights in [0, 1], row-major (y, x): for N = 4 control points of a bicubic B-spline patch, for
+    more the heights at cell centres that a cubic spline goes through.
+    `aperture_shape` is a place in APERTURE_SHAPES, `dispersion` the inverse of the relief's Abbe number.
     """
 
     n_eyes: int
@@ -36,6 +44,8 @@ class Phenotype:
     refractive_index: float | None
     memory_frames: int
     neurons: int
+    aperture_shape: int = 0
+    dispersion: float = 0.0
 
     def pupil(self, eye: EyeConfig) -> optics.Pupil | None:
         """Pupil of each of the eyes; None for the perfect lens."""
@@ -43,11 +53,14 @@ class Phenotype:
 
         if self.relative_aperture is None or self.relief is None or self.refractive_index is None:
             return None
-        control_points = eye.relief_height * np.reshape(self.relief, DOE_SHAPE)
+        side = isqrt(len(self.relief))
+        heights = eye.relief_height * np.reshape(self.relief, (side, side))
+        abbe_number = np.inf if self.dispersion == 0 else 1 / self.dispersion
         return optics.Pupil(
             aperture_radius=0.5 * self.relative_aperture * eye.sensor_width,
-            height=optics.BSplineRelief(control_points),
-            n=self.refractive_index,
+            height=optics.BSplineRelief(heights) if side == 4 else heights,
+            n=optics.RefractiveIndex.from_abbe(self.refractive_index, abbe_number),
+            aperture=_aperture(APERTURE_SHAPES[self.aperture_shape]),
         )
 
     def eyes(self, eye: EyeConfig) -> sim.Eyes:
@@ -77,11 +90,10 @@ class Phenotype:
 
 
 def develop(genome: NDArray[np.float64], config: RunConfig) -> Phenotype:
-    """Phenotype of a genome under a run's config; every genome of the right length has one."""
-    values = Genotype(config.genome).decode(genome)
-    rows, columns = DOE_SHAPE
-    relief = tuple(values[f"doe_{i}{j}"] for i in range(rows) for j in range(columns))
-    seen_through = config.eye.optics
+    """Phenotype of a genome under a run's config; every genome of the right length has one, and its eyes fit."""
+    values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
+    side, seen_through = config.eye.relief_points, config.eye.optics
+    relief = tuple(values[f"doe_{i}{j}"] for i in range(side) for j in range(side))
     return Phenotype(
         n_eyes=int(values["n_eyes"]),
         placement_range_deg=values["placement_range_deg"],
@@ -92,4 +104,27 @@ def develop(genome: NDArray[np.float64], config: RunConfig) -> Phenotype:
         refractive_index=values["refractive_index"] if seen_through else None,
         memory_frames=int(values["memory_frames"]),
         neurons=int(values["neurons"]),
+        aperture_shape=int(values["aperture_shape"]) if seen_through else 0,
+        dispersion=values["dispersion"] if seen_through else 0.0,
     )
+
+
+def repaired(genome: NDArray[np.float64], config: RunConfig) -> tuple[str, ...]:
+    """Genes whose values had to change so that nothing overlaps; () for a genome that develops as it says."""
+    asked = Genotype(config.genome).decode(genome)
+    fits = fitted(asked, config.genome, config.eye)
+    return tuple(name for name, value in asked.items() if fits[name] != value)
+
+
+def _aperture(shape: str) -> Any:
+    """The pupil's shape, in units of its radius."""
+    import optics
+
+    if shape == "circle":
+        return optics.Circle()
+    if shape == "annulus":
+        return optics.Annulus(ANNULUS_INNER)
+    if shape == "slit":
+        width = 2 / np.hypot(1, SLIT_ASPECT)
+        return optics.Slit(width, SLIT_ASPECT * width)
+    return optics.Polygon.regular(3 + APERTURE_SHAPES.index(shape) - APERTURE_SHAPES.index("triangle"), 90.0)

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 import sim
-from evolve.candidate import Candidate
 from evolve.config import EyeConfig
 from evolve.development import Phenotype
 from evolve.files import write_whole
@@ -106,7 +105,7 @@ def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_ev
 
     Raises RunError where there is no such candidate, or its policy is missing or no policy.
     """
-    candidate = _candidate(run, candidate_id)
+    candidate = run.candidate(candidate_id)
     try:
         policy = load_policy(run.policy_path(candidate.id))
     except ValueError as error:
@@ -138,17 +137,6 @@ def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_ev
         **columns,
         **views,
     )
-
-
-def _candidate(run: Run, candidate_id: int | None) -> Candidate:
-    if candidate_id is None:
-        if run.best is None:
-            raise RunError(f"{run.path}: no candidate has been evaluated successfully yet")
-        return run.best
-    for candidate in run.candidates:
-        if candidate.id == candidate_id:
-            return candidate
-    raise RunError(f"{run.path}: there is no candidate {candidate_id}; {len(run.candidates)} have been evaluated")
 
 
 def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any]]:

@@ -10,42 +10,18 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
-from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from evolve.config import RunConfig
-from evolve.development import Phenotype
 from evolve.evaluation import Evaluation
+from evolve.jobs import ATTEMPTS, ExecutorError, Job, Progress
 from evolve.worker import Message, work
 
-__all__ = ["ExecutorError", "Job", "LocalExecutor", "Progress"]
+__all__ = ["ExecutorError", "Job", "LocalExecutor", "Progress", "cores"]
 
-ATTEMPTS = 3
 # Several processes share the cores, so each keeps to one thread; read when the numerical libraries are loaded.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 STOPPING_S = 5.0
-
-Progress = Callable[[int, int, int], None]  # (candidate id, steps trained, steps planned)
-
-
-class ExecutorError(RuntimeError):
-    """The workers cannot work at all on this machine; the message is one line that says why."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """One candidate to evaluate: arguments of `evolve.fitness.evaluate`, under the candidate's id."""
-
-    id: int
-    phenotype: Phenotype
-    config: RunConfig
-    seed: int
-    policy_path: Path
-
-    @property
-    def arguments(self) -> tuple[Any, ...]:
-        return self.phenotype, self.config, self.seed, self.policy_path
 
 
 @dataclass
@@ -74,7 +50,7 @@ class LocalExecutor:
     _workers: list[_Worker] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.count = self.count or _cores()
+        self.count = self.count or cores()
 
     def __enter__(self) -> LocalExecutor:
         return self
@@ -89,15 +65,14 @@ class LocalExecutor:
         self._workers.clear()
 
     def run(self, jobs: Iterable[Job], progress: Progress | None = None) -> Iterator[tuple[Job, Evaluation]]:
-        """Evaluate all jobs; each comes out as soon as it is done, in any order.
+        """Evaluate all jobs; each comes out as soon as it is done, in any order. A deque may be added to meanwhile.
 
         Raises:
             ExecutorError: a worker could not be made ready.
         """
-        waiting = deque(jobs)
+        waiting = jobs if isinstance(jobs, deque) else deque(jobs)
         deaths: dict[int, int] = {}
-        unfinished = len(waiting)
-        while unfinished:
+        while waiting or any(worker.job for worker in self._workers):
             self._hand_out(waiting)
             for worker, message in self._messages():
                 job = worker.job
@@ -107,7 +82,6 @@ class LocalExecutor:
                     raise ExecutorError(message.content)
                 elif message.kind == "done" and job:
                     worker.job = None
-                    unfinished -= 1
                     yield job, message.content
                 elif message.kind == "died":
                     how = self._bury(worker)
@@ -117,7 +91,6 @@ class LocalExecutor:
                     if deaths[job.id] < ATTEMPTS:
                         waiting.appendleft(job)
                         continue
-                    unfinished -= 1
                     yield job, Evaluation.failed(f"its worker process died {ATTEMPTS} times, at last {how}")
 
     def _hand_out(self, waiting: deque[Job]) -> None:
@@ -159,7 +132,7 @@ class LocalExecutor:
         return f"by {signal.Signals(-code).name}" if code is not None and code < 0 else f"with exit code {code}"
 
 
-def _cores() -> int:
+def cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

@@ -1,24 +1,34 @@
-"""The loop: ask for a generation, evaluate what the record lacks, write each candidate down, tell, repeat.
+"""The loop: propose candidates, evaluate what the record lacks, write each down, tell, repeat.
 
-A run that is continued goes through the same loop from its first generation: candidates on record are not evaluated
-again, only told again, which brings the search to where it was.
+A run that is continued goes through the same loop from its beginning: candidates on record are not evaluated again,
+only told again, which brings the search to where it was. Generation by generation, the history follows from the seed
+alone. In the steady state, fitness is told in the order in which candidates finish, so it follows from the record's
+order too.
 """
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Iterator
 from typing import Protocol
-
-import numpy as np
-from numpy.typing import NDArray
 
 from evolve.candidate import Candidate
 from evolve.development import develop
-from evolve.executors import Job, LocalExecutor
-from evolve.search import Search, training_seed
+from evolve.evaluation import Evaluation
+from evolve.jobs import Job, Progress
+from evolve.search import Proposal, Search, training_seed
 from evolve.store import Run, RunError
 from evolve.versions import present, recorded
 
-__all__ = ["Watcher", "evolve"]
+__all__ = ["Executor", "Watcher", "evolve"]
+
+
+class Executor(Protocol):
+    """Someone who evaluates candidates."""
+
+    def run(self, jobs: deque[Job], progress: Progress | None = None) -> Iterator[tuple[Job, Evaluation]]:
+        """Evaluate all jobs, handed out in their order; each comes out once, as soon as it is done. Whoever receives
+        one may add to `jobs` before asking for the next."""
 
 
 class Watcher(Protocol):
@@ -31,52 +41,80 @@ class Watcher(Protocol):
         """A candidate has been evaluated and is on record."""
 
 
-def evolve(run: Run, executor: LocalExecutor, watcher: Watcher) -> None:
+def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
     """Carry a run (whose lock is held) to its end.
 
     Raises:
         RunError: the record cannot be written, or this search does not propose what is on record.
-        ExecutorError: no candidate can be evaluated on this machine.
+        ConfigError: the search cannot be begun.
+        ExecutorError: no candidate can be evaluated.
     """
     search = Search(run.config)
+    if run.config.search.steady_state:
+        _steadily(run, search, executor, watcher)
+    else:
+        _by_generations(run, search, executor, watcher)
+
+
+def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
+    """Tell a generation, in the order of its candidates, once all of it is known."""
     for generation in range(run.config.search.generations):
-        genomes = search.ask()
-        _require_same(run, generation, genomes)
-        _evaluate_missing(run, generation, genomes, executor, watcher)
-        search.tell([candidate.fitness for candidate in run.generation(generation)])
+        proposals = {proposal.id: proposal for proposal in search.propose_generation()}
+        known = {candidate.id for candidate in run.generation(generation)}
+        for candidate in run.generation(generation):
+            _require_same(run, proposals[candidate.id], candidate)
+        missing = deque(_job(run, proposal) for proposal in proposals.values() if proposal.id not in known)
+        for job, outcome in executor.run(missing, watcher.training):
+            _write_down(run, proposals[job.id], job, outcome, watcher)
+        search.tell([(candidate.id, candidate.fitness) for candidate in run.generation(generation)])
 
 
-def _evaluate_missing(
-    run: Run, generation: int, genomes: NDArray[np.float64], executor: LocalExecutor, watcher: Watcher
-) -> None:
-    """Evaluate and write down those candidates of a generation that are not on record."""
-    first = generation * len(genomes)
-    known = {candidate.index for candidate in run.generation(generation)}
-    jobs = []
-    for index in sorted(set(range(len(genomes))) - known):
-        identity = first + index
-        seed = training_seed(run.config.seed, identity)
-        policy = run.policy_path(identity)
-        jobs.append(Job(identity, develop(genomes[index], run.config), run.config, seed, policy))
+def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
+    """Keep one population on its way: whenever a candidate is done, tell it and propose the next one."""
+    under_way: dict[int, Proposal] = {}
+
+    def refill() -> list[Proposal]:
+        room = min(run.config.search.population - len(under_way), run.config.candidates - search.proposed)
+        proposals = [search.propose() for _ in range(room)]
+        under_way.update((proposal.id, proposal) for proposal in proposals)
+        return proposals
+
+    refill()
+    for candidate in run.in_order_of_finish:
+        _require_same(run, under_way.pop(candidate.id, None), candidate)
+        search.tell([(candidate.id, candidate.fitness)])
+        refill()
+    jobs = deque(_job(run, proposal) for proposal in under_way.values())
     for job, outcome in executor.run(jobs, watcher.training):
-        index = job.id - first
-        genome = tuple(genomes[index].tolist())
-        candidate = Candidate.of((job.id, generation, index), genome, job.phenotype, job.seed, outcome)
-        run.append(candidate)
-        watcher.evaluated(candidate)
+        candidate = _write_down(run, under_way.pop(job.id), job, outcome, watcher)
+        search.tell([(candidate.id, candidate.fitness)])
+        jobs.extend(_job(run, proposal) for proposal in refill())
 
 
-def _require_same(run: Run, generation: int, genomes: NDArray[np.float64]) -> None:
+def _job(run: Run, proposal: Proposal) -> Job:
+    phenotype = develop(proposal.vector, run.config)
+    seed = training_seed(run.config.seed, proposal.id)
+    return Job(proposal.id, phenotype, run.config, seed, run.policy_path(proposal.id))
+
+
+def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, watcher: Watcher) -> Candidate:
+    place = (proposal.id, proposal.generation, proposal.index)
+    candidate = Candidate.of(place, proposal.genome, job.phenotype, job.seed, outcome, proposal.parents)
+    run.append(candidate)
+    watcher.evaluated(candidate)
+    return candidate
+
+
+def _require_same(run: Run, proposal: Proposal | None, candidate: Candidate) -> None:
     """The search must propose, bit for bit, what is on record; else it is another search than the one that began."""
-    for candidate in run.generation(generation):
-        if candidate.genome == tuple(genomes[candidate.index].tolist()):
-            continue
-        then, now = recorded(run.path), present()
-        names = ("nevergrad", "cma", "numpy")
-        before = ", ".join(f"{name} {then.get(name, '?')}" for name in names)
-        after = ", ".join(f"{name} {now[name]}" for name in names)
-        raise RunError(
-            f"{run.path} cannot be continued: candidate {candidate.id} is not what the search proposes here "
-            f"(started with {before}; here {after}). Continue it with the versions that began it, and an unchanged "
-            f"config.toml"
-        )
+    if proposal is not None and candidate.genome == proposal.genome:
+        return
+    then, now = recorded(run.path), present()
+    names = ("nevergrad", "cma", "numpy")
+    before = ", ".join(f"{name} {then.get(name, '?')}" for name in names)
+    after = ", ".join(f"{name} {now[name]}" for name in names)
+    raise RunError(
+        f"{run.path} cannot be continued: candidate {candidate.id} is not what the search proposes here "
+        f"(started with {before}; here {after}). Continue it with the versions that began it, and an unchanged "
+        f"config.toml"
+    )

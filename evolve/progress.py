@@ -1,7 +1,8 @@
-"""How a run is going: a bar on a terminal, a line per candidate elsewhere."""
+"""How a run is going: a bar on a terminal, a line per candidate elsewhere, JSON for machines."""
 
 from __future__ import annotations
 
+import json
 import statistics
 import sys
 import time
@@ -11,17 +12,20 @@ from typing import Any, TextIO
 from evolve.candidate import Candidate
 from evolve.store import Run
 
-__all__ = ["Bar", "Lines", "Tally", "watcher"]
+__all__ = ["Bar", "Events", "Lines", "Tally", "clock", "watcher"]
+
+EVENT_S = 1.0  # least time between two events of one candidate's training
 
 
 class Tally:
     """Counts what happened since the run was begun or continued; candidates in training count by their steps."""
 
-    def __init__(self, run: Run) -> None:
-        self._run = run
+    def __init__(self, run: Run, workers: int = 1) -> None:
+        self._run, self._workers = run, workers
         self._began = time.monotonic()
         self._known_before = len(run.candidates)
         self._steps_done = 0
+        self._busy = 0.0
         self._in_training: dict[int, tuple[int, int]] = {}
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
@@ -30,6 +34,7 @@ class Tally:
     def evaluated(self, candidate: Candidate) -> None:
         self._in_training.pop(candidate.id, None)
         self._steps_done += candidate.steps
+        self._busy += candidate.seconds
 
     @property
     def done(self) -> float:
@@ -38,9 +43,18 @@ class Tally:
         return len(self._run.candidates) + sum(parts)
 
     @property
+    def seconds(self) -> float:
+        """Since the run was begun or continued."""
+        return max(time.monotonic() - self._began, 1e-9)
+
+    @property
     def steps_per_second(self) -> float:
-        steps = self._steps_done + sum(steps for steps, _ in self._in_training.values())
-        return steps / max(time.monotonic() - self._began, 1e-9)
+        return (self._steps_done + sum(steps for steps, _ in self._in_training.values())) / self.seconds
+
+    @property
+    def utilisation(self) -> float:
+        """Part of the workers' time that was spent on candidates which are done."""
+        return self._busy / (self._workers * self.seconds)
 
     @property
     def seconds_left(self) -> float | None:
@@ -48,7 +62,16 @@ class Tally:
         since = self.done - self._known_before
         if since <= 0:
             return None
-        return (time.monotonic() - self._began) / since * (self._run.config.candidates - self.done)
+        return self.seconds / since * (self._run.config.candidates - self.done)
+
+    @property
+    def median(self) -> float | None:
+        """Median fitness of the latest generation."""
+        if not self._run.candidates:
+            return None
+        latest = self._run.generation(max(candidate.generation for candidate in self._run.candidates))
+        fitness = [candidate.fitness for candidate in latest if candidate.failure is None]
+        return statistics.median(fitness) if fitness else None
 
     def summary(self) -> str:
         """Generation, best and median fitness, pace and time left."""
@@ -56,23 +79,29 @@ class Tally:
         reached = min(len(run.candidates) // run.config.search.population + 1, run.config.search.generations)
         parts = [f"generation {reached}/{run.config.search.generations}"]
         if run.best is not None:
-            latest = run.generation(max(candidate.generation for candidate in run.candidates))
-            fitness = [candidate.fitness for candidate in latest if candidate.failure is None]
             parts.append(f"best {run.best.fitness:.3g}")
-            parts += [f"median {statistics.median(fitness):.3g}"] if fitness else []
+        if run.best is not None and self.median is not None:
+            parts.append(f"median {self.median:.3g}")
         parts.append(f"{self.steps_per_second:,.0f} steps/s")
         if self.seconds_left is not None:
-            parts.append(f"{_clock(self.seconds_left)} left")
+            parts.append(f"{clock(self.seconds_left)} left")
         return ", ".join(parts)
 
+    def closing(self) -> str:
+        """Pace, and how busy the workers were."""
+        return (
+            f"{clock(self.seconds)} at {self.steps_per_second:,.0f} steps/s; "
+            f"{self._workers} workers were busy {self.utilisation:.0%} of the time"
+        )
 
-class Lines:
-    """Watcher that writes one plain line per candidate."""
 
-    def __init__(self, run: Run, out: TextIO) -> None:
-        self._run, self._out, self._tally = run, out, Tally(run)
+class _Watcher:
+    """What all watchers have in common; a context manager."""
 
-    def __enter__(self) -> Lines:
+    def __init__(self, run: Run, out: TextIO, workers: int) -> None:
+        self.run, self.out, self.tally = run, out, Tally(run, workers)
+
+    def __enter__(self) -> Any:
         return self
 
     def __exit__(
@@ -81,26 +110,68 @@ class Lines:
         return None
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
-        self._tally.training(candidate_id, steps, planned)
+        self.tally.training(candidate_id, steps, planned)
 
     def evaluated(self, candidate: Candidate) -> None:
-        self._tally.evaluated(candidate)
+        self.tally.evaluated(candidate)
+
+
+class Lines(_Watcher):
+    """Watcher that writes one plain line per candidate."""
+
+    def evaluated(self, candidate: Candidate) -> None:
+        super().evaluated(candidate)
         outcome = f"failed ({candidate.failure})" if candidate.failure else f"fitness {candidate.fitness:.3g}"
-        count = f"{len(self._run.candidates)}/{self._run.config.candidates}"
-        print(f"candidate {candidate.id} ({count}): {outcome}; {self._tally.summary()}", file=self._out, flush=True)
+        count = f"{len(self.run.candidates)}/{self.run.config.candidates}"
+        print(f"candidate {candidate.id} ({count}): {outcome}; {self.tally.summary()}", file=self.out, flush=True)
 
 
-class Bar:
+class Events(_Watcher):
+    """Watcher that writes one line of JSON per event."""
+
+    def __init__(self, run: Run, out: TextIO, workers: int) -> None:
+        super().__init__(run, out, workers)
+        self._told: dict[int, float] = {}
+
+    def training(self, candidate_id: int, steps: int, planned: int) -> None:
+        super().training(candidate_id, steps, planned)
+        now = time.monotonic()
+        if now - self._told.get(candidate_id, -EVENT_S) >= EVENT_S:
+            self._told[candidate_id] = now
+            self._write({"event": "training", "candidate": candidate_id, "steps": steps, "planned": planned})
+
+    def evaluated(self, candidate: Candidate) -> None:
+        super().evaluated(candidate)
+        event = {
+            "event": "evaluated",
+            "candidate": candidate.id,
+            "generation": candidate.generation,
+            "fitness": None if candidate.failure else candidate.fitness,
+            "failure": candidate.failure,
+            "evaluated": len(self.run.candidates),
+            "planned": self.run.config.candidates,
+            "best": None if self.run.best is None else self.run.best.fitness,
+            "median": self.tally.median,
+            "steps_per_second": self.tally.steps_per_second,
+            "seconds_left": self.tally.seconds_left,
+        }
+        self._write(event)
+
+    def _write(self, event: dict[str, Any]) -> None:
+        print(json.dumps(event, allow_nan=False), file=self.out, flush=True)
+
+
+class Bar(_Watcher):
     """Watcher that draws a progress bar on a terminal; failures stay above it."""
 
-    def __init__(self, run: Run, out: TextIO) -> None:
+    def __init__(self, run: Run, out: TextIO, workers: int) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+        super().__init__(run, out, workers)
         columns: list[Any] = [BarColumn(), TextColumn("{task.percentage:>3.0f}%"), TimeElapsedColumn()]
         self._progress = Progress(*columns, TextColumn("{task.description}"), console=Console(file=out))
-        self._tally = Tally(run)
-        self._bar = self._progress.add_task(self._tally.summary(), total=run.config.candidates)
+        self._bar = self._progress.add_task(self.tally.summary(), total=run.config.candidates)
 
     def __enter__(self) -> Bar:
         self._progress.start()
@@ -112,11 +183,11 @@ class Bar:
         self._progress.stop()
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
-        self._tally.training(candidate_id, steps, planned)
+        super().training(candidate_id, steps, planned)
         self._update()
 
     def evaluated(self, candidate: Candidate) -> None:
-        self._tally.evaluated(candidate)
+        super().evaluated(candidate)
         if candidate.failure:
             self._progress.console.print(
                 f"candidate {candidate.id} failed: {candidate.failure}", markup=False, highlight=False
@@ -124,15 +195,17 @@ class Bar:
         self._update()
 
     def _update(self) -> None:
-        self._progress.update(self._bar, completed=self._tally.done, description=self._tally.summary())
+        self._progress.update(self._bar, completed=self.tally.done, description=self.tally.summary())
 
 
-def watcher(run: Run, out: TextIO = sys.stderr) -> Bar | Lines:
-    """The watcher that suits `out`."""
-    return Bar(run, out) if out.isatty() else Lines(run, out)
+def watcher(run: Run, out: TextIO = sys.stderr, workers: int = 1, as_json: bool = False) -> Bar | Events | Lines:
+    """The watcher that suits `out`; `as_json` for machines."""
+    if as_json:
+        return Events(run, out, workers)
+    return Bar(run, out, workers) if out.isatty() else Lines(run, out, workers)
 
 
-def _clock(seconds: float) -> str:
+def clock(seconds: float) -> str:
     """1:02:03, or 2:03 below an hour."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)

@@ -1,88 +1,120 @@
-"""The search: CMA-ES that proposes a generation of genomes and is told their fitness.
+"""The search: proposes candidates and is told their fitness, through the phases in which genes open.
 
-Its whole state follows from the seed and the fitness told so far, so a run is continued by asking and telling again
-what was asked and told before; no state is stored. nevergrad is imported here and nowhere else.
+Its whole state follows from the seed and the fitness told so far, so a run is continued by proposing and telling again
+what was proposed and told before; no state is stored.
 """
 
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evolve.config import RunConfig
 from evolve.genotype import Genotype
+from evolve.optimizers import Optimizer, Space, build
 
-__all__ = ["Search", "training_seed"]
+__all__ = ["Proposal", "Search", "training_seed"]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A genome to try, (dimension,) in [0, 1]: candidate `id`, number `index` of `generation`, made from `parents`."""
+
+    id: int
+    generation: int
+    index: int
+    genome: tuple[float, ...]
+    parents: tuple[int, ...]
+
+    @property
+    def vector(self) -> NDArray[np.float64]:
+        return np.array(self.genome)
 
 
 class Search:
-    """CMA-ES (Hansen and Ostermeier 2001, as in pycma, by nevergrad) over the open genes.
+    """Proposes one candidate after the other.
 
-    nevergrad has a flag for noisy functions, but CMA-ES there heeds it only when recommending a single best genome.
-    We take the best candidate from the record and ask for no recommendation.
+    Where genes open in a later generation, a new optimizer begins there: from the best genome so far, over the genes
+    that are open then. Fitness that comes in late is told to the optimizer that had asked for it.
+
+    Raises:
+        ConfigError: there is no such optimizer.
     """
 
     def __init__(self, config: RunConfig) -> None:
-        genotype = Genotype(config.genome)
-        self._dimension = genotype.dimension
-        self._population = config.search.population
-        self._optimizer = _cma(genotype.start, config.search.sigma, self._population, config.seed)
-        self._asked: list[Any] = []
-        self._told: list[float] = []
+        self._config = config
+        self._genotype = Genotype(config.genome)
+        self._next = 0
+        self._fittest, self._best = self._genotype.start, -math.inf
+        self._worst = math.inf
+        self._asked: dict[int, tuple[Optimizer, Proposal]] = {}
+        self._begin_phase(0)
 
-    def ask(self) -> NDArray[np.float64]:
-        """Genomes of the next generation, (population, dimension) in [0, 1]."""
+    @property
+    def proposed(self) -> int:
+        """Candidates proposed so far."""
+        return self._next
+
+    def propose(self) -> Proposal:
+        """The next candidate."""
+        population = self._config.search.population
+        generation, index = divmod(self._next, population)
+        if index == 0 and generation > 0 and generation in self._genotype.phases:
+            self._begin_phase(generation)
+        part, parents = self._optimizer.ask(self._next)
+        genome = self._base.copy()
+        genome[self._varied] = part
+        proposal = Proposal(self._next, generation, index, tuple(genome.tolist()), parents)
+        self._asked[self._next] = self._optimizer, proposal
+        self._next += 1
+        return proposal
+
+    def propose_generation(self) -> list[Proposal]:
+        """All candidates of the next generation.
+
+        Raises:
+            RuntimeError: the fitness of the last one has not been told yet.
+        """
         if self._asked:
-            raise RuntimeError("ask: the fitness of the last generation has not been told yet")
-        with _reflected_mirrors():
-            self._asked = [self._optimizer.ask() for _ in range(self._population)]
-        return np.array([candidate.value[: self._dimension] for candidate in self._asked])
+            raise RuntimeError("propose_generation: the fitness of the last generation has not been told yet")
+        return [self.propose() for _ in range(self._config.search.population)]
 
-    def tell(self, fitness: Sequence[float]) -> None:
-        """Fitness of the generation asked last, in its order; -inf (failed) counts as the worst fitness so far."""
-        if len(fitness) != len(self._asked):
-            raise ValueError(f"tell: {len(self._asked)} genomes were asked for, {len(fitness)} fitness values told")
-        self._told += [value for value in fitness if math.isfinite(value)]
-        worst = min(self._told, default=0.0)
-        with _reflected_mirrors():
-            for candidate, value in zip(self._asked, fitness, strict=True):
-                self._optimizer.tell(candidate, -value if math.isfinite(value) else -worst)
-        self._asked = []
+    def tell(self, fitness: Sequence[tuple[int, float]]) -> None:
+        """(candidate id, fitness) of candidates proposed; -inf (failed) counts as the worst fitness so far.
+
+        Raises:
+            ValueError: a candidate was not proposed, or has been told already.
+        """
+        for identity, value in fitness:
+            if identity not in self._asked:
+                raise ValueError(f"tell: candidate {identity} has not been proposed, or has been told already")
+            if math.isfinite(value):
+                self._worst = min(self._worst, value)
+        for identity, value in fitness:
+            optimizer, proposal = self._asked.pop(identity)
+            worst = self._worst if math.isfinite(self._worst) else 0.0
+            optimizer.tell(identity, value if math.isfinite(value) else worst)
+            if value > self._best:
+                self._best, self._fittest = value, proposal.vector
+
+    def _begin_phase(self, generation: int) -> None:
+        """A new optimizer over the genes open in this generation, around the best genome so far."""
+        self._base = self._fittest
+        self._varied = self._genotype.varied(generation)
+        genes = [(gene, self._config.genome[gene.name]) for gene in self._genotype.open_genes]
+        phase = [generation] if generation else []
+        space = Space(
+            genes=[genes[place] for place in self._varied],
+            start=self._base[self._varied],
+            seed=(self._config.seed, *phase),
+        )
+        self._optimizer = build(space, self._config.search)
 
 
 def training_seed(run_seed: int, candidate_id: int) -> int:
     """Seed of one candidate's training and evaluation: fresh for each, whoever evaluates it."""
     return int(np.random.SeedSequence([run_seed, candidate_id]).generate_state(1)[0])
-
-
-def _cma(start: NDArray[np.float64], sigma: float, population: int, seed: int) -> Any:
-    """nevergrad's CMA-ES whose first generation spreads by `sigma` around `start`."""
-    # CMA-ES has no covariance to adapt in one dimension (nevergrad would switch to a package we don't depend on):
-    # a single open gene gets a coordinate beside it that no one reads.
-    padded = np.append(start, 0.5) if start.size == 1 else start
-
-    def build(scale: float) -> Any:
-        from nevergrad import p
-        from nevergrad.optimization.optimizerlib import ParametrizedCMA
-
-        space = p.Array(init=padded, lower=0.0, upper=1.0).set_mutation(sigma=1.0)
-        space.random_state.seed(np.random.SeedSequence(seed).generate_state(4))
-        return ParametrizedCMA(scale=scale, popsize=population)(space, num_workers=population)
-
-    # nevergrad shrinks the step in bounded spaces by a factor of its own choosing; it is divided out.
-    return build(sigma / build(1.0).es.sigma)
-
-
-@contextmanager
-def _reflected_mirrors() -> Iterator[None]:
-    """pycma misses the mirrored samples it planted in a small population when nevergrad tells them as reflected at the
-    bounds, and warns; the samples told are those that were evaluated, which is what counts."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="orphanated injected solution")
-        yield

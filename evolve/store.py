@@ -42,11 +42,12 @@ class Run:
     config: RunConfig
     candidates: tuple[Candidate, ...] = ()
     notice: str | None = None
+    _finished: tuple[int, ...] = field(default=(), repr=False)
     _whole_bytes: int = field(default=0, repr=False)
 
     @classmethod
-    def create(cls, path: Path | str, config: RunConfig) -> Run:
-        """New run in a directory that does not exist or is empty.
+    def create(cls, path: Path | str, config: RunConfig, origin: str | None = None) -> Run:
+        """New run in a directory that does not exist or is empty; `origin` names the animal that it starts from.
 
         Raises:
             RunError: the directory holds something already, or cannot be written.
@@ -58,7 +59,7 @@ class Run:
                 raise RunError(f"{path} is not empty: choose another name, or continue it with: evolve resume {path}")
             (path / "policies").mkdir()
             (path / CANDIDATES).touch()
-            record_start(path, 0)
+            record_start(path, 0, origin)
             write_whole(path / CONFIG, to_toml(config).encode())
         except OSError as error:
             raise RunError(f"{path} cannot be written: {error.strerror}") from error
@@ -109,6 +110,7 @@ class Run:
         except OSError as error:
             raise RunError(f"{self.path / CANDIDATES}: cannot be written: {error.strerror}") from error
         self._whole_bytes += len(line)
+        self._finished += (candidate.id,)
         self.candidates = tuple(sorted((*self.candidates, candidate), key=lambda known: known.id))
 
     def policy_path(self, candidate_id: int) -> Path:
@@ -121,9 +123,30 @@ class Run:
         done = [candidate for candidate in self.candidates if candidate.failure is None]
         return max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
 
+    def candidate(self, identity: int | None = None) -> Candidate:
+        """The candidate with this id; None: the best.
+
+        Raises:
+            RunError: it has not been evaluated, or none has succeeded.
+        """
+        if identity is None:
+            if self.best is None:
+                raise RunError(f"{self.path}: no candidate has been evaluated successfully yet")
+            return self.best
+        for candidate in self.candidates:
+            if candidate.id == identity:
+                return candidate
+        raise RunError(f"{self.path}: there is no candidate {identity}; {len(self.candidates)} have been evaluated")
+
     def generation(self, number: int) -> list[Candidate]:
         """Candidates of one generation that have been evaluated."""
         return [candidate for candidate in self.candidates if candidate.generation == number]
+
+    @property
+    def in_order_of_finish(self) -> list[Candidate]:
+        """Candidates in the order in which they were evaluated and written down."""
+        by_id = {candidate.id: candidate for candidate in self.candidates}
+        return [by_id[identity] for identity in self._finished]
 
     @property
     def finished(self) -> bool:
@@ -150,6 +173,7 @@ class Run:
                 raise RunError(f"{file}, line {number}: is damaged: {error}") from error
             found[candidate.id] = candidate
         self.candidates = tuple(found[key] for key in sorted(found))
+        self._finished = tuple(found)
 
     def _check(self, candidate: Candidate, found: dict[int, Candidate]) -> None:
         population, dimension = self.config.search.population, Genotype(self.config.genome).dimension

@@ -12,7 +12,7 @@ from typing import Any
 
 from evolve.files import write_whole
 
-__all__ = ["present", "record_start", "recorded"]
+__all__ = ["origin", "present", "record_start", "recorded"]
 
 FILE = "versions.json"
 PACKAGES = (
@@ -46,10 +46,23 @@ def recorded(run: Path) -> dict[str, str]:
     return starts[0]["versions"] if starts else {}
 
 
-def record_start(run: Path, candidates: int) -> None:
-    """Write down that a run goes on from `candidates` evaluated ones with the present versions."""
-    start = {"time": datetime.now(UTC).isoformat(timespec="seconds"), "candidates": candidates, "versions": present()}
+def record_start(run: Path, candidates: int, origin: str | None = None) -> None:
+    """Write down that a run goes on from `candidates` evaluated ones with the present versions, and `origin`, from
+    whose animal it started."""
+    start: dict[str, Any] = {
+        "time": datetime.now(UTC).isoformat(timespec="seconds"),
+        "candidates": candidates,
+        "versions": present(),
+    }
+    if origin is not None:
+        start["from"] = origin
     write_whole(run / FILE, json.dumps([*_starts(run), start], indent=1).encode())
+
+
+def origin(run: Path) -> str | None:
+    """From whose animal a run started ("runs/first:12"); None if from its own config, or if it is not readable."""
+    starts = _starts(run)
+    return str(starts[0]["from"]) if starts and "from" in starts[0] else None
 
 
 def _starts(run: Path) -> list[dict[str, Any]]:

@@ -4,6 +4,7 @@ The tables name each field of each config dataclass, and each gene, with a chang
 A field or gene that is missing here fails the test, so whoever adds one says what it does.
 """
 
+from argparse import Namespace
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
@@ -90,7 +91,7 @@ def hired(config, animal):
     """Workers that a run starts."""
     with TemporaryDirectory() as folder, mock.patch.object(evolve.commands.run, "LocalExecutor") as executor:
         executor.side_effect = KeyboardInterrupt
-        evolve.commands.run._carry(Run.create(Path(folder) / "run", config))
+        evolve.commands.run._carry(Run.create(Path(folder) / "run", config), Namespace(json=False))
         return executor.call_args.args[1]
 
 
@@ -98,7 +99,8 @@ class _ClosedForm:
     """An executor that knows every candidate's fitness."""
 
     def run(self, jobs, progress) -> Iterator:
-        for job in jobs:
+        while jobs:
+            job = jobs.popleft()
             yield job, Evaluation(fitness=-abs(job.phenotype.fov_deg - 70))
 
 
@@ -126,6 +128,11 @@ FIELDS = {
     "eye.bands": Case("eye.bands=3", sight),
     "eye.relief_height": Case("eye.relief_height=80e-6", point_image, ()),
     "eye.rays_per_receptor": Case("eye.rays_per_receptor=2", life),
+    "eye.relief_points": Case("eye.relief_points=5", history, ()),
+    "eye.head_radius": Case("eye.head_radius=100e-6", sight),
+    "eye.receptor_width": Case("eye.receptor_width=100e-6", sight),
+    "search.optimizer": Case("search.optimizer=mutation", history),
+    "search.steady_state": Case("search.steady_state=true", history),
     "search.population": Case("search.population=4", history),
     "search.generations": Case("search.generations=3", history),
     "search.sigma": Case("search.sigma=0.1", history),
@@ -143,6 +150,7 @@ FIELDS = {
     "genome.GENE.low": Case("genome.fov_deg.low=20", history),
     "genome.GENE.high": Case("genome.fov_deg.high=90", history),
     "genome.GENE.start": Case("genome.fov_deg.start=50", history),
+    "genome.GENE.opens_at": Case("genome.fov_deg.opens_at=1", history),
 }
 DOE = {name: point_image for name in GENES if name.startswith("doe_")}
 GENE_OUTPUTS = {
@@ -154,6 +162,8 @@ GENE_OUTPUTS = {
     "relative_aperture": point_image,
     **DOE,
     "refractive_index": point_image,
+    "dispersion": point_image,
+    "aperture_shape": point_image,
     "memory_frames": life,
     "neurons": life,
 }
@@ -201,7 +211,8 @@ def test_every_gene_moves_its_output(name):
     output = GENE_OUTPUTS[name]
     given = () if output is point_image else PERFECT
     before = _settled(output, "detection", given)
-    config = assemble("detection", "quick", assignments=(*SMALL, *given))
+    opened = () if GENES[name].default.open else (f"genome.{name}.open=true",)
+    config = assemble("detection", "quick", assignments=(*SMALL, *given, *opened))
     genotype = Genotype(config.genome)
     genome = genotype.start
     place = [gene.name for gene in genotype.open_genes].index(name)

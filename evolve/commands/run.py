@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from argparse import Namespace
 from pathlib import Path
 
+from evolve.ancestor import starts_from
+from evolve.candidate import Candidate
 from evolve.commands import INTERRUPTED
 from evolve.config import RunConfig
 from evolve.config_source import assemble
+from evolve.development import repaired
 from evolve.executors import LocalExecutor
 from evolve.loop import evolve
-from evolve.progress import watcher
+from evolve.plan import Plan, idle_genes
+from evolve.progress import Bar, Events, Lines, watcher
+from evolve.search import Search
 from evolve.store import Run, next_directory
 from evolve.versions import present, record_start, recorded
 from evolve.worker import evaluate_candidate, prepare_device
@@ -23,12 +29,20 @@ __all__ = ["resume", "start"]
 def start(arguments: Namespace) -> int:
     """Begin a run and carry it to its end."""
     flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
-    config = assemble(arguments.task, arguments.preset, arguments.config, [*arguments.set, *flags])
+    starts = starts_from(arguments.ancestor) if arguments.ancestor else None
+    config = assemble(arguments.task, arguments.preset, arguments.config, [*arguments.set, *flags], starts)
+    Search(config)  # an unknown optimizer, say, is refused before anything is written
     backend.require()
-    run = Run.create(arguments.out or next_directory(config.task, arguments.preset), config)
-    print(f"{run.path}: {_plan(config)}", flush=True)
+    directory = arguments.out or next_directory(config.task, arguments.preset)
+    if arguments.dry_run:
+        return _show(Plan.of(config, directory), arguments.json)
+    run = Run.create(directory, config, starts.name.removeprefix("--from ") if starts else None)
+    if not arguments.json:
+        print(f"{run.path}: {_plan(config)}", flush=True)
+        for note in idle_genes(config):
+            print(f"note: {note}", file=sys.stderr)
     with run.lock():
-        return _carry(run)
+        return _carry(run, arguments)
 
 
 def resume(arguments: Namespace) -> int:
@@ -40,18 +54,29 @@ def resume(arguments: Namespace) -> int:
         if run.notice:
             print(f"note: {run.notice}", file=sys.stderr)
         if run.finished:
-            print(f"{run.path}: all {run.config.candidates} candidates have been evaluated")
-            return _finish(run)
+            if not arguments.json:
+                print(f"{run.path}: all {run.config.candidates} candidates have been evaluated")
+            return _finish(run, arguments.json)
         _note_changes(run.path)
         record_start(run.path, len(run.candidates))
-        print(f"{run.path}: {len(run.candidates)} of {run.config.candidates} candidates are on record", flush=True)
-        return _carry(run)
+        if not arguments.json:
+            print(f"{run.path}: {len(run.candidates)} of {run.config.candidates} candidates are on record", flush=True)
+        return _carry(run, arguments)
 
 
-def _carry(run: Run) -> int:
+def _show(plan: Plan, as_json: bool) -> int:
+    """The plan, with what this machine makes of it; nothing is begun."""
+    if not as_json:
+        print("measuring this machine's pace ...", file=sys.stderr, flush=True)
+    plan = plan.measured()
+    print(json.dumps(plan.record(), indent=1) if as_json else "\n".join(plan.lines()))
+    return 0
+
+
+def _carry(run: Run, arguments: Namespace) -> int:
     """Carry a run whose lock is held to its end; on Ctrl-C say how to go on. Nothing needs saving: it is on record."""
     try:
-        with LocalExecutor(evaluate_candidate, run.config.workers, prepare_device) as executor, watcher(run) as watch:
+        with _executor(run) as executor, _watcher(run, executor.count, arguments) as watch:
             evolve(run, executor, watch)
     except KeyboardInterrupt:
         print(
@@ -60,27 +85,52 @@ def _carry(run: Run) -> int:
             file=sys.stderr,
         )
         return INTERRUPTED
-    return _finish(run)
+    if not arguments.json:
+        print(watch.tally.closing())
+    return _finish(run, arguments.json)
 
 
-def _finish(run: Run) -> int:
+def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lines:
+    return watcher(run, sys.stdout if arguments.json else sys.stderr, workers, arguments.json)
+
+
+def _executor(run: Run) -> LocalExecutor:
+    return LocalExecutor(evaluate_candidate, run.config.workers, prepare_device)
+
+
+def _finish(run: Run, as_json: bool) -> int:
     """Write report and EXR files, and name them; 1 if no candidate could be evaluated."""
     failures = [candidate for candidate in run.candidates if candidate.failure]
     if run.best is None:
         print(f"evolve: every candidate failed; the last: {failures[-1].failure}", file=sys.stderr)
         return 1
-    print(f"best: candidate {run.best.id}, fitness {run.best.fitness:.4g}, success rate {run.best.success_rate:.0%}")
-    if failures:
-        print(f"failed: {len(failures)} of {len(run.candidates)} candidates; the last: {failures[-1].failure}")
-    print("writing report and EXR files ...", flush=True)
+    if not as_json:
+        print("\n".join(_outcome(run, run.best, failures)))
+        print("writing report and EXR files ...", flush=True)
     from evolve import episode, export, report
 
     best = episode.record(run)
     page, frames = report.write(run, best), export.export_episode(best, run.path / "exr")
+    if as_json:
+        products = {"directory": str(run.path), "report": str(page), "exr": [str(frame) for frame in frames]}
+        print(json.dumps({"event": "finished", "best": run.best.id, "fitness": run.best.fitness, **products}))
+        return 0
     print(f"run directory: {run.path}")
     print(f"report: {page}")
     print(f"EXR files: {len(frames)} in {frames[0].parent}, the first: {frames[0].name}")
     return 0
+
+
+def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
+    """The best candidate, how many failed, and how many genomes did not fit together as they were."""
+    lines = [f"best: candidate {best.id}, fitness {best.fitness:.4g}, success rate {best.success_rate:.0%}"]
+    if failures:
+        lines.append(f"failed: {len(failures)} of {len(run.candidates)} candidates; the last: {failures[-1].failure}")
+    changed = [names for candidate in run.candidates if (names := repaired(candidate.vector, run.config))]
+    if changed:
+        genes = ", ".join(sorted({name for names in changed for name in names}))
+        lines.append(f"repaired so that nothing overlaps: {len(changed)} of {len(run.candidates)} candidates ({genes})")
+    return lines
 
 
 def _plan(config: RunConfig) -> str:

@@ -13,6 +13,7 @@ from closed_form import bowl, tiny
 
 import evolve.commands.run
 from evolve.cli import main
+from evolve.config import TASKS
 from evolve.executors import LocalExecutor
 from evolve.genotype import GENES
 from evolve.loop import evolve as carry_on
@@ -139,10 +140,14 @@ def test_status_tells_what_the_record_holds(call, finished):
 
 
 def test_tables_name_every_task_and_gene(call):
-    assert [line.split()[0] for line in call("tasks")[1].splitlines()] == ["navigation", "detection", "tracking"]
+    assert [line.split()[0] for line in call("tasks")[1].splitlines()] == list(TASKS)
     lines = call("genes")[1].splitlines()
-    assert [line.split()[0] for line in lines[1:-2]] == list(GENES)
-    assert "[1, 512]" in lines[-3]
+    table = lines[1 : lines.index("")]
+    assert [line.split()[0] for line in table] == list(GENES)
+    assert "[1, 512]" in table[list(GENES).index("neurons")]
+    records = json.loads(call("genes", "--json")[1])
+    assert [record["name"] for record in records] == list(GENES)
+    assert all(record["meaning"] and record["mutation"] in ("Gaussian", "±1") for record in records)
 
 
 def test_help_comes_at_once_and_names_the_commands():

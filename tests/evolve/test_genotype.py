@@ -11,6 +11,7 @@ import sim
 from evolve.config import TASKS
 from evolve.config_source import assemble
 from evolve.development import Phenotype, develop
+from evolve.genes import ALL_GENES, APERTURE_SHAPES
 from evolve.genotype import CLUSTERS, GENES, Genotype, group_members
 from optics import BSplineRelief
 
@@ -89,8 +90,9 @@ def test_tasks_are_those_of_the_simulation():
 
 def test_groups_cover_all_genes_once():
     members = [name for cluster in CLUSTERS for name in group_members(cluster)]
-    assert sorted(members) == sorted(GENES)
-    assert len(group_members("doe")) == 16
+    assert sorted(members) == sorted(ALL_GENES)
+    assert set(GENES) < set(ALL_GENES)
+    assert len(group_members("doe")) == 81  # of 9 x 9, the largest relief
     assert group_members("nonsense") == ()
 
 
@@ -112,3 +114,32 @@ def test_quick_preset_starts_behind_a_lens_in_focus():
     # A B-spline lies within the hull of its control points.
     path_error = (animal.refractive_index - 1) * np.ptp(difference) / 2
     assert path_error < 550e-9 / 4
+
+
+def test_there_are_more_than_1e20_genotypes_and_a_tenth_of_a_range_makes_another_animal():
+    """Counted with ten values of each real gene, which all differ."""
+    assert GENOTYPE.count(10) == 16**3 * 10 * 512 * 10.0 ** (2 + 18)
+    assert GENOTYPE.count(10) > 1e20
+    for place, gene in enumerate(GENOTYPE.open_genes):
+        animals = set()
+        for u in (np.arange(10) + 0.5) / 10:
+            genome = GENOTYPE.start
+            genome[place] = u
+            animals.add(develop(genome, CONFIG))
+        assert len(animals) == 10, gene.name
+
+
+def test_pupils_have_every_shape_and_glass():
+    config = assemble("detection", "quick", assignments=["genome.optical.open=true"])
+    start = develop(Genotype(config.genome).start, config)
+    areas = {}
+    for number, name in enumerate(APERTURE_SHAPES):
+        pupil = replace(start, aperture_shape=number).pupil(config.eye)
+        areas[name] = pupil.aperture.area
+    # In units of the pupil's radius squared: π, π (1 - 1/4), 4·4/17 and n/2 sin(2π/n).
+    polygons = {name: n / 2 * np.sin(2 * np.pi / n) for n, name in enumerate(APERTURE_SHAPES[3:], start=3)}
+    assert areas == pytest.approx({"circle": np.pi, "annulus": 0.75 * np.pi, "slit": 16 / 17, **polygons})
+    flint = replace(start, dispersion=1 / 30).pupil(config.eye)
+    n_f, n_d, n_c = (flint.n.at(line) for line in (486.134e-9, 587.562e-9, 656.281e-9))
+    assert (n_d - 1) / (n_f - n_c) == pytest.approx(30)
+    assert n_d == pytest.approx(start.refractive_index)

@@ -143,7 +143,7 @@ def test_what_is_no_run_is_named(tmp_path):
 
 def test_damaged_config_is_named(run):
     (run.path / "config.toml").write_text("task = 'detection'\n[serch]\n")
-    with pytest.raises(ConfigError, match=r"config\.toml: unknown key 'serch'"):
+    with pytest.raises(ConfigError, match=r"config\.toml, line 2: unknown key 'serch'"):
         Run.open(run.path)
     (run.path / "candidates.jsonl").unlink()
     (run.path / "config.toml").write_text("task = 'detection'\n")

@@ -1,0 +1,42 @@
+"""Starting from an animal of another run: `--from RUN:ID`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+from evolve.analysis import gene_values
+from evolve.config_lines import Source
+from evolve.genes import ALL_GENES
+from evolve.store import Run
+
+__all__ = ["starts_from"]
+
+
+def starts_from(text: str) -> Source:
+    """Every gene's start as the animal RUN:ID has it (RUN alone: the run's best); RUN is a run directory.
+
+    Raises:
+        RunError: no such run, no such candidate, or none that succeeded.
+    """
+    path, identity = _parsed(text)
+    candidate = Run.open(path).candidate(identity)
+    values = gene_values(candidate.phenotype)
+    genome = {name: {"start": _exact(name, value)} for name, value in values.items()}
+    tree: dict[str, Any] = {"genome": genome}
+    if candidate.phenotype.relief is not None and len(candidate.phenotype.relief) != 16:
+        tree["eye"] = {"relief_points": math.isqrt(len(candidate.phenotype.relief))}
+    return Source(f"--from {path}:{candidate.id}", tree)
+
+
+def _parsed(text: str) -> tuple[Path, int | None]:
+    """Run directory and candidate; a path may hold colons of its own."""
+    head, colon, tail = text.rpartition(":")
+    if colon and tail.isdecimal():
+        return Path(head), int(tail)
+    return Path(text), None
+
+
+def _exact(name: str, value: float) -> float | int:
+    return int(value) if ALL_GENES[name].kind == "integer" else value

@@ -1,0 +1,90 @@
+"""How fast this machine evaluates: some ten seconds of the real thing, in as many processes as the run will have."""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from itertools import cycle, islice
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from evolve.config import RunConfig
+from evolve.development import Phenotype
+from evolve.worker import evaluate_candidate, prepare_device
+
+__all__ = ["Pace", "calibrate"]
+
+ROLLOUTS = 4  # that a short life learns from; an evaluation after the second and the fourth
+
+
+@dataclass(frozen=True)
+class Pace:
+    """What one worker achieves with one animal while all others work too.
+
+    start_s      until its first world is ready
+    steps_per_s  agent steps trained per second, learning included
+    play_s       one evaluation: all its episodes, side by side
+    policy_bytes of its trained policy
+    """
+
+    start_s: float
+    steps_per_s: float
+    play_s: float
+    policy_bytes: int
+
+    def candidate_s(self, config: RunConfig) -> float:
+        """Seconds for one candidate that trains to the end."""
+        learning = config.learning
+        plays = -(-learning.total_steps // learning.eval_interval) + 1
+        return self.start_s + learning.total_steps / self.steps_per_s + plays * self.play_s
+
+
+def calibrate(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
+    """Pace with each animal, of the slowest worker that tried it; all workers try at the same time.
+
+    Raises:
+        BackendError: Dr.Jit cannot work here.
+        AccuracyError: an animal's eyes cannot be computed.
+    """
+    context = multiprocessing.get_context("spawn")
+    tried = list(islice(cycle(animals), max(workers, len(animals))))
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=prepare_device) as pool:
+        paces = list(pool.map(_short_life, [config] * len(tried), [animals[name] for name in tried], range(len(tried))))
+    return {
+        name: _slowest([pace for other, pace in zip(tried, paces, strict=True) if other == name]) for name in animals
+    }
+
+
+def _slowest(paces: list[Pace]) -> Pace:
+    return Pace(
+        start_s=max(pace.start_s for pace in paces),
+        steps_per_s=min(pace.steps_per_s for pace in paces),
+        play_s=max(pace.play_s for pace in paces),
+        policy_bytes=paces[0].policy_bytes,
+    )
+
+
+def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
+    """A life of four rollouts: from one to the next, with an evaluation between the second and the third."""
+    rollout = config.learning.n_envs * config.learning.n_steps
+    short = replace(config.learning, total_steps=ROLLOUTS * rollout, eval_interval=ROLLOUTS // 2 * rollout)
+    marks: list[float] = []
+    with TemporaryDirectory() as folder:
+        policy = Path(folder) / "policy"
+        began = time.perf_counter()
+        evaluate_candidate(
+            *(animal, replace(config, learning=short), seed, policy),
+            progress=lambda steps, planned: marks.append(time.perf_counter()),
+        )
+        size = policy.stat().st_size
+    first, second, third, fourth = marks
+    step_s = (second - first + fourth - third) / 2 / rollout
+    return Pace(
+        start_s=max(first - began - rollout * step_s, 0.0),
+        steps_per_s=1 / step_s,
+        play_s=max(third - second - rollout * step_s, 0.0),
+        policy_bytes=size,
+    )

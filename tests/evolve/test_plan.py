@@ -1,0 +1,89 @@
+"""The plan: what it counts, what it predicts from a pace, and that a pace is measured on the real thing."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from small_run import small_config
+
+import evolve.plan
+from evolve.calibration import Pace, calibrate
+from evolve.cli import main
+from evolve.config_source import assemble
+from evolve.development import develop
+from evolve.fitness import evaluate
+from evolve.genotype import Genotype
+from evolve.plan import Plan, idle_genes
+from optics import backend
+
+PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
+
+
+@pytest.fixture
+def paced(monkeypatch):
+    """A machine of known pace."""
+    monkeypatch.setattr(evolve.plan, "calibrate", lambda config, animals, workers: dict.fromkeys(animals, PACE))
+
+
+def test_hours_count_rounds_of_workers_and_all_that_a_candidate_does(tmp_path, paced):
+    settings = ("search.population=6", "search.generations=10", "learning.total_steps=100000", "workers=4")
+    config = assemble("detection", assignments=[*settings, "learning.eval_interval=30000"])
+    candidate_s = 10 + 100 + (4 + 1) * 5
+    assert PACE.candidate_s(config) == candidate_s
+    plan = Plan.of(config, tmp_path).measured()
+    assert plan.hours["start"] == pytest.approx(10 * 2 * candidate_s / 3600), "6 on 4 workers take two rounds"
+    steady = Plan.of(replace(config, search=replace(config.search, steady_state=True)), tmp_path).measured()
+    assert steady.hours["start"] == pytest.approx(15 * candidate_s / 3600), "60 on 4 workers, nobody waits"
+
+
+def test_disk_holds_policies_and_record_and_a_small_disk_is_noticed(tmp_path, paced, monkeypatch):
+    def plan(generations):
+        settings = (f"search.generations={generations}", "search.population=2")
+        return Plan.of(assemble("detection", assignments=settings), tmp_path).measured()
+
+    per_candidate = (plan(20).disk_bytes - plan(10).disk_bytes) / 20
+    assert 50_000 + 500 < per_candidate < 50_000 + 5_000
+    assert plan(10).notes() == []
+    monkeypatch.setattr(Plan, "free_bytes", 1000)
+    assert plan(10).notes() == ["the disk is too small for this run"]
+
+
+def test_genes_that_cannot_change_anything_are_named():
+    def notes(*settings):
+        return idle_genes(assemble("detection", assignments=settings))
+
+    assert notes() == []
+    assert "placement_range_deg is open but changes nothing" in notes("genome.n_eyes.open=false")[0]
+    assert notes("genome.n_eyes.open=false", "genome.n_eyes.start=3") == []
+    glass = ("genome.refractive_index.open=false", "genome.refractive_index.start=1")
+    assert "refractive_index is held at 1" in notes(*glass)[0]
+    assert "the relief is held flat" in notes("genome.doe.open=false")[0]
+    assert notes("genome.doe.open=false", "genome.doe_11.start=0.9") == []
+
+
+def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    late = ["--set", "genome.optical.opens_at=1", "--set", "genome.n_eyes.open=false"]
+    assert main(["run", "detection", "--preset", "quick", "--dry-run", *late]) == 0
+    out = capsys.readouterr().out
+    assert "3 generations x 4 candidates = 12" in out
+    assert "optical from generation 1: relative_aperture, refractive_index, doe_00 … doe_33 (16)" in out
+    assert "24 of 27" in out
+    assert main(["run", "detection", "--preset", "quick", "--dry-run", "--json", *late]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert plan["evaluations"] == 12
+    assert plan["steps"] == 1_200_000
+    assert plan["genes"]["doe_00"] == 1
+    assert plan["hours"].keys() == {"start", "middle"}
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_pace_is_measured_with_the_real_thing(tmp_path):
+    backend.require()
+    config = small_config()
+    animal = develop(Genotype(config.genome).start, config)
+    pace = calibrate(config, {"start": animal}, 1)["start"]
+    assert evaluate(animal, config, 0, tmp_path / "policy").failure is None
+    assert pace.policy_bytes == (tmp_path / "policy").stat().st_size
+    assert pace.steps_per_s > 0
+    assert pace.start_s > 0
