@@ -98,8 +98,10 @@ class ClosedForm:
         tables |= {"faces": self._faces.astype(np.float32).ravel(), **self._footprints.tables}
         return {name: mi.Float(table) for name, table in tables.items()}
 
-    def radiance(self, scene: None, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any]) -> list[Any]:
-        """What comes along each ray, one array per component."""
+    def radiance(
+        self, scene: None, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any]
+    ) -> tuple[list[Any], Any]:
+        """What comes along each ray, one array per component, and from how far [m]."""
         t, face, normal = self._footprints.hit(ray, inputs)
         on_floor, t_floor = self._floor_hit(ray)
         floor_first = on_floor & (t_floor < t)
@@ -121,7 +123,7 @@ class ClosedForm:
             )
         irradiance = self._irradiance(point, normal, (seen | on_sphere) & (t > 0), ray, [agent, *centres], inputs)
         reflectance = self._interpolate(offset, columns, rows, x, y, inputs)
-        return [r * e for r, e in zip(reflectance, irradiance, strict=True)]
+        return [r * e for r, e in zip(reflectance, irradiance, strict=True)], t
 
     def _floor_hit(self, ray: Any) -> tuple[Any, Any]:
         """Whether and where a ray from above meets the floor."""

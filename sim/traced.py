@@ -34,8 +34,10 @@ class Traced:
         # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.
         self.inputs = {"bsdfs": mi.BSDFPtr([*stage.spheres.bsdfs, stage.scene.shapes()[0].bsdf()])}
 
-    def radiance(self, scene: Any, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any]) -> list[Any]:
-        """What comes along each ray, one array per component."""
+    def radiance(
+        self, scene: Any, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any]
+    ) -> tuple[list[Any], Any]:
+        """What comes along each ray, one array per component, and from how far [m]."""
         ray.wavelengths = self._bands[0]
         si, bsdf = self._first_hit(scene, ray, centres, inputs)
         radii = [BODY_RADIUS, *map(float, self._spheres.radii)]
@@ -45,7 +47,7 @@ class Traced:
             return blocked | scene.ray_test(shadow, active & ~blocked)
 
         spectra = lighting.direct_light(si, bsdf, self._lights, self._bands, occluded)
-        return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))]
+        return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], si.t
 
     def _first_hit(self, scene: Any, ray: Any, centres: list[Any], inputs: dict[str, Any]) -> tuple[Any, Any]:
         """Where the ray meets the static scene or a sphere first, and the BSDF there."""

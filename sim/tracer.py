@@ -34,8 +34,11 @@ class Tracer(Protocol):
     def inputs(self) -> dict[str, Any]:
         """Arrays, by name."""
 
-    def radiance(self, scene: Any, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any]) -> list[Any]:
-        """What comes along each ray, one array per component; agent and centres: of the spheres that move."""
+    def radiance(
+        self, scene: Any, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any]
+    ) -> tuple[list[Any], Any]:
+        """What comes along each ray, one array per component, and from how far [m]; agent and centres: of the
+        spheres that move."""
 
 
 def tracer_of(world: World, stage: Stage, wavelengths: np.ndarray, name: str) -> Tracer:

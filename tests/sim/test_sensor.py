@@ -6,21 +6,22 @@ import numpy as np
 import pytest
 
 import optics
-from sim.sensor import (
-    BoxSensor,
-    ReceptiveFieldSensor,
-    box_sensor,
-    build_sensor,
-    cells_per_receptor,
-    low_discrepancy,
-    receptive_field_sensor,
-)
+from sim.fields import Fields, Unseen, cells_per_receptor, low_discrepancy
+from sim.sensor import BoxSampling, BoxSensor, FieldSampling, ReceptiveFieldSensor, build_sensor, sampling_of
 
 L = 200e-6
 
 
 def eye(resolution=(9, 9), pupil=None, bands=3):
     return optics.Eye(pupil=pupil, resolution=resolution, fov_deg=45.0, sensor_width=L, bands=bands, tolerance=0.03)
+
+
+def box_sensor(eye, rays):
+    return BoxSampling(eye).sensor(rays)
+
+
+def receptive_field_sensor(eye, rays, cells):
+    return FieldSampling(eye, Fields.of(eye, cells)).sensor(rays / math.prod(eye.resolution))
 
 
 def focused(a=0.3):
@@ -95,7 +96,7 @@ def test_a_flipped_kernel_is_noticed(monkeypatch):
     cells = cells_per_receptor(e.resolution)
     expected = convolved(e, cells)
     kernel = optics.Eye.kernel
-    monkeypatch.setattr(type(e), "kernel", lambda self, s: kernel(self, s)[:, ::-1, ::-1])
+    monkeypatch.setattr(type(e), "kernel", lambda self, s, z: kernel(self, s, z)[:, ::-1, ::-1])
     found = sampled(e, receptive_field_sensor(e, 16 * 81, cells))
     assert np.sqrt(np.mean((found - expected) ** 2)) / expected.mean() > 0.05
 
@@ -197,6 +198,27 @@ def test_light_that_spreads_far_is_tabulated_on_coarser_cells():
     assert np.asarray(sensor.weights[0].sum()) == pytest.approx(1.0, abs=0.02)
 
 
-def test_no_rays_is_refused():
-    with pytest.raises(ValueError, match="rays_per_receptor"):
-        build_sensor(eye(), 0)
+def test_a_trial_is_part_of_the_sensor():
+    """Directions and weights of some receptors, without the rest."""
+    for e in (eye((4, 5)), eye((4, 5), focused())):
+        some = np.array([0, 7, 19])
+        sampling = sampling_of(e)
+        trial, sensor = sampling.trial(12, some), sampling.sensor(12)
+        light = np.random.default_rng(0).random(len(sensor.directions))
+        if isinstance(sensor, BoxSensor):
+            mine = light.reshape(20, -1)[some].ravel()
+            np.testing.assert_array_equal(trial.directions, sensor.directions.reshape(20, -1, 3)[some].reshape(-1, 3))
+            whole = light.reshape(20, -1).mean(axis=1)[None].repeat(3, axis=0)
+        else:
+            mine = light
+            np.testing.assert_array_equal(trial.directions, sensor.directions)
+            whole = dense(sensor) @ light
+        # The sensor leaves out weights that change signals by less than a tenth of the noise.
+        np.testing.assert_allclose(trial.weights @ mine, whole[:, some], atol=0.1 * e.noise_sigma / e.throughput)
+
+
+def test_so_few_rays_that_a_receptor_has_none_become_more():
+    sampling = sampling_of(eye((6, 6), focused()))
+    with pytest.raises(Unseen, match="rays_per_receptor"):
+        sampling.trial(1 / 36, np.arange(36))
+    assert 1 < len(sampling.sensor(1 / 36).directions) < 36

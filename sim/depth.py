@@ -1,0 +1,55 @@
+"""Depth layers: light from objects at different distances is blurred differently by one eye."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+
+
+@dataclass(frozen=True)
+class DepthLayers:
+    """Distances for which an eye has a kernel, evenly spaced in vergence 1/z, in which defocus is linear. Light from
+    between two of them is shared linearly, light from beyond the ends goes to the ends.
+
+    farthest, nearest  [m], farthest may be infinite · count: with a single layer it is at the mean vergence
+    """
+
+    farthest: float = math.inf
+    nearest: float = math.inf
+    count: int = 1
+
+    def __post_init__(self) -> None:
+        if not 0 < self.nearest <= self.farthest:
+            raise ValueError(
+                f"depth: nearest = {self.nearest!r}, must be positive and at most farthest {self.farthest!r}"
+            )
+        if self.count < 1 or (self.count > 1 and self.nearest == self.farthest):
+            raise ValueError(
+                f"depth: {self.count} layers from {self.nearest!r} to {self.farthest!r} m, must be 1 or more"
+            )
+
+    @property
+    def distances(self) -> tuple[float, ...]:
+        """[m], farthest first, (layer,)."""
+        far, near = 1 / self.farthest, 1 / self.nearest
+        places = [i / (self.count - 1) for i in range(self.count)] if self.count > 1 else [0.5]
+        return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in places)
+
+    def shares(self, vergence: Any) -> list[Any]:
+        """Share of each layer in light from 1/z [1/m], Dr.Jit arrays; they sum to 1."""
+        if self.count == 1:
+            return [1.0]
+        far, near = 1 / self.farthest, 1 / self.nearest
+        place = dr.clip((vergence - far) * ((self.count - 1) / (near - far)), 0, self.count - 1)
+        return [dr.maximum(1 - dr.abs(place - float(layer)), 0) for layer in range(self.count)]
+
+    def __str__(self) -> str:
+        if self.count == 1:
+            return f"one PSF at {self.distances[0]:.3g} m"
+        return f"{self.count} layers, {self.farthest:.3g} to {self.nearest:.3g} m"
+
+
+ONE_PSF = DepthLayers()

@@ -1,0 +1,113 @@
+"""What "auto" picks is enough, is not much more than enough, and says why."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import optics
+import sim
+from sim.fidelity import PERFECT_LENS_RUNGS, PUPIL_RUNGS
+from sim.simulation import Simulation
+
+DETECTION = sim.Eyes(n_eyes=2, resolution=(9, 11))
+NAVIGATION = sim.Eyes(n_eyes=5, resolution=(1, 4), fov_deg=30, placement_range_deg=150)
+
+
+def behind_lens(eyes, a):
+    focal_length = eyes.eye().sensor_distance
+    return replace(eyes, optics=optics.Pupil(a * eyes.sensor_width / 2, thin_lens_focal_length=focal_length))
+
+
+CASES = {
+    "detection, a = 1/4": ("detection", behind_lens(DETECTION, 0.25)),
+    "detection, a = 0.6": ("detection", behind_lens(DETECTION, 0.6)),
+    "navigation, a = 0.6": ("navigation", behind_lens(NAVIGATION, 0.6)),
+    "navigation, perfect": ("navigation", replace(NAVIGATION, noise_sigma=0.03)),
+}
+
+
+def lived_through(world, n=48):
+    """States that agents get into, which the pilot knows nothing of."""
+    simulation = Simulation(world, n, 3, "training", 1)
+    simulation.reset()
+    rng = np.random.default_rng(5)
+    for _ in range(12):
+        simulation.step(rng.uniform(-1, 1, (n, 2)))
+    simulation.close()
+    return simulation.state
+
+
+def actual_error(world, eyes, state, rays):
+    truth, found = (sim.BatchedRenderer(world, eyes, state.n, n).signals(state) for n in (rays * 40, rays))
+    return np.sqrt(np.mean((found - truth) ** 2))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_pick_is_enough_and_not_far_more_than_enough(name):
+    task, eyes = CASES[name]
+    world = sim.build_world(task, seed=11)
+    fidelity = sim.choose_fidelity(world, eyes)
+    state = lived_through(world)
+    error = actual_error(world, replace(eyes, bands=fidelity.bands), state, fidelity.rays_per_receptor)
+    assert error < eyes.noise_sigma / 2
+    # A third as many rays would not do, or there is no lower rung: errors fall like n^-0.6 ... n^-1.
+    rungs = PERFECT_LENS_RUNGS if eyes.optics is None else PUPIL_RUNGS
+    fewer = max((n for n in rungs if n <= fidelity.rays_per_receptor / 3), default=None)
+    if fewer is not None:
+        assert actual_error(world, eyes, state, fewer) > 0.35 * eyes.noise_sigma
+
+
+def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
+    world = sim.build_world("detection")
+    rays = [sim.choose_fidelity(world, behind_lens(DETECTION, a)).rays_per_receptor for a in (0.1, 0.25, 0.6)]
+    assert rays == sorted(rays)
+    assert rays[0] < 1 < rays[-1]
+    calm = sim.choose_fidelity(world, behind_lens(replace(DETECTION, noise_sigma=0.0), 0.1))
+    assert rays[0] < calm.rays_per_receptor < PUPIL_RUNGS[-1]
+
+
+def test_the_same_pick_every_time_whatever_the_number_of_worlds():
+    eyes = behind_lens(DETECTION, 0.25)
+    world = sim.build_world("detection")
+    one, many = (sim.BatchedRenderer(world, eyes, n) for n in (1, 16))
+    assert one.fidelity == many.fidelity
+    assert len(one.sensor.directions) == round(one.fidelity.rays_per_receptor * 99)
+
+
+def test_it_can_be_overruled():
+    world = sim.build_world("detection")
+    eyes = behind_lens(DETECTION, 0.25)
+    strict = sim.choose_fidelity(world, eyes, tolerance=5e-4)
+    assert strict.tolerance == 5e-4
+    assert strict.rays_per_receptor > sim.choose_fidelity(world, eyes).rays_per_receptor
+    renderer = sim.BatchedRenderer(world, eyes, 1, strict)
+    assert renderer.fidelity is strict
+    assert len(renderer.bands.wavelengths) == strict.bands
+    asked = sim.BatchedRenderer(world, eyes, 1, 2)
+    assert len(asked.sensor.directions) == 2 * 99
+    assert "as asked" in str(asked.fidelity)
+
+
+def test_it_says_why():
+    fidelity = sim.choose_fidelity(sim.build_world("detection"), behind_lens(DETECTION, 0.25))
+    lines = str(fidelity).splitlines()
+    assert [line.split()[0] for line in lines] == ["stage", "bands", "depth", "light", "rays"]
+    assert fidelity.predicted_error <= fidelity.tolerance == 0.005
+    assert "nearest that is seen" in fidelity.why
+
+
+@pytest.mark.parametrize(
+    ("call", "named"),
+    [
+        (lambda world: sim.BatchedRenderer(world, DETECTION, 1, 0), "rays_per_receptor = 0"),
+        (lambda world: sim.BatchedRenderer(world, DETECTION, 1, math.nan), "rays_per_receptor = nan"),
+        (lambda world: sim.BatchedRenderer(world, DETECTION, 1, "many"), "rays_per_receptor = 'many'"),
+        (lambda world: sim.choose_fidelity(world, DETECTION, tolerance=0), "tolerance = 0"),
+        (lambda world: sim.Fidelity(1.0, 0), "bands = 0"),
+    ],
+)
+def test_bad_arguments_are_named(call, named):
+    with pytest.raises(ValueError, match=named):
+        call(sim.build_world("detection"))
