@@ -146,8 +146,10 @@ class Plan:
         return "\n".join([*head, "weighed", *others])
 
 
+@lru_cache(maxsize=256)
 def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -> tuple[Plan, Sampling]:
-    """The cheapest sampling that meets the problem's tolerance.
+    """The cheapest sampling that meets the problem's tolerance. Planning takes as long as a small PSF: the same
+    problem is planned once.
 
     method: "auto" weighs all, "exact" all that approximate nothing; a method's name asks for it alone, and then
         only its sampling has to meet the tolerance, not its model.
@@ -176,7 +178,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
 
 @lru_cache(maxsize=256)
 def _weigh(problem: Problem, methods: tuple[str, ...]) -> dict[str, Sampling | None]:
-    """The cheapest sampling of each method. Planning takes as long as a small PSF: the same problem is planned once."""
+    """The cheapest sampling of each method."""
     found = {name: METHODS[name](problem) for name in methods}
     return {name: min(samplings, key=_cost) if samplings else None for name, samplings in found.items()}
 
