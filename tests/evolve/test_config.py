@@ -68,7 +68,15 @@ def _from_text(text):
         return assemble("detection", file=file)
 
 
+def test_rays_are_a_number_or_chosen():
+    assert assemble("detection").eye.rays_per_receptor == "auto"
+    assert assemble("detection", assignments=["eye.rays_per_receptor=auto"]).eye.rays_per_receptor == "auto"
+    assert assemble("detection", assignments=["eye.rays_per_receptor=0.5"]).eye.rays_per_receptor == 0.5
+
+
 WRONG = [
+    ("eye.rays_per_receptor=many", "eye.rays_per_receptor = 'many'", "a number or 'auto'"),
+    ("eye.rays_per_receptor=0", "eye.rays_per_receptor = 0", "(0, 4096]"),
     ("serch.population=3", "unknown key 'serch'", "'search'"),
     ("search.poplation=3", "'search.poplation'", "'population'"),
     ("search=3", "search", "section"),
