@@ -10,7 +10,7 @@ from sim.color import encode_srgb
 
 SIZE = (240, 960)  # pixels that the pictures of all eyes fill at most, if a receptor needs no more than one
 GAP = 4  # pixels between eyes
-BETWEEN = 40  # grey level of the gaps
+BETWEEN = 200  # grey level of the gaps
 
 
 def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:

@@ -18,7 +18,7 @@ from sim.world import World
 BEHIND, ABOVE, AHEAD = 4.0, 5.0, 3.0
 FOVY_DEG = 50.0
 WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m]
-SPP = 16
+SPP = 12
 SIZE = (360, 480)  # pixels (height, width)
 
 
@@ -39,7 +39,7 @@ class Onlooker:
         self._mirror.sync(self._data)
         height, width = size
         view = _follow(state, index)
-        radiance = self._mirror.render(view, width, height, spp=SPP, wavelengths=WAVELENGTHS)
+        radiance = self._mirror.render(view, width, height, spp=SPP, wavelengths=WAVELENGTHS, sampler="multijitter")
         linear = np.clip(preview(radiance, WAVELENGTHS * 1e9), 0.0, 1.0)
         picture = np.rint(255 * encode_srgb(linear)).astype(np.uint8)
         if self.eyes is None:

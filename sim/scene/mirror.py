@@ -122,12 +122,14 @@ class Mirror:
         spp: int = 16,
         wavelengths: np.ndarray | Sequence[float] = (450e-9, 550e-9, 650e-9),
         seed: int = 0,
+        sampler: str = "independent",
     ) -> np.ndarray:
         """Spectral radiance at `wavelengths` [m], (band, y, x) float32, averaged over each pixel's square.
 
         camera      name or id of a camera of the model, or a Viewpoint
         integrator  a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}
         spp         samples per pixel
+        sampler     "independent", or "multijitter" for pictures: less noise
         Units: a white Lambertian that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
         """
         view = cameras.viewpoint(self.model, self._data, camera)
@@ -137,7 +139,7 @@ class Mirror:
                 self._move_light(lights.HEADLIGHT, lights.aimed(view.position, -view.rotation[:, 2]))
                 self._params.update()
             sensor = cameras.sensor(view, width, height, self._near())
-            return rays.radiance(self.scene, sensor, integrator, spp, np.asarray(wavelengths, float), seed)
+            return rays.radiance(self.scene, sensor, integrator, spp, np.asarray(wavelengths, float), seed, sampler)
 
     def render_ids(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
         """Geom id seen through the centre of each pixel, (y, x) int32, -1 for none."""

@@ -23,9 +23,19 @@ def check_size(width: int, height: int, spp: int) -> None:
 
 
 def radiance(
-    scene: Any, sensor: Any, integrator: str | Mapping[str, Any], spp: int, wavelengths: np.ndarray, seed: int
+    scene: Any,
+    sensor: Any,
+    integrator: str | Mapping[str, Any],
+    spp: int,
+    wavelengths: np.ndarray,
+    seed: int,
+    sampler: str = "independent",
 ) -> np.ndarray:
-    """Radiance (band, y, x) float32 at `wavelengths` [m]: the mean over `spp` random positions in each pixel."""
+    """Radiance (band, y, x) float32 at `wavelengths` [m]: the mean over `spp` random positions in each pixel.
+
+    sampler  of Mitsuba's: "independent", or "multijitter", whose samples of a pixel keep apart: less noise, of another
+             kind than a standard error tells; not in scalar variants, nor for spp that it would round
+    """
     width, height = (int(n) for n in sensor.film().size())
     method = mi.load_dict(_description(integrator))
     samples_at_once = max(1, WAVEFRONT // (width * height))
@@ -38,7 +48,7 @@ def radiance(
             n = min(samples_at_once, spp - done)
             # The same seed for every group of wavelengths: their rays are the same.
             sampler_seed = (seed * 0x9E3779B1 + done) & 0xFFFFFFFF
-            total += _sum_of_samples(scene, sensor, method, spectrum, n, sampler_seed)
+            total += _sum_of_samples(scene, sensor, method, spectrum, _sampler(sampler, n), sampler_seed)
         bands.append(total[: len(nm)] / spp)
     return np.concatenate(bands).reshape(-1, height, width).astype(np.float32)
 
@@ -83,10 +93,17 @@ def _scalar_hit(scene: Any, sensor: Any, position: np.ndarray) -> tuple[str, np.
     return si.shape.id(), np.array(ray(si.t), dtype=float)
 
 
-def _sum_of_samples(scene: Any, sensor: Any, method: Any, spectrum: list[float], n: int, seed: int) -> np.ndarray:
-    """Sum of n samples per pixel, (LANES, pixels)."""
+def _sampler(kind: str, n: int) -> Any:
+    sampler: Any = mi.load_dict({"type": kind, "sample_count": n})
+    if kind != "independent" and (_is_scalar() or sampler.sample_count() != n):
+        raise ValueError(f"sampler = {kind!r}: cannot take {n} samples here; take 'independent'")
+    return sampler
+
+
+def _sum_of_samples(scene: Any, sensor: Any, method: Any, spectrum: list[float], sampler: Any, seed: int) -> np.ndarray:
+    """Sum of the sampler's samples per pixel, (LANES, pixels)."""
     width, height = (int(k) for k in sensor.film().size())
-    sampler = mi.load_dict({"type": "independent", "sample_count": n})
+    n = sampler.sample_count()
     if _is_scalar():
         sampler.seed(seed)
         sums = [
@@ -99,6 +116,7 @@ def _sum_of_samples(scene: Any, sensor: Any, method: Any, spectrum: list[float],
         ]
         return np.array(sums).T
     pixels = width * height
+    sampler.set_samples_per_wavefront(n)
     sampler.seed(seed, pixels * n)
     pixel = dr.arange(mi.UInt32, pixels * n) // n
     x, y = mi.Float(pixel % width) / width, mi.Float(pixel // width) / height

@@ -1,5 +1,6 @@
 """Where eyes sit and look."""
 
+import dataclasses
 import math
 
 import mujoco
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 import sim
+from optics import Pupil, Receptors
 from sim.agent import BODY_RADIUS, camera_rotations, eye_positions, eye_rotations
 
 
@@ -56,8 +58,65 @@ def test_cameras_of_a_world_are_the_eyes():
         ("sensor_width", 0.0),
         ("noise_sigma", -1.0),
         ("bands", 0),
+        ("n_eyes", 2.5),
+        ("n_eyes", "two"),
+        ("n_eyes", math.inf),
+        ("resolution", 15),
+        ("resolution", (15,)),
+        ("fov_deg", 0),
+        ("fov_deg", "wide"),
+        ("noise_sigma", None),
     ],
 )
 def test_values_out_of_range_are_named(name, value):
     with pytest.raises(ValueError, match=f"Eyes: {name} = "):
         sim.Eyes(**{name: value})
+
+
+# Every field, a change to it, and the shape of what is seen afterwards.
+CHANGES = {
+    "n_eyes": (3, (3, 3, 4, 5)),
+    "resolution": ((5, 4), (2, 3, 5, 4)),
+    "fov_deg": (70.0, (2, 3, 4, 5)),
+    "placement_range_deg": (90.0, (2, 3, 4, 5)),
+    "optics": (Pupil(60e-6, thin_lens_focal_length=240e-6), (2, 3, 4, 5)),
+    "sensor_width": (150e-6, (2, 3, 4, 5)),
+    "noise_sigma": (0.02, (2, 3, 4, 5)),
+    "bands": (5, (2, 3, 4, 5)),
+    "receptors": ("lms", (2, 3, 4, 5)),
+}
+
+
+@pytest.mark.parametrize("field", [f.name for f in dataclasses.fields(sim.Eyes)])
+def test_every_field_moves_what_is_seen(field):
+    """A field that is not in the table fails: whoever adds one says what it does. (The sensor's width changes what a
+    lens of given focal length makes of the scene.)"""
+    value, shape = CHANGES[field]
+    given = {"optics": Pupil(50e-6, thin_lens_focal_length=240e-6)} if field == "sensor_width" else {}
+    before = _seen(sim.Eyes(resolution=(4, 5), **given))
+    assert np.array_equal(_seen(sim.Eyes(resolution=(4, 5), **given)), before)
+    after = _seen(sim.Eyes(**{"resolution": (4, 5), **given, field: value}))
+    assert after.shape == shape
+    assert not np.array_equal(before, after)
+
+
+def _seen(eyes):
+    worlds = sim.make_vec_env("foraging", eyes, 1, 7)
+    try:
+        return worlds.reset()["eyes"][0, 0]
+    finally:
+        worlds.close()
+
+
+def test_mosaics_and_pigments_change_the_number_of_channels():
+    kinds = Receptors((350, 440, 530, 600))
+    assert _seen(sim.Eyes(resolution=(4, 5), receptors=kinds)).shape == (2, 4, 4, 5)
+    assert _seen(sim.Eyes(resolution=(4, 5), receptors=kinds.arranged(((0, 1), (2, 3))))).shape == (2, 1, 4, 5)
+    assert _seen(sim.Eyes(resolution=(4, 5), receptors=(350,))).shape == (2, 1, 4, 5)
+
+
+def test_unknown_receptors_come_with_the_nearest_name():
+    with pytest.raises(ValueError, match=r"receptors = 'hunnybee': must be one of .*; did you mean 'honeybee'\?"):
+        sim.Eyes(receptors="hunnybee")
+    with pytest.raises(ValueError, match="there is no type; an eye needs at least one"):
+        sim.Eyes(receptors=())

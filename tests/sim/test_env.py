@@ -1,5 +1,6 @@
 """The single environment: Gymnasium's and stable-baselines3's own checkers, and agreement with the batch."""
 
+import dataclasses
 import subprocess
 import sys
 import warnings
@@ -8,10 +9,15 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env as gymnasium_check
+from gymnasium.wrappers import FlattenObservation
 from stable_baselines3.common.env_checker import check_env as sb3_check
 
+import optics
 import sim
-from sim.picture import _follow
+from sim.agent import EYE_HEIGHT
+from sim.color import encode_srgb
+from sim.eye_images import GAP
+from sim.picture import Onlooker, _follow
 from sim.registration import IDS
 
 EYES = sim.Eyes(n_eyes=2, resolution=(3, 4), fov_deg=60)
@@ -19,16 +25,42 @@ EYES = sim.Eyes(n_eyes=2, resolution=(3, 4), fov_deg=60)
 
 @pytest.mark.parametrize("id_", IDS)
 def test_checkers_are_content(id_):
-    """Two warnings are known: a receptor's Gaussian noise has no bound, and an observation of many eyes and frames
-    is neither an image nor a vector."""
-    env = gymnasium.make(id_, eyes=EYES, rays_per_receptor=1, render_mode="rgb_array")
+    """Gymnasium's has nothing to say. stable-baselines3's recommends a policy of one's own for observations that are
+    neither an image nor a vector; as a vector, it has nothing to say either."""
+    env = gymnasium.make(id_, eyes=EYES, rays_per_receptor=1)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warnings.filterwarnings("ignore", message=".*(infinity|-inf).*")
-        warnings.filterwarnings("ignore", message=".*unconventional shape.*")
         gymnasium_check(env.unwrapped, skip_render_check=True)
-        sb3_check(env.unwrapped, skip_render_check=True)
+        sb3_check(FlattenObservation(env), skip_render_check=True)
+        with pytest.warns(UserWarning, match="use a custom policy") as said:
+            sb3_check(env.unwrapped, skip_render_check=True)
+        assert len(said) == 1
     env.close()
+
+
+def test_gymnasium_checks_the_pictures_too():
+    env = gymnasium.make("rhabdom/Foraging-v0", eyes=EYES, rays_per_receptor=1, render_mode="eyes")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gymnasium_check(env.unwrapped)
+    env.close()
+
+
+@pytest.mark.parametrize("eyes", [EYES, dataclasses.replace(EYES, noise_sigma=0.0, receptors="goldfish")])
+def test_observations_stay_within_finite_bounds(eyes):
+    """Close to objects and walls, where signals are brightest; the bounds are not idle either."""
+    env = sim.make_env("detection", eyes)
+    space = env.observation_space["eyes"]
+    assert np.isfinite([space.low, space.high]).all()
+    observation, _ = env.reset(seed=0)
+    brightest = 0.0
+    for _ in range(60):
+        assert env.observation_space.contains(observation)
+        brightest = max(brightest, observation["eyes"].max())
+        observation, _, terminated, truncated, _ = env.step(np.array([1.0, 0.1]))
+        if terminated or truncated:
+            observation, _ = env.reset()
+    assert space.high.max() < 20 * brightest
 
 
 def test_ids_are_known_after_importing_sim():
@@ -69,6 +101,92 @@ def test_picture_follows_the_agent():
     assert (np.abs(first.astype(int) - second) > 30).mean() > 0.05
 
 
-def test_unknown_render_mode_is_named():
-    with pytest.raises(ValueError, match="render_mode"):
-        sim.make_env("detection", EYES, render_mode="human")
+def test_fields_are_drawn_on_the_eyes_level_and_end_where_sight_ends():
+    """One eye that looks straight ahead, at an object 3 m away: the picture changes in a wedge between the two and past
+    the object, and neither behind it nor beside the field."""
+    eyes = sim.Eyes(n_eyes=1, resolution=(5, 5), fov_deg=40)
+    env = sim.make_env("detection", eyes, render_mode="rgb_array")
+    env.reset(seed=0)
+    state = env.state
+    objects = state.objects.copy()
+    objects[0, :, :2] = [[3.0, 0.0], [-6.0, 0.0], [-6.0, 3.0]]
+    state = dataclasses.replace(state, position=np.zeros((1, 2)), heading=np.zeros(1), objects=objects)
+    world = env._batch.simulation.world
+    bare, drawn = (Onlooker(world, who).picture(state).astype(int) for who in (None, eyes))
+    changed = np.abs(bare - drawn).max(axis=2) > 8
+
+    def at(x, y):
+        """Whether a point on the eyes' level lies in the drawn field."""
+        view = _follow(state, 0)
+        local = view.rotation.T @ (np.array([x, y, EYE_HEIGHT]) - view.position)
+        half = np.tan(np.radians(view.fovy_deg) / 2)
+        column, row = (
+            240 + 180 * local[0] / -local[2] / half,
+            180 - 180 * local[1] / -local[2] / half,
+        )
+        return changed[int(row), int(column)]
+
+    assert at(1.5, 0.2)
+    assert at(1.5, -0.4)
+    assert not at(1.5, 0.8)  # tan 20° of 1.3 m is 0.47 m
+    assert not at(1.5, -0.8)
+    assert not at(5.5, 0.0)  # behind the object
+    assert at(6.0, 1.6)  # past it
+    assert not at(-1.0, 0.0)
+    assert 0.005 < changed.mean() < 0.3
+
+
+@pytest.mark.parametrize("receptors", ["rgb", (500,), "goldfish", "mosaic"])
+def test_pictures_of_eyes_show_their_signals(receptors):
+    """Each receptor is a square of its signal's grey level, or of its type's colour; eyes stand from left to right."""
+    mosaic = receptors == "mosaic"
+    kinds = optics.Receptors((600, 520, 460), mosaic=((0, 1), (1, 2))) if mosaic else receptors
+    eyes = dataclasses.replace(EYES, noise_sigma=0.0, receptors=kinds)
+    env = sim.make_env("detection", eyes, render_mode="eyes")
+    observation, _ = env.reset(seed=1)
+    picture = env.render()
+    assert picture.dtype == np.uint8
+    signals = observation["eyes"][-1]
+    scale = picture.shape[0] // 3
+    assert picture.shape == (3 * scale, 2 * 4 * scale + GAP, 3)
+    assert scale >= 50
+    middles = picture[scale // 2 :: scale]
+    left, right = middles[:, scale // 2 : 4 * scale : scale], middles[:, 4 * scale + GAP + scale // 2 :: scale]
+    for image, signal in zip((left, right), signals, strict=True):
+        if mosaic:
+            kind = np.array([[0, 1, 0, 1], [1, 2, 1, 2], [0, 1, 0, 1]])
+            expected = np.where(np.arange(3) == kind[..., None], signal[0][..., None], 0.0)
+        elif receptors == "rgb":
+            expected = signal.transpose(1, 2, 0)
+        else:
+            continue
+        np.testing.assert_allclose(image, 255 * encode_srgb(np.clip(expected, 0, 1)), atol=0.51)
+    if receptors == (500,):
+        assert np.ptp(picture.astype(int), axis=2).max() == 0
+    assert len(np.unique(picture[..., 0])) > 3
+
+
+def test_renders_nothing_before_the_world_has_begun():
+    with pytest.raises(RuntimeError, match="call reset before render"):
+        sim.make_env("detection", EYES, render_mode="eyes").render()
+    assert sim.make_env("detection", EYES).render() is None
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ({"render_mode": "human"}, "render_mode = 'human', must be one of 'rgb_array', 'eyes' or None"),
+        ({"spectra": {"wal": "foliage"}}, "no material or light 'wal'; did you mean 'wall'"),
+        ({"memory": 0}, "memory = 0"),
+    ],
+)
+def test_bad_options_are_named(options, named):
+    with pytest.raises(ValueError, match=named):
+        sim.make_env("detection", EYES, **options)
+
+
+def test_actions_of_another_shape_are_named():
+    env = sim.make_env("detection", EYES)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"actions have shape \(1, 3\), must be \(1, 2\)"):
+        env.step(np.zeros(3))

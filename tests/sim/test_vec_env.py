@@ -41,11 +41,13 @@ def played(venv, steps):
     return first, [venv.step(seeking(venv, step)) for step in range(steps)]
 
 
+BEES = dataclasses.replace(EYES, receptors=optics.receptors_of("honeybee").arranged(((0, 1), (1, 2))), bands=6)
 LENS = dataclasses.replace(EYES, optics=optics.Pupil(aperture_radius=40e-6, thin_lens_focal_length=170e-6))
 
 
 @pytest.mark.parametrize(
-    ("task", "eyes"), [("detection", EYES), ("tracking", EYES), ("navigation", EYES), ("detection", LENS)]
+    ("task", "eyes"),
+    [("detection", EYES), ("foraging", BEES), ("tracking", EYES), ("navigation", EYES), ("detection", LENS)],
 )
 def test_episodes_do_not_depend_on_the_number_of_worlds(task, eyes):
     """Bit-identical, over restarts, noise and moving objects."""
@@ -180,6 +182,43 @@ def test_a_broken_world_restarts_and_says_why():
     assert np.isfinite(reward).all()
     assert np.isfinite(observation["eyes"]).all()
     assert np.isfinite(infos[1]["terminal_observation"]["eyes"]).all()
+
+
+@pytest.mark.parametrize("broken", ["heading", "position", "objects"])
+def test_worlds_that_hold_nan_end_and_the_others_go_on_as_if_alone(broken):
+    """Bit for bit: what the neighbours see and get is what they would without the broken world."""
+    venvs = [make(3, memory=2) for _ in range(2)]
+    for venv in venvs:
+        venv.reset()
+    damaged = getattr(venvs[0].state, broken).copy()
+    damaged[1] = np.nan
+    venvs[0].simulation._state = dataclasses.replace(venvs[0].state, **{broken: damaged})
+    (ours, reward, done, infos), (theirs, other, _, _) = (venv.step(actions(3, 0)) for venv in venvs)
+    assert done.tolist() == [False, True, False]
+    assert infos[1]["failure"] == "unstable physics"
+    for world in (0, 2):
+        assert "failure" not in infos[world]
+        assert np.array_equal(ours["eyes"][world], theirs["eyes"][world])
+        assert reward[world] == other[world]
+    assert np.isfinite(reward).all()
+    for array in (*ours.values(), *infos[1]["terminal_observation"].values()):
+        assert np.isfinite(array).all()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_an_action_that_is_no_number_ends_its_episode_alone(value):
+    venv = make(3)
+    venv.reset()
+    bad = actions(3, 0)
+    bad[2, 1] = value
+    observation, reward, done, infos = venv.step(bad)
+    assert done.tolist() == [False, False, True]
+    assert infos[2]["failure"] == "action is not finite"
+    assert not infos[2]["TimeLimit.truncated"]
+    assert np.isfinite(reward).all()
+    for array in (*observation.values(), *infos[2]["terminal_observation"].values()):
+        assert np.isfinite(array).all()
+    assert venv.observation_space.contains(infos[2]["terminal_observation"])
 
 
 def test_observations_lie_in_their_space():
