@@ -33,6 +33,9 @@ TASKS: Mapping[str, str] = {
 }
 
 
+AUTO = "auto"  # in place of a number: chosen when it is needed
+
+
 class ConfigError(ValueError):
     """A setting that cannot be used; the message is one line naming key, value and what is allowed.
 
@@ -63,7 +66,9 @@ class EyeConfig:
     relief_points: int = _setting(
         4, RELIEF_POINTS, "genes of the relief along one side; 4: a bicubic patch, more: a cubic spline through as many"
     )
-    rays_per_receptor: int = _setting(4, Interval(1, 4096), "rays traced per receptor and frame")
+    rays_per_receptor: float | str = _setting(
+        AUTO, Interval(0, 4096, open_low=True), "rays traced per receptor and frame; auto: as few as its noise allows"
+    )
     head_radius: float = _setting(
         1e-3, Interval(0, 10, open_low=True), "radius of the head [m]; eyes on it do not overlap"
     )
@@ -187,7 +192,12 @@ class RunConfig:
 def check_value(cls: type, name: str, value: Any, key: str) -> Any:
     """`value` as field `name` of `cls` takes it; raises ConfigError naming `key`, the value and what is allowed."""
     definition = next(f for f in fields(cls) if f.name == name)
-    kind = {"int": int, "float": float, "bool": bool, "str": str}[str(definition.type)]
+    if definition.type == "float | str":
+        if value == AUTO:
+            return value
+        if isinstance(value, str):
+            raise ConfigError(f"{key} = {value!r}: must be a number or {AUTO!r}", key)
+    kind = {"int": int, "float": float, "float | str": float, "bool": bool, "str": str}[str(definition.type)]
     return _checked(value, kind, definition.metadata.get("valid"), key)
 
 

@@ -33,7 +33,7 @@ class ReferenceRenderer:
                           light is blurred as if from infinity
     depth_layers          kernels between them, or "auto"
     variant               of Mitsuba, spectral; scalar_spectral runs without LLVM
-    seed                  of the samples
+    seed                  of the samples; may be changed between pictures
 
     Raises ValueError for a bad argument, optics.AccuracyError for a pupil whose light spreads too far.
     """
@@ -54,12 +54,12 @@ class ReferenceRenderer:
         self.world, self.eyes, self.eye = world, eyes, eyes.eye()
         self.bands: optics.SpectralBands = self.eye.spectral_bands
         self.samples_per_receptor = samples_per_receptor or (1 if self.eye.pupil is None else 4)
-        self._integrator, self._spp, self._seed = integrator, spp, seed
+        self._integrator, self._spp, self.seed = integrator, spp, seed
         self._has_depth = depths is not None
         z: Any = np.array(depths) if depths else math.inf
         self.sight = self.eye.sight(self.samples_per_receptor, z, depth_layers)
         self._data = mujoco.MjData(world.model)
-        self._mirror = mirror(world.model, variant=variant)
+        self._mirror = mirror(world.model, variant=variant, spectra=world.spectra)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -93,7 +93,7 @@ class ReferenceRenderer:
     def _picture(self, view: Viewpoint) -> np.ndarray:
         height, width = self.shape
         wavelengths = self.bands.wavelengths
-        return self._mirror.render(view, width, height, self._integrator, self._spp, wavelengths, self._seed)
+        return self._mirror.render(view, width, height, self._integrator, self._spp, wavelengths, self.seed)
 
     def _views(self, state: WorldState, index: int) -> list[Viewpoint]:
         """Every eye's view of one world, in which everything is put where the state has it."""
