@@ -57,6 +57,11 @@ class Memory:
                 past[fresh] = frame[fresh]
         return np.stack(self._past, axis=1)
 
+    @property
+    def newest(self) -> np.ndarray:
+        """The last frame of every world, (env, ...)."""
+        return self._past[-1]
+
     def preview(self, frame: np.ndarray, worlds: np.ndarray) -> np.ndarray:
         """What these worlds' memory would hold with this frame (len(worlds), ...) added; nothing is remembered."""
         return np.stack([*(past[worlds] for past in self._past[1:]), frame], axis=1)

@@ -22,6 +22,16 @@ SPP = 12
 SIZE = (360, 480)  # pixels (height, width)
 
 
+RENDER_MODES = ("rgb_array", "eyes")
+
+
+def check_render_mode(render_mode: str | None) -> None:
+    """Raises ValueError for other render modes than RENDER_MODES and None."""
+    if render_mode not in (None, *RENDER_MODES):
+        modes = ", ".join(map(repr, RENDER_MODES))
+        raise ValueError(f"render_mode = {render_mode!r}, must be one of {modes} or None")
+
+
 class Onlooker:
     """A camera that follows the agent; it holds its own mirror of the world.
 

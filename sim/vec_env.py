@@ -8,11 +8,14 @@ from typing import Any
 import drjit as dr
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
 from optics.tabulated import Spectrum
 from sim.agent import Eyes
+from sim.eye_images import side_by_side
 from sim.noise import ReceptorNoise, add_noise
 from sim.observation import STANDING, Memory, action_space, observation_space
+from sim.picture import Onlooker, check_render_mode
 from sim.render import BatchedRenderer
 from sim.simulation import Simulation, Step
 from sim.state import WorldState
@@ -24,14 +27,17 @@ TERMINAL_WIDTH = 8  # worlds of the small renderer that looks at final states
 class EyesVecEnv(VecEnv):
     """Many agents with eyes, each in its own world.
 
-    Observations, actions and `info` are in docs/design.md, "Seams". Worlds start anew by themselves; the
+    Observations, rewards, endings and `info` are in docs/tasks.md. Worlds start anew by themselves; the
     observation returned is then the first of the new episode, and info["terminal_observation"] the last of the
     old one. World i's episodes depend on the seed and i alone, not on the number of worlds.
     """
 
-    def __init__(self, simulation: Simulation, renderer: BatchedRenderer, memory: int) -> None:
+    def __init__(
+        self, simulation: Simulation, renderer: BatchedRenderer, memory: int, render_mode: str | None = None
+    ) -> None:
         self.simulation, self.renderer, self.eyes = simulation, renderer, renderer.eyes
-        self.render_mode: str | None = None
+        self.render_mode = render_mode
+        self._onlooker: Onlooker | None = None
         self._terminal_renderer: BatchedRenderer | None = None
         self._memory = Memory(memory)
         channels = renderer.eye.channels
@@ -99,6 +105,25 @@ class EyesVecEnv(VecEnv):
 
     def close(self) -> None:
         self.simulation.close()
+
+    # --- pictures
+
+    def get_images(self) -> list[np.ndarray]:
+        """A picture of every world, (y, x, 3) uint8, as `render_mode` asks; none without. Raises RuntimeError before
+        the first reset."""
+        state = self.state
+        if self.render_mode == "eyes":
+            return [side_by_side(frame, self.renderer.eye) for frame in self._memory.newest]
+        if self.render_mode == "rgb_array":
+            self._onlooker = self._onlooker or Onlooker(self.simulation.world, self.eyes)
+            return [self._onlooker.picture(state, world) for world in range(state.n)]
+        return []
+
+    def render(self, mode: str | None = None) -> np.ndarray | None:
+        """All worlds' pictures, tiled."""
+        if self.render_mode == "eyes" and mode in (None, "eyes"):
+            return tile_images(self.get_images())
+        return super().render(mode)
 
     # --- observations
 
@@ -194,6 +219,7 @@ def make_vec_env(
     rays_per_receptor: float | str = "auto",
     world_seed: int = 0,
     spectra: Mapping[str, Spectrum | str] | None = None,
+    render_mode: str | None = None,
 ) -> EyesVecEnv:
     """A batched environment of one task.
 
@@ -206,13 +232,16 @@ def make_vec_env(
     rays_per_receptor  rays traced for each receptor; "auto": as few as its noise allows, see `sim.BatchedRenderer`
     world_seed         of the layout that all worlds share: navigation's maze
     spectra            of materials and lights, by name, in the place of their colours: see `sim.build_world`
+    render_mode        "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye
+                       reports, side by side
 
     Physics takes as many threads as Dr.Jit has: limit both with drjit.set_thread_count.
     Raises ValueError for a bad argument.
     """
     eyes = Eyes() if eyes is None else eyes
     Memory(memory)  # complains before the scene is built
+    check_render_mode(render_mode)
     world = build_world(task, seed=world_seed, spectra=spectra)
     simulation = Simulation(world, n_envs, seed, mode, threads=min(dr.thread_count(), n_envs))
     renderer = BatchedRenderer(world, eyes, n_envs, rays_per_receptor)
-    return EyesVecEnv(simulation, renderer, memory)
+    return EyesVecEnv(simulation, renderer, memory, render_mode)

@@ -93,7 +93,7 @@ def test_picture_follows_the_agent():
     assert first.dtype == np.uint8
     env.step(np.array([-1.0, 1.0]))  # turns on the spot: the body stays, the world turns
     second = env.render()
-    state, mirror = env.state, env._onlooker._mirror
+    state, mirror = env.state, env._batch._onlooker._mirror
     ids = mirror.render_ids(_follow(state, 0), 480, 360)
     y, x = np.nonzero(ids == mirror.model.geom("agent").id)
     assert len(y) > 50
@@ -166,8 +166,21 @@ def test_pictures_of_eyes_show_their_signals(receptors):
     assert len(np.unique(picture[..., 0])) > 3
 
 
+@pytest.mark.parametrize(("mode", "rows", "columns"), [("eyes", 2, 2), ("rgb_array", 2, 1)])
+def test_batches_are_shown_as_tiles_of_the_single_worlds_pictures(mode, rows, columns):
+    venv = sim.make_vec_env("detection", EYES, rows * columns, 3, render_mode=mode)
+    env = sim.make_env("detection", EYES, render_mode=mode)
+    venv.reset()
+    env.reset(seed=3)
+    tiles, first = venv.render(), env.render()
+    height, width, _ = first.shape
+    assert tiles.shape == (rows * height, columns * width, 3)
+    np.testing.assert_array_equal(tiles[:height, :width], first)
+    assert not np.array_equal(tiles[-height:, :width], first)
+
+
 def test_renders_nothing_before_the_world_has_begun():
-    with pytest.raises(RuntimeError, match="call reset before render"):
+    with pytest.raises(RuntimeError, match="call reset first"):
         sim.make_env("detection", EYES, render_mode="eyes").render()
     assert sim.make_env("detection", EYES).render() is None
 
