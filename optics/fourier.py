@@ -101,7 +101,7 @@ def periodic_spectrum(u: np.ndarray, period: int, across: int) -> np.ndarray:
     rows = fft.fft(_wrap(u, period, 1), axis=1, overwrite_x=True)
     if across < period:
         rows = rows[:, kept_indices(period, across)]
-    return fft.fft(_wrap(rows, period, 0), axis=0, overwrite_x=True)  # type: ignore[no-any-return]
+    return fft.fft(_wrap(rows, period, 0), axis=0, overwrite_x=True)
 
 
 def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int, int]) -> np.ndarray:
@@ -114,7 +114,7 @@ def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int,
         whole = np.zeros((len(rows), period), spectrum.dtype)
         whole[:, kept_indices(period, spectrum.shape[1])] = lines
         lines = whole
-    return fft.ifft(lines, axis=1, norm="forward", overwrite_x=True)[:, columns]  # type: ignore[no-any-return]
+    return fft.ifft(lines, axis=1, norm="forward", overwrite_x=True)[:, columns]
 
 
 def kept_indices(period: int, across: int) -> np.ndarray:

@@ -126,7 +126,7 @@ def _fade_table(ripple: float) -> Table:
 @dataclass(frozen=True, eq=False)
 class FreeSpace:
     """Over a spectrum: the transfer function, with everything that does not depend on the field, and how much of each
-    frequency is too near grazing or evanescent (None: nothing is)."""
+    frequency is too near grazing or evanescent, for real and imaginary parts (fy, 2 fx) (None: nothing is)."""
 
     transfer: np.ndarray
     grazing: np.ndarray | None
@@ -154,7 +154,7 @@ class Passage:
         # A frequency's cell on the circle f = n/λ counts by how far it reaches outside: an error of its width squared.
         outside = np.clip((sine - 1) / (step * self.wavelength or 1) + 0.5, 0, 1)
         weights = (
-            None if weight is None or not weight.any() else np.ascontiguousarray(weight, dtype=types.dtype)
+            None if weight is None or not weight.any() else np.repeat(weight, 2, axis=1).astype(types.dtype)
             for weight in (grazing, outside)
         )
         return FreeSpace(self._transfer(fx, fy, types), *weights)

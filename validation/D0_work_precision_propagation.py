@@ -5,7 +5,7 @@ clock starts, and its overall scale is fitted; ours starts from radius and focal
 Without --peers they are the points stored with their date and machine, and the goals, which are ratios of times, are
 only indicative.
 
-    python -m validation.D0_work_precision_propagation [--peers [--write]] [--rounds N] [--cases f/2 ...] [--out DIR]
+    python -m validation.D0_work_precision_propagation [--peers [PEER ...] [--write]] [--rounds N] [--cases f/2 ...]
 
 prints tables and goals, draws the figure, exits 1 if a goal is missed. Peers: `pip install .[peers]`.
 """
@@ -17,30 +17,32 @@ import os
 import platform
 import sys
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from validation.peers import installed
 from validation.peers.goals import ACCURATE, CONVERGED_PEER, FASTER, SINGLE, own_best, verdicts
 from validation.peers.measure import one_thread, our_points, peer_points, quickest
 from validation.peers.points import STORED, Point, read_points, write_points
-from validation.peers.problem import CASES, Case
+from validation.peers.problem import CASES, Case, Peer
 from validation.workprec import OURS, OURS_TOO, Curve, Region, draw_work_precision, front
 
 COLORS = {"float32": OURS, "float64": OURS_TOO}
 
 
-def measure(cases: Sequence[Case], machine: str, rounds: int, with_peers: bool) -> tuple[list[Point], list[Point]]:
+def measure(
+    cases: Sequence[Case], machine: str, rounds: int, rivals: Mapping[Peer, str]
+) -> tuple[list[Point], list[Point]]:
     """Ours and the peers', interleaved; the least of each point's medians over the rounds."""
     ours, peers = [], []
-    if with_peers:
-        print(f"peers: {', '.join(f'{peer.distribution} {at}' for peer, at in installed().items())}", file=sys.stderr)
+    if rivals:
+        print(f"peers: {', '.join(f'{peer.distribution} {at}' for peer, at in rivals.items())}", file=sys.stderr)
     for number in range(rounds):
         for case in cases:
             print(f"round {number + 1} of {rounds}: {case.name}", file=sys.stderr, flush=True)
             with one_thread():
                 ours.append(list(our_points(case, machine)))
-                peers.append(list(peer_points(case, machine)) if with_peers else [])
+                peers.append(list(peer_points(case, machine, rivals)))
     return quickest(ours), quickest(peers)
 
 
@@ -129,15 +131,17 @@ TITLES = {
 def main(arguments: list[str] | None = None) -> int:
     options = _options(arguments)
     cases = [case for case in CASES if case.name in options.cases]
-    ours, peers = measure(cases, options.machine, options.rounds, options.peers)
-    if not options.peers:
+    rivals = _rivals(options.peers)
+    ours, peers = measure(cases, options.machine, options.rounds, rivals)
+    if not rivals:
         peers = [point for point in read_points(options.stored) if point.case in options.cases]
     stamps = ", ".join(sorted({f"{point.date} on {point.machine}" for point in peers})) or "none"
-    source = "measured in this run" if options.peers else f"stored ({stamps})"
+    source = "measured in this run" if rivals else f"stored ({stamps})"
     print(table([*ours, *peers]))
     print(f"peers: {source}; one thread")
     if options.write:
-        others = [point for point in read_points(options.stored) if point.case not in options.cases]
+        names = {peer.distribution for peer in rivals}
+        others = [p for p in read_points(options.stored) if p.case not in options.cases or p.peer not in names]
         write_points([*others, *peers], options.stored)
         print(f"written: {options.stored}")
     path = options.out / "D0_work_precision_propagation.png"
@@ -145,17 +149,24 @@ def main(arguments: list[str] | None = None) -> int:
     print(f"figure: {path}")
     found = verdicts(ours, peers)
     print("\n".join(map(str, found)))
-    if not options.peers:
+    if not rivals:
         print("ratios to stored points are indicative only; --peers measures both in one run")
     missed = [verdict for verdict in found if not verdict.passed]
     print(f"{len(missed)} of {len(found)} goals missed" if missed else "all goals hold")
     return 1 if missed else 0
 
 
+def _rivals(names: list[str] | None) -> Mapping[Peer, str]:
+    """Peers to run, with their versions: all that are installed for an empty list, none for None."""
+    if names is None:
+        return {}
+    return {peer: at for peer, at in installed().items() if not names or peer.distribution in names}
+
+
 def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     names = [case.name for case in CASES]
-    parser.add_argument("--peers", action="store_true", help="run the peers that are installed")
+    parser.add_argument("--peers", nargs="*", metavar="PEER", help="run the peers that are installed, or only these")
     parser.add_argument("--write", action="store_true", help="store the peers' points (with --peers)")
     parser.add_argument("--stored", type=Path, default=STORED, help="file of the stored points")
     parser.add_argument("--rounds", type=int, default=1, help="measure everything so many times, keep the quickest")
@@ -163,7 +174,10 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--machine", default=f"{os.cpu_count()} cores {platform.machine()}", help="its class, in words")
     parser.add_argument("--out", type=Path, default=Path("validation/figures"), help="directory for the figure")
     options = parser.parse_args(arguments)
-    if options.write and not options.peers:
+    unknown = set(options.peers or ()) - {peer.distribution for peer in installed()}
+    if unknown:
+        parser.error(f"--peers {' '.join(sorted(unknown))}: not installed, or unknown")
+    if options.write and options.peers is None:
         parser.error("--write stores what --peers measures: give both")
     if options.rounds < 1:
         parser.error(f"--rounds {options.rounds}: must be at least 1")

@@ -189,3 +189,14 @@ def test_a_window_off_the_axis_shows_what_a_larger_one_does():
     part = optics.propagate(u, out_shape=(9, 11), out_centre=(-13e-6, 7e-6), **asked)
     expected = whole.u[50 + 7 - 4 : 50 + 7 + 5, 50 - 13 - 5 : 50 - 13 + 6]
     assert np.linalg.norm(part.u - expected) < 1e-4 * np.linalg.norm(expected)
+
+
+def test_darkness_around_the_light_costs_nothing():
+    """A field in a wide dark frame is the field alone: same picture, same period."""
+    u = gaussian(48, 0.5e-6, 4e-6)
+    settings = {"dx": 0.5e-6, "wavelength": WAVELENGTH, "distance": 80e-6, "out_shape": (40, 40), "tolerance": 1e-5}
+    framed = optics.propagate(np.pad(u[None], ((0, 1), (100, 100), (60, 61))), **settings)
+    alone = optics.propagate(u, **settings)
+    np.testing.assert_allclose(framed.u[0], alone.u, atol=1e-6 * np.abs(alone.u).max())
+    assert np.abs(framed.u[1]).max() == 0
+    assert framed.plan.samples == alone.plan.samples

@@ -5,15 +5,15 @@ from __future__ import annotations
 import statistics
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import date
 from importlib import metadata
 from typing import Any
 
-from validation.peers import installed, rhabdom
+from validation.peers import rhabdom
 from validation.peers.points import Point
-from validation.peers.problem import Case, Run, error, grids
+from validation.peers.problem import Case, Peer, Run, error, grids
 
 __all__ = ["OURS", "median_seconds", "one_thread", "our_points", "peer_points", "quickest"]
 
@@ -72,9 +72,9 @@ def our_points(case: Case, machine: str) -> Iterator[Point]:
             yield _point(case, OURS, version, run, machine, fitted=True)
 
 
-def peer_points(case: Case, machine: str) -> Iterator[Point]:
-    """Every method of every peer that is installed, on every grid, in every precision."""
-    for peer, version in installed().items():
+def peer_points(case: Case, machine: str, peers: Mapping[Peer, str]) -> Iterator[Point]:
+    """Every method of these peers (with their versions), on every grid, in every precision."""
+    for peer, version in peers.items():
         done = set()  # methods that choose their own pitch see some grids as the same
         for grid in grids(case):
             for dtype in peer.dtypes:
