@@ -218,6 +218,7 @@ def make_vec_env(
     mode: str = "training",
     rays_per_receptor: float | str = "auto",
     world_seed: int = 0,
+    mazes: int = 1,
     spectra: Mapping[str, Spectrum | str] | None = None,
     render_mode: str | None = None,
 ) -> EyesVecEnv:
@@ -230,7 +231,7 @@ def make_vec_env(
     memory             frames in an observation
     mode               "training", or "evaluation" (objects respawn; rewards weighted as fitness)
     rays_per_receptor  rays traced for each receptor; "auto": as few as its noise allows, see `sim.BatchedRenderer`
-    world_seed         of the layout that all worlds share: navigation's maze
+    world_seed, mazes  of the layout that all worlds share: navigation's mazes, and how many
     spectra            of materials and lights, by name, in the place of their colours: see `sim.build_world`
     render_mode        "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye
                        reports, side by side
@@ -241,7 +242,7 @@ def make_vec_env(
     eyes = Eyes() if eyes is None else eyes
     Memory(memory)  # complains before the scene is built
     check_render_mode(render_mode)
-    world = build_world(task, seed=world_seed, spectra=spectra)
+    world = build_world(task, seed=world_seed, mazes=mazes, spectra=spectra)
     simulation = Simulation(world, n_envs, seed, mode, threads=min(dr.thread_count(), n_envs))
     renderer = BatchedRenderer(world, eyes, n_envs, rays_per_receptor)
     return EyesVecEnv(simulation, renderer, memory, render_mode)

@@ -61,17 +61,24 @@ class World:
 
 
 def build_world(
-    task: str, *, seed: int = 0, eyes: Eyes | None = None, spectra: Mapping[str, Spectrum | str] | None = None
+    task: str,
+    *,
+    seed: int = 0,
+    mazes: int = 1,
+    eyes: Eyes | None = None,
+    spectra: Mapping[str, Spectrum | str] | None = None,
 ) -> World:
     """Build the world of a task.
 
     task     "detection", "foraging", "navigation" or "tracking"
-    seed     draws the maze of navigation; the field of the others is always the same
+    seed     draws the mazes of navigation; the field of the others is always the same
+    mazes    of navigation: so many different ones, and an episode begins in any of them
     eyes     if given, the agent carries cameras eye_0 ..., left to right
     spectra  of materials and lights, by name ("wall", "floor", "light_0" ...), in addition to or instead of the task's
              own: `optics.Spectrum`, or names out of `optics.reflectance` and `optics.illuminant`
 
-    Raises ValueError for an unknown task, a negative seed, or spectra of what is not there.
+    Raises ValueError for an unknown task, a negative seed, mazes for another task than navigation, or spectra of what
+    is not there.
     """
     if task not in TASKS:
         near = difflib.get_close_matches(task, TASKS, n=1)
@@ -79,8 +86,10 @@ def build_world(
         raise ValueError(f"unknown task {task!r}, must be one of {', '.join(TASKS)}{hint}")
     if seed < 0:
         raise ValueError(f"build_world: seed = {seed}, must be at least 0")
-    spec = _empty_world()
-    layout = _LAYOUTS[task](spec, np.random.default_rng(seed))
+    if mazes < 1 or (mazes > 1 and task != "navigation"):
+        raise ValueError(f"build_world: mazes = {mazes}, must be 1, or more for 'navigation'")
+    spec, rng = _empty_world(), np.random.default_rng(seed)
+    layout = navigation.add_layout(spec, rng, mazes) if task == "navigation" else _LAYOUTS[task](spec, rng)
     _add_agent(spec, layout.agent_spawn[0], eyes)
     model = spec.compile()
     return World(

@@ -20,26 +20,28 @@ STRIPE_PERIODS = (4.0, 2.0, 1.0, 2 / 3)
 _NEIGHBORS = ((0, 2), (0, -2), (2, 0), (-2, 0))
 
 
-def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
-    """Add a maze drawn by `rng`."""
-    walls = draw_maze(MAZE, rng)
+def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, mazes: int = 1) -> Layout:
+    """Add mazes drawn by `rng`, side by side (north of each other) and without a way from one to the next: an agent
+    starts in any of them, and what it learns is good for all."""
+    walls = np.concatenate([draw_maze(MAZE, rng) for _ in range(mazes)])
+    shape = walls.shape
     materials.add_texture(spec, "stripes", materials.stripes((8, 256), 2, axis=1))
     for i, period in enumerate(STRIPE_PERIODS):
         materials.add_textured(spec, f"stripes_{i}", "stripes", repeat=(2 / period, 1), uniform=True)
-    add_floor(spec, (MAZE[1] * CELL, MAZE[0] * CELL))
+    add_floor(spec, (shape[1] * CELL, shape[0] * CELL))
     for i, (row, column, n_rows, n_columns) in enumerate(merge_walls(walls, LONGEST_WALL)):
-        center = cell_centers(np.array(column + (n_columns - 1) / 2), np.array(row + (n_rows - 1) / 2), MAZE)
+        center = cell_centers(np.array(column + (n_columns - 1) / 2), np.array(row + (n_rows - 1) / 2), shape)
         frequency = rng.integers(len(STRIPE_PERIODS))
         add_wall(spec, f"wall_{i}", center, (n_columns * CELL, n_rows * CELL), f"stripes_{frequency}")
     rows, columns = np.nonzero(~walls)
     start = columns < START_COLUMNS
-    right = MAZE[1] * CELL / 2 - CELL
+    right = shape[1] * CELL / 2 - CELL
     return Layout(
         objects=(),
-        agent_spawn=cell_centers(columns[start], rows[start], MAZE),
+        agent_spawn=cell_centers(columns[start], rows[start], shape),
         object_spawn=np.empty((0, 2)),
         goal_region=np.array(
-            [right - GOAL_COLUMNS * CELL, CELL - MAZE[0] * CELL / 2, right, MAZE[0] * CELL / 2 - CELL]
+            [right - GOAL_COLUMNS * CELL, CELL - shape[0] * CELL / 2, right, shape[0] * CELL / 2 - CELL]
         ),
     )
 

@@ -38,11 +38,12 @@ def radiances(world, state):
 
 
 @pytest.mark.parametrize(
-    ("task", "seed"), [("detection", 0), ("tracking", 1), *(("navigation", seed) for seed in range(8))]
+    ("task", "seed", "mazes"),
+    [("detection", 0, 1), ("tracking", 1, 1), ("navigation", 8, 5), *(("navigation", seed, 1) for seed in range(8))],
 )
-def test_every_ray_sees_what_mitsuba_sees(task, seed):
+def test_every_ray_sees_what_mitsuba_sees(task, seed, mazes):
     """All rays agree to float32, but for the few that graze an edge (of a stripe, a wall, a shadow)."""
-    world = build_world(task, seed=seed)
+    world = build_world(task, seed=seed, mazes=mazes)
     ours, theirs = radiances(world, scattered(world, 24, seed))
     different = np.abs(ours - theirs).max(axis=1) > 2e-3
     assert different.mean() < 1e-3

@@ -9,7 +9,9 @@ from sim import materials
 from sim.agent import BODY_RADIUS, eye_positions
 from sim.color import decode_srgb
 from sim.layout import CELL
+from sim.physics import Physics
 from sim.scene.surfaces import image
+from sim.simulation import Simulation
 from sim.tasks import detection, navigation
 from sim.world import MAX_SPEED
 
@@ -162,6 +164,23 @@ def test_a_maze_is_its_seeds():
     assert walls(1).shape != walls(2).shape or not np.array_equal(walls(1), walls(2))
 
 
+def test_several_mazes_are_different_and_apart():
+    """Episodes begin in each of them; the first is what it is alone; a wall as long as the world parts neighbours."""
+    one, three = (sim.build_world("navigation", seed=4, mazes=mazes) for mazes in (1, 3))
+    height = 13 * 2.0
+    centers = np.array([-height, 0.0, height])
+    starts = [three.agent_spawn[np.abs(three.agent_spawn[:, 1] - c) < height / 2] - [0, c] for c in centers]
+    assert {tuple(s) for s in starts[0]} == {tuple(s) for s in one.agent_spawn}
+    assert len({tuple(map(tuple, s)) for s in starts}) > 1
+    physics = Physics(three, 1)
+    for border in (centers[:2] + centers[1:]) / 2:
+        for x in np.arange(-38.9, 39, 0.5):
+            inside = (physics.glide.lower < [x, border - 0.1]) & (physics.glide.upper > [x, border - 0.1])
+            assert inside.all(axis=1).any()
+    begun = {round(Simulation(three, 1, seed, "training", 1).reset().position[0, 1] / height) for seed in range(9)}
+    assert begun == {-1, 0, 1}
+
+
 def test_maze_starts_and_goal_lie_in_free_cells():
     world = sim.build_world("navigation", seed=5)
     x_min, y_min, x_max, y_max = world.goal_region
@@ -182,6 +201,8 @@ def test_stripes_start_light_and_split_evenly():
 
 
 def test_bad_input_is_named():
+    with pytest.raises(ValueError, match="mazes = 2, must be 1, or more for 'navigation'"):
+        sim.build_world("detection", mazes=2)
     with pytest.raises(ValueError, match="did you mean 'navigation'"):
         sim.build_world("navigate")
     with pytest.raises(ValueError, match="seed = -1"):
