@@ -17,7 +17,7 @@ import numpy as np
 from optics.tabulated import Spectrum
 from sim.scene import cameras, lights, rays, shapes, surfaces
 from sim.scene.cameras import Viewpoint
-from sim.scene.spectra import of_geom, resolve
+from sim.scene.spectra import in_daylight, of_geom, resolve
 from sim.variant import DEFAULT_VARIANT
 from sim.variant import variant as in_variant
 
@@ -179,7 +179,10 @@ class Mirror:
         material = self.model.geom_matid[geom]
         if material < 0 or self.model.mat_emission[material] <= 0:
             return None
-        return lights.emission(surfaces.rgba(self.model, geom)[:3], float(self.model.mat_emission[material]))
+        measured, level = of_geom(self.model, geom, self.spectra), float(self.model.mat_emission[material])
+        if measured is not None:
+            return lights.emission(np.ones(3), level, in_daylight(measured))
+        return lights.emission(surfaces.rgba(self.model, geom)[:3], level)
 
     def _bsdf(self, geom: int) -> Any:
         """Geoms that look alike share one BSDF object."""

@@ -1,7 +1,8 @@
 """Measured spectra in the place of colours: reflectances of materials, emission of lights, by their names in the model.
 
 A material's spectrum takes the place of its rgba; a texture, which must be grey, still multiplies it. A light's takes
-the place of daylight's and of its colour; how bright it is stays the largest of its diffuse's components.
+the place of daylight's and of its colour; how bright it is stays the largest of its diffuse's components. What glows,
+glows as it would look in daylight.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from optics.tabulated import LIMITS_NM, Spectrum, illuminant, reflectance
+from optics.tabulated import LIMITS_NM, Spectrum, daylight, illuminant, reflectance
 
 HEADLIGHT = "headlight"
 Spectra = Mapping[str, Spectrum]
@@ -51,6 +52,13 @@ def of_geom(model: mujoco.MjModel, geom: int, spectra: Spectra) -> Spectrum | No
     """The reflectance of a geom's material; None where there is only a colour."""
     material = int(model.geom_matid[geom])
     return spectra.get(model.material(material).name) if material >= 0 else None
+
+
+def in_daylight(reflectance: Spectrum) -> Spectrum:
+    """What a surface of this reflectance sends out in unit daylight, at the entries of both tables."""
+    entries = {*np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1, 5.0), *reflectance.wavelengths_nm}
+    nm = np.array([x for x in sorted(entries) if LIMITS_NM[0] <= x <= LIMITS_NM[1]])
+    return Spectrum(tuple(nm), tuple(reflectance.at(nm * 1e-9) * daylight(nm * 1e-9)))
 
 
 def described(spectrum: Spectrum, scale: float = 1.0) -> dict[str, Any]:

@@ -63,6 +63,19 @@ def test_daylight_is_ultraviolet_too():
     np.testing.assert_allclose(found, daylight(NM * 1e-9), rtol=1e-4)
 
 
+def test_what_glows_glows_in_its_spectrum():
+    """emission · ρ(λ) D65(λ), without any light; between the tables' entries, the product of lines is a
+    parabola: 1e-3."""
+    xml = XML.format(material="leaf", kind="plane", z=0, space="auto").replace('"leaf"/>', '"leaf" emission=".7"/>', 1)
+    mirror = sim.mirror(
+        mujoco.MjModel.from_xml_string(xml.replace('<light name="sun"', '<light active="false"')),
+        spectra={"leaf": UNEVEN},
+    )
+    view = Viewpoint.looking_at(np.array([0, 0, 5.0]), np.zeros(3), 1.0)
+    found = mirror.render(view, 1, 1, spp=1, wavelengths=NM * 1e-9)[:, 0, 0]
+    np.testing.assert_allclose(found, 0.7 * UNEVEN.at(NM * 1e-9) * daylight(NM * 1e-9), rtol=2e-3)
+
+
 @pytest.mark.parametrize(
     ("material", "spectra", "named"),
     [
