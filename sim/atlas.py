@@ -55,8 +55,7 @@ def _bake_one(model: mujoco.MjModel, geom: int, bsdf: Any, wavelengths: np.ndarr
     """Reflectance (row, column, band), and the way there from Mitsuba's (u, v) of the geom, (2, 3)."""
     width, height = 1, 1
     if shapes.is_textured(model, geom):
-        texture = surfaces.texture_id(model, geom)
-        width, height = int(model.tex_width[texture]), int(model.tex_height[texture])
+        height, width = surfaces.image(model, surfaces.texture_id(model, geom)).shape[:2]
     to_uv = shapes.uv_transform(model, geom)
     to_uv = np.eye(3) if to_uv is None else to_uv
     column, row = np.meshgrid(np.arange(width), np.arange(height))

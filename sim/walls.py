@@ -17,6 +17,7 @@ from sim.agent import EYE_HEIGHT
 from sim.scene import shapes, surfaces
 
 SIDES = 4  # of a wall: those that face -x, +x, -y, +y
+FACES = 6  # of a box, of four corners each
 ALIGNED = (
     1e-6  # largest deviation of a wall's rotation from quarter turns, and of faces from a common height or grid [m]
 )
@@ -105,6 +106,8 @@ def _box(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> tuple[np.ndar
     (part,) = shapes.parts(model, geom)
     triangles = part.triangles
     assert triangles is not None
+    if len(triangles.vertices) != 4 * FACES:
+        raise Unsuited(f"box {model.geom(geom).name!r} has a cube texture")
     vertices = triangles.vertices @ pose[:3, :3].T + pose[:3, 3]
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     uv = np.zeros((len(vertices), 2)) if triangles.uv is None else triangles.uv

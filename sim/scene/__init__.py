@@ -1,10 +1,16 @@
 """A MuJoCo model as a Mitsuba scene.
 
 mirror         Mirror: build, sync, render
+source         a file, a spec or text -> the model
 shapes         geoms -> Mitsuba shapes, and their poses
 tessellation   geoms -> triangles with MuJoCo's texture coordinates
-surfaces       materials and textures -> BSDFs
+cube           triangles under cube textures
+surfaces       colours and textures
+bsdfs          materials -> BSDFs
 spectra        measured spectra in the place of colours
 lights         lights -> emitters, with daylight's spectrum
+sky            the skybox -> light from infinity
 cameras        cameras -> sensors
+rays           what a sensor sees of a scene
+inventory      what has no counterpart, in words
 """

@@ -33,6 +33,13 @@ class Viewpoint:
         rotation = np.column_stack([right, np.cross(back, right), back])
         return Viewpoint(np.asarray(origin, float), rotation, fovy_deg)
 
+    def rays(self, width: int, height: int) -> np.ndarray:
+        """Directions through the pixels' centres, of unit depth along the axis, (y, x, 3)."""
+        half = np.tan(np.radians(self.fovy_deg) / 2)
+        y, x = np.indices((height, width))
+        across, up = (2 * (x + 0.5) - width) / height * half, (1 - 2 * (y + 0.5) / height) * half
+        return np.stack([across, up, -np.ones((height, width))], axis=-1) @ self.rotation.T
+
 
 def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: str | int | Viewpoint) -> Viewpoint:
     """Where a camera of the model is. Raises ValueError for an unknown one and for other than plain perspective."""

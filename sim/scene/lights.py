@@ -3,6 +3,9 @@
 Units: a light of diffuse 1 lays the irradiance π · daylight(λ) on a surface that faces it, so that a white Lambertian
 there has radiance daylight(λ): D65, 1 at 560 nm. Mitsuba's own `d65` is scaled otherwise (1.0101 at 560 nm), and
 its `rgb` emitters inherit that; the tables here are optics' own.
+
+A light is one light: its diffuse colour also makes the highlights, whatever its specular colour. Light from a point
+falls with the square of the distance; where MuJoCo's attenuates otherwise, both agree at the model's centre.
 """
 
 from __future__ import annotations
@@ -17,10 +20,15 @@ import mujoco
 import numpy as np
 
 from optics.tabulated import Spectrum, daylight
+from sim.scene import sky
 from sim.scene.spectra import HEADLIGHT, Spectra, described
 
 WAVELENGTHS_NM = np.arange(300.0, 781.0, 5.0)
 _TYPES = mujoco.mjtLightType
+_PROFILE = 513  # samples across a spot's cone
+_WIDEST_DEG = 88.0  # cone that an image can be projected over
+# What only MuJoCo's other renderer reads, and its value where nothing was asked for.
+_UNMIRRORED = {"intensity": 0.0, "bulbradius": 0.02, "range": 10.0, "softness": 0.2}
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,7 @@ class Emitter:
     """A light as Mitsuba describes it; `position` and `direction` are where data puts it."""
 
     name: str
-    light: int  # id in the model; -1: the camera's headlight
+    light: int  # id in the model; -1: none of its lights (the camera's headlight, the sky)
     description: dict[str, Any]
 
 
@@ -49,6 +57,11 @@ def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) ->
     }
 
 
+def white() -> float:
+    """Radiance of white under a light of diffuse 1 over that of Mitsuba's `d65`."""
+    return float(daylight(np.array([560e-9]))[0]) / float(_evaluate(mi.load_dict({"type": "d65"}), 560.0)[0])
+
+
 def _hue(rgb: np.ndarray) -> np.ndarray:
     texture = mi.load_dict({"type": "rgb", "value": [float(c) for c in rgb]})
     if str(mi.variant()).startswith("scalar"):
@@ -63,19 +76,13 @@ def _evaluate(texture: Any, nm: Any) -> np.ndarray:
 
 
 def emitters(model: mujoco.MjModel, data: mujoco.MjData, spectra: Spectra) -> tuple[list[Emitter], list[str]]:
-    """All active lights, and what of them could not be mirrored, in words."""
+    """All active lights and the sky, and what of the lights could not be mirrored, in words."""
     found, left_out = [], []
     for light in range(model.nlight):
         if not model.light_active[light]:
             continue
-        name = model.light(light).name or f"light {light}"
-        if np.any(model.light_ambient[light] > 0):
-            left_out.append(f"ambient part of {name!r}")
-        if model.light_type[light] == _TYPES.mjLIGHT_IMAGE:
-            left_out.append(f"image-based {name!r}")
-        elif np.any(model.light_diffuse[light] > 0):
-            if model.light_type[light] != _TYPES.mjLIGHT_DIRECTIONAL:
-                left_out.append(f"absent attenuation of {name!r} (mirrored with 1/r², equal at the model's center)")
+        left_out += _left_out(model, light)
+        if model.light_type[light] != _TYPES.mjLIGHT_IMAGE and np.any(model.light_diffuse[light] > 0):
             found.append(Emitter(f"light_{light}", light, _describe(model, data, light, spectra)))
     headlight = model.vis.headlight
     if headlight.active:
@@ -84,6 +91,9 @@ def emitters(model: mujoco.MjModel, data: mujoco.MjData, spectra: Spectra) -> tu
         if np.any(headlight.diffuse > 0):
             spectrum = emission(headlight.diffuse, math.pi, spectra.get(HEADLIGHT))
             found.append(Emitter(HEADLIGHT, -1, {"type": "directional", "irradiance": spectrum}))
+    heaven = sky.description(model, white())
+    if heaven is not None:
+        found.append(Emitter("sky", -1, heaven))
     return found, left_out
 
 
@@ -103,6 +113,25 @@ def aimed(origin: np.ndarray, direction: np.ndarray) -> Any:
     return mi.ScalarTransform4f(matrix.tolist())
 
 
+def _left_out(model: mujoco.MjModel, light: int) -> list[str]:
+    name, words = model.light(light).name or f"light {light}", []
+    if model.light_type[light] == _TYPES.mjLIGHT_IMAGE:
+        return [f"image-based {name!r}"]
+    if np.any(model.light_ambient[light] > 0):
+        words.append(f"ambient part of {name!r}")
+    if not np.any(model.light_diffuse[light] > 0) and np.any(model.light_specular[light] > 0):
+        words.append(f"{name!r}, which makes highlights only")
+    if not model.light_castshadow[light]:
+        words.append(f"absent shadows of {name!r}")
+    if model.light_type[light] != _TYPES.mjLIGHT_DIRECTIONAL and np.any(model.light_attenuation[light, :2] > 0):
+        words.append(f"attenuation of {name!r} (mirrored with 1/r², equal at the model's center)")
+    for field, unset in _UNMIRRORED.items():
+        value = float(np.ravel(getattr(model, f"light_{field}")[light])[0])
+        if not math.isclose(value, unset, rel_tol=1e-6, abs_tol=1e-9):
+            words.append(f"{field} = {value:g} of {name!r}")
+    return words
+
+
 def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int, spectra: Spectra) -> dict[str, Any]:
     diffuse, kind = model.light_diffuse[light], model.light_type[light]
     measured = spectra.get(model.light(light).name)
@@ -110,14 +139,21 @@ def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int, spectra: S
         spectrum = emission(diffuse, math.pi, measured)
         return {"type": "directional", "irradiance": spectrum, "to_world": pose(data, light)}
     distance = max(float(np.linalg.norm(data.light_xpos[light] - model.stat.center)), 1e-3)
-    spectrum = emission(diffuse, math.pi * distance**2, measured)
-    if kind == _TYPES.mjLIGHT_POINT or model.light_cutoff[light] >= 90:
+    constant, linear, square = model.light_attenuation[light]
+    falloff = max(float(constant + linear * distance + square * distance**2), 1e-9)
+    spectrum = emission(diffuse, math.pi * distance**2 / falloff, measured)
+    cutoff, exponent = float(model.light_cutoff[light]), float(model.light_exponent[light])
+    if kind == _TYPES.mjLIGHT_POINT or (cutoff >= 90 and exponent == 0):
         return {"type": "point", "intensity": spectrum, "to_world": pose(data, light)}
-    cutoff = float(model.light_cutoff[light])
-    return {
-        "type": "spot",
-        "intensity": spectrum,
-        "to_world": pose(data, light),
-        "cutoff_angle": cutoff,
-        "beam_width": 0.95 * cutoff,
-    }
+    # Mitsuba's beam has to be narrower than its cone.
+    cutoff = min(cutoff, _WIDEST_DEG)
+    spot = {"type": "spot", "intensity": spectrum, "to_world": pose(data, light), "cutoff_angle": cutoff}
+    return spot | {"beam_width": 0.999 * cutoff, "texture": _profile(cutoff, exponent)}
+
+
+def _profile(cutoff_deg: float, exponent: float) -> dict[str, Any]:
+    """cosᵉ of the angle from a spot's axis, as the image that it projects over its cone."""
+    tangent = np.tan(np.radians(cutoff_deg)) * (2 * (np.arange(_PROFILE) + 0.5) / _PROFILE - 1)
+    cosine = 1 / np.sqrt(1 + tangent[:, None] ** 2 + tangent[None, :] ** 2)
+    bitmap = mi.Bitmap(np.ascontiguousarray(cosine**exponent, dtype=np.float32)[..., None])
+    return {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "clamp"}

@@ -1,13 +1,14 @@
 """`mirror(model)`: any MuJoCo model as a spectral Mitsuba scene that follows mjData.
 
-Mirrored: all geoms but height fields and signed distance fields, colours and 2-D textures, lights, perspective
-cameras. Surfaces are Lambertian. What cannot be mirrored is named in one MirrorWarning.
+Mirrored: all geoms, with their materials and textures, lights, the skybox, and cameras. Faces are seen as MuJoCo draws
+them: a camera inside a body looks out of it. What cannot be mirrored is named in one MirrorWarning.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -15,7 +16,7 @@ import mujoco
 import numpy as np
 
 from optics.tabulated import Spectrum
-from sim.scene import cameras, lights, rays, shapes, surfaces
+from sim.scene import bsdfs, cameras, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
 from sim.scene.spectra import in_daylight, of_geom, resolve
 from sim.variant import DEFAULT_VARIANT
@@ -29,7 +30,7 @@ class MirrorWarning(UserWarning):
 
 
 def mirror(
-    model: mujoco.MjModel,
+    model: mujoco.MjModel | mujoco.MjSpec | str | Path,
     data: mujoco.MjData | None = None,
     *,
     bodies: Sequence[str] | None = None,
@@ -39,6 +40,7 @@ def mirror(
 ) -> Mirror:
     """Mirror a MuJoCo model.
 
+    model    an MjModel, or what compiles to one: an MjSpec, the path of an MJCF, URDF or MJB file, MJCF text
     data     poses to start from; None: the model's reference pose
     bodies   names of the bodies whose geoms are wanted ("world" is the static one); None: all
     groups   geom groups that are visible; a geom of alpha 0 never is
@@ -47,10 +49,10 @@ def mirror(
              `optics.Spectrum`, or what `optics.reflectance` and `optics.illuminant` know by name; {"headlight": "A"} is
              the camera's
 
-    Raises ValueError for an unknown body, a variant without spectra, a model without visible geoms, or spectra of what
-    the model does not have.
+    Raises ValueError for a model that does not compile, an unknown body, a variant without spectra, a model without
+    visible geoms, or spectra of what the model does not have; warns once, by MirrorWarning, of what has no counterpart.
     """
-    return Mirror(model, data, bodies=bodies, groups=groups, variant=variant, spectra=spectra)
+    return Mirror(source.load(model), data, bodies=bodies, groups=groups, variant=variant, spectra=spectra)
 
 
 class Mirror:
@@ -77,10 +79,10 @@ class Mirror:
         self.model, self.variant = model, variant
         self.spectra = resolve(model, spectra)
         visible = _visible(model, bodies, groups)
-        self.geoms = np.array([g for g in visible if surfaces.geom_type(model, g) in shapes.MIRRORED], dtype=int)
+        self.geoms = np.array([g for g in visible if shapes.has_shape(model, g)], dtype=int)
         if not len(self.geoms):
             raise ValueError("mirror: the model has no visible geom of a kind that can be mirrored")
-        self._data = _reference_pose(model) if data is None else data
+        self._data = _reference_pose(model) if data is None else _checked(model, data)
         self._parts = {int(g): shapes.parts(model, g) for g in self.geoms}
         self._poses = {g: shapes.pose(self._data, g) for g in self._parts}
         self._bsdfs: dict[Any, Any] = {}
@@ -88,14 +90,17 @@ class Mirror:
             self._emitters, left_out = lights.emitters(model, self._data, self.spectra)
             self.scene = self._build()
             self._params = mi.traverse(self.scene)
-        left_out = _left_out(model, visible) + left_out
+        left_out = inventory.left_out(model, visible, groups) + left_out
         if left_out:
             warnings.warn(f"not mirrored: {'; '.join(left_out)}", MirrorWarning, stacklevel=3)
 
     def sync(self, data: mujoco.MjData) -> None:
         """Move everything to where `data` has it (after mj_forward or mj_step). Only what moved is touched: a scene
-        in which nothing moved is not rebuilt."""
-        self._data = data
+        in which nothing moved is not rebuilt.
+
+        Raises ValueError for the data of another model, and for positions that are not finite.
+        """
+        self._data = _checked(self.model, data)
         with in_variant(self.variant):
             for geom, parts in self._parts.items():
                 pose = shapes.pose(data, geom)
@@ -132,14 +137,18 @@ class Mirror:
         sampler     "independent", or "multijitter" for pictures: less noise
         Units: a white Lambertian that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
         """
-        view = cameras.viewpoint(self.model, self._data, camera)
+        view = self.viewpoint(camera)
         rays.check_size(width, height, spp)
         with in_variant(self.variant):
             if any(e.name == lights.HEADLIGHT for e in self._emitters):
                 self._move_light(lights.HEADLIGHT, lights.aimed(view.position, -view.rotation[:, 2]))
                 self._params.update()
-            sensor = cameras.sensor(view, width, height, self._near())
-            return rays.radiance(self.scene, sensor, integrator, spp, np.asarray(wavelengths, float), seed, sampler)
+            taken = self._camera(view, width, height)
+            return taken.radiance(integrator, spp, np.asarray(wavelengths, float), seed, sampler)
+
+    def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
+        """Where a camera of the model is now, and how it looks."""
+        return cameras.viewpoint(self.model, self._data, camera)
 
     def render_ids(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
         """Geom id seen through the centre of each pixel, (y, x) int32, -1 for none."""
@@ -150,15 +159,21 @@ class Mirror:
         return self._first_hits(camera, width, height)[1]
 
     def _first_hits(self, camera: str | int | Viewpoint, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-        view = cameras.viewpoint(self.model, self._data, camera)
+        view = self.viewpoint(camera)
         rays.check_size(width, height, 1)
         with in_variant(self.variant):
-            sensor = cameras.sensor(view, width, height, self._near())
-            names, points = rays.first_hits(self.scene, sensor)
+            names, points = self._camera(view, width, height).first_hits()
         ids = np.array([int(name.split("_")[1]) if name else -1 for name in names], dtype=np.int32)
         depth = np.full(len(ids), np.inf, dtype=np.float32)
         depth[ids >= 0] = (points[ids >= 0] - view.position) @ -view.rotation[:, 2]
         return ids.reshape(height, width), depth.reshape(height, width)
+
+    def _camera(self, view: Viewpoint, width: int, height: int) -> rays.Camera:
+        """MuJoCo draws planes from both sides, and only the outer side of everything else."""
+        planes = {g for g in self._parts if surfaces.geom_type(self.model, g) == mujoco.mjtGeom.mjGEOM_PLANE}
+        closed = {f"geom_{g}_{k}" for g, parts in self._parts.items() if g not in planes for k in range(len(parts))}
+        sensor = cameras.sensor(view, width, height, self._near())
+        return rays.Camera(self.scene, sensor, frozenset(closed))
 
     def _near(self) -> float:
         return max(float(self.model.vis.map.znear * self.model.stat.extent), 1e-6)
@@ -168,8 +183,8 @@ class Mirror:
         for geom, parts in self._parts.items():
             for k, part in enumerate(parts):
                 name = f"geom_{geom}_{k}"
-                glow = self._glow(geom)
-                description[name] = shapes.build(part, self._poses[geom], name, self._bsdf(geom), glow)
+                bsdf = self._bsdf(geom, part.mirrors)
+                description[name] = shapes.build(part, self._poses[geom], name, bsdf, self._glow(geom))
         for emitter in self._emitters:
             description[emitter.name] = emitter.description
         return mi.load_dict(description)
@@ -184,17 +199,20 @@ class Mirror:
             return lights.emission(np.ones(3), level, in_daylight(measured))
         return lights.emission(surfaces.rgba(self.model, geom)[:3], level)
 
-    def _bsdf(self, geom: int) -> Any:
+    def _bsdf(self, geom: int, mirrors: bool = True) -> Any:
         """Geoms that look alike share one BSDF object."""
         to_uv = shapes.uv_transform(self.model, geom)
         key = (
             self.model.geom_matid[geom],
             tuple(surfaces.rgba(self.model, geom)),
             None if to_uv is None else tuple(to_uv.ravel()),
-            surfaces.is_open(self.model, geom),
+            bsdfs.is_open(self.model, geom),
+            mirrors and bsdfs.mirror_share(self.model, geom) > 0,
+            shapes.is_textured(self.model, geom),
         )
         if key not in self._bsdfs:
-            self._bsdfs[key] = surfaces.bsdf(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
+            measured = of_geom(self.model, geom, self.spectra)
+            self._bsdfs[key] = bsdfs.bsdf(self.model, geom, to_uv, measured, mirrors)
         return self._bsdfs[key]
 
     def _move(self, geom: int, parts: list[shapes.Part], pose: np.ndarray) -> None:
@@ -229,27 +247,15 @@ def _reference_pose(model: mujoco.MjModel) -> mujoco.MjData:
     return data
 
 
-def _left_out(model: mujoco.MjModel, visible: list[int]) -> list[str]:
-    """What of the visible model has no counterpart in the scene, in words."""
-    words = []
-    for g in visible:
-        name = model.geom(g).name or f"geom {g}"
-        if surfaces.geom_type(model, g) not in shapes.MIRRORED:
-            kind = surfaces.geom_type(model, g).name.removeprefix("mjGEOM_").lower()
-            words.append(f"{kind} geom {name!r}")
-        elif surfaces.texture_id(model, g) >= 0 and not shapes.is_textured(model, g):
-            words.append(f"cube texture of geom {name!r}")
-        elif shapes.is_textured(model, g) and _lacks_uv(model, g):
-            words.append(f"texture of geom {name!r}, whose mesh has no texture coordinates")
-    if np.any(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX):
-        words.append("skybox")
-    if model.nflex:
-        words.append(f"{model.nflex} flexes")
-    if model.nskin:
-        words.append(f"{model.nskin} skins")
-    return words
-
-
-def _lacks_uv(model: mujoco.MjModel, geom: int) -> bool:
-    is_mesh = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH
-    return bool(is_mesh and model.mesh_texcoordadr[model.geom_dataid[geom]] < 0)
+def _checked(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
+    """The data, if it is of this model and everything in it is somewhere."""
+    if data.geom_xpos.shape != (model.ngeom, 3) or data.xpos.shape != (model.nbody, 3):
+        raise ValueError(
+            f"mirror: data of {len(data.geom_xpos)} geoms and {len(data.xpos)} bodies is not the model's, which has "
+            f"{model.ngeom} and {model.nbody}"
+        )
+    lost = ~(np.isfinite(data.geom_xpos).all(axis=1) & np.isfinite(data.geom_xmat).all(axis=1))
+    if lost.any():
+        name = model.geom(int(np.argmax(lost))).name or str(int(np.argmax(lost)))
+        raise ValueError(f"mirror: geom {name!r} is at no finite place; the simulation became unstable, reset its data")
+    return data

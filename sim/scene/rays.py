@@ -1,4 +1,5 @@
-"""Rays of a sensor through a scene: what Mitsuba's own film does, but at given wavelengths and pixel centres.
+"""Rays of a sensor through a scene: what Mitsuba's own film does, but at given wavelengths and pixel centres, and with
+the faces that MuJoCo does not draw looked through.
 
 Works on the types of the variant in force: whole wavefronts, or, in a scalar variant, one ray at a time.
 """
@@ -6,6 +7,7 @@ Works on the types of the variant in force: whole wavefronts, or, in a scalar va
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -14,6 +16,7 @@ import numpy as np
 
 LANES = 4  # wavelengths in one mi.Spectrum
 WAVEFRONT = 1 << 21  # rays traced at once
+NESTED = 64  # bodies in each other that a camera may be inside of
 
 
 def check_size(width: int, height: int, spp: int) -> None:
@@ -22,35 +25,124 @@ def check_size(width: int, height: int, spp: int) -> None:
             raise ValueError(f"{name} = {value}, must be at least 1")
 
 
-def radiance(
-    scene: Any,
-    sensor: Any,
-    integrator: str | Mapping[str, Any],
-    spp: int,
-    wavelengths: np.ndarray,
-    seed: int,
-    sampler: str = "independent",
-) -> np.ndarray:
-    """Radiance (band, y, x) float32 at `wavelengths` [m]: the mean over `spp` random positions in each pixel.
+@dataclass(frozen=True)
+class Camera:
+    """scene, sensor: Mitsuba's. one_sided: names of the shapes whose inner side the camera looks through."""
 
-    sampler  of Mitsuba's: "independent", or "multijitter", whose samples of a pixel keep apart: less noise, of another
-             kind than a standard error tells; not in scalar variants, nor for spp that it would round
-    """
-    width, height = (int(n) for n in sensor.film().size())
-    method = mi.load_dict(_description(integrator))
-    samples_at_once = max(1, WAVEFRONT // (width * height))
-    bands = []
-    for start in range(0, len(wavelengths), LANES):
-        nm = 1e9 * wavelengths[start : start + LANES]
-        spectrum = [float(x) for x in np.pad(nm, (0, LANES - len(nm)), mode="edge")]
-        total = np.zeros((LANES, height * width))
-        for done in range(0, spp, samples_at_once):
-            n = min(samples_at_once, spp - done)
-            # The same seed for every group of wavelengths: their rays are the same.
-            sampler_seed = (seed * 0x9E3779B1 + done) & 0xFFFFFFFF
-            total += _sum_of_samples(scene, sensor, method, spectrum, _sampler(sampler, n), sampler_seed)
-        bands.append(total[: len(nm)] / spp)
-    return np.concatenate(bands).reshape(-1, height, width).astype(np.float32)
+    scene: Any
+    sensor: Any
+    one_sided: frozenset[str]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height)"""
+        width, height = (int(n) for n in self.sensor.film().size())
+        return width, height
+
+    def radiance(
+        self,
+        integrator: str | Mapping[str, Any],
+        spp: int,
+        wavelengths: np.ndarray,
+        seed: int,
+        sampler: str = "independent",
+    ) -> np.ndarray:
+        """Radiance (band, y, x) float32 at `wavelengths` [m]: the mean over `spp` random positions in each pixel.
+
+        sampler  of Mitsuba's: "independent", or "multijitter", whose samples of a pixel keep apart: less noise, of
+                 another kind than a standard error tells; not in scalar variants, nor for spp that it would round
+        """
+        width, height = self.size
+        method = mi.load_dict(_description(integrator))
+        samples_at_once = max(1, WAVEFRONT // (width * height))
+        bands = []
+        for start in range(0, len(wavelengths), LANES):
+            nm = 1e9 * wavelengths[start : start + LANES]
+            spectrum = [float(x) for x in np.pad(nm, (0, LANES - len(nm)), mode="edge")]
+            total = np.zeros((LANES, height * width))
+            for done in range(0, spp, samples_at_once):
+                n = min(samples_at_once, spp - done)
+                # The same seed for every group of wavelengths: their rays are the same.
+                sampler_seed = (seed * 0x9E3779B1 + done) & 0xFFFFFFFF
+                total += self._sum_of_samples(method, spectrum, _sampler(sampler, n), sampler_seed)
+            bands.append(total[: len(nm)] / spp)
+        return np.concatenate(bands).reshape(-1, height, width).astype(np.float32)
+
+    def first_hits(self) -> tuple[list[str], np.ndarray]:
+        """Name of the shape seen through each pixel's centre ("" for none), row by row, and the point hit (n, 3)."""
+        width, height = self.size
+        y, x = (a.ravel() for a in np.indices((height, width)))
+        positions = np.stack([(x + 0.5) / width, (y + 0.5) / height]).astype(np.float32)
+        if _is_scalar():
+            hits = [self._scalar_hit(position) for position in positions.T]
+            return [name for name, _ in hits], np.array([point for _, point in hits])
+        ray, _ = self.sensor.sample_ray(0.0, 0.5, mi.Point2f(positions), mi.Point2f(0.5))
+        ray.maxt = dr.inf  # nothing is too far away to be seen
+        si = self._look(ray)
+        names = {_registry_id(shape): shape.id() for shape in self.scene.shapes()}
+        shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
+        found = dr.select(si.is_valid(), shape, 0).numpy()
+        # Of the hit, its distance is exact; its point suffers on shapes as large as a world.
+        return [names[i] if i else "" for i in found], np.array(ray(si.t).numpy(), dtype=float).T
+
+    def _scalar_hit(self, position: np.ndarray) -> tuple[str, np.ndarray]:
+        ray, _ = self.sensor.sample_ray(0.0, 0.5, [float(p) for p in position], [0.5, 0.5])
+        ray.maxt = dr.inf
+        si = self._look(ray)
+        if not si.is_valid():
+            return "", np.full(3, np.nan)
+        return si.shape.id(), np.array(ray(si.t), dtype=float)
+
+    def _look(self, ray: Any) -> Any:
+        """What the ray meets first; its origin is moved past the inner faces in its way."""
+        si = self.scene.ray_intersect(ray)
+        for _ in range(NESTED):
+            inner = self._is_inner(si, ray)
+            if not dr.any(inner):
+                break
+            ray.o = dr.select(inner, si.spawn_ray(ray.d).o, ray.o)
+            si = self.scene.ray_intersect(ray)
+        return si
+
+    def _is_inner(self, si: Any, ray: Any) -> Any:
+        leaving = si.is_valid() & (dr.dot(si.n, ray.d) > 0)
+        if _is_scalar():
+            return bool(leaving) and si.shape.id() in self.one_sided
+        ids = {_registry_id(shape): shape.id() in self.one_sided for shape in self.scene.shapes()}
+        table = mi.Bool([ids.get(i, False) for i in range(max(ids) + 1)])
+        shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
+        return leaving & dr.gather(mi.Bool, table, shape, leaving)
+
+    def _sum_of_samples(self, method: Any, spectrum: list[float], sampler: Any, seed: int) -> np.ndarray:
+        """Sum of the sampler's samples per pixel, (LANES, pixels)."""
+        width, height = self.size
+        n = sampler.sample_count()
+        if _is_scalar():
+            sampler.seed(seed)
+            corners = [(x / width, y / height) for y in range(height) for x in range(width)]
+            return np.array(
+                [sum(self._sample(method, spectrum, sampler, *corner) for _ in range(n)) for corner in corners]
+            ).T
+        pixels = width * height
+        sampler.set_samples_per_wavefront(n)
+        sampler.seed(seed, pixels * n)
+        pixel = dr.arange(mi.UInt32, pixels * n) // n
+        values = self._sample(
+            method, spectrum, sampler, mi.Float(pixel % width) / width, mi.Float(pixel // width) / height
+        )
+        return values.reshape(LANES, pixels, n).sum(axis=2, dtype=float)
+
+    def _sample(self, method: Any, spectrum: list[float], sampler: Any, x: Any, y: Any) -> np.ndarray:
+        width, height = self.size
+        jitter = sampler.next_2d()
+        position = mi.Point2f(x + jitter.x / width, y + jitter.y / height)
+        ray, _ = self.sensor.sample_ray_differential(0.0, 0.5, position, mi.Point2f(0.5))
+        ray.maxt = dr.inf
+        # Opaque to the compiler: other wavelengths are the same kernel.
+        ray.wavelengths = mi.Spectrum(*(x if _is_scalar() else dr.opaque(mi.Float, x) for x in spectrum))
+        self._look(ray)
+        value = method.sample(self.scene, sampler, ray)[0]
+        return np.array(value) if _is_scalar() else np.array(value.numpy(), dtype=float)
 
 
 def _description(integrator: str | Mapping[str, Any]) -> dict[str, Any]:
@@ -61,38 +153,6 @@ def _description(integrator: str | Mapping[str, Any]) -> dict[str, Any]:
     return description
 
 
-def first_hits(scene: Any, sensor: Any) -> tuple[list[str], np.ndarray]:
-    """Name of the shape seen through each pixel's centre ("" for none), row by row, and the point hit (n, 3)."""
-    width, height = (int(n) for n in sensor.film().size())
-    y, x = (a.ravel() for a in np.indices((height, width)))
-    positions = np.stack([(x + 0.5) / width, (y + 0.5) / height]).astype(np.float32)
-    if _is_scalar():
-        hits = [_scalar_hit(scene, sensor, position) for position in positions.T]
-        return [name for name, _ in hits], np.array([point for _, point in hits])
-    ray, _ = sensor.sample_ray(0.0, 0.5, mi.Point2f(positions), mi.Point2f(0.5))
-    ray.maxt = dr.inf  # nothing is too far away to be seen
-    si = scene.ray_intersect(ray)
-    names = {_registry_id(shape): shape.id() for shape in scene.shapes()}
-    shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
-    found = dr.select(si.is_valid(), shape, 0).numpy()
-    # Of the hit, its distance is exact; its point suffers on shapes as large as a world.
-    return [names[i] if i else "" for i in found], np.array(ray(si.t).numpy(), dtype=float).T
-
-
-def _registry_id(shape: Any) -> int:
-    pointer: Any = dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))
-    return int(pointer[0])
-
-
-def _scalar_hit(scene: Any, sensor: Any, position: np.ndarray) -> tuple[str, np.ndarray]:
-    ray, _ = sensor.sample_ray(0.0, 0.5, [float(p) for p in position], [0.5, 0.5])
-    ray.maxt = dr.inf
-    si = scene.ray_intersect(ray)
-    if not si.is_valid():
-        return "", np.full(3, np.nan)
-    return si.shape.id(), np.array(ray(si.t), dtype=float)
-
-
 def _sampler(kind: str, n: int) -> Any:
     sampler: Any = mi.load_dict({"type": kind, "sample_count": n})
     if kind != "independent" and (_is_scalar() or sampler.sample_count() != n):
@@ -100,49 +160,9 @@ def _sampler(kind: str, n: int) -> Any:
     return sampler
 
 
-def _sum_of_samples(scene: Any, sensor: Any, method: Any, spectrum: list[float], sampler: Any, seed: int) -> np.ndarray:
-    """Sum of the sampler's samples per pixel, (LANES, pixels)."""
-    width, height = (int(k) for k in sensor.film().size())
-    n = sampler.sample_count()
-    if _is_scalar():
-        sampler.seed(seed)
-        sums = [
-            sum(
-                _sample(scene, sensor, method, spectrum, sampler, x / width, y / height, width, height)
-                for _ in range(n)
-            )
-            for y in range(height)
-            for x in range(width)
-        ]
-        return np.array(sums).T
-    pixels = width * height
-    sampler.set_samples_per_wavefront(n)
-    sampler.seed(seed, pixels * n)
-    pixel = dr.arange(mi.UInt32, pixels * n) // n
-    x, y = mi.Float(pixel % width) / width, mi.Float(pixel // width) / height
-    values = _sample(scene, sensor, method, spectrum, sampler, x, y, width, height)
-    return values.reshape(LANES, pixels, n).sum(axis=2, dtype=float)
-
-
-def _sample(
-    scene: Any,
-    sensor: Any,
-    method: Any,
-    spectrum: list[float],
-    sampler: Any,
-    x: Any,
-    y: Any,
-    width: int,
-    height: int,
-) -> np.ndarray:
-    jitter = sampler.next_2d()
-    position = mi.Point2f(x + jitter.x / width, y + jitter.y / height)
-    ray, _ = sensor.sample_ray_differential(0.0, 0.5, position, mi.Point2f(0.5))
-    ray.maxt = dr.inf
-    # Opaque to the compiler: other wavelengths are the same kernel.
-    ray.wavelengths = mi.Spectrum(*(x if _is_scalar() else dr.opaque(mi.Float, x) for x in spectrum))
-    value = method.sample(scene, sampler, ray)[0]
-    return np.array(value) if _is_scalar() else np.array(value.numpy(), dtype=float)
+def _registry_id(shape: Any) -> int:
+    pointer: Any = dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))
+    return int(pointer[0])
 
 
 def _is_scalar() -> bool:

@@ -4,41 +4,48 @@ cylinder, disk, ellipsoids); everything whose texture coordinates Mitsuba would 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mitsuba as mi
 import mujoco
 import numpy as np
 
-from sim.scene import surfaces, tessellation
+from sim.scene import bsdfs, cube, surfaces, tessellation
 from sim.scene.tessellation import Triangles
 
 _TYPES = mujoco.mjtGeom
-MIRRORED = (
+_PRIMITIVES = (
     _TYPES.mjGEOM_PLANE,
     _TYPES.mjGEOM_SPHERE,
     _TYPES.mjGEOM_CAPSULE,
     _TYPES.mjGEOM_ELLIPSOID,
     _TYPES.mjGEOM_CYLINDER,
     _TYPES.mjGEOM_BOX,
-    _TYPES.mjGEOM_MESH,
 )
+_ASSETS = (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF, _TYPES.mjGEOM_HFIELD)
 
 
 # Half side of an infinite plane in units of the model's extent: an eye one extent above it sees its end 1e-4 rad below
 # the horizon, and float32 lays texture and shadows on it to 1e-3 of an extent. (Triangles of that size would be hit in
 # the wrong places; Mitsuba's rectangle is solved in closed form.)
 INFINITY = 1e4
+# Longest semi-axis over the shortest up to which Mitsuba's `ellipsoids` are hit where they are: they are solved in
+# float32, and at 5 some rays miss the limb, at 35 many hit what is not there. Flatter ones are tessellated.
+ROUND = 3.0
 
 
 @dataclass(frozen=True)
 class Part:
-    """One Mitsuba shape of a geom: a plugin placed by `local` (4, 4) in the geom's frame, or triangles."""
+    """One Mitsuba shape of a geom: a plugin placed by `local` (4, 4) in the geom's frame, or triangles.
+
+    mirrors: whether the geom's mirror share is on it, if it has one
+    """
 
     plugin: str = ""
     local: np.ndarray | None = None
     triangles: Triangles | None = None
+    mirrors: bool = True
 
     def placement(self, pose: np.ndarray) -> dict[str, Any]:
         """What puts the shape where a geom's pose (4, 4) says: names and values of Mitsuba's parameters."""
@@ -72,16 +79,28 @@ def pose(data: mujoco.MjData, geom: int) -> np.ndarray:
     return matrix
 
 
+def has_shape(model: mujoco.MjModel, geom: int) -> bool:
+    """Whether a geom is of a kind that is mirrored, and its asset is there (a user-defined sdf has no mesh)."""
+    kind = surfaces.geom_type(model, geom)
+    return kind in _PRIMITIVES or (kind in _ASSETS and model.geom_dataid[geom] >= 0)
+
+
 def is_textured(model: mujoco.MjModel, geom: int) -> bool:
     texture = surfaces.texture_id(model, geom)
-    return texture >= 0 and bool(model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D)
+    return texture >= 0 and surfaces.is_mirrored(model, geom, texture)
+
+
+def _is_cubic(model: mujoco.MjModel, geom: int) -> bool:
+    return is_textured(model, geom) and surfaces.faces_of(model, surfaces.texture_id(model, geom)) > 0
 
 
 def uv_transform(model: mujoco.MjModel, geom: int) -> np.ndarray | None:
     """(3, 3) from Mitsuba's own texture coordinates of a shape to MuJoCo's, repeats included; None where the
     triangles carry MuJoCo's already, or nothing asks for them."""
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
-    if not is_textured(model, geom) or kind not in (_TYPES.mjGEOM_SPHERE, _TYPES.mjGEOM_PLANE):
+    if not is_textured(model, geom) or _is_cubic(model, geom):
+        return None
+    if kind not in (_TYPES.mjGEOM_SPHERE, _TYPES.mjGEOM_PLANE):
         return None
     if kind == _TYPES.mjGEOM_SPHERE:
         # Both have u = azimuth / 2π, v = polar angle / π from +z.
@@ -104,34 +123,63 @@ def _half_sides(model: mujoco.MjModel, geom: int) -> np.ndarray:
 def parts(model: mujoco.MjModel, geom: int) -> list[Part]:
     """The shapes that make up a geom."""
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
-    if kind == _TYPES.mjGEOM_SPHERE:
+    if kind == _TYPES.mjGEOM_SPHERE and not _is_cubic(model, geom):
         return [Part("sphere", _placed(size[0], size[0], size[0]))]
     if kind == _TYPES.mjGEOM_PLANE:
         return [Part("rectangle", _scaled([*_half_sides(model, geom), 1.0]))]
-    if not is_textured(model, geom) and kind == _TYPES.mjGEOM_ELLIPSOID:
+    if not is_textured(model, geom) and kind == _TYPES.mjGEOM_ELLIPSOID and size.max() <= ROUND * size.min():
         return [Part("ellipsoids", _scaled(size))]
     if not is_textured(model, geom) and kind in (_TYPES.mjGEOM_CYLINDER, _TYPES.mjGEOM_CAPSULE):
         return _exact_cylinder(kind, size[0], size[1])
-    return [Part(triangles=_triangles(model, geom))]
+    triangles = _triangles(model, geom)
+    if kind != _TYPES.mjGEOM_BOX or bsdfs.mirror_share(model, geom) == 0:
+        return [Part(triangles=triangles)]
+    top = (triangles.vertices[triangles.faces][..., 2] > size[2] * (1 - 1e-9)).all(axis=1)
+    return [Part(triangles=triangles.only(~top), mirrors=False), Part(triangles=triangles.only(top))]
 
 
 def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
-    kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
-    if kind == _TYPES.mjGEOM_MESH:
+    kind, size = surfaces.geom_type(model, geom), _half_sizes(model, geom)
+    if kind in (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF):
         triangles = tessellation.mesh(model, model.geom_dataid[geom])
+    elif kind == _TYPES.mjGEOM_HFIELD:
+        triangles = tessellation.height_field(model, model.geom_dataid[geom])
     elif kind == _TYPES.mjGEOM_BOX:
         triangles = tessellation.box(size)
-    elif kind == _TYPES.mjGEOM_ELLIPSOID:
-        triangles = tessellation.ellipsoid(size)
     elif kind == _TYPES.mjGEOM_CYLINDER:
-        triangles = tessellation.cylinder(size[0], size[1])
+        triangles = tessellation.cylinder(size[0], size[2])
+    elif kind == _TYPES.mjGEOM_CAPSULE:
+        triangles = tessellation.capsule(size[0], size[2])
     else:
-        triangles = tessellation.capsule(size[0], size[1])
+        triangles = tessellation.ellipsoid(size)
     if not is_textured(model, geom):
         return triangles
+    if _is_cubic(model, geom):
+        return _wrapped(model, geom, triangles, size)
+    repeat = surfaces.texture_repeat(model, geom, size)
+    if triangles.uv is None:
+        # MuJoCo projects the image along z: (x, -y) / 2 half sizes - 1/2, the repeats before the shift.
+        uv = triangles.vertices[:, :2] / size[:2] * repeat * [0.5, -0.5] - 0.5
+        return replace(triangles, uv=uv)
+    return triangles.repeated(repeat)
+
+
+def _wrapped(model: mujoco.MjModel, geom: int, triangles: Triangles, size: np.ndarray) -> Triangles:
+    """Triangles under a cube texture."""
+    texture = surfaces.texture_id(model, geom)
+    uniform = bool(model.mat_texuniform[model.geom_matid[geom]])
+    towards = cube.directions(triangles.vertices, surfaces.geom_type(model, geom), size, uniform)
+    return cube.laid(triangles, towards, int(model.tex_width[texture]), surfaces.faces_of(model, texture))
+
+
+def _half_sizes(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """What MuJoCo's renderer takes for half sizes along x, y, z."""
+    kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
+    if kind == _TYPES.mjGEOM_SPHERE:
+        return np.repeat(size[0], 3)
     if kind in (_TYPES.mjGEOM_CYLINDER, _TYPES.mjGEOM_CAPSULE):
-        size = np.array([size[0], size[0], size[1]])  # MuJoCo's renderer: half sizes along x, y, z
-    return triangles.repeated(surfaces.texture_repeat(model, geom, size))
+        return np.array([size[0], size[0], size[1]])
+    return np.asarray(size, float)
 
 
 def _exact_cylinder(kind: mujoco.mjtGeom, radius: float, half_length: float) -> list[Part]:

@@ -29,6 +29,10 @@ class Triangles:
         """The same, the texture repeated (u, v) times."""
         return self if self.uv is None else replace(self, uv=self.uv * repeat)
 
+    def only(self, which: np.ndarray) -> Triangles:
+        """The same with only some of its faces, by mask (m,)."""
+        return replace(self, faces=self.faces[which])
+
 
 def join(parts: list[Triangles]) -> Triangles:
     """One mesh of several; all or none have texture coordinates, and all or none normals."""
@@ -41,9 +45,6 @@ def join(parts: list[Triangles]) -> Triangles:
         uv=np.concatenate(uvs) if uvs else None,
         normals=np.concatenate(normals) if normals else None,
     )
-
-
-_QUAD = np.array([[0, 1, 2], [0, 2, 3]])
 
 
 _QUAD = np.array([[0, 1, 2], [0, 2, 3]])
@@ -117,6 +118,38 @@ def mesh(model: mujoco.MjModel, mesh_id: int) -> Triangles:
         flat = np.repeat(flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300), 3, axis=0)
         normals = np.where(np.sum(normals * flat, axis=1, keepdims=True) < 0.8, flat, normals)
     return Triangles(vertices, np.arange(len(vertices)).reshape(-1, 3), uv, normals)
+
+
+def height_field(model: mujoco.MjModel, field: int) -> Triangles:
+    """A height field asset as the closed solid that MuJoCo draws: facets whose diagonals run from the lower left to the
+    upper right corner of each cell, walls along its four sides, and a base."""
+    rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
+    sx, sy, top, base = model.hfield_size[field]
+    start = model.hfield_adr[field]
+    z = top * model.hfield_data[start : start + rows * columns].astype(float)
+    y, x = np.meshgrid(np.linspace(-sy, sy, rows), np.linspace(-sx, sx, columns), indexing="ij")
+    index = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (i.ravel() for i in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
+    surface = Triangles(
+        np.column_stack([x.ravel(), y.ravel(), z]),
+        np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])]),
+    )
+    # Counter-clockwise around the field as seen from above.
+    rim = (index[0, :], index[:, -1], index[-1, ::-1], index[::-1, 0])
+    return join([surface, *(_wall(surface.vertices[edge], base) for edge in rim), _base(sx, sy, base)])
+
+
+def _wall(edge: np.ndarray, base: float) -> Triangles:
+    """From an edge (n, 3) of the surface down to the base."""
+    n = len(edge)
+    foot = np.column_stack([edge[:, :2], np.full(n, -base)])
+    i = np.arange(n - 1)
+    faces = np.concatenate([np.column_stack([n + i, n + i + 1, i + 1]), np.column_stack([n + i, i + 1, i])])
+    return Triangles(np.concatenate([edge, foot]), faces)
+
+
+def _base(sx: float, sy: float, base: float) -> Triangles:
+    return Triangles(np.array([[-sx, -sy, -base], [-sx, sy, -base], [sx, sy, -base], [sx, -sy, -base]]), _QUAD)
 
 
 def _arc(start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,10 @@ KINDS = (
     (GEOM.mjGEOM_CYLINDER, [0.2, 0.3, 0]),
     (GEOM.mjGEOM_ELLIPSOID, [0.4, 0.15, 0.25]),
     (GEOM.mjGEOM_MESH, [0, 0, 0]),
+    (GEOM.mjGEOM_HFIELD, [0, 0, 0]),
 )
+# Its rays meet an octree's approximation of the mesh that is drawn.
+SDF = ((GEOM.mjGEOM_SDF, [0, 0, 0]),)
 
 
 def random_quat(rng):
@@ -40,7 +43,7 @@ def add_gradient(spec, name="gradient"):
     spec.add_material(name=name).textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
 
 
-def every_kind(seed, textured=False, mocap=False):
+def every_kind(seed, textured=False, mocap=False, kinds=KINDS):
     """An infinite floor and two geoms of every kind, each on its own body at a random pose, and a camera."""
     rng = np.random.default_rng(seed)
     spec = mujoco.MjSpec()
@@ -51,9 +54,11 @@ def every_kind(seed, textured=False, mocap=False):
         uservert=(0.3 * np.array(TETRAHEDRON)).ravel().tolist(),
         userface=np.ravel(TETRAHEDRON_FACES).tolist(),
     )
+    hills = spec.add_hfield(name="hills", nrow=4, ncol=6, size=[0.3, 0.25, 0.2, 0.1])
+    hills.userdata = rng.uniform(0, 1, 24).tolist()
     add_gradient(spec)
     spec.worldbody.add_geom(name="floor", type=GEOM.mjGEOM_PLANE, size=[0, 0, 0.1])
-    for i, (kind, size) in enumerate(2 * KINDS):
+    for i, (kind, size) in enumerate(2 * kinds):
         body = spec.worldbody.add_body(
             name=f"body_{i}",
             mocap=mocap,
@@ -61,8 +66,12 @@ def every_kind(seed, textured=False, mocap=False):
             # A plane has no back side for MuJoCo's rays: it keeps facing the camera.
             quat=[1, 0, 0, 0] if kind == GEOM.mjGEOM_PLANE else random_quat(rng),
         )
-        arguments = {"meshname": "tetrahedron"} if kind == GEOM.mjGEOM_MESH else {"size": size}
-        if textured and kind != GEOM.mjGEOM_MESH:
+        arguments = {"size": size}
+        if kind == GEOM.mjGEOM_HFIELD:
+            arguments = {"hfieldname": "hills"}
+        elif kind in (GEOM.mjGEOM_MESH, GEOM.mjGEOM_SDF):
+            arguments = {"meshname": "tetrahedron"}
+        if textured:
             arguments["material"] = "gradient"
         body.add_geom(
             type=kind, contype=0, conaffinity=0, pos=rng.uniform(-0.1, 0.1, 3).tolist(),

@@ -5,6 +5,8 @@ open cylinders, a capsule's caps at one end, ellipsoid's quaternion with its rea
 reversed, π forgotten, colours not linearised, sync that does nothing.
 """
 
+import warnings
+
 import mujoco
 import numpy as np
 import pytest
@@ -81,7 +83,7 @@ def test_sync_moves_geoms_camera_and_light():
     before = assert_agrees(mirror, model, data, "camera", 120, 90)
     rng = np.random.default_rng(5)
     data.mocap_pos += rng.uniform(-0.3, 0.3, data.mocap_pos.shape)
-    planes = np.isin(np.arange(model.nmocap), [2, 9])
+    planes = np.array([kind == models.GEOM.mjGEOM_PLANE for kind, _ in 2 * models.KINDS])
     data.mocap_quat[~planes] = [models.random_quat(rng) for _ in range(int(np.sum(~planes)))]
     mujoco.mj_forward(model, data)
     mirror.sync(data)
@@ -201,19 +203,48 @@ def test_emissive_material_glows():
 
 
 def test_what_cannot_be_mirrored_is_named_once():
-    spec = mujoco.MjSpec()
-    field = spec.add_hfield(name="hills", nrow=2, ncol=2, size=[1, 1, 1, 0.1])
-    field.userdata = [0.0, 1.0, 0.0, 1.0]
-    spec.worldbody.add_geom(name="ground", type=models.GEOM.mjGEOM_HFIELD, hfieldname="hills")
-    spec.worldbody.add_geom(type=models.GEOM.mjGEOM_SPHERE, size=[1, 0, 0])
-    sky = mujoco.mjtTexture.mjTEXTURE_SKYBOX
-    spec.add_texture(name="sky", type=sky, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, width=8, height=48)
+    xml = """<mujoco><visual><headlight ambient="0.1 0.1 0.1" diffuse="0 0 0"/></visual><asset>
+    <texture name="sky" type="skybox" builtin="flat" rgb1="1 1 1" width="8" height="48"/>
+    <texture name="sky2" type="skybox" builtin="flat" width="8" height="48"/>
+    <texture name="cube" type="cube" builtin="flat" width="8" height="48"/>
+    <texture name="bumps" type="2d" builtin="flat" width="8" height="8"/>
+    <material name="cubic" texture="cube"/>
+    <material name="rough"><layer role="normal" texture="bumps"/></material></asset>
+    <worldbody>
+    <light name="lamp" pos="0 0 3" attenuation="1 0 0" castshadow="false" ambient="1 1 1" bulbradius="0.3"/>
+    <light name="off" active="false" castshadow="false"/>
+    <geom name="ground" type="plane" size="0 0 1" material="cubic"/><geom name="ball" size="1" material="rough"/>
+    <geom name="hidden" size="1" material="cubic" group="3"/>
+    <site name="seen" size="0.1"/><site name="unseen" size="0.1" group="4"/>
+    <body pos="2 0 0"><freejoint/><geom size="0.1"/><site name="end"/></body></worldbody>
+    <tendon><spatial><site site="seen"/><site site="end"/></spatial></tendon></mujoco>"""
     with pytest.warns(MirrorWarning) as caught:
-        mirror = sim.mirror(spec.compile())
+        mirror = sim.mirror(xml)
     (message,) = (str(w.message) for w in caught)
-    assert "hfield geom 'ground'" in message
-    assert "skybox" in message
-    assert list(mirror.geoms) == [1]
+    for words in (
+        "cube texture on plane geom 'ground'",
+        "normal texture of material 'rough'",
+        "1 more skyboxes",
+        "light of the sky below 360 nm",
+        "haze",
+        "2 sites",
+        "1 tendon",
+        "ambient part of the headlight",
+        "ambient part of 'lamp'",
+        "absent shadows of 'lamp'",
+        "attenuation of 'lamp'",
+        "bulbradius = 0.3 of 'lamp'",
+    ):
+        assert words in message
+    assert message.count(";") == 11
+    assert list(mirror.geoms) == [0, 1, 3]
+
+
+def test_a_model_that_can_be_mirrored_wholly_is_mirrored_without_a_word():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sim.mirror(_xml(LIGHT, WHITE))
+        sim.mirror(models.every_kind(0, textured=True, kinds=models.KINDS + models.SDF))
 
 
 def test_invisible_geoms_and_other_bodies_are_left_out():
@@ -257,17 +288,21 @@ def test_the_callers_variant_stays_in_force():
 
 
 def test_geom_ids_agree_with_mujocos_renderer():
-    """The rays of the oracle, and the mirror, against pixels that MuJoCo draws."""
-    model = models.every_kind(0)
+    """The rays of the oracle, and the mirror, against pixels that MuJoCo draws; signed distance fields are drawn as
+    meshes, which rays do not see."""
+    model = models.every_kind(0, kinds=models.KINDS + models.SDF)
     model.vis.quality.numslices = model.vis.quality.numstacks = 100
+    model.vis.map.zfar = 1e4  # the floor reaches to the horizon
     pictures = draw([model], 200, 150)
     if pictures is None:
         pytest.skip("no OpenGL context: compared with MuJoCo's ray casting alone")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    ids, _ = camera_hits(model, data, "camera", 200, 150)
-    assert np.mean(pictures[1][0] == ids) >= 0.995
-    assert np.mean(pictures[1][0] == sim.mirror(model, data).render_ids("camera", 200, 150)) >= 0.995
+    drawn, (ids, _) = pictures[1][0], camera_hits(model, data, "camera", 200, 150)
+    meshes = np.isin([ids, drawn], np.flatnonzero(model.geom_type == models.GEOM.mjGEOM_SDF)).any(axis=0)
+    assert np.mean((drawn == ids)[~meshes]) >= 0.995
+    assert meshes.mean() > 0.01
+    assert np.mean(drawn == sim.mirror(model, data).render_ids("camera", 200, 150)) >= 0.995
 
 
 def test_viewpoint_looks_where_it_is_told():

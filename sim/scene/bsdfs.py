@@ -1,0 +1,107 @@
+"""Materials as Mitsuba BSDFs. A surface is Lambertian unless its material asks for more:
+
+- specular > 0: under a rough dielectric coat, of reflectance 0.08 specular at normal incidence (0.5 is glass of index
+  1.5; Burley 2012) and of Beckmann roughness √(2 / (n + 2)) for the exponent n = 128 shininess (Walter et al. 2007).
+  specular = shininess = 0.5 is how MuJoCo's compiler says that neither was set: Lambertian.
+- metallic or roughness set: Burley's principled BSDF.
+- reflectance, on planes and on top of boxes as in MuJoCo: that share of the light is reflected as by a mirror.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from optics.tabulated import Spectrum
+from sim.color import decode_srgb
+from sim.scene import spectra, surfaces
+
+_TYPES = mujoco.mjtGeom
+_UNSET_GLOSS = (0.5, 0.5)  # specular, shininess
+_OPAQUE = 0.995  # MuJoCo calls what is below transparent
+
+
+def is_open(model: mujoco.MjModel, geom: int) -> bool:
+    """Whether the inner side of a geom's surface can be seen."""
+    return surfaces.geom_type(model, geom) in (_TYPES.mjGEOM_PLANE, _TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF)
+
+
+def mirror_share(model: mujoco.MjModel, geom: int) -> float:
+    """Share of the light that a geom's plane, or a box's top, reflects as a mirror does."""
+    material = model.geom_matid[geom]
+    flat = surfaces.geom_type(model, geom) in (_TYPES.mjGEOM_PLANE, _TYPES.mjGEOM_BOX)
+    if material < 0 or not flat or surfaces.rgba(model, geom)[3] < _OPAQUE:
+        return 0.0
+    return float(np.clip(model.mat_reflectance[material], 0, 1))
+
+
+def bsdf(
+    model: mujoco.MjModel,
+    geom: int,
+    to_uv: np.ndarray | None = None,
+    measured: Spectrum | None = None,
+    mirrors: bool = True,
+) -> Any:
+    """A geom's BSDF (a Mitsuba object of the variant in force): both sides of planes and meshes, which may be open;
+    see-through by its rgba's alpha.
+
+    measured: a reflectance that takes the place of its colour. mirrors: whether its mirror share counts.
+    """
+    if measured is None:
+        description = _matter(model, geom, surfaces.reflectance(model, geom, to_uv))
+    else:
+        description = _measured(model, geom, to_uv, measured)
+    share = mirror_share(model, geom) if mirrors else 0.0
+    if share > 0:
+        silver = {"type": "conductor", "material": "none"}
+        description = {"type": "blendbsdf", "weight": share, "bsdf_0": description, "bsdf_1": silver}
+    if is_open(model, geom):
+        description = {"type": "twosided", "inside": description}
+    alpha = float(surfaces.rgba(model, geom)[3])
+    if alpha < 1:
+        description = {"type": "mask", "opacity": alpha, "inside": description}
+    return mi.load_dict(description)
+
+
+def _matter(model: mujoco.MjModel, geom: int, color: dict[str, Any]) -> dict[str, Any]:
+    """Mitsuba BSDF of a geom's material in a colour (a Mitsuba texture)."""
+    material = model.geom_matid[geom]
+    if material < 0:
+        return {"type": "diffuse", "reflectance": color}
+    metallic, roughness = float(model.mat_metallic[material]), float(model.mat_roughness[material])
+    if metallic >= 0 or roughness >= 0:
+        parameters = {"metallic": max(metallic, 0.0), "roughness": roughness if roughness >= 0 else 1.0}
+        return {"type": "principled", "base_color": color, **parameters}
+    specular, shininess = float(model.mat_specular[material]), float(model.mat_shininess[material])
+    if specular <= 0 or (specular, shininess) == _UNSET_GLOSS:
+        return {"type": "diffuse", "reflectance": color}
+    root = np.sqrt(0.08 * min(specular, 1.0))
+    return {
+        "type": "roughplastic",
+        "diffuse_reflectance": color,
+        "int_ior": float((1 + root) / (1 - root)),
+        "ext_ior": 1.0,
+        "distribution": "beckmann",
+        "alpha": float(np.sqrt(2 / (128 * np.clip(shininess, 0, 1) + 2))),
+    }
+
+
+def _measured(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, spectrum: Spectrum) -> dict[str, Any]:
+    """Mitsuba BSDF of a measured reflectance, multiplied by the geom's texture if it has one."""
+    whole = _matter(model, geom, spectra.described(spectrum))
+    texture = surfaces.texture_id(model, geom)
+    if texture < 0 or not surfaces.is_mirrored(model, geom, texture):
+        return whole
+    pixels = surfaces.image(model, texture)
+    if np.ptp(pixels, axis=2).max() > 0:
+        name = model.material(int(model.geom_matid[geom])).name
+        raise ValueError(f"spectra: material {name!r} has a coloured texture: must be grey beside a spectrum")
+    is_linear = model.tex_colorspace[texture] == mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
+    share = pixels[..., :1] if is_linear else decode_srgb(pixels[..., :1])
+    # Mitsuba multiplies no textures: black and the whole reflectance are mixed instead, pixel by pixel.
+    black = _matter(model, geom, {"type": "uniform", "value": 0.0})
+    weight = surfaces.bitmap(share, to_uv) | {"raw": True}
+    return {"type": "blendbsdf", "weight": weight, "bsdf_0": black, "bsdf_1": whole}

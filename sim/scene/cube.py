@@ -1,0 +1,136 @@
+"""Cube textures: six square images around a geom, laid on its triangles.
+
+MuJoCo looks a cube texture up by direction: a point's coordinates in the geom's frame, divided by its half sizes
+unless the texture is uniform. Mitsuba has no such texture, so triangles are cut where two faces meet and get
+texture coordinates in one image that holds the six faces below each other, R L U D F B as MuJoCo stores them:
+R/L = +x/-x, U/D = +y/-y, F/B = +z/-z (the faces' own axes are OpenGL's, table 3.19 of its 2.1 specification).
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from sim.scene.tessellation import Triangles
+
+BORDER = 1  # texels around each face that repeat its edge, so that bilinear lookups do not bleed into its neighbours
+# Of each face: the axis it faces and its sign, the axes of the image's columns and rows and their signs.
+_MAJOR, _MAJOR_SIGN = np.array([0, 0, 1, 1, 2, 2]), np.array([1, -1, 1, -1, 1, -1])
+_COLUMN, _COLUMN_SIGN = np.array([2, 2, 0, 0, 0, 0]), np.array([-1, 1, 1, 1, 1, -1])
+_ROW, _ROW_SIGN = np.array([1, 1, 2, 2, 1, 1]), np.array([-1, -1, 1, -1, -1, -1])
+_SEAMS = ((0, 1, 1), (0, 1, -1), (1, 2, 1), (1, 2, -1), (0, 2, 1), (0, 2, -1))  # planes d_a = ± d_b between faces
+# Coordinates are a ratio of two that are linear on a triangle; taken as linear themselves they are wrong by about
+# an eighth of their span times the divisor's. Triangles are halved until that is below this fraction of a face.
+TOLERANCE = 2e-3
+_HALVINGS = 12
+
+
+def padded(pixels: np.ndarray) -> np.ndarray:
+    """Faces below each other (n w, w, 3), with a border around each: (n (w + 2), w + 2, 3)."""
+    width = pixels.shape[1]
+    faces = pixels.reshape(-1, width, width, 3)
+    margin = (BORDER, BORDER)
+    return np.pad(faces, ((0, 0), margin, margin, (0, 0)), mode="edge").reshape(-1, width + 2 * BORDER, 3)
+
+
+def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uniform: bool) -> np.ndarray:
+    """Where MuJoCo looks a cube texture up, (n, 3), for points (n, 3) in a geom's frame.
+
+    size: half sizes (3,) along x, y, z. A capsule's are those of its side: its caps are looked up as if the side's
+    unit cylinder went on.
+    """
+    if kind in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_HFIELD):
+        found = vertices.copy()
+    else:
+        found = vertices / size
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        beyond = np.abs(vertices[:, 2]) - size[2]
+        cap = beyond > 0
+        found[cap, 2] = np.sign(vertices[cap, 2]) * (1 + beyond[cap] / size[0])
+    return found * size if uniform else found
+
+
+def look_up(towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Face (n,) of directions (n, 3), and where on it (n, 2): column and row in [0, 1], row 0 on top."""
+    axis = np.argmax(np.abs(towards), axis=1)
+    face = 2 * axis + (np.take_along_axis(towards, axis[:, None], 1)[:, 0] < 0)
+    return face, _on_face(towards, face)
+
+
+def laid(triangles: Triangles, towards: np.ndarray, width: int, n_faces: int) -> Triangles:
+    """The triangles, cut along the seams, with texture coordinates in the padded image of n_faces (6, or 1 that is
+    on all sides) of `width` texels. towards: directions of the vertices, (n, 3)."""
+    corners = np.concatenate([triangles.vertices, towards], axis=1)
+    if triangles.normals is not None:
+        corners = np.concatenate([corners, triangles.normals], axis=1)
+    pieces = corners[triangles.faces]  # (triangle, corner, position | direction | normal)
+    for a, b, sign in _SEAMS:
+        pieces = _cut(pieces, pieces[..., 3 + a] - sign * pieces[..., 3 + b])
+    pieces = _halved(pieces)
+    flat = pieces.reshape(-1, pieces.shape[2])
+    face = np.repeat(_face_of(pieces), 3)
+    at = _on_face(flat[:, 3:6], face)
+    pitch = width + 2 * BORDER
+    row = (face if n_faces > 1 else 0) * pitch + BORDER + at[:, 1] * width
+    uv = np.column_stack([(BORDER + at[:, 0] * width) / pitch, row / (n_faces * pitch)])
+    normals = None
+    if triangles.normals is not None:
+        normals = flat[:, 6:] / np.maximum(np.linalg.norm(flat[:, 6:], axis=1, keepdims=True), 1e-300)
+    return Triangles(flat[:, :3], np.arange(len(flat)).reshape(-1, 3), uv, normals)
+
+
+def _on_face(towards: np.ndarray, face: np.ndarray) -> np.ndarray:
+    lane = np.arange(len(towards))
+    major = np.maximum(towards[lane, _MAJOR[face]] * _MAJOR_SIGN[face], 1e-12)
+    column = towards[lane, _COLUMN[face]] * _COLUMN_SIGN[face] / major
+    row = towards[lane, _ROW[face]] * _ROW_SIGN[face] / major
+    return np.clip((np.column_stack([column, row]) + 1) / 2, 0, 1)
+
+
+def _face_of(pieces: np.ndarray) -> np.ndarray:
+    return look_up(pieces[:, :, 3:6].mean(axis=1))[0]
+
+
+def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """Triangles cut in two or three where `side` (triangle, corner) changes its sign."""
+    side = np.where(np.abs(side) < 1e-9 * np.abs(side).max(initial=0), 0, side)
+    crossed = (side.max(axis=1) > 0) & (side.min(axis=1) < 0)
+    whole, cut, side = pieces[~crossed], pieces[crossed], side[crossed]
+    # Turn each triangle so that its first corner is alone on its side (a corner on the seam counts with the others).
+    positive = (side > 0).sum(axis=1)
+    lone = np.where(positive == 1, np.argmax(side, axis=1), np.argmin(side, axis=1))
+    turn = (lone[:, None] + np.arange(3)) % 3
+    cut, side = np.take_along_axis(cut, turn[..., None], 1), np.take_along_axis(side, turn, 1)
+    # Where the edges to the other two corners meet the seam; a corner on it stays where it is.
+    along = (side[:, :1] / (side[:, :1] - side[:, 1:]))[..., None]
+    seam = cut[:, :1] + along * (cut[:, 1:] - cut[:, :1])
+    tip = np.stack([cut[:, 0], seam[:, 0], seam[:, 1]], axis=1)
+    near = np.stack([seam[:, 0], cut[:, 1], cut[:, 2]], axis=1)
+    far = np.stack([seam[:, 0], cut[:, 2], seam[:, 1]], axis=1)
+    return np.concatenate([whole, tip, near[side[:, 1] != 0], far[side[:, 2] != 0]])
+
+
+def _halved(pieces: np.ndarray) -> np.ndarray:
+    """Triangles halved along their longest edge until their texture coordinates are as good as linear."""
+    done = []
+    for _ in range(_HALVINGS):
+        bent = _bend(pieces) > TOLERANCE
+        done.append(pieces[~bent])
+        pieces = pieces[bent]
+        if not len(pieces):
+            break
+        edges = np.linalg.norm(np.roll(pieces, -1, axis=1)[..., 3:6] - pieces[..., 3:6], axis=2)
+        turn = (np.argmax(edges, axis=1)[:, None] + np.arange(3)) % 3
+        a, b, c = np.moveaxis(np.take_along_axis(pieces, turn[..., None], 1), 1, 0)
+        middle = (a + b) / 2
+        pieces = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    return np.concatenate([*done, pieces])
+
+
+def _bend(pieces: np.ndarray) -> np.ndarray:
+    """About the error of linear texture coordinates, as a fraction of a face, per triangle."""
+    face = _face_of(pieces)
+    major = np.take_along_axis(pieces[..., 3:6], _MAJOR[face][:, None, None], 2)[..., 0] * _MAJOR_SIGN[face][:, None]
+    at = _on_face(pieces[..., 3:6].reshape(-1, 3), np.repeat(face, 3)).reshape(-1, 3, 2)
+    ratio = major.max(axis=1) / np.maximum(major.min(axis=1), 1e-9)
+    return np.ptp(at, axis=1).max(axis=1) * (ratio - 1) / 8

@@ -1,0 +1,73 @@
+"""MuJoCo's skybox as the light that comes from infinity.
+
+A skybox is drawn behind everything; here it also shines, as a sky does: white of it has the radiance of a white
+Lambertian that faces a light of diffuse 1, between 360 and 780 nm. MuJoCo looks it up by (x, z, -y): faces R/L are
+seen towards +x/-x, U/D towards +z/-z, F/B towards -y/+y.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from sim.scene import cube, surfaces
+
+MAX_ROWS = 1024  # of the panorama
+
+
+def texture(model: mujoco.MjModel) -> int:
+    """The skybox that MuJoCo draws, the first; -1 for none."""
+    found = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
+    return int(found[0]) if len(found) else -1
+
+
+def description(model: mujoco.MjModel, white: float) -> dict[str, Any] | None:
+    """Mitsuba's `envmap` of the model's skybox; None where there is none, or a black one.
+
+    white: radiance of white over that of Mitsuba's `d65`, which `envmap` takes for the light of a panorama.
+    """
+    skybox = texture(model)
+    if skybox < 0:
+        return None
+    panorama = _panorama(surfaces.linear(model, skybox, np.ones(3)))
+    if not panorama.any():
+        return None
+    bitmap = mi.Bitmap(np.ascontiguousarray(panorama, dtype=np.float32))
+    bitmap.set_srgb_gamma(False)
+    return {
+        "type": "envmap",
+        "bitmap": bitmap,
+        "scale": white,
+        # Mitsuba's y is up.
+        "to_world": mi.ScalarTransform4f([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]]),
+    }
+
+
+def _panorama(image: np.ndarray) -> np.ndarray:
+    """Latitude-longitude image (h, 2h, 3) of a padded cube image: columns from u = 0 at -z of Mitsuba's frame over
+    +x, centres at half texels; rows from +y to -y, the first and last on the poles."""
+    pitch = image.shape[1]
+    rows = min(MAX_ROWS, 2 * (pitch - 2 * cube.BORDER))
+    rows = max(rows, 16)
+    polar = np.pi * np.arange(rows) / (rows - 1)
+    azimuth = np.pi * (np.arange(2 * rows) + 0.5) / rows
+    sin = np.sin(polar)[:, None]
+    x, y, z = np.broadcast_arrays(sin * np.sin(azimuth), np.cos(polar)[:, None], -sin * np.cos(azimuth))
+    # Mitsuba's (x, y, z) is the world's (x, -z, y), and MuJoCo looks the world's (x, y, z) up at (x, z, -y).
+    face, at = cube.look_up(np.stack([x, y, z], axis=-1).reshape(-1, 3))
+    if len(image) == pitch:
+        face = np.zeros_like(face)
+    where = cube.BORDER - 0.5 + at * (pitch - 2 * cube.BORDER)
+    return _bilinear(image, where[:, 0], where[:, 1] + face * pitch).reshape(rows, 2 * rows, 3)
+
+
+def _bilinear(image: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.ndarray:
+    left, top = np.floor(column).astype(int), np.floor(row).astype(int)
+    left, top = np.clip(left, 0, image.shape[1] - 2), np.clip(top, 0, image.shape[0] - 2)
+    right, down = (column - left)[:, None], (row - top)[:, None]
+    upper = image[top, left] * (1 - right) + image[top, left + 1] * right
+    lower = image[top + 1, left] * (1 - right) + image[top + 1, left + 1] * right
+    return upper * (1 - down) + lower * down

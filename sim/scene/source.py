@@ -1,0 +1,45 @@
+"""What a mirror is made of: a compiled model, or something that compiles to one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+
+
+def load(source: mujoco.MjModel | mujoco.MjSpec | str | Path) -> mujoco.MjModel:
+    """The model of an MjModel, an MjSpec, a file (MJCF, URDF, or MJB) or MJCF text (which starts with "<").
+
+    Raises ValueError, in one line that names the thing, for anything that does not become a model.
+    """
+    if isinstance(source, mujoco.MjModel):
+        return source
+    if isinstance(source, mujoco.MjSpec):
+        return _compiled(source.compile, f"MjSpec {source.modelname!r}")
+    if isinstance(source, str) and source.lstrip().startswith("<"):
+        return _compiled(lambda: mujoco.MjModel.from_xml_string(source), "this MJCF text")
+    if not isinstance(source, str | Path):
+        raise ValueError(
+            f"mirror: model is a {type(source).__name__}, must be an MjModel, an MjSpec, a path or MJCF text"
+        )
+    if not Path(source).is_file():
+        raise ValueError(f"mirror: no file {str(source)!r}; give the path of an MJCF, URDF or MJB file")
+    if Path(source).suffix == ".mjb":
+        return _compiled(lambda: mujoco.MjModel.from_binary_path(str(source)), repr(str(source)))
+    return _compiled(lambda: mujoco.MjModel.from_xml_path(str(source)), repr(str(source)))
+
+
+def _compiled(compile_it: Callable[[], mujoco.MjModel], name: str) -> mujoco.MjModel:
+    try:
+        return compile_it()
+    except (ValueError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ").removeprefix("XML Error: ")
+        missing = re.search(r"opening file '([^']*)'|resource not found|file not found", reason, re.IGNORECASE)
+        fix = (
+            "put the file there, or point <compiler meshdir texturedir> at it"
+            if missing
+            else "correct what MuJoCo names"
+        )
+        raise ValueError(f"mirror: {name} does not compile: {reason}; {fix}") from error
