@@ -81,8 +81,18 @@ def _parser() -> argparse.ArgumentParser:
     resume = _command(commands, "resume", "run.resume", "continue a run that was interrupted", directory=True)
     for command in (run, resume):
         command.add_argument("--json", action="store_true", help="for machines: a line of JSON per event")
+        command.add_argument(
+            "--executor", choices=("local", "dask"), default="local", help="who evaluates candidates (default: local)"
+        )
+        command.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster: tcp://host:8786")
+        command.add_argument("--tensorboard", action="store_true", help="write scalars into DIR/tensorboard")
     status = _command(commands, "status", "status.status", "how a run stands", directory=True)
     status.add_argument("--json", action="store_true", help="for machines")
+    status.add_argument("--watch", action="store_true", help="again at every change, as long as the run goes on")
+    compare = _command(commands, "compare", "compare.compare", "put runs side by side")
+    compare.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories")
+    compare.add_argument("--json", action="store_true", help="for machines")
+    compare.add_argument("--html", type=Path, metavar="FILE", help="also write a page with their curves")
     for name, meaning in (
         ("replay", "play the best agent once more, and say how it fared"),
         ("report", "write the HTML report"),

@@ -50,6 +50,11 @@ def assemble(
     if starts is not None:
         asked.append(starts)
     asked += [Source(f"--set {text.strip()}", parse_assignment(text)) for text in assignments]
+    return _assembled(task, preset, asked)
+
+
+def _assembled(task: str | None, preset: str | None, asked: list[Source]) -> RunConfig:
+    """From what was asked, later sources winning, over the task's and the preset's settings."""
     if task is not None:
         asked.append(Source("", {"task": task}))
     known_task = [source.tree["task"] for source in asked if "task" in source.tree]
@@ -67,6 +72,11 @@ def assemble(
 def from_toml(path: Path) -> RunConfig:
     """Configuration written by `to_toml`, which has every default written out."""
     return assemble(file=path)
+
+
+def from_text(text: str) -> RunConfig:
+    """As `from_toml`, from the text itself."""
+    return _assembled(None, None, [Source("config.toml", tomllib.loads(text), text)])
 
 
 def to_toml(config: RunConfig) -> str:

@@ -6,13 +6,14 @@ import json
 import statistics
 import sys
 import time
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, TextIO
 
 from evolve.candidate import Candidate
 from evolve.store import Run
 
-__all__ = ["Bar", "Events", "Lines", "Tally", "clock", "watcher"]
+__all__ = ["Bar", "Events", "Lines", "Tally", "Watchers", "clock", "watcher"]
 
 EVENT_S = 1.0  # least time between two events of one candidate's training
 
@@ -196,6 +197,21 @@ class Bar(_Watcher):
 
     def _update(self) -> None:
         self._progress.update(self._bar, completed=self.tally.done, description=self.tally.summary())
+
+
+class Watchers:
+    """Several watchers as one."""
+
+    def __init__(self, watchers: Sequence[Any]) -> None:
+        self._watchers = watchers
+
+    def training(self, candidate_id: int, steps: int, planned: int) -> None:
+        for one in self._watchers:
+            one.training(candidate_id, steps, planned)
+
+    def evaluated(self, candidate: Candidate) -> None:
+        for one in self._watchers:
+            one.evaluated(candidate)
 
 
 def watcher(run: Run, out: TextIO = sys.stderr, workers: int = 1, as_json: bool = False) -> Bar | Events | Lines:

@@ -16,7 +16,7 @@ from evolve.config import RunConfig
 from evolve.development import Phenotype
 from evolve.evaluation import Evaluation
 
-__all__ = ["Message", "evaluate_candidate", "prepare_device", "work"]
+__all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "work"]
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,8 @@ def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: C
             arguments = connection.recv()
         except EOFError:
             return
-        connection.send(Message("done", _evaluated(evaluate, arguments, connection)))
+        outcome = evaluated(evaluate, arguments, lambda *steps: connection.send(Message("progress", steps)))
+        connection.send(Message("done", outcome))
 
 
 def prepare_device() -> None:
@@ -67,10 +68,12 @@ def evaluate_candidate(
     return evaluate(phenotype, config, seed, policy_path, progress)
 
 
-def _evaluated(evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], connection: Connection) -> Evaluation:
+def evaluated(
+    evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], progress: Callable[[int, int], None]
+) -> Evaluation:
     """The candidate's evaluation; whatever goes wrong in it becomes its failure."""
     try:
-        return evaluate(*arguments, progress=lambda *steps: connection.send(Message("progress", steps)))
+        return evaluate(*arguments, progress=progress)
     except Exception as error:
         return Evaluation.failed(_one_line(error))
 

@@ -91,7 +91,7 @@ def hired(config, animal):
     """Workers that a run starts."""
     with TemporaryDirectory() as folder, mock.patch.object(evolve.commands.run, "LocalExecutor") as executor:
         executor.side_effect = KeyboardInterrupt
-        evolve.commands.run._carry(Run.create(Path(folder) / "run", config), Namespace(json=False))
+        evolve.commands.run._carry(Run.create(Path(folder) / "run", config), Namespace(json=False, executor="local", tensorboard=False))
         return executor.call_args.args[1]
 
 
@@ -143,6 +143,7 @@ FIELDS = {
     "learning.n_epochs": Case("learning.n_epochs=3", life),
     "learning.learning_rate": Case("learning.learning_rate=1e-2", life),
     "learning.gamma": Case("learning.gamma=0.5", life),
+    "learning.gae_lambda": Case("learning.gae_lambda=0.5", life),
     "learning.eval_interval": Case("learning.eval_interval=32", life),
     "learning.patience": Case("learning.patience=1", life, STAGNANT),
     "evaluation.episodes": Case("evaluation.episodes=2", life),

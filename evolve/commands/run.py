@@ -5,18 +5,21 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
+from contextlib import nullcontext
 from pathlib import Path
 
 from evolve.ancestor import starts_from
 from evolve.candidate import Candidate
 from evolve.commands import INTERRUPTED
-from evolve.config import RunConfig
+from evolve.config import ConfigError, RunConfig
 from evolve.config_source import assemble
+from evolve.dask_executor import DaskExecutor
 from evolve.development import repaired
 from evolve.executors import LocalExecutor
 from evolve.loop import evolve
 from evolve.plan import Plan, idle_genes
-from evolve.progress import Bar, Events, Lines, watcher
+from evolve.progress import Bar, Events, Lines, Watchers, watcher
+from evolve.scalars import Scalars
 from evolve.search import Search
 from evolve.store import Run, next_directory
 from evolve.versions import present, record_start, recorded
@@ -28,6 +31,7 @@ __all__ = ["resume", "start"]
 
 def start(arguments: Namespace) -> int:
     """Begin a run and carry it to its end."""
+    _require_scheduler(arguments)
     flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
     starts = starts_from(arguments.ancestor) if arguments.ancestor else None
     config = assemble(arguments.task, arguments.preset, arguments.config, [*arguments.set, *flags], starts)
@@ -47,6 +51,7 @@ def start(arguments: Namespace) -> int:
 
 def resume(arguments: Namespace) -> int:
     """Carry an interrupted run to its end."""
+    _require_scheduler(arguments)
     run = Run.open(arguments.directory)
     backend.require()
     with run.lock():
@@ -76,8 +81,12 @@ def _show(plan: Plan, as_json: bool) -> int:
 def _carry(run: Run, arguments: Namespace) -> int:
     """Carry a run whose lock is held to its end; on Ctrl-C say how to go on. Nothing needs saving: it is on record."""
     try:
-        with _executor(run) as executor, _watcher(run, executor.count, arguments) as watch:
-            evolve(run, executor, watch)
+        with (
+            _executor(run, arguments) as executor,
+            _watcher(run, executor.count, arguments) as watch,
+            Scalars(run) if arguments.tensorboard else nullcontext() as scalars,
+        ):
+            evolve(run, executor, Watchers([watch, *([scalars] if scalars else [])]))
     except KeyboardInterrupt:
         print(
             f"\nevolve: interrupted; {len(run.candidates)} of {run.config.candidates} candidates are on record. "
@@ -94,8 +103,16 @@ def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lin
     return watcher(run, sys.stdout if arguments.json else sys.stderr, workers, arguments.json)
 
 
-def _executor(run: Run) -> LocalExecutor:
+def _executor(run: Run, arguments: Namespace) -> DaskExecutor | LocalExecutor:
+    if arguments.executor == "dask":
+        return DaskExecutor(arguments.scheduler)
     return LocalExecutor(evaluate_candidate, run.config.workers, prepare_device)
+
+
+def _require_scheduler(arguments: Namespace) -> None:
+    """Only Dask has one, and needs one."""
+    if (arguments.executor == "dask") != (arguments.scheduler is not None):
+        raise ConfigError("--executor dask needs --scheduler ADDRESS, and nothing else takes one")
 
 
 def _finish(run: Run, as_json: bool) -> int:

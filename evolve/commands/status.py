@@ -1,33 +1,53 @@
-"""`evolve status`: how a run stands, read from its record alone."""
+"""`evolve status`: how a run stands, read from its record alone, once or again and again."""
 
 from __future__ import annotations
 
 import json
 import statistics
 import sys
+import time
 from argparse import Namespace
 from typing import Any
 
 from evolve.lock import holder
 from evolve.store import Run
 
-__all__ = ["status"]
+__all__ = ["standing", "status"]
+
+WATCH_S = 2.0  # between two looks
+SHOWN = 12  # generations, the latest
 
 
 def status(arguments: Namespace) -> int:
-    """Print how a run stands."""
-    run = Run.open(arguments.directory)
-    standing = _standing(run)
-    if arguments.json:
-        print(json.dumps(standing, indent=2, allow_nan=False))
+    """Print how a run stands; with --watch again whenever that has changed, until nobody works on it any more."""
+    now = standing(Run.open(arguments.directory))
+    if not arguments.watch:
+        _show(arguments, now)
         return 0
-    if run.notice:
-        print(f"note: {run.notice}", file=sys.stderr)
-    print("\n".join(_lines(standing)))
-    return 0
+    shown: dict[str, Any] | None = None
+    while True:
+        if now != shown:
+            _show(arguments, now)
+            shown = now
+        if now["state"] != "running":
+            return 0
+        time.sleep(WATCH_S)
+        now = standing(Run.open(arguments.directory))
 
 
-def _standing(run: Run) -> dict[str, Any]:
+def _show(arguments: Namespace, now: dict[str, Any]) -> None:
+    """As text; as JSON indented, or one line each where it is repeated. A terminal is cleared before each look."""
+    if arguments.json:
+        print(json.dumps(now, indent=None if arguments.watch else 2, allow_nan=False), flush=True)
+        return
+    if now["notice"]:
+        print(f"note: {now['notice']}", file=sys.stderr)
+    clear = "\x1b[H\x1b[2J" if arguments.watch and sys.stdout.isatty() else ""
+    print(clear + "\n".join(_lines(now)), flush=True)
+
+
+def standing(run: Run) -> dict[str, Any]:
+    """How a run stands, as plain values."""
     worker = holder(run.path)
     state = "running" if worker else "finished" if run.finished else "interrupted"
     best = run.best
@@ -36,6 +56,7 @@ def _standing(run: Run) -> dict[str, Any]:
         "task": run.config.task,
         "state": state,
         "process": worker,
+        "notice": run.notice,
         "candidates": {
             "evaluated": len(run.candidates),
             "failed": sum(candidate.failure is not None for candidate in run.candidates),
@@ -59,19 +80,21 @@ def _generation(run: Run, number: int) -> dict[str, Any]:
     }
 
 
-def _lines(standing: dict[str, Any]) -> list[str]:
-    count, best = standing["candidates"], standing["best"]
-    by = f" by process {standing['process']}" if standing["process"] else ""
+def _lines(now: dict[str, Any]) -> list[str]:
+    count, best = now["candidates"], now["best"]
+    by = f" by process {now['process']}" if now["process"] else ""
     failed = f", {count['failed']} failed" if count["failed"] else ""
     lines = [
-        f"{standing['directory']}: {standing['task']}, {standing['state']}{by}",
-        f"{count['evaluated']} of {count['planned']} candidates evaluated{failed}, {standing['steps']:,} steps trained",
+        f"{now['directory']}: {now['task']}, {now['state']}{by}",
+        f"{count['evaluated']} of {count['planned']} candidates evaluated{failed}, {now['steps']:,} steps trained",
     ]
     if best is not None:
         lines.append(f"best: candidate {best['id']}, fitness {best['fitness']:.4g}")
-    for number, generation in enumerate(standing["generations"]):
-        if generation["best"] is not None:
-            lines.append(f"generation {number}: best {generation['best']:.4g}, median {generation['median']:.4g}")
-    if standing["state"] == "interrupted":
-        lines.append(f"continue: evolve resume {standing['directory']}")
+    told = [(number, g) for number, g in enumerate(now["generations"]) if g["best"] is not None]
+    if len(told) > SHOWN:
+        lines.append(f"generations 0 to {told[-SHOWN][0] - 1}: best {max(g['best'] for _, g in told[:-SHOWN]):.4g}")
+    for number, generation in told[-SHOWN:]:
+        lines.append(f"generation {number}: best {generation['best']:.4g}, median {generation['median']:.4g}")
+    if now["state"] == "interrupted":
+        lines.append(f"continue: evolve resume {now['directory']}")
     return lines

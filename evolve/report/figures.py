@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +15,7 @@ from evolve.candidate import Candidate
 from evolve.report.svg import drawing, inline
 from evolve.report.theme import ACCENT, LINE, MUTED, VERMILLION
 
-__all__ = ["fitness_figure", "gene_figure", "learning_figure", "relief_figure", "success_figure"]
+__all__ = ["comparison_figure", "fitness_figure", "gene_figure", "learning_figure", "relief_figure", "success_figure"]
 
 SIZE = (370, 260)
 Generations = Sequence[int] | NDArray[np.int64]
@@ -33,6 +34,22 @@ def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Ca
         last = rows[-1]
         alt = f"Fitness over {len(rows)} generations: best {last.best_so_far:.3g}, last median {last.median:.3g}."
         return inline(figure, "fitness", alt)
+
+
+def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> str:
+    """Best fitness so far of several runs, each under its name."""
+    with drawing(740, 320) as figure:
+        axes = figure.subplots()
+        for place, (name, rows) in enumerate(curves.items()):
+            colour = colormaps["viridis"](0.05 + 0.8 * place / max(len(curves) - 1, 1))
+            generations, best = [row.generation for row in rows], [row.best_so_far for row in rows]
+            axes.plot(generations, best, color=colour, lw=2, marker="o", ms=4, label=name)
+        longest = max((len(rows) for rows in curves.values()), default=1)
+        _generation_axis(axes, range(longest))
+        axes.set_ylabel("best fitness so far")
+        if curves:
+            axes.legend(frameon=False, labelcolor=MUTED)
+        return inline(figure, "comparison", f"Best fitness so far of {len(curves)} runs over the generations.")
 
 
 def success_figure(candidates: Sequence[Candidate]) -> str:

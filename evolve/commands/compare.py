@@ -1,0 +1,25 @@
+"""`evolve compare`: runs side by side."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+
+from evolve.comparison import differing_settings, lines, summary, write_page
+from evolve.store import Run
+
+__all__ = ["compare"]
+
+
+def compare(arguments: Namespace) -> int:
+    """Print runs side by side."""
+    runs = [Run.open(directory) for directory in arguments.directories]
+    if arguments.json:
+        print(json.dumps({"runs": [summary(run) for run in runs], "settings": differing_settings(runs)}, indent=1))
+    else:
+        print("\n".join(lines(runs)))
+    if arguments.html:
+        write_page(runs, arguments.html)
+        if not arguments.json:
+            print(f"page: {arguments.html}")
+    return 0

@@ -1,0 +1,51 @@
+"""As `closed_form`, for workers that share nothing with the test but a folder: RHABDOM_TEST names it."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from evolve.evaluation import Evaluation
+
+
+def bowl(phenotype, config, seed, policy_path, progress):
+    """Fitness known in closed form, and a policy that names the seed."""
+    if "RHABDOM_TEST" in os.environ:
+        with (Path(os.environ["RHABDOM_TEST"]) / "calls.log").open("a") as log:
+            log.write(f"{int(policy_path.stem)}\n")
+    progress(config.learning.total_steps // 2, config.learning.total_steps)
+    policy_path.write_text(f"policy {seed}")
+    fitness = -abs(phenotype.fov_deg - 70.0) + 1e-9 * (seed % 1000)
+    curve = ((2048, fitness / 3), (4096, fitness))
+    return Evaluation(fitness, (fitness,) * config.evaluation.episodes, 0.5, config.learning.total_steps, 0.01, curve)
+
+
+def slow(phenotype, config, seed, policy_path, progress):
+    """As `bowl`, with time to be interrupted."""
+    time.sleep(0.3)
+    return bowl(phenotype, config, seed, policy_path, progress)
+
+
+def fails_for_some(phenotype, config, seed, policy_path, progress):
+    """Every other candidate raises."""
+    if int(policy_path.stem) % 2:
+        raise ValueError("no such\nluck")
+    return bowl(phenotype, config, seed, policy_path, progress)
+
+
+def killed_once(phenotype, config, seed, policy_path, progress):
+    """The process is killed in the middle of candidate 2, the first time."""
+    outcome = bowl(phenotype, config, seed, policy_path, progress)
+    mark = Path(os.environ["RHABDOM_TEST"]) / "killed"
+    if int(policy_path.stem) == 2 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return outcome
+
+
+def killed_always(phenotype, config, seed, policy_path, progress):
+    """The process is killed whenever candidate 1 is evaluated."""
+    outcome = bowl(phenotype, config, seed, policy_path, progress)
+    if int(policy_path.stem) == 1:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return outcome
