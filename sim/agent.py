@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from optics.photon_budget import PhotonBudget
 from optics.receptors import receptors_of
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ class Eyes:
     receptors            types of receptor: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish",
                          wavelengths of visual pigments' peaks [nm] such as (350, 440, 530), or `optics.Receptors`,
                          which can be a mosaic; the field then holds optics.Receptors
+    photon_budget        optics.PhotonBudget: how much light there is and how long receptors gather it; its shot noise
+                         comes beside `noise_sigma`. None: light is no object
 
     Raises ValueError for values outside these ranges and for unknown receptors, with the nearest name.
     """
@@ -50,6 +53,7 @@ class Eyes:
     noise_sigma: float = 0.01
     bands: int = 4
     receptors: Any = "rgb"
+    photon_budget: PhotonBudget | None = None
 
     def __post_init__(self) -> None:
         def check(name: str, valid: Callable[[Any], bool], range_: str) -> None:
@@ -76,6 +80,8 @@ class Eyes:
         check("noise_sigma", lambda x: 0.0 <= x < math.inf, "non-negative and finite")
         check("bands", counts, "a whole number, at least 1")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
+        if not isinstance(self.photon_budget, PhotonBudget | None):
+            raise ValueError(f"Eyes: photon_budget = {self.photon_budget!r}, must be an optics.PhotonBudget or None")
 
     def eye(self) -> Eye:
         """One eye's optics and retina."""
@@ -89,6 +95,7 @@ class Eyes:
             bands=self.bands,
             noise_sigma=self.noise_sigma,
             receptors=self.receptors,
+            photon_budget=self.photon_budget,
         )
 
     def azimuths(self) -> np.ndarray:

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+import optics
 from sim.recording import aligned, garbage_kept
 from sim.variant import variant
 
@@ -21,7 +23,7 @@ PER_DRAW = 4  # normal numbers from one evaluation of Philox4x32
 FEW = 8  # worlds of the narrower kernel that serves a few of them
 
 
-class ReceptorNoise:
+class Normals:
     """Standard normal numbers, `shape` of them per world and frame.
 
     keys   one per world, (n,) uint64 · shape: of one world's receptors
@@ -99,8 +101,44 @@ class _Kernel:
             return self._normals(module.UInt64(self._key_buffer), module.UInt32(self._frame_buffer), self._lanes)
 
 
-def add_noise(signals: np.ndarray, sigma: float, normals: np.ndarray) -> np.ndarray:
-    """Signals (n, ...) with Gaussian noise of standard deviation sigma; `normals` of the same shape are used up."""
-    normals *= np.float32(sigma)
-    normals += signals
-    return normals
+@dataclass(frozen=True)
+class NoiseModel:
+    """How noisy a signal s is: variance V = σ² + s / N, N the photons that a signal of 1 stands for.
+
+    sigma    standard deviation of the Gaussian part
+    photons  N, to be broadcast against signals (..., channel, h, w); None: no shot noise
+    """
+
+    sigma: float
+    photons: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, eye: optics.Eye) -> NoiseModel | None:
+        """An eye's; None without any noise."""
+        photons = eye.photons
+        if photons is None:
+            return cls(eye.noise_sigma) if eye.noise_sigma > 0 else None
+        mosaic = eye.mosaic
+        spread = photons[:, None, None] if mosaic is None else photons[mosaic][None]
+        return cls(eye.noise_sigma, spread.astype(np.float32))
+
+    def largest(self, brightest: float) -> float:
+        """Standard deviation where a signal is twice the brightest."""
+        shot = 0.0 if self.photons is None else 2 * brightest / float(self.photons.min())
+        return math.sqrt(self.sigma**2 + shot)
+
+    def __call__(self, signals: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Noisy signals (n, ...) from standard normal numbers z of the same shape, which are used up.
+
+        Shot noise is Poisson's to its third moment: s + √V z + s/N² (z² - 1) / 6V (Cornish & Fisher 1938), which
+        matters below a hundred photons.
+        """
+        if self.photons is None:
+            normals *= np.float32(self.sigma)
+            normals += signals
+            return normals
+        light = np.maximum(signals, 0) / self.photons
+        variance = np.maximum(light + np.float32(self.sigma**2), np.finfo(np.float32).tiny)
+        skewed: np.ndarray = light / self.photons * (normals * normals - 1) / (6 * variance)
+        noisy: np.ndarray = signals + np.sqrt(variance) * normals + skewed
+        return noisy

@@ -12,11 +12,11 @@ SIGMAS = 10.0
 ROUNDING = 1e-4  # of float32, as a share of the brightest signal
 
 
-def observation_space(eyes: Eyes, channels: int, memory: int, brightest: float) -> spaces.Dict:
+def observation_space(eyes: Eyes, channels: int, memory: int, brightest: float, noise: float) -> spaces.Dict:
     """Space of one world's observation. brightest: what a receptor reports of white facing all lights at once; as much
-    again may come from its surroundings."""
+    again may come from its surroundings. noise: the largest standard deviation."""
     shape = (memory, eyes.n_eyes, channels, *eyes.resolution)
-    margin = SIGMAS * eyes.noise_sigma + ROUNDING * brightest
+    margin = SIGMAS * noise + ROUNDING * brightest
     return spaces.Dict(
         {
             "eyes": spaces.Box(-margin, 2 * brightest + margin, shape, np.float32),

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env.base_vec_env import tile_images
 from optics.tabulated import Spectrum
 from sim.agent import Eyes
 from sim.eye_images import side_by_side
-from sim.noise import ReceptorNoise, add_noise
+from sim.noise import NoiseModel, Normals
 from sim.observation import STANDING, Memory, action_space, observation_space
 from sim.picture import Onlooker, check_render_mode
 from sim.render import BatchedRenderer
@@ -41,11 +41,12 @@ class EyesVecEnv(VecEnv):
         self._terminal_renderer: BatchedRenderer | None = None
         self._memory = Memory(memory)
         channels = renderer.eye.channels
-        super().__init__(
-            simulation.n, observation_space(self.eyes, channels, memory, renderer.brightest), action_space()
-        )
+        self._noise = NoiseModel.of(renderer.eye)
+        spread = self._noise.largest(renderer.brightest) if self._noise else 0.0
+        space = observation_space(self.eyes, channels, memory, renderer.brightest, spread)
+        super().__init__(simulation.n, space, action_space())
         frame = self.observation_space["eyes"].shape[1:]
-        self._noise = ReceptorNoise(simulation.streams.noise_keys, frame) if self.eyes.noise_sigma > 0 else None
+        self._normals = Normals(simulation.streams.noise_keys, frame) if self._noise else None
         self._commanded = self._actions = np.zeros((self.num_envs, 2), np.float32)
         self._returns, self._lengths = np.zeros(self.num_envs), np.zeros(self.num_envs, int)
 
@@ -57,8 +58,8 @@ class EyesVecEnv(VecEnv):
     def reset(self) -> dict[str, np.ndarray]:
         if self._seeds[0] is not None:
             self.simulation.seed(self._seeds[0])
-            if self._noise:
-                self._noise.restart(self.simulation.streams.noise_keys)
+            if self._normals:
+                self._normals.restart(self.simulation.streams.noise_keys)
         self.simulation.reset()
         self._reset_seeds()
         self._reset_options()
@@ -128,9 +129,10 @@ class EyesVecEnv(VecEnv):
     # --- observations
 
     def _observe(self, fresh: np.ndarray, contact: np.ndarray) -> dict[str, np.ndarray]:
-        running = self._noise.begin() if self._noise else None  # it is drawn while the state is packed
-        signals = self.renderer.signals(self.state)
-        frame = add_noise(signals, self.eyes.noise_sigma, running.values()) if running else signals
+        running = self._normals.begin() if self._normals else None  # they are drawn while the state is packed
+        frame = self.renderer.signals(self.state)
+        if self._noise and running:
+            frame = self._noise(frame, running.values())
         return {
             "eyes": self._memory.remember(frame, fresh),
             "contact": contact.astype(np.float32)[:, None],
@@ -138,8 +140,9 @@ class EyesVecEnv(VecEnv):
         }
 
     def _add_terminal_observations(self, infos: list[dict[str, Any]], step: Step, ended: np.ndarray) -> None:
-        signals = self._terminal_signals(step.state, ended)
-        frame = add_noise(signals, self.eyes.noise_sigma, self._noise.of(ended)) if self._noise else signals
+        frame = self._terminal_signals(step.state, ended)
+        if self._noise and self._normals:
+            frame = self._noise(frame, self._normals.of(ended))
         stacks = self._memory.preview(frame, ended)
         for stack, world in zip(stacks, ended, strict=True):
             infos[world]["terminal_observation"] = {

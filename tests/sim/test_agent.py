@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sim
-from optics import Pupil, Receptors
+from optics import PhotonBudget, Pupil, Receptors
 from sim.agent import BODY_RADIUS, camera_rotations, eye_positions, eye_rotations
 
 
@@ -84,6 +84,7 @@ CHANGES = {
     "noise_sigma": (0.02, (2, 3, 4, 5)),
     "bands": (5, (2, 3, 4, 5)),
     "receptors": ("lms", (2, 3, 4, 5)),
+    "photon_budget": (PhotonBudget(illuminance=10.0), (2, 3, 4, 5)),
 }
 
 

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sim.noise import ReceptorNoise, add_noise
+import optics
+import sim
+from sim.noise import NoiseModel, Normals
 
 SHAPE = (2, 3, 5, 7)  # 210 numbers, no multiple of four
 
@@ -15,7 +17,7 @@ def keys(n, seed=0):
 
 @pytest.fixture(scope="module")
 def frames():
-    noise = ReceptorNoise(keys(12), SHAPE)
+    noise = Normals(keys(12), SHAPE)
     return np.array([noise.begin().values() for _ in range(200)])
 
 
@@ -39,12 +41,12 @@ def test_no_frame_comes_twice(frames):
 
 
 def test_a_worlds_noise_does_not_depend_on_its_neighbours(frames):
-    few = ReceptorNoise(keys(12)[:3], SHAPE)
+    few = Normals(keys(12)[:3], SHAPE)
     np.testing.assert_array_equal([few.begin().values() for _ in range(4)], frames[:4, :3])
 
 
 def test_some_worlds_alone_draw_their_own_next_frames(frames):
-    noise = ReceptorNoise(keys(12), SHAPE)
+    noise = Normals(keys(12), SHAPE)
     np.testing.assert_array_equal(noise.of(np.array([7, 3])), frames[0, [7, 3]])
     after = noise.begin().values()
     np.testing.assert_array_equal(after[[3, 7]], frames[1, [3, 7]])
@@ -52,12 +54,52 @@ def test_some_worlds_alone_draw_their_own_next_frames(frames):
 
 
 def test_restart_begins_anew(frames):
-    noise = ReceptorNoise(keys(12, seed=1), SHAPE)
+    noise = Normals(keys(12, seed=1), SHAPE)
     assert not np.array_equal(noise.begin().values(), frames[0])
     noise.restart(keys(12))
     np.testing.assert_array_equal(noise.begin().values(), frames[0])
 
 
-def test_noise_adds_with_its_standard_deviation():
+def test_gaussian_noise_adds_with_its_standard_deviation():
     signals = np.array([[1.0, 2.0]], np.float32)
-    np.testing.assert_allclose(add_noise(signals, 0.1, np.array([[1.0, -2.0]], np.float32)), [[1.1, 1.8]], rtol=1e-6)
+    np.testing.assert_allclose(NoiseModel(0.1)(signals, np.array([[1.0, -2.0]], np.float32)), [[1.1, 1.8]], rtol=1e-6)
+
+
+@pytest.mark.parametrize("photons", [20.0, 300.0, 1e5])
+def test_shot_noise_has_poissons_moments(photons):
+    """300,000 draws of a signal of 0.5 beside Gaussian noise as strong: mean, variance and third cumulant within 5 of
+    their own standard errors; a Gaussian of the same variance misses the third cumulant where photons are few."""
+    sigma, signal, n = np.sqrt(0.5 / photons), 0.5, 300_000
+    z = np.random.default_rng(0).standard_normal((1, 1, 1, 1, n), dtype=np.float32)
+    noise = NoiseModel(float(sigma), np.full((1, 1, 1), photons, np.float32))
+    drawn = noise(np.full_like(z, signal), z.copy()).astype(np.float64).ravel()
+    variance, third = sigma**2 + signal / photons, signal / photons**2
+    assert abs(drawn.mean() - signal) < 5 * np.sqrt(variance / n)
+    assert drawn.var() == pytest.approx(variance, rel=5 * np.sqrt(2 / n) + 2 * third**2 / variance**3)
+    error = 5 * np.sqrt(15 / n) * variance**1.5
+    assert abs(((drawn - drawn.mean()) ** 3).mean() - third) < error
+    gaussian = (signal + np.sqrt(variance) * z).astype(np.float64).ravel()
+    assert photons > 100 or abs(((gaussian - gaussian.mean()) ** 3).mean() - third) > error
+
+
+def test_dim_light_is_noisy_light():
+    """A hundredth of the light, ten times the shot noise; the photons are those of `optics.Eye`."""
+    sun, dusk = (
+        sim.Eyes(resolution=(4, 5), noise_sigma=0.0, photon_budget=optics.PhotonBudget(illuminance=lx))
+        for lx in (1e4, 1e2)
+    )
+    seen = []
+    for eyes in (sun, dusk):
+        worlds = sim.make_vec_env("detection", eyes, 16, seed=3)
+        noisy, clean = worlds.reset()["eyes"][:, 0], worlds.renderer.signals(worlds.state)
+        lit = clean > 0
+        expected = np.sqrt(clean / eyes.eye().photons[:, None, None])[lit]
+        assert np.std((noisy - clean)[lit] / expected) == pytest.approx(1, rel=0.06)  # 1920 numbers: ± 1.6 %
+        seen.append(np.std(noisy - clean))
+        worlds.close()
+    assert seen[1] / seen[0] == pytest.approx(10, rel=0.05)
+
+
+def test_photon_budgets_are_checked():
+    with pytest.raises(ValueError, match=r"photon_budget = 3, must be an optics\.PhotonBudget or None"):
+        sim.Eyes(photon_budget=3)
