@@ -100,7 +100,9 @@ class LearningConfig:
     batch_size: int = _setting(1024, Interval(2, 10**7), "samples per gradient step")
     n_epochs: int = _setting(4, Interval(1, 1000), "passes over the samples per update")
     learning_rate: float = _setting(1e-3, Interval(0, 1, open_low=True), "Adam's step size")
-    gamma: float = _setting(0.99, Interval(0, 1), "discount per step")
+    gamma: float = _setting(0.9, Interval(0, 1), "discount per step")
+    gae_lambda: float = _setting(0.9, Interval(0, 1), "share of what follows in an action's advantage, per step")
+    value_weight: float = _setting(4.0, Interval(0, 1000), "weight of the critic's loss beside the actor's")
     eval_interval: int = _setting(50_000, Interval(1, 10**10), "training steps between evaluations")
     patience: int = _setting(5, Interval(1, 10**6), "evaluations without improvement before training stops")
 

@@ -10,13 +10,18 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from evolve.config import LearningConfig
-from evolve.policy import EyePolicy, TrainingDiverged
+from evolve.policy import EyePolicy, TrainingDiverged, learnt, set_learnt
 from evolve.rollout import FrameRolloutBuffer
+
+UNIT_RATE = 0.2  # of the way to the spread of the last returns, per rollout
+FLAT = 1e-6  # spread of returns that all are the same
 
 Progress = Callable[[int, int], None]  # (steps trained, steps planned)
 
@@ -25,8 +30,9 @@ Progress = Callable[[int, int], None]  # (steps trained, steps planned)
 class Training:
     """What became of a training.
 
-    steps  environment steps taken, in whole rollouts
-    curve  (steps, mean return of the evaluation episodes), every `eval_interval` steps
+    policy  as it was at the best evaluation
+    steps   environment steps taken, in whole rollouts
+    curve   (steps, mean return of the evaluation episodes), every `eval_interval` steps
     """
 
     policy: EyePolicy
@@ -36,15 +42,49 @@ class Training:
 
 @dataclass(frozen=True)
 class Episodes:
-    """One whole episode of each world: returns (world,), and successes (world,): the goal was reached, and before
-    any adversary."""
+    """One whole episode of each world.
+
+    returns (world,) · first_events (world,): what was reached first, +1 the goal, -1 an adversary, 0 nothing
+    """
 
     returns: np.ndarray
-    successes: np.ndarray
+    first_events: np.ndarray
+
+    @property
+    def successes(self) -> np.ndarray:
+        """Where the goal was reached, and before any adversary, (world,) bool."""
+        return self.first_events > 0
 
 
-class _CheckedPPO(PPO):
-    """PPO that stops at the first rollout or update that is not finite, instead of learning nonsense from it."""
+class RewardsInUnits(VecEnvWrapper):
+    """Worlds whose rewards come in units that the learner sets."""
+
+    def __init__(self, worlds: VecEnv) -> None:
+        super().__init__(worlds)
+        self.unit = 1.0
+
+    def reset(self) -> dict[str, np.ndarray]:
+        observation: dict[str, np.ndarray] = self.venv.reset()
+        return observation
+
+    def step_wait(self) -> VecEnvStepReturn:
+        observation, reward, done, infos = self.venv.step_wait()
+        return observation, reward / np.float32(self.unit), done, infos
+
+
+class AdaptingPPO(PPO):
+    """PPO whose policy adapts to the signals it meets, and which stops at the first rollout or update that is not
+    finite, instead of learning nonsense from it."""
+
+    rollout_buffer: FrameRolloutBuffer
+    policy: EyePolicy
+
+    def collect_rollouts(
+        self, env: VecEnv, callback: BaseCallback, rollout_buffer: RolloutBuffer, n_rollout_steps: int
+    ) -> bool:
+        if self.num_timesteps == 0:
+            self.policy.features_extractor.adapt(torch.from_numpy(self._last_obs["eyes"][:, -1]))
+        return super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps)
 
     def train(self) -> None:
         for name in ("rewards", "values", "log_probs"):
@@ -54,6 +94,20 @@ class _CheckedPPO(PPO):
         _require_finite("loss", np.asarray(self.logger.name_to_value["train/value_loss"]), self.num_timesteps)
         for name, parameter in self.policy.named_parameters():
             _require_finite(f"policy's {name}", parameter.detach().numpy(), self.num_timesteps)
+        # Not before: the update compares the policy with what it was when it acted. Neighbouring frames are alike.
+        self.policy.features_extractor.adapt(torch.from_numpy(self.rollout_buffer.new_frames[:, ::8]))
+        self._adapt_unit()
+
+    @torch.no_grad()
+    def _adapt_unit(self) -> None:
+        """Measure rewards in units of the spread of returns; what the critic says of the worlds stays the same
+        (Pop-Art: van Hasselt et al. 2016, eq. 5)."""
+        change = max(float(self.rollout_buffer.returns.std()), FLAT)
+        if self.num_timesteps > self.rollout_buffer.rewards.size:  # not the first rollout: forget gradually
+            change **= UNIT_RATE
+        self.env.unit *= change
+        for parameter in self.policy.value_net.parameters():
+            parameter.div_(change)
 
 
 def _require_finite(name: str, values: np.ndarray, steps: int) -> None:
@@ -75,6 +129,31 @@ class _Report(BaseCallback):
         self.progress(self.num_timesteps, self.planned)
 
 
+def learner(worlds: VecEnv, neurons: int, config: LearningConfig, seed: int) -> AdaptingPPO:
+    """A learner that has learnt nothing yet. It sees rewards in units of the spread of its discounted returns, so
+    that an agent's first minutes at a wall, a hundred times as bad as anything later, do not swamp the critic."""
+    torch.set_num_threads(1)
+    seed = int(np.random.SeedSequence(seed).generate_state(1)[0])  # SB3 takes 32 bits
+    model = AdaptingPPO(
+        EyePolicy,
+        RewardsInUnits(worlds),
+        n_steps=config.n_steps,
+        batch_size=config.batch_size,
+        n_epochs=config.n_epochs,
+        learning_rate=config.learning_rate,
+        gamma=config.gamma,
+        gae_lambda=config.gae_lambda,
+        vf_coef=config.value_weight,
+        seed=seed,
+        device="cpu",
+        policy_kwargs={"neurons": neurons},
+        rollout_buffer_class=FrameRolloutBuffer,
+        rollout_buffer_kwargs={"seed": seed},
+    )
+    model.set_logger(Logger(None, []))
+    return model
+
+
 def train(
     worlds: VecEnv,
     evaluation_worlds: VecEnv,
@@ -87,34 +166,22 @@ def train(
 
     After every `eval_interval` steps the policy plays one episode in each of the evaluation worlds; learning ends
     after `patience` such evaluations without a better mean return, or after `total_steps`. The policy returned
-    is the last one.
+    is the one with the best mean return (the earliest of them).
 
     Raises TrainingDiverged where rewards, loss, weights or actions stop being finite.
     """
-    torch.set_num_threads(1)
-    seed = int(np.random.SeedSequence(seed).generate_state(1)[0])  # SB3 takes 32 bits
-    model = _CheckedPPO(
-        EyePolicy,
-        worlds,
-        n_steps=config.n_steps,
-        batch_size=config.batch_size,
-        n_epochs=config.n_epochs,
-        learning_rate=config.learning_rate,
-        gamma=config.gamma,
-        seed=seed,
-        device="cpu",
-        policy_kwargs={"neurons": neurons},
-        rollout_buffer_class=FrameRolloutBuffer,
-        rollout_buffer_kwargs={"seed": seed},
-    )
-    model.set_logger(Logger(None, []))
+    model = learner(worlds, neurons, config, seed)
     report = _Report(progress, config.total_steps) if progress else None
     curve: list[tuple[int, float]] = []
+    best: dict[str, torch.Tensor] = {}
     while model.num_timesteps < config.total_steps and not stuck(curve, config.patience):
         stretch = min(config.eval_interval, config.total_steps - model.num_timesteps)
         model.learn(stretch, callback=report, reset_num_timesteps=False)
-        episodes = play(model.policy, evaluation_worlds, seed)
-        curve.append((model.num_timesteps, float(episodes.returns.mean())))
+        mean_return = float(play(model.policy, evaluation_worlds, seed).returns.mean())
+        if not curve or mean_return > max(value for _, value in curve):
+            best = {name: tensor.detach().clone() for name, tensor in learnt(model.policy).items()}
+        curve.append((model.num_timesteps, mean_return))
+    set_learnt(model.policy, best)
     return Training(model.policy, model.num_timesteps, tuple(curve))
 
 
@@ -130,7 +197,7 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
     observation = worlds.reset()
     returns = np.zeros(worlds.num_envs)
     playing = np.ones(worlds.num_envs, bool)
-    first_event = np.zeros(worlds.num_envs)  # +1 goal, -1 adversary, 0 none yet
+    first_event = np.zeros(worlds.num_envs)
     while playing.any():
         action, _ = policy.predict(observation, deterministic=True)
         observation, reward, done, infos = worlds.step(action)
@@ -140,7 +207,7 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
         playing &= ~done
     if not math.isfinite(returns.sum()):
         raise TrainingDiverged("returns of the evaluation episodes not finite")
-    return Episodes(returns, first_event > 0)
+    return Episodes(returns, first_event)
 
 
 def _terms(info: dict[str, Any]) -> dict[str, float]:

@@ -1,7 +1,9 @@
 """What an agent does with what it sees: an MLP per eye, a memory of frames, and an actor and a critic.
 
-Every eye has weights of its own, and one encoder serves all its remembered frames: signals -> 4 -> 8 -> 16 per frame,
-then `memory` x 16 -> 16 over the frames. The eyes' features are joined with contact and previous action.
+Every eye has weights of its own, and one encoder serves all its remembered frames: signals -> 16 -> 16 -> 16 per
+frame, then `memory` x 16 -> 16 over the frames. The eyes' features are joined with contact and previous action.
+Receptors adapt: the first layer sees signals less their running mean, in units of their spread, as learning has met
+them.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -23,13 +26,15 @@ from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
+from evolve.adam import Adam
 from evolve.files import write_whole
 
-ENCODER_WIDTHS = (4, 8, 16)  # hidden, hidden, code of one frame
+ENCODER_WIDTHS = (16, 16, 16)  # hidden, hidden, code of one frame
 EYE_FEATURES = 16  # what the temporal layer makes of an eye's remembered codes
-SIGNAL_GAIN = 4.0  # signals of the tasks' worlds spread by 0.1 to 0.2: brought to the order of 1 for the tanh units
 # Standard deviation 0.5 of the first actions: with 1, a third of the commands are clipped and turns are mostly noise.
 INITIAL_LOG_STD = -0.7
+DARK = 1e-6  # spread of signals that all are the same: keeps weights finite
+CONTRAST = 0.4  # what a signal one spread off its mean counts: small enough for tanh units to start out linear
 
 
 class TrainingDiverged(FloatingPointError):
@@ -76,6 +81,35 @@ class PerEyeLinear(nn.Module):
         return torch.baddbmm(self.bias, self.weight, x)
 
 
+class AdaptedLinear(PerEyeLinear):
+    """The same over signals less each receptor's running mean, in units of their eye's spread about it.
+
+    Signals of one scene are mostly alike from moment to moment, and behind a small pupil they are small numbers: raw,
+    their means would saturate the units and their changes hardly move them. Folded into weight and bias, it is free.
+    """
+
+    def __init__(self, n_eyes: int, inputs: int, outputs: int) -> None:
+        super().__init__(n_eyes, inputs, outputs)
+        self.register_buffer("mean", torch.zeros(n_eyes, inputs, 1))
+        self.register_buffer("variance", torch.ones(n_eyes, 1, 1))
+        self.register_buffer("seen", torch.zeros(1))  # frames
+
+    def forward(self, x: Tensor) -> Tensor:
+        weight = CONTRAST * self.weight * torch.rsqrt(self.variance + DARK**2)
+        return torch.baddbmm(self.bias - weight @ self.mean, weight, x)
+
+    @torch.no_grad()
+    def adapt(self, x: Tensor) -> None:
+        """Take signals (eye, inputs, sample) into mean and spread (Chan, Golub and LeVeque 1983, eq. 2.1)."""
+        share = x.shape[2] / (self.seen + x.shape[2])
+        deviation = x - self.mean
+        step = deviation.mean(dim=2, keepdim=True)
+        variance = deviation.square().mean(dim=2, keepdim=True) - share * step**2
+        self.variance.lerp_(variance.mean(dim=1, keepdim=True), share)
+        self.mean.add_(share * step)
+        self.seen.add_(x.shape[2])
+
+
 class EyeFeatures(BaseFeaturesExtractor):
     """Features of an observation: 16 per eye, then contact and previous action.
 
@@ -89,9 +123,10 @@ class EyeFeatures(BaseFeaturesExtractor):
         self.memory, self.n_eyes, *retina = observation_space["eyes"].shape
         others = observation_space["contact"].shape[0] + observation_space["previous_action"].shape[0]
         super().__init__(observation_space, EYE_FEATURES * self.n_eyes + others)
-        widths = (math.prod(retina), *ENCODER_WIDTHS)
-        layers: list[nn.Module] = []
-        for inputs, outputs in itertools.pairwise(widths):
+        self.n_receptors = math.prod(retina)
+        widths = (self.n_receptors, *ENCODER_WIDTHS)
+        layers: list[nn.Module] = [AdaptedLinear(self.n_eyes, *widths[:2]), nn.Tanh()]
+        for inputs, outputs in itertools.pairwise(widths[1:]):
             layers += [PerEyeLinear(self.n_eyes, inputs, outputs), nn.Tanh()]
         self.encoder = nn.Sequential(*layers)
         self.temporal = nn.Sequential(
@@ -110,8 +145,15 @@ class EyeFeatures(BaseFeaturesExtractor):
     def _encode(self, frames: Tensor) -> Tensor:
         """(a, b, eye, channel, height, width) -> codes (eye, code, a, b)."""
         a, b = frames.shape[:2]
-        signals = SIGNAL_GAIN * frames.reshape(a * b, self.n_eyes, -1)
-        return self.encoder(signals.permute(1, 2, 0)).unflatten(2, (a, b))
+        return self.encoder(self._signals(frames)).unflatten(2, (a, b))
+
+    def _signals(self, frames: Tensor) -> Tensor:
+        """(..., eye, channel, height, width) -> (eye, receptors, sample)."""
+        return frames.reshape(-1, self.n_eyes, self.n_receptors).permute(1, 2, 0)
+
+    def adapt(self, frames: Tensor) -> None:
+        """Adapt the receptors to more frames (..., eye, channel, height, width)."""
+        self.encoder[0].adapt(self._signals(frames))
 
     def _windows(self, codes: Tensor, age: Tensor) -> Tensor:
         """Codes (eye, code, segment, memory - 1 + step) -> of remembered frames (eye, code, memory, segment, step)."""
@@ -134,6 +176,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
             "features_extractor_class": EyeFeatures,
             "net_arch": [neurons, neurons],
             "log_std_init": INITIAL_LOG_STD,
+            "optimizer_class": Adam,
         }
         super().__init__(observation_space, action_space, lr_schedule, **kwargs)
         self.config = PolicyConfig(tuple(observation_space["eyes"].shape), neurons)
@@ -158,7 +201,7 @@ def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy
 
 def save_policy(policy: EyePolicy, path: Path | str) -> None:
     """Write the policy's tensors as safetensors, its shape in the metadata; whole or not at all."""
-    tensors = {name: parameter.detach() for name, parameter in policy.named_parameters()}
+    tensors = {name: tensor.detach().clone() for name, tensor in learnt(policy).items()}
     # One entry: safetensors writes several in random order, and the same policy must be the same bytes.
     metadata = {"config": json.dumps(asdict(policy.config))}
     write_whole(Path(path), safetensors.torch.save(tensors, metadata))
@@ -178,11 +221,7 @@ def load_policy(path: Path | str) -> EyePolicy:
         stored = json.loads(metadata["config"])
         config = PolicyConfig(tuple(int(n) for n in stored["eyes"]), int(stored["neurons"]))
         policy = build_policy(config)
-        parameters = dict(policy.named_parameters())  # each once; the state dict names shared ones thrice
-        if tensors.keys() != parameters.keys():
-            raise ValueError(f"tensors missing or unknown: {sorted(tensors.keys() ^ parameters.keys())}")
-        for name, parameter in parameters.items():
-            _assign(parameter, tensors[name], name)
+        set_learnt(policy, tensors)
     except FileNotFoundError:
         raise ValueError(f"no policy at {path}") from None
     except (safetensors.SafetensorError, KeyError, TypeError, ValueError, RuntimeError) as error:
@@ -193,9 +232,18 @@ def load_policy(path: Path | str) -> EyePolicy:
     return policy
 
 
+def learnt(policy: EyePolicy) -> dict[str, Tensor]:
+    """All that learning changes, by name: weights, and what the receptors have adapted to."""
+    return {**dict(policy.named_parameters()), **dict(policy.named_buffers())}
+
+
 @torch.no_grad()
-def _assign(parameter: nn.Parameter, tensor: Tensor, name: str) -> None:
-    """Set a parameter, without torch's broadcasting of a wrong shape."""
-    if tensor.shape != parameter.shape:
-        raise ValueError(f"{name} has shape {tuple(tensor.shape)}, expected {tuple(parameter.shape)}")
-    parameter.copy_(tensor)
+def set_learnt(policy: EyePolicy, tensors: Mapping[str, Tensor]) -> None:
+    """Inverse of `learnt`. Raises ValueError for a name or a shape that the policy has not."""
+    own = learnt(policy)
+    if tensors.keys() != own.keys():
+        raise ValueError(f"tensors missing or unknown: {sorted(tensors.keys() ^ own.keys())}")
+    for name, tensor in own.items():
+        if tensors[name].shape != tensor.shape:
+            raise ValueError(f"{name} has shape {tuple(tensors[name].shape)}, expected {tuple(tensor.shape)}")
+        tensor.copy_(tensors[name])

@@ -74,6 +74,11 @@ class FrameRolloutBuffer(RolloutBuffer):
         self.pos += 1
         self.full = self.pos == self.buffer_size
 
+    @property
+    def new_frames(self) -> np.ndarray:
+        """The frames of this rollout's steps, (world, step, eye, channel, height, width)."""
+        return self.frames[:, self.memory - 1 :]
+
     def get(self, batch_size: int | None = None) -> Iterator[DictRolloutBufferSamples]:
         """Mini-batches of whole segments, about `batch_size` samples each, every sample once per call."""
         assert self.full

@@ -28,11 +28,19 @@ BODY = 0.3  # reflectance of the agent's body
 LIGHTS = ((20.0, 40.0, 0.9), (140.0, 40.0, 0.6), (260.0, 40.0, 0.45))
 
 
-def stripes(shape: tuple[int, int], n: int, axis: int) -> np.ndarray:
-    """Image of `n` stripes, alternately light and dark along `axis` (0: rows, 1: columns), (height, width, 3)
-    uint8, display-referred; the first stripe is light."""
-    dark = (np.arange(shape[axis]) * n // shape[axis]) % 2 == 1
-    values = np.where(dark, BLACK, WHITE)
+def stripes(shape: tuple[int, int], edges: int | Sequence[float], axis: int) -> np.ndarray:
+    """Image of stripes, alternately light and dark along `axis` (0: rows, 1: columns), (height, width, 3) uint8,
+    display-referred; the first stripe is light.
+
+    edges  between stripes, as parts of the axis in (0, 1); or how many stripes there are, all equally wide. A texel
+           that an edge crosses has the mean reflectance of what it covers.
+    """
+    n = shape[axis]
+    inner = np.arange(1, edges) / edges if isinstance(edges, int) else np.asarray(edges, float)
+    bounds = np.concatenate([[0.0], inner, [1.0]])
+    lit = np.concatenate([[0.0], np.cumsum(np.diff(bounds) * (np.arange(len(bounds) - 1) % 2 == 0))])
+    light = n * np.diff(np.interp(np.arange(n + 1) / n, bounds, lit))
+    values = BLACK + (WHITE - BLACK) * light
     image = np.broadcast_to(values[:, None] if axis == 0 else values[None, :], shape)
     return np.repeat(np.rint(255 * encode_srgb(image)).astype(np.uint8)[..., None], 3, axis=2)
 

@@ -144,6 +144,7 @@ FIELDS = {
     "learning.learning_rate": Case("learning.learning_rate=1e-2", life),
     "learning.gamma": Case("learning.gamma=0.5", life),
     "learning.gae_lambda": Case("learning.gae_lambda=0.5", life),
+    "learning.value_weight": Case("learning.value_weight=0.5", life),
     "learning.eval_interval": Case("learning.eval_interval=32", life),
     "learning.patience": Case("learning.patience=1", life, STAGNANT),
     "evaluation.episodes": Case("evaluation.episodes=2", life),

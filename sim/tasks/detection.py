@@ -11,21 +11,25 @@ from sim.layout import CELL, Layout, add_floor, add_wall, cell_centers
 FIELD = (9, 11)  # free cells (rows, columns)
 OBJECT_RADIUS = 0.5  # [m]
 OBJECTS = ("goal", "adversary_0", "adversary_1")
-STRIPES = 8  # across the visible side of an object
+STRIPES = 6  # across the visible side of an object
+# Edges between an adversary's bands [deg from the top]: about as far apart as a goal's where eyes see them, and such
+# that light from above brightens either kind as much (validation/E1_balance.py finds them).
+BAND_EDGES_DEG = (23.2, 47.8, 77.1, 107.0, 138.0, 170.0)
 OBJECT_MARGIN = 2  # cells between the wall and the nearest place of an object
 
 
 def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
     """Add field and objects.
 
-    Goal: stripes along meridians (upright); adversary: along parallels (level), the same pattern turned by 90°.
+    Goal: stripes along meridians (upright); adversary: along parallels (level), about as wide, turned by 90°.
 
-    16 sectors of 22.5° around the vertical axis, of which a viewer sees 8, against 8 bands of 22.5° of latitude:
-    across its centre, an object looks the same along the horizontal as the other kind along the vertical. Either
-    has as much white as black, so that no single receptor tells them apart by brightness.
+    12 sectors of 30° around the vertical axis, of which a viewer sees 6, against bands of latitude whose edges make
+    up for the light from above: no single receptor that sees all of an object tells by brightness what it is.
     """
-    materials.add_texture(spec, "upright_stripes", materials.stripes((8, 512), 2 * STRIPES, axis=1))
-    materials.add_texture(spec, "level_stripes", materials.stripes((256, 8), STRIPES, axis=0))
+    materials.add_texture(spec, "upright_stripes", materials.stripes((8, 1536), 2 * STRIPES, axis=1))
+    materials.add_texture(
+        spec, "level_stripes", materials.stripes((1024, 8), [edge / 180 for edge in BAND_EDGES_DEG], axis=0)
+    )
     materials.add_textured(spec, "goal", "upright_stripes")
     materials.add_textured(spec, "adversary", "level_stripes")
     return furnished_field(spec)

@@ -6,8 +6,8 @@ import torch
 from bright_spot import BrightSpot
 
 from evolve.config import LearningConfig
-from evolve.learner import play, stuck, train
-from evolve.policy import TrainingDiverged
+from evolve.learner import learner, play, stuck, train
+from evolve.policy import TrainingDiverged, learnt
 
 QUICK = LearningConfig(total_steps=8192, n_envs=16, n_steps=32, batch_size=128, eval_interval=2048, patience=100)
 
@@ -48,11 +48,10 @@ def test_progress_is_told_after_every_rollout():
 
 
 def test_stops_when_evaluations_stop_improving():
-    """A policy that hardly moves plays the same evaluation episodes each time: one best, then `patience` more."""
-    config = LearningConfig(
-        total_steps=20_000, n_envs=16, n_steps=32, batch_size=512, learning_rate=1e-20, eval_interval=512, patience=3
-    )
-    assert [steps for steps, _ in learn(config).curve] == [512, 1024, 1536, 2048]
+    """The second evaluation is the best by far: `patience` more, and no further."""
+    config = LearningConfig(total_steps=20_000, n_envs=16, n_steps=32, batch_size=128, eval_interval=512, patience=3)
+    training = train(BrightSpot(16), Favouring(kind_evaluation=2), 16, config, 0)
+    assert [steps for steps, _ in training.curve] == [512, 1024, 1536, 2048, 2560]
 
 
 @pytest.mark.parametrize(
@@ -74,17 +73,57 @@ def test_rewards_that_are_no_numbers_end_the_training():
         learn(worlds=Poisoned(16))
 
 
-class Huge(BrightSpot):
-    def step_wait(self):
-        observation, reward, done, infos = super().step_wait()
-        return observation, reward * np.float32(1e30), done, infos
-
-
 @pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
 def test_a_loss_that_overflows_ends_the_training():
     """The critic's error squares to infinity; gradient clipping would turn it into a training that does nothing."""
+    model = learner(BrightSpot(16), 16, QUICK, 0)
+    model.learn(512)
+    model.rollout_buffer.returns[:] = 1e30
     with pytest.raises(TrainingDiverged, match="loss not finite after 512 steps"):
-        learn(worlds=Huge(16))
+        model.train()
+
+
+class Dear(BrightSpot):
+    def step_wait(self):
+        observation, reward, done, infos = super().step_wait()
+        return observation, 1000 * reward, done, infos
+
+
+def test_the_unit_of_rewards_does_not_matter():
+    training = learn(worlds=Dear(16))
+    assert play(training.policy, BrightSpot(64), 99).successes.mean() > 0.9
+
+
+class Favouring(BrightSpot):
+    """Evaluation worlds that are kinder in one evaluation than in all others."""
+
+    def __init__(self, kind_evaluation):
+        super().__init__(16)
+        self.evaluations, self.kind_evaluation = 0, kind_evaluation
+
+    def reset(self):
+        self.evaluations += 1
+        return super().reset()
+
+    def step_wait(self):
+        observation, reward, done, infos = super().step_wait()
+        return observation, reward + 100 * (self.evaluations == self.kind_evaluation), done, infos
+
+
+def test_the_best_policy_is_returned_not_the_last():
+    """Bit for bit the policy of a training that ended with that evaluation, adaptation included."""
+
+    def policy(evaluations, kind_evaluation):
+        config = LearningConfig(
+            total_steps=512 * evaluations, n_envs=16, n_steps=32, batch_size=128, eval_interval=512, patience=100
+        )
+        training = train(BrightSpot(16), Favouring(kind_evaluation), 16, config, 0)
+        assert training.steps == 512 * evaluations
+        return torch.cat([tensor.flatten() for tensor in learnt(training.policy).values()])
+
+    second = policy(4, kind_evaluation=2)
+    assert torch.equal(second, policy(2, kind_evaluation=2))
+    assert not torch.equal(second, policy(4, kind_evaluation=4))
 
 
 class Blinding(BrightSpot):

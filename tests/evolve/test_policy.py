@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from evolve.policy import SIGNAL_GAIN, PolicyConfig, build_policy, load_policy, save_policy
+from evolve.policy import CONTRAST, PolicyConfig, build_policy, learnt, load_policy, save_policy
 
 CONFIG = PolicyConfig(eyes=(3, 2, 3, 2, 4), neurons=8)
 
@@ -19,6 +19,8 @@ def policy():
     with torch.no_grad():  # biases start at zero, where a misplaced one would not show
         for parameter in policy.features_extractor.parameters():
             parameter += 0.1 * torch.randn_like(parameter)
+        for _ in range(2):  # signals of an odd mean and spread per receptor
+            policy.features_extractor.adapt(torch.rand(50, *CONFIG.eyes[1:]) * torch.rand(CONFIG.eyes[1:]) + 0.3)
     return policy
 
 
@@ -41,13 +43,14 @@ def layer(parameters, name, eye, x):
 
 
 def test_features_are_those_of_a_loop_over_eyes_and_frames(policy):
-    parameters = {name: p.detach().numpy() for name, p in policy.features_extractor.named_parameters()}
+    parameters = {name: p.detach().numpy() for name, p in learnt(policy.features_extractor).items()}
     observation = random_observation(CONFIG, 2)
     expected = []
     for sample in range(2):
         for eye in range(2):
             codes = []
-            for frame in SIGNAL_GAIN * observation["eyes"][sample, :, eye].reshape(3, -1):
+            mean, variance = (parameters[f"encoder.0.{name}"][eye, :, 0] for name in ("mean", "variance"))
+            for frame in (observation["eyes"][sample, :, eye].reshape(3, -1) - mean) * CONTRAST / np.sqrt(variance):
                 for name in ("encoder.0", "encoder.2", "encoder.4"):
                     frame = layer(parameters, name, eye, frame)
                 codes.append(frame)
@@ -55,6 +58,34 @@ def test_features_are_those_of_a_loop_over_eyes_and_frames(policy):
         expected += [observation["contact"][sample], observation["previous_action"][sample]]
     # float32 sums of a few dozen terms of order 1
     np.testing.assert_allclose(features_of(policy, observation).ravel(), np.concatenate(expected), atol=2e-6)
+
+
+def test_receptors_adapt_to_mean_and_spread_of_all_they_have_seen(policy):
+    """In pieces of any size; one spread per eye, so that a receptor that sees little change is not made of noise."""
+    random = np.random.default_rng(1)
+    seen = random.normal(0.4, 0.1, (70, *CONFIG.eyes[1:])).astype(np.float32)
+    seen[:, 1] *= 3
+    features = build_policy(CONFIG).features_extractor
+    for piece in np.split(seen, [1, 20, 21]):
+        features.adapt(torch.from_numpy(piece))
+    layer, flat = features.encoder[0], seen.reshape(70, 2, -1)
+    np.testing.assert_allclose(layer.mean[..., 0], flat.mean(0), rtol=1e-5)
+    np.testing.assert_allclose(layer.variance[:, 0, 0], flat.var(0).mean(-1), rtol=1e-4)
+
+
+def test_dim_light_looks_like_bright_light_once_adapted(policy):
+    """Behind a pupil a tenth as wide, signals are a hundredth; what is learnt from them need not know."""
+    random = np.random.default_rng(2)
+    frames = random.uniform(0, 1, (40, *CONFIG.eyes[1:])).astype(np.float32)
+    observation = random_observation(CONFIG, 5)
+
+    def features(gain):
+        torch.manual_seed(3)
+        dim = build_policy(CONFIG)
+        dim.features_extractor.adapt(torch.from_numpy(gain * frames))
+        return features_of(dim, {**observation, "eyes": np.float32(gain) * observation["eyes"]})
+
+    np.testing.assert_allclose(features(np.float32(0.01)), features(np.float32(1)), atol=1e-4)
 
 
 def test_an_eye_moves_its_own_features_only(policy):

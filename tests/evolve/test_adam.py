@@ -1,0 +1,40 @@
+"""Adam against torch's own, and what it saves."""
+
+import subprocess
+import sys
+
+import torch
+
+from evolve.adam import EPSILON, Adam
+
+
+def trained(optimizer_class, **options):
+    torch.manual_seed(0)
+    net = torch.nn.Sequential(torch.nn.Linear(5, 7), torch.nn.Tanh(), torch.nn.Linear(7, 2))
+    inputs, targets = torch.randn(30, 5), torch.randn(30, 2)
+    optimizer = optimizer_class(net.parameters(), lr=1e-2, **options)
+    for step in range(60):
+        optimizer.param_groups[0]["lr"] = 1e-2 / (1 + step)  # SB3's schedules set it so
+        optimizer.zero_grad()
+        (net(inputs) - targets).square().mean().backward()
+        torch.nn.utils.clip_grad_norm_(net.parameters(), 0.5)
+        optimizer.step()
+    return torch.cat([p.detach().flatten() for p in net.parameters()])
+
+
+def test_steps_are_those_of_torchs_adam():
+    """To float32 rounding over 60 steps; another epsilon (torch's own 1e-8) moves the weights by far more."""
+    ours = trained(Adam)
+    torch.testing.assert_close(ours, trained(torch.optim.Adam, eps=EPSILON), rtol=0, atol=2e-6)
+    assert (ours - trained(torch.optim.Adam, eps=1e-2)).abs().max() > 1e-4
+
+
+def test_a_policy_is_built_without_torchs_compiler():
+    """torch._dynamo takes seconds to import; every worker process would pay for it."""
+    code = (
+        "import sys; from evolve.policy import PolicyConfig, build_policy\n"
+        "policy = build_policy(PolicyConfig((1, 1, 1, 1, 1), 4)); policy.optimizer.zero_grad()\n"
+        "sum(p.sum() for p in policy.parameters()).backward(); policy.optimizer.step()\n"
+        "sys.exit('torch._dynamo' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
