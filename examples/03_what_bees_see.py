@@ -1,0 +1,40 @@
+"""Two flowers that no camera tells apart, as receptors of a camera, of people, of goldfish and of bees report them.
+
+python examples/03_what_bees_see.py [--out eyes.png]   (--out: the task `foraging` through the eyes of each)
+"""
+
+import argparse
+
+import numpy as np
+
+import optics
+import sim
+from sim.tasks.foraging import ULTRAVIOLET, petal
+
+SHOWN = ("rgb", "lms", "goldfish", "honeybee")
+
+for name in SHOWN:
+    eye = optics.Eye(resolution=(1, 1), bands=16, receptors=name)
+    wavelengths = eye.spectral_bands.wavelengths
+    daylight = optics.illuminant("D65").at(wavelengths)
+    goal, adversary = (
+        eye.see((petal(share).at(wavelengths) * daylight)[:, None, None], 1)[:, 0, 0] for share in ULTRAVIOLET.values()
+    )
+    peaks = ", ".join(f"{kind.peak_nm:.0f}" for kind in eye.receptors.types)
+    contrast = np.abs(goal - adversary).max() / eye.noise_sigma
+    print(f"{name:<9} receptors of {peaks:<19} nm differ by {contrast:5.1f} standard deviations of their noise")
+
+parser = argparse.ArgumentParser()
+parser.add_argument("--out", help="draw what the eyes see into this file")
+out = parser.parse_args().out
+if out:
+    from matplotlib.image import imsave
+
+    pictures = []
+    for name in SHOWN:
+        eyes = sim.Eyes(n_eyes=1, resolution=(30, 60), fov_deg=45, receptors=name, bands=8)
+        world = sim.make_env("foraging", eyes, render_mode="eyes")
+        world.reset(seed=2429)  # goal and adversary ahead
+        pictures.append(world.render())
+    imsave(out, np.concatenate(pictures))
+    print(f"drawn to  {out}")
