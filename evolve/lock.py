@@ -15,7 +15,7 @@ PATIENCE_S = 0.5  # someone asking `holder` has the lock for an instant
 
 
 class LockedError(ValueError):
-    """Another process works on the run; the message is one line that names it."""
+    """Another process works on the run, or it cannot be written; the message is one line that says which."""
 
 
 class RunLock:
@@ -28,7 +28,10 @@ class RunLock:
         self._descriptor: int | None = None
 
     def __enter__(self) -> RunLock:
-        self._descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            self._descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as error:
+            raise LockedError(f"{self._path.parent} cannot be written: {error.strerror}") from error
         deadline = time.monotonic() + PATIENCE_S
         while True:
             try:

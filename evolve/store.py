@@ -16,15 +16,17 @@ from pathlib import Path
 from evolve.candidate import Candidate
 from evolve.config import RunConfig
 from evolve.config_source import from_toml, to_toml
-from evolve.files import write_whole
+from evolve.files import UNFINISHED, sweep, write_whole
 from evolve.genotype import Genotype
 from evolve.lock import RunLock
+from evolve.versions import FILE as VERSIONS
 from evolve.versions import record_start
 
 __all__ = ["Candidate", "Run", "RunError", "next_directory"]
 
 CONFIG = "config.toml"
 CANDIDATES = "candidates.jsonl"
+POLICIES = "policies"
 
 
 class RunError(ValueError):
@@ -55,9 +57,9 @@ class Run:
         path = Path(path)
         try:
             path.mkdir(parents=True, exist_ok=True)
-            if {entry.name for entry in path.iterdir()} - {RunLock.NAME}:
+            if not _holds_no_run(path):
                 raise RunError(f"{path} is not empty: choose another name, or continue it with: evolve resume {path}")
-            (path / "policies").mkdir()
+            (path / POLICIES).mkdir(exist_ok=True)
             (path / CANDIDATES).touch()
             record_start(path, 0, origin)
             write_whole(path / CONFIG, to_toml(config).encode())
@@ -87,11 +89,16 @@ class Run:
         return RunLock(self.path)
 
     def repair(self) -> None:
-        """Cut off a candidate's unfinished last line (after `lock`), and read the rest anew."""
+        """Cut off an unfinished last line and remove files half written (after `lock`); read the rest anew."""
         self._read()
-        with (self.path / CANDIDATES).open("r+b") as file:
-            file.truncate(self._whole_bytes)
-            os.fsync(file.fileno())
+        try:
+            sweep(self.path)
+            sweep(self.path / POLICIES)
+            with (self.path / CANDIDATES).open("r+b") as file:
+                file.truncate(self._whole_bytes)
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise RunError(f"{self.path / CANDIDATES}: cannot be written: {error.strerror}") from error
 
     def append(self, candidate: Candidate) -> None:
         """Write a candidate down for good.
@@ -115,7 +122,7 @@ class Run:
 
     def policy_path(self, candidate_id: int) -> Path:
         """Where a candidate's trained policy is kept."""
-        return self.path / "policies" / f"{candidate_id:06d}.safetensors"
+        return self.path / POLICIES / f"{candidate_id:06d}.safetensors"
 
     @property
     def best(self) -> Candidate | None:
@@ -186,6 +193,17 @@ class Run:
             )
         if len(candidate.genome) != dimension:
             raise ValueError(f"genome has {len(candidate.genome)} values, {dimension} genes are open")
+
+
+def _holds_no_run(path: Path) -> bool:
+    """Whether a directory is empty, or as a process leaves it that is killed while it creates a run: config.toml, which
+    makes it one, is written last."""
+    begun = {RunLock.NAME, VERSIONS, CANDIDATES, POLICIES}
+    names = {entry.name for entry in path.iterdir() if not entry.name.endswith(UNFINISHED)}
+    if not names <= begun:
+        return False
+    record, policies = path / CANDIDATES, path / POLICIES
+    return not (record.exists() and record.stat().st_size) and not (policies.exists() and any(policies.iterdir()))
 
 
 def next_directory(task: str, preset: str, base: Path = Path("runs")) -> Path:

@@ -2,6 +2,8 @@
 
 import json
 import os
+import pickle
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,6 +19,7 @@ from evolve.config import TASKS
 from evolve.executors import LocalExecutor
 from evolve.genotype import GENES
 from evolve.loop import evolve as carry_on
+from evolve.scalars import Scalars
 from evolve.store import Run
 
 ROOT = Path(__file__).parents[2]
@@ -202,3 +205,92 @@ def test_workers_and_seed_reach_the_run(call, tmp_path, monkeypatch):
     code, _, _ = call("run", "detection", "--workers", 3, "--seed", 5, "--out", tmp_path / "run")
     assert (code, asked) == (130, [3])
     assert Run.open(tmp_path / "run").config.seed == 5
+
+
+class Hostile:
+    """Leaves a mark where it is unpickled."""
+
+    def __init__(self, mark):
+        self.mark = str(mark)
+
+    def __reduce__(self):
+        return os.mkdir, (self.mark,)
+
+
+@pytest.mark.parametrize("command", ["replay", "resume", "report", "export"])
+def test_hostile_pickle_is_refused_and_never_run(call, finished, tmp_path, command):
+    run, mark = tmp_path / "run", tmp_path / "executed"
+    shutil.copytree(finished, run)
+    for policy in range(12):
+        (run / "policies" / f"{policy:06d}.safetensors").write_bytes(pickle.dumps(Hostile(mark)))
+    code, _, err = call(command, run)
+    assert code == 2
+    assert "is not a rhabdom policy" in err
+    assert err.count("\n") == 1
+    assert not mark.exists()
+    pickle.loads(pickle.dumps(Hostile(mark)))
+    assert mark.exists(), "it would have been run"
+
+
+@pytest.mark.parametrize("command", ["replay", "resume", "report", "export"])
+def test_deleted_policy_is_named_and_nothing_is_lost(call, finished, tmp_path, command):
+    run = tmp_path / "run"
+    shutil.copytree(finished, run)
+    best = Run.open(run).best.id
+    for policy in (run / "policies").iterdir():
+        policy.unlink()
+    kept = (run / "candidates.jsonl").read_bytes()
+    code, _, err = call(command, run)
+    assert code == 2
+    assert f"no policy at {run}/policies/{best:06d}.safetensors" in err
+    assert err.count("\n") == 1
+    assert (run / "candidates.jsonl").read_bytes() == kept
+    assert call("status", run)[0] == 0
+
+
+def test_compare_puts_runs_side_by_side(call, finished, tmp_path):
+    other = Run.create(tmp_path / "other", tiny("seed=3", "search.sigma=0.1"))
+    code, out, _ = call("compare", finished, other.path, "--html", tmp_path / "page.html")
+    assert code == 0
+    rows = {line.split("  ")[0]: line.split()[-1] for line in out.splitlines()}
+    assert rows["search.sigma"] == "0.1"
+    assert rows["fitness"] == "-"
+    assert "search.population" not in rows
+    assert "best fitness so far" in (tmp_path / "page.html").read_text().lower()
+    both = json.loads(call("compare", finished, finished, "--json")[1])
+    assert both["settings"] == {}
+    assert both["runs"][0]["best"] == Run.open(finished).best.id
+    assert both["runs"][0]["best_so_far"] == sorted(both["runs"][0]["best_so_far"])
+
+
+def test_watch_ends_with_the_run(call, finished):
+    code, out, _ = call("status", finished, "--watch", "--json")
+    assert code == 0
+    assert [json.loads(line)["state"] for line in out.splitlines()] == ["finished"]
+
+
+@pytest.mark.parametrize(
+    "flags",
+    [("--executor", "dask"), ("--scheduler", "tcp://127.0.0.1:1"), ("--executor", "dask", "--scheduler", "no:1")],
+)
+def test_clusters_that_cannot_be_reached_are_refused(call, tmp_path, monkeypatch, flags):
+    code, _, err = call("run", "detection", "--out", tmp_path / "run", *flags)
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "--scheduler" in err or "no Dask scheduler answers" in err
+
+
+def test_scalars_are_the_records(finished, tmp_path):
+    accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    run = Run.open(shutil.copytree(finished, tmp_path / "run"))
+    with Scalars(run):
+        pass
+    shown = {}
+    for name in ("candidates", "generations"):
+        events = accumulator.EventAccumulator(str(run.path / "tensorboard" / name))
+        events.Reload()
+        shown[name] = {tag: {e.step: e.value for e in events.Scalars(tag)} for tag in events.Tags()["scalars"]}
+    assert shown["candidates"]["fitness"] == pytest.approx({c.id: c.fitness for c in run.candidates}, rel=1e-6)
+    assert shown["candidates"]["genes/fov_deg"] == pytest.approx({c.id: c.phenotype.fov_deg for c in run.candidates})
+    best = {g: max(c.fitness for c in run.generation(g)) for g in range(3)}
+    assert shown["generations"]["fitness/best"] == pytest.approx(best, rel=1e-6)

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+KILLS = int(os.environ.get("RHABDOM_KILLS", "50"))
 SMALL = """
 seed = 11
 workers = 1
@@ -80,3 +81,12 @@ def test_killed_run_resumes_to_the_history_of_an_uninterrupted_one(tmp_path):
     assert lives(tmp_path / "killed") == lives(tmp_path / "whole")
     for policy in (tmp_path / "whole" / "policies").iterdir():
         assert tensors(policy) == tensors(tmp_path / "killed" / "policies" / policy.name)
+
+
+def test_fifty_kills_at_random_moments_change_nothing(tmp_path):
+    """In a process of its own, because it forks; its seed is printed, for those who want to see a failure again."""
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}:{Path(__file__).parent}", "TMPDIR": str(tmp_path)}
+    command = [sys.executable, Path(__file__).with_name("kills.py"), str(KILLS)]
+    child = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert child.returncode == 0, child.stdout + child.stderr
+    assert "finished as if nothing had happened" in child.stdout

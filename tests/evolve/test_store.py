@@ -210,3 +210,60 @@ def test_default_directory_is_the_first_that_is_free(tmp_path):
     (tmp_path / "detection-quick-1").mkdir()
     (tmp_path / "detection-quick-3").mkdir()
     assert next_directory("detection", "quick", tmp_path).name == "detection-quick-2"
+
+
+def test_run_killed_while_it_is_created_can_be_begun_again(tmp_path):
+    """config.toml is written last; before it there is nothing to lose."""
+    for left in ((), ("versions.json",), ("versions.json", "candidates.jsonl", ".config.toml.123.unfinished")):
+        path = tmp_path / str(len(left))
+        (path / "policies").mkdir(parents=True)
+        for name in left:
+            (path / name).touch()
+        assert Run.create(path, CONFIG).candidates == ()
+        assert Run.open(path).config == CONFIG
+    (tmp_path / "other" / "policies").mkdir(parents=True)
+    (tmp_path / "other" / "policies" / "mine").touch()
+    with pytest.raises(RunError, match="is not empty"):
+        Run.create(tmp_path / "other", CONFIG)
+
+
+def test_repair_removes_what_was_half_written(run):
+    for folder in (run.path, run.path / "policies"):
+        (folder / ".000001.77.unfinished").touch()
+    run.repair()
+    assert not list(run.path.rglob("*.unfinished"))
+    assert (run.path / "config.toml").exists()
+
+
+def test_read_only_directory_is_named_and_can_still_be_read(tmp_path):
+    """In a process of its own, which gives up root's rights if it has them: root may write anywhere."""
+    run = Run.create(tmp_path / "run", CONFIG)
+    run.append(candidate(0))
+    kept = (run.path / "candidates.jsonl").read_bytes()
+    script = (
+        "import os, sys\n"
+        "sys.path[:0] = sys.argv[2:]\n"
+        "from test_store import Run, candidate\n"
+        "Run.open(sys.argv[1])\n"
+        "os.setuid(65534) if os.geteuid() == 0 else None\n"
+        "run = Run.open(sys.argv[1])\n"
+        "print([c.id for c in run.candidates])\n"
+        "for change in (lambda: run.append(candidate(1)), lambda: run.lock().__enter__(), run.repair):\n"
+        "    try:\n"
+        "        change()\n"
+        "    except Exception as error:\n"
+        "        print(f'{type(error).__name__}: {error}')\n"
+    )
+    for place in (tmp_path.parent.parent, tmp_path.parent, tmp_path):
+        place.chmod(0o755)
+    run.path.chmod(0o555)
+    for file in run.path.iterdir():
+        file.chmod(0o555 if file.is_dir() else 0o444)
+    here = os.path.dirname(__file__)
+    command = [sys.executable, "-c", script, str(run.path), here, os.path.dirname(os.path.dirname(here))]
+    child = subprocess.run(command, capture_output=True, text=True, check=False)
+    lines = child.stdout.splitlines()
+    assert lines[0] == "[0]", child.stderr
+    assert len(lines) == 4
+    assert all("cannot be written: Permission denied" in line for line in lines[1:]), lines
+    assert (run.path / "candidates.jsonl").read_bytes() == kept
