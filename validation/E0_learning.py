@@ -1,0 +1,182 @@
+"""E0: what is learnt, how soon, and with which settings
+
+Detection is solved if the goal comes first in 80 % of the episodes; one that reaches objects without telling them
+apart finds it first in a third. Every row is a training with `evolve.learner` in sim's worlds, watched every 50,000
+steps: 100 episodes of the policy as it is, without exploration, in worlds it never saw. CPU seconds are those of one
+thread, rollouts and updates, without these evaluations; "update" is the optimiser's share of them. In brackets: the
+95 % interval of the last evaluation (Wilson). Returns are undiscounted training returns per episode.
+
+Settings are the defaults but for those named. A row of few steps is a training that was stopped there, not one that
+learnt so fast.
+
+Trainings are stored (`docs/validation/data/E0.csv`), because they take minutes each; the page comes from the store.
+
+    python -m validation.E0_learning [--train CASE ...] [--seeds N ...] [--out DIR] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import statistics
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import sim
+from evolve.config import LearningConfig
+from validation.learning import Case, Row, read_rows, steps_to, watched, wilson, write_rows
+from validation.page import Page, parser
+from validation.workprec import MUTED, OURS, OURS_TOO
+
+STORED = Path("docs/validation/data/E0.csv")
+SOLVED = 0.8  # of the episodes
+CHANCE = 1 / 3
+PAIR = sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_deg=60)
+ONE_RECEPTOR = sim.Eyes(n_eyes=1, resolution=(1, 1), fov_deg=45)
+ROW_OF_EYES = sim.Eyes(n_eyes=10, resolution=(1, 4), fov_deg=30, placement_range_deg=150)
+ONE_EYE = sim.Eyes(n_eyes=1, resolution=(1, 4), fov_deg=30)
+
+CHANGES: tuple[dict[str, Any], ...] = (
+    {},
+    {"value_weight": 0.5},
+    {"value_weight": 16.0},
+    {"gamma": 0.99, "gae_lambda": 0.95},
+    {"gamma": 0.8},
+    {"learning_rate": 5e-4},
+    {"learning_rate": 2e-3},
+    {"n_epochs": 2},
+    {"n_epochs": 8},
+    {"batch_size": 512},
+    {"batch_size": 2048},
+    {"n_steps": 32},
+    {"n_steps": 128},
+    {"n_envs": 32},
+    {"n_envs": 128},
+)
+
+
+def _settings(changes: dict[str, Any]) -> Case:
+    """Detection with two eyes and the default settings but for these."""
+    name = ", ".join(f"{key} {value:g}" for key, value in changes.items()) or "detection, 2 x (15 x 15)"
+    return Case(name, PAIR, learning=replace(LearningConfig(), **changes))
+
+
+SETTINGS = tuple(_settings(changes) for changes in CHANGES)
+CONTROLS = (
+    Case("detection, 1 receptor", ONE_RECEPTOR, rays_per_receptor="auto"),
+    Case("tracking, 2 x (15 x 15)", PAIR, task="tracking"),
+    Case("tracking, 1 receptor", ONE_RECEPTOR, task="tracking", rays_per_receptor="auto"),
+    Case("navigation, 10 x (1 x 4)", ROW_OF_EYES, task="navigation", rays_per_receptor=16),
+    Case("navigation, 1 x (1 x 4)", ONE_EYE, task="navigation", rays_per_receptor=16),
+)
+CASES = {case.name: case for case in (*SETTINGS, *CONTROLS)}
+
+
+def store(case: Case, seed: int, path: Path) -> None:
+    """Train, and put the rows in the place of those that the file has of this case and seed, as they come."""
+    others = [row for row in read_rows(path) if (row.case, row.seed) != (case.name, seed)]
+    rows = []
+    for row in watched(case, seed):
+        rows.append(row)
+        write_rows([*others, *rows], path)
+        print(
+            f"{case.name}, seed {seed}: {row.steps} steps, {row.cpu_seconds:.0f} CPU s, "
+            f"goal {row.goals}, adversary {row.adversaries} of {row.episodes}, return {row.mean_return:.2f}",
+            flush=True,
+        )
+
+
+def trainings(rows: Sequence[Row]) -> dict[str, list[list[Row]]]:
+    """Rows by case, in the order of CASES, and by seed."""
+    found: dict[str, list[list[Row]]] = {}
+    for name in CASES:
+        seeds = sorted({row.seed for row in rows if row.case == name})
+        if seeds:
+            found[name] = [[row for row in rows if (row.case, row.seed) == (name, seed)] for seed in seeds]
+    return found
+
+
+def table(rows: Sequence[Row]) -> str:
+    """A line per training: steps and CPU seconds to the threshold, and what was reached in the end."""
+    head = f"{'case':32}{'seed':>5}{'80 % after':>12}{'CPU s':>7}{'steps':>9}{'goal first':>20}"
+    lines = [head + f"{'adversary':>11}{'return':>8}{'update':>8}"]
+    for name, runs in trainings(rows).items():
+        for run in runs:
+            solved, last = steps_to(run, SOLVED), run[-1]
+            low, high = wilson(last.goals, last.episodes)
+            lines.append(
+                f"{name:32}{last.seed:5}"
+                + (f"{solved.steps:12,}{solved.cpu_seconds:7.0f}" if solved else f"{'never':>12}{'':7}")
+                + f"{last.steps:9,}{last.goals / last.episodes:8.2f} [{low:.2f}, {high:.2f}]"
+                + f"{last.adversaries / last.episodes:11.2f}{last.mean_return:8.1f}"
+                + f"{last.update_seconds / last.cpu_seconds:8.0%}"
+            )
+    return "\n".join(lines)
+
+
+def verdicts(rows: Sequence[Row]) -> list[str]:
+    """Every bound that the stored trainings break, in words."""
+    runs = trainings(rows)
+    broken = []
+    for task in ("detection", "tracking"):
+        pair, single = runs.get(f"{task}, 2 x (15 x 15)", []), runs.get(f"{task}, 1 receptor", [])
+        broken += [f"{task}, seed {r[0].seed}: not solved" for r in pair if not steps_to(r, SOLVED)]
+        for run in single:
+            low, _ = wilson(run[-1].goals, run[-1].episodes)
+            if low > CHANCE:
+                broken.append(f"{task}, 1 receptor, seed {run[0].seed}: better than chance")
+    many, one = (
+        [run[-1].mean_return for run in runs.get(f"navigation, {eyes}", [])] for eyes in ("10 x (1 x 4)", "1 x (1 x 4)")
+    )
+    if many and one and statistics.median(many) <= statistics.median(one):
+        broken.append("navigation: ten eyes do not beat one")
+    return broken
+
+
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """How often the goal came first, over steps."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(7, 4.5), layout="constrained")
+    named = {"detection, 2 x (15 x 15)": OURS, "tracking, 2 x (15 x 15)": OURS_TOO}
+    for name, runs in trainings(rows).items():
+        if name.startswith("navigation"):
+            continue
+        for i, run in enumerate(runs):
+            x, y = [row.steps / 1e3 for row in run], [row.goals / row.episodes for row in run]
+            axes.plot(x, y, color=named.get(name, MUTED), lw=1.5 if name in named else 0.8)
+            if i == 0:
+                axes.annotate(name, (x[-1], y[-1]), fontsize=7, xytext=(3, 0), textcoords="offset points", va="center")
+    for level, label in ((SOLVED, "solved"), (CHANCE, "chance")):
+        axes.axhline(level, color=MUTED, lw=0.6, ls=":")
+        axes.annotate(label, (0, level), fontsize=7, va="bottom")
+    axes.set(xlabel="steps [1000]", ylabel="goal first, share of episodes", ylim=(0, 1), xlim=(0, None))
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=150)
+    pyplot.close(figure)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train what is asked for, then make the page of all that is stored."""
+    options_parser = parser(__doc__ or "")
+    options_parser.add_argument("--train", nargs="+", default=[], choices=CASES, metavar="CASE", help=" | ".join(CASES))
+    options_parser.add_argument("--seeds", nargs="+", type=int, default=[0], help="of the trainings")
+    options_parser.add_argument("--steps", type=int, default=600_000, help="of each training")
+    options_parser.add_argument("--interval", type=int, default=50_000, help="steps between evaluations")
+    options_parser.add_argument("--stored", type=Path, default=STORED, help="file of the stored trainings")
+    options = options_parser.parse_args(arguments)
+    for name in options.train:
+        learning = replace(CASES[name].learning, total_steps=options.steps, eval_interval=options.interval)
+        for seed in options.seeds:
+            store(replace(CASES[name], learning=learning), seed, options.stored)
+    rows = read_rows(options.stored)
+    page = Page("E0_learning", __doc__ or "", table(rows), verdicts(rows))
+    return page.publish(options, lambda path: draw(rows, path))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

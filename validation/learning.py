@@ -1,0 +1,119 @@
+"""Watched trainings: how often the goal is reached, after how many steps and CPU seconds."""
+
+from __future__ import annotations
+
+import csv
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+
+import sim
+from evolve.config import LearningConfig
+from evolve.learner import learner, play
+
+__all__ = ["Case", "Row", "read_rows", "steps_to", "watched", "wilson", "write_rows"]
+
+UNSEEN = 10_000  # added to a training's seed: evaluation worlds start where no training world did
+
+
+@dataclass(frozen=True)
+class Case:
+    """A training: who learns what, and how. episodes: played at every evaluation, in worlds that end at the first
+    object touched."""
+
+    name: str
+    eyes: sim.Eyes
+    task: str = "detection"
+    learning: LearningConfig = field(default_factory=LearningConfig)
+    memory: int = 5
+    neurons: int = 64
+    rays_per_receptor: float | str = 1
+    episodes: int = 100
+
+
+@dataclass(frozen=True)
+class Row:
+    """One evaluation. cpu_seconds: of rollouts and updates so far, one thread; update_seconds: of updates alone."""
+
+    case: str
+    seed: int
+    steps: int
+    cpu_seconds: float
+    update_seconds: float
+    goals: int
+    adversaries: int
+    episodes: int
+    mean_return: float
+
+
+def watched(case: Case, seed: int) -> Iterable[Row]:
+    """Train once; a row after every `eval_interval` steps, and no early end."""
+    dr.set_thread_count(1)
+    common: dict[str, Any] = {"memory": case.memory, "rays_per_receptor": case.rays_per_receptor}
+    worlds = sim.make_vec_env(case.task, case.eyes, case.learning.n_envs, seed, **common)
+    unseen = sim.make_vec_env(case.task, case.eyes, case.episodes, seed + UNSEEN, **common)
+    model = learner(worlds, case.neurons, case.learning, seed)
+    cpu_seconds = update_seconds = 0.0
+    update = model.train
+
+    def timed_update() -> None:
+        nonlocal update_seconds
+        began = time.process_time()
+        update()
+        update_seconds += time.process_time() - began
+
+    model.train = timed_update  # type: ignore[method-assign]
+    while model.num_timesteps < case.learning.total_steps:
+        began = time.process_time()
+        model.learn(case.learning.eval_interval, reset_num_timesteps=False)
+        cpu_seconds += time.process_time() - began
+        episodes = play(model.policy, unseen, seed + UNSEEN)
+        yield Row(
+            case=case.name,
+            seed=seed,
+            steps=model.num_timesteps,
+            cpu_seconds=round(cpu_seconds, 2),
+            update_seconds=round(update_seconds, 2),
+            goals=int((episodes.first_events > 0).sum()),
+            adversaries=int((episodes.first_events < 0).sum()),
+            episodes=case.episodes,
+            mean_return=round(float(episodes.returns.mean()), 4),
+        )
+
+
+def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
+    """Interval for a probability, 95 % by default (Wilson 1927)."""
+    share, spread = successes / trials, z * z / trials
+    middle = (share + spread / 2) / (1 + spread)
+    half = z / (1 + spread) * math.sqrt(share * (1 - share) / trials + spread / (4 * trials))
+    return middle - half, middle + half
+
+
+def steps_to(rows: Iterable[Row], threshold: float) -> Row | None:
+    """The first evaluation of one training at which the goal came first in this share of the episodes."""
+    return next((row for row in rows if row.goals >= threshold * row.episodes), None)
+
+
+def read_rows(path: Path) -> list[Row]:
+    """Rows of a CSV file; none if there is no file."""
+    if not path.exists():
+        return []
+    kinds = {"str": str, "int": int, "float": float}
+    with path.open(encoding="utf-8", newline="") as file:
+        return [Row(**{f.name: kinds[str(f.type)](line[f.name]) for f in fields(Row)}) for line in csv.DictReader(file)]
+
+
+def write_rows(rows: Iterable[Row], path: Path) -> None:
+    """The file anew, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_suffix(".tmp")
+    with unfinished.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, [f.name for f in fields(Row)], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(asdict(row) for row in rows)
+    unfinished.replace(path)
