@@ -20,8 +20,9 @@ import mujoco
 import numpy as np
 
 from optics.tabulated import Spectrum, daylight
-from sim.scene import sky
-from sim.scene.spectra import HEADLIGHT, Spectra, described
+from sim.color import decode_srgb
+from sim.scene import sky, surfaces
+from sim.scene.spectra import HEADLIGHT, Spectra, described, in_daylight
 
 WAVELENGTHS_NM = np.arange(300.0, 781.0, 5.0)
 _TYPES = mujoco.mjtLightType
@@ -55,6 +56,22 @@ def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) ->
         "wavelength_max": float(WAVELENGTHS_NM[-1]),
         "values": ",".join(f"{v:.9g}" for v in values),
     }
+
+
+def glow(
+    model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, measured: Spectrum | None
+) -> dict[str, Any] | None:
+    """Radiance of a geom whose material is emissive: that share of what it would have in full daylight."""
+    material = model.geom_matid[geom]
+    if material < 0 or model.mat_emission[material] <= 0:
+        return None
+    level = float(model.mat_emission[material])
+    if measured is not None:
+        return emission(np.ones(3), level, in_daylight(measured))
+    texture = surfaces.texture_id(model, geom)
+    if texture >= 0 and surfaces.is_mirrored(model, geom, texture):
+        return {"type": "d65", "nested": surfaces.reflectance(model, geom, to_uv), "scale": level * white()}
+    return emission(decode_srgb(surfaces.rgba(model, geom)[:3]), level)
 
 
 def white() -> float:

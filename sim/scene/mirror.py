@@ -18,7 +18,7 @@ import numpy as np
 from optics.tabulated import Spectrum
 from sim.scene import bsdfs, cameras, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
-from sim.scene.spectra import in_daylight, of_geom, resolve
+from sim.scene.spectra import of_geom, resolve
 from sim.variant import DEFAULT_VARIANT
 from sim.variant import variant as in_variant
 
@@ -90,6 +90,7 @@ class Mirror:
             self._emitters, left_out = lights.emitters(model, self._data, self.spectra)
             self.scene = self._build()
             self._params = mi.traverse(self.scene)
+            self._names = rays.names_of(self.scene)
         left_out = inventory.left_out(model, visible, groups) + left_out
         if left_out:
             warnings.warn(f"not mirrored: {'; '.join(left_out)}", MirrorWarning, stacklevel=3)
@@ -173,7 +174,7 @@ class Mirror:
         planes = {g for g in self._parts if surfaces.geom_type(self.model, g) == mujoco.mjtGeom.mjGEOM_PLANE}
         closed = {f"geom_{g}_{k}" for g, parts in self._parts.items() if g not in planes for k in range(len(parts))}
         sensor = cameras.sensor(view, width, height, self._near())
-        return rays.Camera(self.scene, sensor, frozenset(closed))
+        return rays.Camera(self.scene, sensor, self._names, frozenset(closed))
 
     def _near(self) -> float:
         return max(float(self.model.vis.map.znear * self.model.stat.extent), 1e-6)
@@ -190,14 +191,9 @@ class Mirror:
         return mi.load_dict(description)
 
     def _glow(self, geom: int) -> dict[str, Any] | None:
-        """Spectrum that a geom of an emissive material sends out."""
-        material = self.model.geom_matid[geom]
-        if material < 0 or self.model.mat_emission[material] <= 0:
-            return None
-        measured, level = of_geom(self.model, geom, self.spectra), float(self.model.mat_emission[material])
-        if measured is not None:
-            return lights.emission(np.ones(3), level, in_daylight(measured))
-        return lights.emission(surfaces.rgba(self.model, geom)[:3], level)
+        """What a geom of an emissive material sends out."""
+        to_uv = shapes.uv_transform(self.model, geom)
+        return lights.glow(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
 
     def _bsdf(self, geom: int, mirrors: bool = True) -> Any:
         """Geoms that look alike share one BSDF object."""

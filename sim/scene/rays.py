@@ -27,10 +27,12 @@ def check_size(width: int, height: int, spp: int) -> None:
 
 @dataclass(frozen=True)
 class Camera:
-    """scene, sensor: Mitsuba's. one_sided: names of the shapes whose inner side the camera looks through."""
+    """scene, sensor: Mitsuba's. names: of the scene's shapes, by their ids. one_sided: names of the shapes whose inner
+    side the camera looks through."""
 
     scene: Any
     sensor: Any
+    names: Mapping[int, str]
     one_sided: frozenset[str]
 
     @property
@@ -79,11 +81,10 @@ class Camera:
         ray, _ = self.sensor.sample_ray(0.0, 0.5, mi.Point2f(positions), mi.Point2f(0.5))
         ray.maxt = dr.inf  # nothing is too far away to be seen
         si = self._look(ray)
-        names = {_registry_id(shape): shape.id() for shape in self.scene.shapes()}
         shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
         found = dr.select(si.is_valid(), shape, 0).numpy()
         # Of the hit, its distance is exact; its point suffers on shapes as large as a world.
-        return [names[i] if i else "" for i in found], np.array(ray(si.t).numpy(), dtype=float).T
+        return [self.names[i] if i else "" for i in found], np.array(ray(si.t).numpy(), dtype=float).T
 
     def _scalar_hit(self, position: np.ndarray) -> tuple[str, np.ndarray]:
         ray, _ = self.sensor.sample_ray(0.0, 0.5, [float(p) for p in position], [0.5, 0.5])
@@ -108,8 +109,7 @@ class Camera:
         leaving = si.is_valid() & (dr.dot(si.n, ray.d) > 0)
         if _is_scalar():
             return bool(leaving) and si.shape.id() in self.one_sided
-        ids = {_registry_id(shape): shape.id() in self.one_sided for shape in self.scene.shapes()}
-        table = mi.Bool([ids.get(i, False) for i in range(max(ids) + 1)])
+        table = mi.Bool([self.names.get(i, "") in self.one_sided for i in range(max(self.names) + 1)])
         shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
         return leaving & dr.gather(mi.Bool, table, shape, leaving)
 
@@ -143,6 +143,11 @@ class Camera:
         self._look(ray)
         value = method.sample(self.scene, sampler, ray)[0]
         return np.array(value) if _is_scalar() else np.array(value.numpy(), dtype=float)
+
+
+def names_of(scene: Any) -> dict[int, str]:
+    """Names of a scene's shapes by the ids that Dr.Jit gave them; none in a scalar variant, which has no ids."""
+    return {} if _is_scalar() else {_registry_id(shape): shape.id() for shape in scene.shapes()}
 
 
 def _description(integrator: str | Mapping[str, Any]) -> dict[str, Any]:

@@ -1,5 +1,6 @@
-"""Geoms as Mitsuba shapes. Planes and spheres, and other curved geoms without a texture, are exact (rectangle, sphere,
-cylinder, disk, ellipsoids); everything whose texture coordinates Mitsuba would lay differently is tessellated."""
+"""Geoms as Mitsuba shapes. Planes and spheres, and capsules and cylinders without a texture, are exact (rectangle,
+sphere, cylinder, disk); everything whose texture coordinates Mitsuba would lay differently is tessellated, and so are
+ellipsoids: Mitsuba solves its own in float32, and what is small, flat or far away is hit where it is not."""
 
 from __future__ import annotations
 
@@ -30,9 +31,6 @@ _ASSETS = (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF, _TYPES.mjGEOM_HFIELD)
 # the horizon, and float32 lays texture and shadows on it to 1e-3 of an extent. (Triangles of that size would be hit in
 # the wrong places; Mitsuba's rectangle is solved in closed form.)
 INFINITY = 1e4
-# Longest semi-axis over the shortest up to which Mitsuba's `ellipsoids` are hit where they are: they are solved in
-# float32, and at 5 some rays miss the limb, at 35 many hit what is not there. Flatter ones are tessellated.
-ROUND = 3.0
 
 
 @dataclass(frozen=True)
@@ -53,12 +51,7 @@ class Part:
             placed = {"vertex_positions": self.vertices(pose)}
             return placed if self.triangles.normals is None else {**placed, "vertex_normals": self.normals(pose)}
         assert self.local is not None
-        if self.plugin != "ellipsoids":
-            return {"to_world": mi.Transform4f((pose @ self.local).tolist())}
-        quat = np.empty(4)
-        mujoco.mju_mat2Quat(quat, pose[:3, :3].ravel())
-        # Centre, semi-axes, quaternion with its real part last.
-        return {"data": np.concatenate([pose[:3, 3], np.diag(self.local)[:3], np.roll(quat, -1)]).astype(np.float32)}
+        return {"to_world": mi.Transform4f((pose @ self.local).tolist())}
 
     def vertices(self, pose: np.ndarray) -> np.ndarray:
         """Vertices in the world, flat float32."""
@@ -127,8 +120,6 @@ def parts(model: mujoco.MjModel, geom: int) -> list[Part]:
         return [Part("sphere", _placed(size[0], size[0], size[0]))]
     if kind == _TYPES.mjGEOM_PLANE:
         return [Part("rectangle", _scaled([*_half_sides(model, geom), 1.0]))]
-    if not is_textured(model, geom) and kind == _TYPES.mjGEOM_ELLIPSOID and size.max() <= ROUND * size.min():
-        return [Part("ellipsoids", _scaled(size))]
     if not is_textured(model, geom) and kind in (_TYPES.mjGEOM_CYLINDER, _TYPES.mjGEOM_CAPSULE):
         return _exact_cylinder(kind, size[0], size[1])
     triangles = _triangles(model, geom)
@@ -205,11 +196,9 @@ def _placed(sx: float, sy: float, sz: float, z: float = 0.0) -> np.ndarray:
 def build(part: Part, pose: np.ndarray, name: str, bsdf: Any, radiance: dict[str, Any] | None) -> Any:
     """The Mitsuba shape (of the variant in force) of a part, emitting where `radiance` is given."""
     if part.triangles is None:
-        description: dict[str, Any] = {"type": part.plugin, "bsdf": bsdf, "id": name}
-        if part.plugin == "ellipsoids":
-            description |= {"data": mi.TensorXf(part.placement(pose)["data"][None]), "extent": 1.0}
-        else:
-            description["to_world"] = mi.ScalarTransform4f((pose @ part.local).tolist())
+        assert part.local is not None
+        placed = mi.ScalarTransform4f((pose @ part.local).tolist())
+        description: dict[str, Any] = {"type": part.plugin, "bsdf": bsdf, "id": name, "to_world": placed}
         if radiance is not None:
             description["emitter"] = {"type": "area", "radiance": radiance}
         return mi.load_dict(description)
