@@ -25,6 +25,7 @@ __all__ = [
     "Trajectory",
     "acuity_cpd",
     "bootstrap_interval",
+    "champions",
     "gene_values",
     "generation_statistics",
     "image_quality",
@@ -82,6 +83,19 @@ def by_generation(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candi
     return [(g, [c for c in ordered if c.generation == g]) for g in sorted({c.generation for c in ordered})]
 
 
+def champions(candidates: Sequence[Candidate]) -> list[tuple[int, Candidate]]:
+    """(generation, best candidate up to its end), from the first generation in which one succeeded."""
+    found: list[tuple[int, Candidate]] = []
+    best: Candidate | None = None
+    for generation, members in by_generation(candidates):
+        for candidate in filter(succeeded, members):
+            if best is None or candidate.fitness > best.fitness:
+                best = candidate
+        if best is not None:
+            found.append((generation, best))
+    return found
+
+
 def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationStatistics]:
     """Fitness statistics of every generation that has candidates; failed ones count as failed, not as fitness."""
     rows: list[GenerationStatistics] = []
@@ -137,7 +151,8 @@ def gene_values(phenotype: Phenotype) -> dict[str, float]:
     if phenotype.refractive_index is not None:
         values["refractive_index"] = phenotype.refractive_index
         values |= {"dispersion": phenotype.dispersion, "aperture_shape": float(phenotype.aperture_shape)}
-    return values | {"memory_frames": float(phenotype.memory_frames), "neurons": float(phenotype.neurons)}
+    brain = ("memory_frames", "neurons", "layers")
+    return values | {name: float(getattr(phenotype, name)) for name in brain}
 
 
 def acuity_cpd(phenotype: Phenotype) -> float:

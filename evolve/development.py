@@ -46,6 +46,7 @@ class Phenotype:
     neurons: int
     aperture_shape: int = 0
     dispersion: float = 0.0
+    layers: int = 2
 
     def pupil(self, eye: EyeConfig) -> optics.Pupil | None:
         """Pupil of each of the eyes; None for the perfect lens."""
@@ -106,6 +107,7 @@ def develop(genome: NDArray[np.float64], config: RunConfig) -> Phenotype:
         neurons=int(values["neurons"]),
         aperture_shape=int(values["aperture_shape"]) if seen_through else 0,
         dispersion=values["dispersion"] if seen_through else 0.0,
+        layers=int(values["layers"]),
     )
 
 

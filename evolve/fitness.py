@@ -56,5 +56,8 @@ def _live(phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress
         config.task, eyes, config.evaluation.episodes, evaluation, mode="evaluation", **common
     )
     with closing(training_worlds), closing(evaluation_worlds):
-        training = train(training_worlds, evaluation_worlds, phenotype.neurons, config.learning, weights, progress)
+        brain = {"neurons": phenotype.neurons, "layers": phenotype.layers}
+        training = train(
+            training_worlds, evaluation_worlds, config=config.learning, seed=weights, progress=progress, **brain
+        )
         return training, play(training.policy, evaluation_worlds, evaluation)

@@ -136,6 +136,7 @@ def _brain() -> list[Gene]:
     return [
         _count("memory_frames", (1, 32), (1, 10, 5), "frames", "past frames that the brain sees", "neural"),
         _count("neurons", (1, 512), (1, 512, 64), "", "neurons in each hidden layer", "neural"),
+        _count("layers", (1, 4), (1, 4, 2), "", "hidden layers of actor and critic", "neural", False),
     ]
 
 

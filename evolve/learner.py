@@ -129,7 +129,7 @@ class _Report(BaseCallback):
         self.progress(self.num_timesteps, self.planned)
 
 
-def learner(worlds: VecEnv, neurons: int, config: LearningConfig, seed: int) -> AdaptingPPO:
+def learner(worlds: VecEnv, neurons: int, config: LearningConfig, seed: int, layers: int = 2) -> AdaptingPPO:
     """A learner that has learnt nothing yet. It sees rewards in units of the spread of its discounted returns, so
     that an agent's first minutes at a wall, a hundred times as bad as anything later, do not swamp the critic."""
     torch.set_num_threads(1)
@@ -146,7 +146,7 @@ def learner(worlds: VecEnv, neurons: int, config: LearningConfig, seed: int) -> 
         vf_coef=config.value_weight,
         seed=seed,
         device="cpu",
-        policy_kwargs={"neurons": neurons},
+        policy_kwargs={"neurons": neurons, "layers": layers},
         rollout_buffer_class=FrameRolloutBuffer,
         rollout_buffer_kwargs={"seed": seed},
     )
@@ -161,6 +161,7 @@ def train(
     config: LearningConfig,
     seed: int,
     progress: Progress | None = None,
+    layers: int = 2,
 ) -> Training:
     """Learn to act in `worlds`: same arguments, same policy, bit for bit (on one machine).
 
@@ -170,7 +171,7 @@ def train(
 
     Raises TrainingDiverged where rewards, loss, weights or actions stop being finite.
     """
-    model = learner(worlds, neurons, config, seed)
+    model = learner(worlds, neurons, config, seed, layers)
     report = _Report(progress, config.total_steps) if progress else None
     curve: list[tuple[int, float]] = []
     best: dict[str, torch.Tensor] = {}

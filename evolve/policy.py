@@ -45,12 +45,13 @@ class TrainingDiverged(FloatingPointError):
 class PolicyConfig:
     """The shape of a policy: all that is needed to build it again.
 
-    eyes is the shape of the observation's `eyes` (memory, eye, channel, height, width); neurons the width of both
-    hidden layers of actor and critic.
+    eyes is the shape of the observation's `eyes` (memory, eye, channel, height, width); neurons the width of the
+    `layers` hidden layers of actor and critic.
     """
 
     eyes: tuple[int, ...]
     neurons: int
+    layers: int = 2
 
     def observation_space(self) -> spaces.Dict:
         """The observation that sim's environments give with these eyes."""
@@ -167,19 +168,26 @@ class EyeFeatures(BaseFeaturesExtractor):
 
 
 class EyePolicy(MultiInputActorCriticPolicy):
-    """SB3's actor-critic over EyeFeatures, with two hidden layers of `neurons` each for actor and critic."""
+    """SB3's actor-critic over EyeFeatures, with `layers` hidden layers of `neurons` each for actor and critic."""
 
     def __init__(
-        self, observation_space: spaces.Dict, action_space: spaces.Box, lr_schedule: Any, *, neurons: int, **kwargs: Any
+        self,
+        observation_space: spaces.Dict,
+        action_space: spaces.Box,
+        lr_schedule: Any,
+        *,
+        neurons: int,
+        layers: int = 2,
+        **kwargs: Any,
     ) -> None:
         kwargs |= {
             "features_extractor_class": EyeFeatures,
-            "net_arch": [neurons, neurons],
+            "net_arch": [neurons] * layers,
             "log_std_init": INITIAL_LOG_STD,
             "optimizer_class": Adam,
         }
         super().__init__(observation_space, action_space, lr_schedule, **kwargs)
-        self.config = PolicyConfig(tuple(observation_space["eyes"].shape), neurons)
+        self.config = PolicyConfig(tuple(observation_space["eyes"].shape), neurons, layers)
 
     def extract_features(
         self, obs: dict[str, Tensor], features_extractor: BaseFeaturesExtractor | None = None
@@ -196,7 +204,8 @@ class EyePolicy(MultiInputActorCriticPolicy):
 def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy:
     """An untrained policy, drawn from torch's random state."""
     action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-    return EyePolicy(config.observation_space(), action_space, lambda _: learning_rate, neurons=config.neurons)
+    shape = {"neurons": config.neurons, "layers": config.layers}
+    return EyePolicy(config.observation_space(), action_space, lambda _: learning_rate, **shape)
 
 
 def save_policy(policy: EyePolicy, path: Path | str) -> None:
@@ -219,7 +228,9 @@ def load_policy(path: Path | str) -> EyePolicy:
             metadata = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no mapping)
         stored = json.loads(metadata["config"])
-        config = PolicyConfig(tuple(int(n) for n in stored["eyes"]), int(stored["neurons"]))
+        config = PolicyConfig(
+            tuple(int(n) for n in stored["eyes"]), int(stored["neurons"]), int(stored.get("layers", 2))
+        )
         policy = build_policy(config)
         set_learnt(policy, tensors)
     except FileNotFoundError:

@@ -91,7 +91,9 @@ def hired(config, animal):
     """Workers that a run starts."""
     with TemporaryDirectory() as folder, mock.patch.object(evolve.commands.run, "LocalExecutor") as executor:
         executor.side_effect = KeyboardInterrupt
-        evolve.commands.run._carry(Run.create(Path(folder) / "run", config), Namespace(json=False, executor="local", tensorboard=False))
+        evolve.commands.run._carry(
+            Run.create(Path(folder) / "run", config), Namespace(json=False, executor="local", tensorboard=False)
+        )
         return executor.call_args.args[1]
 
 
@@ -168,6 +170,7 @@ GENE_OUTPUTS = {
     "aperture_shape": point_image,
     "memory_frames": life,
     "neurons": life,
+    "layers": life,
 }
 
 

@@ -10,12 +10,22 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
-from evolve.analysis import GenerationStatistics, Trajectory, succeeded
+from evolve.analysis import GenerationStatistics, Trajectory, bootstrap_interval, champions, succeeded
 from evolve.candidate import Candidate
+from evolve.genealogy import descent, nearest_parent
 from evolve.report.svg import drawing, inline
 from evolve.report.theme import ACCENT, LINE, MUTED, VERMILLION
 
-__all__ = ["comparison_figure", "fitness_figure", "gene_figure", "learning_figure", "relief_figure", "success_figure"]
+__all__ = [
+    "comparison_figure",
+    "fitness_figure",
+    "gene_figure",
+    "genealogy_figure",
+    "learning_figure",
+    "relief_figure",
+    "success_figure",
+    "vision_figure",
+]
 
 SIZE = (370, 260)
 Generations = Sequence[int] | NDArray[np.int64]
@@ -28,6 +38,7 @@ def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Ca
         _candidates(axes, candidates, [c.fitness for c in candidates])
         generations = [row.generation for row in rows]
         _spread(axes, generations, [r.low for r in rows], [r.median for r in rows], [r.high for r in rows])
+        _confidence(axes, candidates)
         axes.plot(generations, [r.best_so_far for r in rows], color=ACCENT, lw=2, marker="o", ms=4)
         _generation_axis(axes, generations)
         axes.set_ylabel("fitness (mean return)")
@@ -50,6 +61,41 @@ def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> s
         if curves:
             axes.legend(frameon=False, labelcolor=MUTED)
         return inline(figure, "comparison", f"Best fitness so far of {len(curves)} runs over the generations.")
+
+
+def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> str:
+    """Every candidate beside its generation, at its fitness, joined with the nearest of its parents; the best one's
+    line of descent in the accent colour."""
+    known = {candidate.id: candidate for candidate in candidates}
+    population = max(candidate.index for candidate in candidates) + 1
+    with drawing(*SIZE) as figure:
+        axes = figure.subplots()
+
+        def place(candidate: Candidate) -> tuple[float, float]:
+            aside = 0.5 * (candidate.index / max(population - 1, 1) - 0.5)
+            return candidate.generation + aside, candidate.fitness
+
+        for candidate in filter(succeeded, candidates):
+            parent = nearest_parent(candidate, known)
+            if parent is not None and succeeded(parent):
+                axes.plot(*zip(place(parent), place(candidate), strict=True), color=MUTED, alpha=0.25, lw=0.7)
+        _candidates(axes, candidates, [c.fitness for c in candidates])
+        line = [candidate for candidate in descent(best, candidates) if succeeded(candidate)]
+        axes.plot(*zip(*map(place, line), strict=True), color=ACCENT, lw=2, marker="o", ms=4)
+        _generation_axis(axes, sorted({candidate.generation for candidate in candidates}))
+        axes.set_ylabel("fitness (mean return)")
+        return inline(figure, "genealogy", f"Descent of candidate {best.id} over {len(line)} generations of its line.")
+
+
+def vision_figure(name: str, label: str, generations: Sequence[int], values: Sequence[float]) -> str:
+    """One measure of the best eye so far over the generations."""
+    with drawing(250, 165, font=10.5) as figure:
+        axes = figure.subplots()
+        axes.plot(generations, values, color=ACCENT, lw=1.8, marker="o", ms=3)
+        _generation_axis(axes, generations)
+        axes.yaxis.set_major_locator(MaxNLocator(4))
+        axes.set_ylabel(label)
+        return inline(figure, f"vision-{name}", f"{name}: {values[-1]:.3g} in the best eye of all.")
 
 
 def success_figure(candidates: Sequence[Candidate]) -> str:
@@ -147,6 +193,14 @@ def _candidates(axes: Axes, candidates: Sequence[Candidate], values: Sequence[fl
     axes.plot(x[good], np.asarray(values, float)[good], ls="none", marker="o", ms=3.2, mew=0, color=MUTED, alpha=0.6)
     bottom = axes.get_xaxis_transform()
     axes.plot(x[~good], np.full((~good).sum(), 0.02), ls="none", marker="x", ms=4, color=VERMILLION, transform=bottom)
+
+
+def _confidence(axes: Axes, candidates: Sequence[Candidate]) -> None:
+    """95 % bootstrap interval of the best candidate's fitness, from its episodes' returns."""
+    best = [(generation, champion) for generation, champion in champions(candidates) if champion.returns]
+    if best:
+        low, high = zip(*(bootstrap_interval(champion.returns) for _, champion in best), strict=True)
+        axes.fill_between([generation for generation, _ in best], low, high, color=ACCENT, alpha=0.15, lw=0)
 
 
 def _generation_axis(axes: Axes, generations: Generations) -> None:

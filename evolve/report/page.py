@@ -2,23 +2,41 @@
 
 from __future__ import annotations
 
-from evolve.analysis import acuity_cpd, gene_values, generation_statistics, trajectory
+import math
+
+from evolve.analysis import acuity_cpd, champions, gene_values, generation_statistics, trajectory
 from evolve.candidate import Candidate
 from evolve.config import TASKS
 from evolve.episode import Episode
+from evolve.genealogy import descent
 from evolve.genotype import CLUSTERS, GENES, Gene
 from evolve.report import tables
 from evolve.report.eye_figures import eye_figures
-from evolve.report.figures import fitness_figure, gene_figure, learning_figure, relief_figure, success_figure
+from evolve.report.figures import (
+    fitness_figure,
+    gene_figure,
+    genealogy_figure,
+    learning_figure,
+    relief_figure,
+    success_figure,
+    vision_figure,
+)
 from evolve.report.markup import KEY, document, figure, number, section, text
 from evolve.report.player import player, summary
 from evolve.report.stage import Stage
 from evolve.report.views import views
 from evolve.store import Run
+from evolve.vision import SCENES, vision
 
 __all__ = ["render"]
 
 POPULATION = f"{KEY.format('muted band')} 10–90 % of the population, {KEY.format('muted')} its median"
+VISION = {
+    "image quality": ("IQ", "image_quality", "area of the MTF above the noise, times throughput"),
+    "contrast": ("MTF", "contrast", "at half the receptors’ Nyquist frequency, in white daylight"),
+    "PSNR": ("PSNR [dB]", "psnr_db", "of the view, made as bright, against a perfect lens’s"),
+    "SSIM": ("SSIM", "ssim", "structural similarity with a perfect lens’s view"),
+}
 
 
 def header(run: Run) -> str:
@@ -37,7 +55,8 @@ def fitness_section(run: Run) -> str:
         return section("fitness", "Fitness", "<p>No candidate has been evaluated yet.</p>\n")
     rows = generation_statistics(run.candidates)
     caption = (
-        f"<b>Fitness over generations.</b> {KEY.format('accent')} best so far, {POPULATION}; a dot per candidate, "
+        f"<b>Fitness over generations.</b> {KEY.format('accent')} best so far and, pale, the 95 % bootstrap interval "
+        f"of its mean return; {POPULATION}; a dot per candidate, "
         f'<span class="vermillion">×</span> failed. Fitness is the mean return of {run.config.evaluation.episodes} '
         "evaluation episodes after training."
     )
@@ -53,6 +72,11 @@ def fitness_section(run: Run) -> str:
             f"(no. {best.id}), {KEY.format('muted')} the others."
         )
         figures += figure(learning_figure(run.candidates, best), caption)
+        caption = (
+            f"<b>Genealogy.</b> Each candidate and the nearest of its parents; {KEY.format('accent')} the line of "
+            f"candidate {best.id}: {', '.join(str(c.id) for c in descent(best, run.candidates))}."
+        )
+        figures += figure(genealogy_figure(run.candidates, best), caption)
     return section("fitness", "Fitness", f'<div class="figures">{figures}</div>\n')
 
 
@@ -109,6 +133,22 @@ def _relief(run: Run, genes: list[Gene]) -> str:
     return f'<div class="wide">{figure(relief_figure(paths), caption)}</div>\n'
 
 
+def vision_section(run: Run) -> str:
+    """What the best eyes so far see, over the generations."""
+    best = champions(run.candidates)
+    seen = {candidate.id: vision(candidate.phenotype, run.config) for _, candidate in best}
+    if not seen:
+        return ""
+    generations = [generation for generation, _ in best]
+    figures = ""
+    for name, (label, field, meaning) in VISION.items():
+        values = [getattr(seen[candidate.id], field) for _, candidate in best]
+        if any(math.isfinite(value) for value in values):
+            figures += figure(vision_figure(name, label, generations, values), f"<b>{name}</b>: {meaning}")
+    intro = f"<p>The best eye so far in each generation; views are of {SCENES} starts of episodes, without noise.</p>\n"
+    return section("vision", "Vision over the generations", f'{intro}<div class="figures small">{figures}</div>\n')
+
+
 def candidates_section(run: Run) -> str:
     """The table of everyone, and the list of those who failed."""
     intro = "<p>Fitness is the mean return of the evaluation episodes; lowest and highest are single episodes.</p>\n"
@@ -133,7 +173,7 @@ def episode_section(run: Run, episode: Episode) -> str:
 
 def render(run: Run, episode: Episode | None) -> bytes:
     """The whole page; without an episode where no candidate has succeeded."""
-    parts = [header(run), fitness_section(run), genes_section(run)]
+    parts = [header(run), fitness_section(run), genes_section(run), vision_section(run)]
     if (best := run.best) is not None and episode is not None:
         parts += [best_section(run, best, episode), episode_section(run, episode)]
     else:

@@ -107,7 +107,7 @@ def test_gene_values_are_those_of_the_phenotype():
     assert values["resolution_width"] == 15
     assert values["doe_01"] == pytest.approx(1 / 15)  # row-major: column grows first
     assert values["doe_10"] == pytest.approx(4 / 15)
-    assert len(values) == 5 + 20 + 2
+    assert len(values) == 5 + 20 + 3
 
 
 def test_gene_values_without_optics():

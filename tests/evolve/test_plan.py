@@ -68,7 +68,7 @@ def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, mon
     out = capsys.readouterr().out
     assert "3 generations x 4 candidates = 12" in out
     assert "optical from generation 1: relative_aperture, refractive_index, doe_00 … doe_33 (16)" in out
-    assert "24 of 27" in out
+    assert "24 of 28" in out
     assert main(["run", "detection", "--preset", "quick", "--dry-run", "--json", *late]) == 0
     plan = json.loads(capsys.readouterr().out)
     assert plan["evaluations"] == 12

@@ -1,0 +1,55 @@
+"""What eyes see beside a perfect lens: by the definitions, and worse for worse eyes."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from evolve.config_source import assemble
+from evolve.development import develop
+from evolve.genotype import Genotype
+from evolve.vision import ssim, vision
+from optics import backend
+
+CONFIG = assemble("detection", "quick")
+
+
+@pytest.fixture(scope="module")
+def eye():
+    backend.require()
+    return develop(Genotype(CONFIG.genome).start, CONFIG)
+
+
+def test_ssim_by_its_equation():
+    """One window over the whole picture; Wang et al. 2004, eq. 13."""
+    rng = np.random.default_rng(0)
+    a, b = rng.random((2, 1, 7, 7))
+    (mu, nu), cov = (a.mean(), b.mean()), np.cov(a.ravel(), b.ravel())
+    c1, c2 = 0.01**2, 0.03**2
+    expected = (2 * mu * nu + c1) * (2 * cov[0, 1] + c2)
+    expected /= (mu**2 + nu**2 + c1) * (cov[0, 0] + cov[1, 1] + c2)
+    assert ssim(a, b) == pytest.approx(expected)
+    assert ssim(a, a) == pytest.approx(1.0)
+
+
+def test_ssim_of_a_line_of_receptors_is_no_number():
+    assert math.isnan(ssim(np.zeros((3, 2, 8)), np.zeros((3, 2, 8))))
+    assert ssim(np.zeros((3, 4, 5)), np.zeros((3, 4, 5))) == 1.0, "window of 3 for a side of 4"
+
+
+def test_perfect_lens_sees_itself(eye):
+    perfect = replace(eye, relative_aperture=None, relief=None, refractive_index=None)
+    seen = vision(perfect, CONFIG)
+    assert (seen.image_quality, seen.contrast, seen.psnr_db) == (1 - CONFIG.eye.noise_sigma, 1.0, math.inf)
+    assert seen.ssim == pytest.approx(1.0)
+
+
+def test_defocus_is_seen_by_every_measure(eye):
+    sharp = vision(eye, CONFIG)
+    blurred = vision(replace(eye, relief=(0.5,) * 16), CONFIG)
+    assert sharp.image_quality > blurred.image_quality
+    assert sharp.contrast > blurred.contrast + 0.1
+    assert sharp.psnr_db > blurred.psnr_db + 3
+    assert sharp.ssim > blurred.ssim + 0.1
+    assert vision(eye, CONFIG) == sharp, "the scenes are always the same"
