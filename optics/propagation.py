@@ -163,16 +163,16 @@ def _sampling(method: str, source: Grid, window: Grid, wavelength: float, distan
     )
     band = min(bands, key=lambda band: band.walk)
     far = band.walk
-    if band.end >= (
-        0.5 / source.dx if band.square else nyquist
-    ):  # nothing to fade: all that the samples hold may matter
+    # Where nothing can fade, all that the samples hold may matter.
+    if band.end >= (0.5 / source.dx if band.square else nyquist):
         end = nyquist if paraxial else min(nyquist, STEEPEST_SINE / wavelength)
         band, far = EVERYTHING, walk(end, wavelength, z, paraxial) * (math.sqrt(0.5) if end == nyquist else 1)
     least = max(max(halves) + far, 2 * (max(source.shape) // 2 + 1) * source.dx)
     samples = fast_length(least / source.dx)
     # Evanescent waves are kept for their power, which is reported.
     highest = max(band.end, 0 if paraxial else 1 / wavelength)
-    across = min(samples, 2 * math.ceil(highest * samples * source.dx) + 1) if band.fade else samples
+    wanted = 2 * highest * samples * source.dx + 3  # as a float: it may be infinite
+    across = 2 * math.ceil((wanted - 3) / 2) + 1 if band.fade and wanted < samples else samples
     if max(across, *window.shape) > MOST_SAMPLES:
         raise AccuracyError(
             f"distance = {distance:g} m over a window of {2 * window.half_width:.3g} m needs {across} samples across; "
