@@ -26,6 +26,15 @@ def slow(phenotype, config, seed, policy_path, progress):
     return bowl(phenotype, config, seed, policy_path, progress)
 
 
+def endless(phenotype, config, seed, policy_path, progress):
+    """Goes on for half a minute, and says so."""
+    for step in range(300):
+        with (Path(os.environ["RHABDOM_TEST"]) / "beats.log").open("a") as log:
+            log.write(".")
+        progress(step, 300)
+        time.sleep(0.1)
+
+
 def fails_for_some(phenotype, config, seed, policy_path, progress):
     """Every other candidate raises."""
     if int(policy_path.stem) % 2:

@@ -144,6 +144,27 @@ def test_what_is_added_meanwhile_is_evaluated_too(tmp_path, cluster):
     assert sorted(found) == list(range(5))
 
 
+def test_candidate_that_nobody_wants_any_more_is_given_up(tmp_path, cluster):
+    """As after Ctrl-C: it would go on for half a minute."""
+    told, beats = [], cluster.folder / "beats.log"
+    with cluster.executor("endless") as executor:
+        running = executor.run(jobs(tmp_path, 1), lambda *report: told.append(report) or interrupt())
+
+        def interrupt():
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            next(running)
+    assert told
+    deadline = time.monotonic() + 15
+    while True:
+        before = beats.stat().st_size
+        time.sleep(1.0)
+        if beats.stat().st_size == before:
+            break
+        assert time.monotonic() < deadline, "it goes on"
+
+
 def test_worker_with_other_software_is_refused(tmp_path, cluster, monkeypatch):
     monkeypatch.setattr(remote, "_software", lambda: {"torch": "0.4", "numpy": ""})
     with (
