@@ -118,8 +118,8 @@ class Case:
     given: tuple[str, ...] = PERFECT
 
 
-# Steps too small to move a weight: every evaluation plays the same, so none improves.
-STAGNANT = ("learning.learning_rate=1e-30", "learning.total_steps=96", "learning.eval_interval=32", *PERFECT)
+# Steps too small to move a weight: but for what receptors adapt to, every evaluation plays the same; soon none improves.
+STAGNANT = ("learning.learning_rate=1e-30", "learning.total_steps=256", "learning.eval_interval=32", *PERFECT)
 FIELDS = {
     "task": Case("task=tracking", life),
     "seed": Case("seed=1", history),
