@@ -31,6 +31,7 @@ PERFECT_LENS_RUNGS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 25
 PUPIL_RUNGS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
 # Of the tolerance; errors add up as squares, so this much leaves 0.87 of it to the rays.
 SHARE_OF_DEPTH = SHARE_OF_BANDS = 0.35
+LAYERS = (1, 3, 5, 9)  # nodes of each are among those of the next
 NEAREST = 0.005  # quantile of the distances that counts as the nearest
 
 
@@ -120,7 +121,7 @@ def choose_fidelity(world: World, eyes: Eyes, tolerance: float | None = None) ->
 def chosen(pilot: Pilot, eyes: Eyes, eye: optics.Eye, tolerance: float | None = None) -> tuple[Fidelity, Sampling]:
     """What `choose_fidelity` gives, with the eyes' own bands, and how the eye is to be sampled."""
     allowed = _allowed(eyes, eye, tolerance)
-    depth, depth_level = _depth(pilot.distances(), eye, SHARE_OF_DEPTH * allowed)
+    depth, depth_level = _depth(pilot, eye, SHARE_OF_DEPTH * allowed)
     sampling = sampling_of(eye, depth)
     rungs = PERFECT_LENS_RUNGS if eye.pupil is None else PUPIL_RUNGS
     left = allowed * math.sqrt(1 - SHARE_OF_DEPTH**2 - SHARE_OF_BANDS**2)
@@ -149,8 +150,8 @@ def _bands(eye: optics.Eye, allowed: float) -> tuple[int, Level]:
     return bands, Level("bands", f"{bands}", allowed, f"fewest with {allowed:.1e} for any colours up to white")
 
 
-def _depth(distances: np.ndarray, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
-    """One PSF for infinity where that is enough, else as few layers as optics' own ladder wants.
+def _depth(pilot: Pilot, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
+    """One PSF for infinity where that is certainly enough, else as few layers as glimpses of the world want.
 
     Light through the pupil's point p lands f p/z further off than from infinity. In the mean over a disk of radius R
     that is |Δx| + |Δy| = 8/(3π) f R/z; a square receptor's field moves by as much of its width, and no scene up to
@@ -158,19 +159,21 @@ def _depth(distances: np.ndarray, eye: optics.Eye, allowed: float) -> tuple[Dept
     """
     if eye.pupil is None:
         return ONE_PSF, Level("depth", str(ONE_PSF), 0.0, "a perfect lens blurs nothing")
+    distances = pilot.distances()
     near, far = float(np.quantile(distances, NEAREST, method="higher")), float(distances[-1])
     shift = 8 / (3 * math.pi) * eye.sensor_distance * eye.pupil.radius / near / eye.receptor_pitch
     bound = eye.throughput * shift
     if bound <= allowed:
         why = f"blur of {shift:.1e} of a receptor at {near:.2g} m, the nearest that is seen"
         return ONE_PSF, Level("depth", str(ONE_PSF), bound, why)
-    within = min(max(allowed / eye.throughput, 1e-6), 0.5)
     try:
-        choice = eye.sight(2, np.array([near, far]), "auto", 1, within).choices[0]
+        errors = pilot.errors_of_layers(DepthLayers(far, near, LAYERS[-1]), LAYERS)
     except optics.AccuracyError as error:
         return DepthLayers(far, near, 1), Level("depth", "one PSF", None, f"at the mean depth: {error}")
-    layers = DepthLayers(far, near, choice.counts[0])
-    return layers, Level("depth", str(layers), eye.throughput * (choice.predicted_error or 0.0), choice.why)
+    count = next((n for n, e in errors.items() if CAUTION * e <= allowed), LAYERS[-1])
+    layers = DepthLayers(far, near, count)
+    why = f"fewest of 1 ... {LAYERS[-1]} for {allowed:.1e}"
+    return layers, Level("depth", str(layers), CAUTION * errors[count], why)
 
 
 def _fewest(error: Callable[[float], float], rungs: tuple[float, ...], allowed: float) -> tuple[float, Level]:

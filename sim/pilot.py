@@ -7,7 +7,7 @@ with what many times as many rays see. All is drawn with fixed seeds: the same w
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -19,7 +19,7 @@ from sim.agent import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.depth import DepthLayers
 from sim.placement import CLEARANCE
 from sim.recording import aligned
-from sim.sensor import BoxSampling, Sampling, Trial
+from sim.sensor import BoxSampling, Sampling, Trial, sampling_of
 from sim.stage import Stage
 from sim.tracer import Tracer
 from sim.variant import variant
@@ -30,6 +30,7 @@ RAYS = 2**19  # of one trial, at most, unless that leaves too few glimpses
 GLIMPSES = (12, 96)  # at least and at most
 FINER = 8  # times as many rays, at least, for what is taken as the truth
 TRUE = 4096  # rays of it, at least, behind a pupil
+WEIGHTS = 2**23  # of it, at most, unless it would not be finer
 STRAY = 0.75  # [m] from a cell's centre, along either axis
 
 
@@ -89,11 +90,15 @@ class Pilot:
         """Root mean square error of the signals with so many rays per receptor; raises Unseen where a receptor has
         none."""
         truths: dict[int, np.ndarray] = {}
-        least = TRUE / np.prod(self._eyes.resolution) if self._eye.pupil else FINER
+        receptors = np.prod(self._eyes.resolution)
+        least = TRUE / receptors if self._eye.pupil else FINER
+        planes = sampling.depth.count * self._eye.bands * len(self._receptors)
+        most = WEIGHTS / planes / (receptors if self._eye.pupil else len(self._receptors))
 
         def error(rays_per_receptor: float) -> float:
             # In powers of 4, so that a truth serves several.
-            level = int(np.ceil(np.log(max(FINER * rays_per_receptor, least)) / np.log(4) - 1e-9))
+            finer = max(2 * rays_per_receptor, min(max(FINER * rays_per_receptor, least), most))
+            level = int(np.ceil(np.log(finer) / np.log(4) - 1e-9))
             if level not in truths:
                 truths[level] = self._signals(sampling.trial(4.0**level, self._receptors), sampling.depth)
             truth = truths[level]
@@ -101,6 +106,21 @@ class Pilot:
             return float(np.sqrt(np.mean((found - truth) ** 2)))
 
         return error
+
+    def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
+        """Root mean square difference to the signals with the finest layers, all with the same rays; the nodes of
+        each count must be among those of the finest. Raises optics.AccuracyError, see `optics.Eye.kernel`."""
+        sampling = sampling_of(self._eye, finest)
+        trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
+        truth = self._signals(trial, finest)
+        nodes = trial.weights.reshape(finest.count, -1, *trial.weights.shape[1:])
+        found = {}
+        for n in counts:
+            chosen = np.linspace(0, finest.count - 1, n).astype(int) if n > 1 else [finest.count // 2]
+            weights = nodes[chosen].reshape(-1, *trial.weights.shape[1:])
+            signals = self._signals(Trial(trial.directions, weights), replace(finest, count=n))
+            found[n] = float(np.sqrt(np.mean((signals - truth) ** 2)))
+        return found
 
     def distances(self) -> np.ndarray:
         """Of what the eyes see, along their axes [m], sorted; infinite where they see nothing."""

@@ -32,6 +32,7 @@ class ReferenceRenderer:
     depths                nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all
                           light is blurred as if from infinity
     depth_layers          kernels between them, or "auto"
+    sampler               of Mitsuba: "multijitter" for less noise
     variant               of Mitsuba, spectral; scalar_spectral runs without LLVM
     seed                  of the samples; may be changed between pictures
 
@@ -48,13 +49,14 @@ class ReferenceRenderer:
         samples_per_receptor: int | None = None,
         depths: tuple[float, float] | None = None,
         depth_layers: int | str = "auto",
+        sampler: str = "independent",
         variant: str = DEFAULT_VARIANT,
         seed: int = 0,
     ) -> None:
         self.world, self.eyes, self.eye = world, eyes, eyes.eye()
         self.bands: optics.SpectralBands = self.eye.spectral_bands
         self.samples_per_receptor = samples_per_receptor or (1 if self.eye.pupil is None else 4)
-        self._integrator, self._spp, self.seed = integrator, spp, seed
+        self._integrator, self._spp, self._sampler, self.seed = integrator, spp, sampler, seed
         self._has_depth = depths is not None
         z: Any = np.array(depths) if depths else math.inf
         self.sight = self.eye.sight(self.samples_per_receptor, z, depth_layers)
@@ -92,8 +94,9 @@ class ReferenceRenderer:
 
     def _picture(self, view: Viewpoint) -> np.ndarray:
         height, width = self.shape
-        wavelengths = self.bands.wavelengths
-        return self._mirror.render(view, width, height, self._integrator, self._spp, wavelengths, self.seed)
+        return self._mirror.render(
+            view, width, height, self._integrator, self._spp, self.bands.wavelengths, self.seed, self._sampler
+        )
 
     def _views(self, state: WorldState, index: int) -> list[Viewpoint]:
         """Every eye's view of one world, in which everything is put where the state has it."""

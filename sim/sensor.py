@@ -169,8 +169,11 @@ class FieldSampling:
 
     def _sensor(self, rays: int) -> ReceptiveFieldSensor:
         draw, (height, width) = self.fields.draw(rays), self.eye.resolution
-        rows = [self.fields.weights(draw, i * width + np.arange(width)).astype(np.float32) for i in range(height)]
-        weights = tuple(scipy.sparse.csr_array(np.concatenate(band)) for band in zip(*rows, strict=True))
+        rows: list[list[scipy.sparse.csr_array]] = []
+        for i in range(height):
+            dense = self.fields.weights(draw, i * width + np.arange(width)).astype(np.float32)
+            rows.append([scipy.sparse.csr_array(plane) for plane in dense])
+        weights = tuple(scipy.sparse.vstack(plane, format="csr") for plane in zip(*rows, strict=True))
         weights = within_stretches(weights, self.eye.resolution, negligible_share(self.eye))
         return ReceptiveFieldSensor(directions_of(self.eye, draw.points), weights, self.eye.resolution, self.depth)
 

@@ -28,7 +28,7 @@ CASES = {
 }
 
 
-def lived_through(world, n=48):
+def lived_through(world, n=32):
     """States that agents get into, which the pilot knows nothing of."""
     simulation = Simulation(world, n, 3, "training", 1)
     simulation.reset()
@@ -40,7 +40,7 @@ def lived_through(world, n=48):
 
 
 def actual_error(world, eyes, state, rays):
-    truth, found = (sim.BatchedRenderer(world, eyes, state.n, n).signals(state) for n in (rays * 40, rays))
+    truth, found = (sim.BatchedRenderer(world, eyes, state.n, n).signals(state) for n in (rays * 16, rays))
     return np.sqrt(np.mean((found - truth) ** 2))
 
 
