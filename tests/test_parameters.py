@@ -118,7 +118,7 @@ class Case:
     given: tuple[str, ...] = PERFECT
 
 
-# Steps too small to move a weight: but for what receptors adapt to, every evaluation plays the same; soon none improves.
+# Steps too small to move a weight: but for the receptors' adapting, evaluations play the same, and soon none improves.
 STAGNANT = ("learning.learning_rate=1e-30", "learning.total_steps=256", "learning.eval_interval=32", *PERFECT)
 FIELDS = {
     "task": Case("task=tracking", life),

@@ -1,0 +1,66 @@
+"""What the page says is what the store holds."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import sim
+from evolve.config import LearningConfig
+from validation import E0_learning
+from validation.learning import Case, Row, read_rows, steps_to, watched, wilson, write_rows
+
+ROOT = Path(__file__).parents[2]
+ROW = Row("detection, 2 x (15 x 15)", 0, 50_000, 10.0, 4.0, 30, 60, 100, 1.5)
+
+
+def learning(case, *goals, seed=0):
+    return [replace(ROW, case=case, seed=seed, steps=50_000 * (i + 1), goals=n) for i, n in enumerate(goals)]
+
+
+def test_wilson_interval():
+    """Newcombe (1998), table I: 81 of 263 gives .2553 to .3662."""
+    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
+    assert wilson(0, 20)[0] == pytest.approx(0, abs=1e-12)
+
+
+def test_first_evaluation_that_solves_counts():
+    rows = learning("a", 30, 80, 70, 90)
+    assert steps_to(rows, 0.8) == rows[1]
+    assert steps_to(rows, 0.95) is None
+
+
+def test_rows_survive_the_file(tmp_path):
+    rows = [ROW, replace(ROW, case='with, "quotes"', cpu_seconds=0.1)]
+    write_rows(rows, tmp_path / "a" / "b.csv")
+    assert read_rows(tmp_path / "a" / "b.csv") == rows
+    assert read_rows(tmp_path / "none.csv") == []
+
+
+def test_verdicts_name_what_is_not_learnt():
+    solved, stuck = learning("detection, 2 x (15 x 15)", 50, 85), learning("tracking, 2 x (15 x 15)", 50, 60)
+    cheating = learning("detection, 1 receptor", 60)
+    chance = learning("tracking, 1 receptor", 38)
+    assert E0_learning.verdicts([*solved, *stuck, *cheating, *chance]) == [
+        "detection, 1 receptor, seed 0: better than chance",
+        "tracking, seed 0: not solved",
+    ]
+
+
+def test_a_training_is_watched():
+    """Two rollouts and two evaluations, of an eye so small that it takes seconds."""
+    learning = LearningConfig(total_steps=512, n_envs=16, n_steps=16, batch_size=64, eval_interval=256)
+    case = Case("x", sim.Eyes(n_eyes=1, resolution=(1, 2)), learning=learning, memory=2, neurons=8, episodes=8)
+    rows = list(watched(case, seed=3))
+    assert [row.steps for row in rows] == [256, 512]
+    for row in rows:
+        assert 0 <= row.goals + row.adversaries <= row.episodes == 8
+        assert 0 < row.update_seconds < row.cpu_seconds
+    assert rows[0].cpu_seconds < rows[1].cpu_seconds
+
+
+def test_page_is_the_stores(tmp_path):
+    stored = ROOT / E0_learning.STORED
+    E0_learning.main(["--stored", str(stored), "--out", str(tmp_path), "--docs", str(tmp_path)])
+    page = (ROOT / "docs/validation/E0.md").read_text(encoding="utf-8")
+    assert (tmp_path / "E0.md").read_text(encoding="utf-8") == page
