@@ -6,7 +6,6 @@ They run in worker processes, so they live in a module of their own.
 import os
 import signal
 import time
-from dataclasses import replace
 from pathlib import Path
 
 from evolve.config_source import assemble
@@ -34,13 +33,6 @@ def slow_for_some(phenotype, config, seed, policy_path, progress):
     """As `bowl`, but candidates finish in another order than they are handed out."""
     time.sleep(0.2 * (int(policy_path.stem) % 2 == 0))
     return bowl(phenotype, config, seed, policy_path, progress)
-
-
-def takes_its_time(phenotype, config, seed, policy_path, progress):
-    """0.4 s for every third candidate, 0.1 s for the others."""
-    seconds = 0.4 if int(policy_path.stem) % 3 == 0 else 0.1
-    time.sleep(seconds)
-    return replace(bowl(phenotype, config, seed, policy_path, progress), seconds=seconds)
 
 
 def fails_for_some(phenotype, config, seed, policy_path, progress):
