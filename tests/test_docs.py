@@ -57,8 +57,11 @@ def test_site_is_whole_and_needs_no_network(site):
     pages = list(site.rglob("*.html"))
     assert len(pages) >= len(list(DOCS.rglob("*.md")))
     for page in pages:
-        loaded = re.findall(r"<(?:link|script|img)\b[^>]*?(?:src|href)=[\"']?(https?:[^\"' >]*)", page.read_text())
+        html = page.read_text()
+        loaded = re.findall(r"<(?:link|script|img)\b[^>]*?(?:src|href)=[\"']?(https?:[^\"' >]*)", html)
         assert loaded == [], page.name
+        prose = re.sub(r"<(pre|code|script)\b.*?</\1>", "", html, flags=re.DOTALL)
+        assert "](" not in prose, f"{page.name}: a link that was not understood"
 
 
 @pytest.mark.parametrize("package", ["optics", "sim", "evolve"])
