@@ -2,8 +2,7 @@
 against OpenGL's definition, written here once more.
 
 A texture's grey value codes the face in one model, its column in another, its row in a third; a white one tells the
-light, so that a ratio of radiances gives the code. Tried and seen to fail, one at a time: faces U and D swapped, R and
-L swapped, F and B swapped, columns of ±z mirrored, rows of ±y mirrored, rows upside down, uniform textures taken for
+light, so that a ratio of radiances gives the code. Tried and seen to fail, one at a time: uniform textures taken for
 others, caps looked up by their own sphere, no cut along the seams, no halving.
 """
 

@@ -305,6 +305,23 @@ def test_geom_ids_agree_with_mujocos_renderer():
     assert np.mean(drawn == sim.mirror(model, data).render_ids("camera", 200, 150)) >= 0.995
 
 
+def test_a_camera_inside_bodies_looks_out_of_them():
+    """As in MuJoCo, which draws outer sides only: through a head and a helmet, but not through a wall from behind."""
+    ball = '<geom name="ball" size="0.5" pos="4 0 0" rgba="0.8 0.8 0.8 1"/>'
+    around = '<geom name="head" size="0.2"/><geom name="helmet" type="box" size="0.4 0.3 0.3"/>'
+    wall = '<geom name="wall" type="plane" size="5 5 1" pos="2 0 0" zaxis="1 0 0"/>'
+    light = LIGHT.replace("0 0 -1", "0.6 0 -0.8")  # past the head
+    view = Viewpoint.looking_at(np.zeros(3), np.array([1.0, 0, 0]), 5.0)
+    for variant in ("llvm_ad_spectral", "scalar_spectral"):
+        mirror = sim.mirror(_xml(light, around + ball), variant=variant)
+        assert (mirror.render_ids(view, 4, 4) == 2).all()
+        np.testing.assert_allclose(mirror.render_depth(view, 4, 4), 3.5, atol=0.03)
+        alone = sim.mirror(_xml(light, ball), variant=variant).render(view, 4, 4, wavelengths=[560e-9])
+        assert alone.min() > 0.2
+        np.testing.assert_allclose(mirror.render(view, 4, 4, wavelengths=[560e-9]), alone, rtol=1e-3)
+    assert (sim.mirror(_xml("", around + wall + ball)).render_ids(view, 4, 4) == 2).all()
+
+
 def test_viewpoint_looks_where_it_is_told():
     model = models.every_kind(0)
     data = mujoco.MjData(model)

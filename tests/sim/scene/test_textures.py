@@ -37,7 +37,13 @@ CASES = {
     "capsule": (GEOM.mjGEOM_CAPSULE, [0.5, 0.5, 0], TURNED, (1, 1), False),
     "capsule-upside-down": (GEOM.mjGEOM_CAPSULE, [0.5, 0.5, 0], [0.1, 1, 0, 0], (1, 1), False),
     "mesh": (GEOM.mjGEOM_MESH, [0, 0, 0], [1, 0, 0, 0.3], (1, 1), False),
+    "mesh-repeated": (GEOM.mjGEOM_MESH, [0, 0, 0], [1, 0, 0, 0.3], (0.6, 0.8), False),
+    "mesh-without": (GEOM.mjGEOM_MESH, [0, 0, 0], [1, 0, 0, 0.3], (0.6, 0.8), False),
+    "mesh-without-uniform": (GEOM.mjGEOM_MESH, [0, 0, 0], [1, 0, 0, 0.3], (0.6, 0.8), True),
+    "hfield": (GEOM.mjGEOM_HFIELD, [0.9, 0.7, 0.5], [1, 0, 0, 0.3], (0.6, 0.8), False),
+    "hfield-uniform": (GEOM.mjGEOM_HFIELD, [0.9, 0.7, 0.5], [1, 0, 0, 0.3], (0.6, 0.8), True),
 }
+WITH_FORMULA = [case for case in CASES if not case.startswith("mesh")]
 QUAD = np.array([[-0.8, -0.8, 0], [0.8, -0.8, 0], [0.8, 0.8, 0], [-0.8, 0.8, 0.05]])
 QUAD_UV = np.array([[0.1, 0.9], [0.8, 0.7], [0.9, 0.2], [0.2, 0.05]])
 
@@ -69,10 +75,14 @@ def build(case, code, emission=0.0):
         spec.add_mesh(
             name="quad",
             uservert=np.concatenate([QUAD, back]).ravel().tolist(),
-            usertexcoord=np.concatenate([QUAD_UV, QUAD_UV]).ravel().tolist(),
+            usertexcoord=[] if "without" in case else np.concatenate([QUAD_UV, QUAD_UV]).ravel().tolist(),
             userface=[0, 1, 2, 0, 2, 3, 4, 6, 5, 4, 7, 6],
         )
     where = {"meshname": "quad"} if kind == GEOM.mjGEOM_MESH else {"size": size}
+    if kind == GEOM.mjGEOM_HFIELD:
+        hills = spec.add_hfield(name="hills", nrow=3, ncol=4, size=[*size, 0.2])
+        hills.userdata = np.random.default_rng(3).uniform(0, 0.4, 12).tolist()
+        where = {"hfieldname": "hills"}
     spec.worldbody.add_geom(type=kind, quat=quat, material="code", **where)
     if emission == 0:
         light = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
@@ -136,6 +146,9 @@ def formula(case, points):
         a, b, c = x / size[0], y / size[1], z / size[2]
         face = np.argmax(np.abs([a, b, c]), axis=0)
         uv = [(np.where(face == 0, b, a) + 1) / 2, (1 - np.where(face == 2, b, c)) / 2]
+    elif kind == GEOM.mjGEOM_HFIELD:
+        # Along z on all of it, walls included; the repeats are counted from the middle.
+        return np.stack([x / size[0], -y / size[1]], -1) / 2 * scale - 0.5
     elif kind == GEOM.mjGEOM_SPHERE:
         scale = np.array(repeat) * (size[0] if uniform else 1)
         uv = [azimuth, np.arccos(np.clip(z / size[0], -1, 1)) / np.pi]
@@ -170,7 +183,7 @@ def assert_same_place(uv, expected):
     assert np.mean(distance[plain] < 5 / TEXELS) > 0.99
 
 
-@pytest.mark.parametrize("case", [c for c in CASES if c != "mesh"])
+@pytest.mark.parametrize("case", WITH_FORMULA)
 def test_textures_lie_where_the_formulas_say(case):
     uv, points = coordinates(case)
     assert_same_place(uv, formula(case, points))
