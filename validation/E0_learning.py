@@ -126,7 +126,8 @@ def verdicts(rows: Sequence[Row]) -> list[str]:
         pair, single = runs.get(f"{task}, 2 x (15 x 15)", []), runs.get(f"{task}, 1 receptor", [])
         broken += [f"{task}, seed {r[0].seed}: not solved" for r in pair if not steps_to(r, SOLVED)]
         for run in single:
-            low, _ = wilson(run[-1].goals, run[-1].episodes)
+            last = run[-1]
+            low, _ = wilson(last.goals, max(last.goals + last.adversaries, 1))
             if low > CHANCE:
                 broken.append(f"{task}, 1 receptor, seed {run[0].seed}: better than chance")
     many, one = (
