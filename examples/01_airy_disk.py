@@ -34,7 +34,7 @@ if out:
 
     figure, (image, line) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
     edge = 8.0
-    shown = np.log10(result.psf[0] / result.psf.max())
+    shown = np.log10(np.maximum(result.psf[0] / result.psf.max(), 1e-8))  # dark rings reach 0
     drawn = image.imshow(shown, vmin=-5, vmax=0, extent=(-edge, edge, -edge, edge), origin="lower", cmap="magma")
     image.set(xlabel="x [µm]", ylabel="y [µm]", title="PSF of an ideal f/4 lens")
     figure.colorbar(drawn, ax=image, label="log$_{10}$ of the PSF over its peak")
