@@ -81,13 +81,13 @@ class EyeConfig:
 class SearchConfig:
     """Who proposes candidates, how many at a time, and when it is told how they fared."""
 
+    population: int = _setting(16, Interval(2, 10_000), "candidates per generation")
+    generations: int = _setting(50, Interval(1, 100_000), "generations")
+    sigma: float = _setting(0.2, Interval(0, 1, open_low=True), "initial step, as a part of each gene's range")
     optimizer: str = _setting("CMA", None, "CMA, mutation, or any optimizer of nevergrad by its name")
     steady_state: bool = _setting(
         False, None, "propose the next candidate as soon as one is evaluated; off: generation by generation"
     )
-    population: int = _setting(16, Interval(2, 10_000), "candidates per generation")
-    generations: int = _setting(50, Interval(1, 100_000), "generations")
-    sigma: float = _setting(0.2, Interval(0, 1, open_low=True), "initial step, as a part of each gene's range")
 
 
 @dataclass(frozen=True)
