@@ -1,7 +1,7 @@
 """What materials ask for beside their colour: gloss, mirrors, metal and glow, against closed forms.
 
-Tried and seen to fail, one at a time: gloss for MuJoCo's defaults, specular taken for the reflectance itself, shininess
-for the roughness, a box's mirror on all its sides, a mirror on top of the whole colour, glow not decoded.
+Tried and seen to fail, one at a time: gloss for MuJoCo's defaults, specular taken for the reflectance itself, a box's
+mirror on all its sides, a perfect mirror in Mitsuba's blend, glow not decoded.
 """
 
 import numpy as np

@@ -2,8 +2,9 @@
 against OpenGL's definition, written here once more.
 
 A texture's grey value codes the face in one model, its column in another, its row in a third; a white one tells the
-light, so that a ratio of radiances gives the code. Tried and seen to fail, one at a time: uniform textures taken for
-others, caps looked up by their own sphere, no cut along the seams, no halving.
+light, so that a ratio of radiances gives the code. Tried and seen to fail, one at a time: faces U and D swapped,
+columns of ±x mirrored, rows of ±y mirrored, uniform textures taken for others, caps looked
+up by their own sphere, no cut along the seams, no halving.
 """
 
 import mujoco

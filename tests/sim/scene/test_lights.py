@@ -1,5 +1,4 @@
-"""Spots and lamps against MuJoCo's formulas. Tried and seen to fail: no exponent, the exponent on the sine, attenuation
-ignored."""
+"""Spots and lamps against MuJoCo's formulas. Tried and seen to fail: no exponent, attenuation ignored."""
 
 import warnings
 

@@ -1,6 +1,7 @@
 """The skybox: where MuJoCo draws its faces, and how bright it is.
 
 Every face shows a ramp of its own, in grey; a picture is compared pixel by pixel with MuJoCo's renderer.
+Tried and seen to fail, one at a time: F and B swapped, U and D swapped, R and L swapped.
 """
 
 import warnings
