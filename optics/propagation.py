@@ -166,7 +166,8 @@ def _sampling(method: str, source: Grid, window: Grid, wavelength: float, distan
     # Where nothing can fade, all that the samples hold may matter.
     if band.end >= (0.5 / source.dx if band.square else nyquist):
         end = nyquist if paraxial else min(nyquist, STEEPEST_SINE / wavelength)
-        band, far = EVERYTHING, walk(end, wavelength, z, paraxial) * (math.sqrt(0.5) if end == nyquist else 1)
+        # To the corner's walk along either axis: what ends at Nyquist's frequency as if cut blurs far.
+        band, far = EVERYTHING, walk(end, wavelength, z, paraxial)
     least = max(max(halves) + far, 2 * (max(source.shape) // 2 + 1) * source.dx)
     samples = fast_length(least / source.dx)
     # Evanescent waves are kept for their power, which is reported.

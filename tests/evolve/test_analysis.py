@@ -114,7 +114,7 @@ def test_gene_values_without_optics():
     values = gene_values(phenotype(relative_aperture=None, relief=None, refractive_index=None))
     assert set(values) == {
         *("n_eyes", "placement_range_deg", "fov_deg", "resolution_height", "resolution_width"),
-        *("memory_frames", "neurons"),
+        *("memory_frames", "neurons", "layers"),
     }
 
 

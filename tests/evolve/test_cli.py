@@ -168,18 +168,28 @@ def test_help_comes_at_once_and_names_the_commands():
 
 
 def test_ctrl_c_saves_says_how_to_go_on_and_exits_130(tmp_path):
-    """As a terminal does it: the interrupt goes to the whole process group."""
+    """As a terminal does it: the interrupt goes to the whole process group. (Where these tests run in the background,
+    interrupts may be ignored, and children inherit that.)"""
     path = tmp_path / "run"
     small = ("search.population=2", "learning.total_steps=500000000", "learning.eval_interval=500000000")
     settings = [part for text in small for part in ("--set", text)]
     command = [sys.executable, "-m", "evolve", "run", "detection", "--preset", "quick", "--workers", "2", *settings]
     with subprocess.Popen(
-        [*command, "--out", path], cwd=ROOT, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [*command, "--out", path],
+        cwd=ROOT,
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as child:
         assert b"generations" in child.stdout.readline()
         time.sleep(1.0)  # into the workers' start; any moment must do
         os.killpg(child.pid, signal.SIGINT)
-        _, err = child.communicate(timeout=60)
+        try:
+            _, err = child.communicate(timeout=60)
+        except subprocess.TimeoutExpired:
+            os.killpg(child.pid, signal.SIGKILL)
+            raise
     assert child.returncode == 130
     assert f"Continue with: evolve resume {path}" in err.decode()
     assert "Traceback" not in err.decode()

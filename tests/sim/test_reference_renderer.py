@@ -71,7 +71,7 @@ def test_ten_random_worlds_look_as_they_do_to_mitsuba(seen):
     means = [z_scores(o.mean(axis=(2, 3)), t.mean(axis=(3, 4))) for o, t in seen]
     # Twenty images: one |t_11| beyond 5 has p = 8e-3.
     assert np.abs(means).max() < 5
-    assert min(t.std() for _, t in seen) > 0.05  # there was something to see
+    assert min(t.std() for _, t in seen) > 0.03  # there was something to see
 
 
 def prism(eyes):
