@@ -22,7 +22,7 @@ from optics.precision import Precision, opaque
 from optics.soft_edge import kaiser_beta
 from optics.table import Table
 
-__all__ = ["STEEPEST_SINE", "Band", "FreeSpace", "kept_band", "kept_square", "walk"]
+__all__ = ["STEEPEST_SINE", "Band", "TransferFunction", "kept_band", "kept_square", "walk"]
 
 # Steepest light that a period makes room for, as sin θ; z tan θ has no bound beyond.
 STEEPEST_SINE = 0.995
@@ -124,7 +124,7 @@ def _fade_table(ripple: float) -> Table:
 
 
 @dataclass(frozen=True, eq=False)
-class FreeSpace:
+class TransferFunction:
     """Over a spectrum: the transfer function, with everything that does not depend on the field, and how much of each
     frequency is too near grazing or evanescent, for real and imaginary parts (fy, 2 fx) (None: nothing is)."""
 
@@ -145,7 +145,7 @@ class Passage:
     ripple: float
     centre: tuple[float, float]
 
-    def over(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> FreeSpace:
+    def over(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> TransferFunction:
         """At frequencies fx (column), fy (row) [1/m], in steps of fx[1] - fx[0]."""
         step = abs(fx[1] - fx[0]) if len(fx) > 1 else 0.0
         sine = np.hypot(fx[None, :], fy[:, None]) * self.wavelength
@@ -157,7 +157,7 @@ class Passage:
             None if weight is None or not weight.any() else np.repeat(weight, 2, axis=1).astype(types.dtype)
             for weight in (grazing, outside)
         )
-        return FreeSpace(self._transfer(fx, fy, types), *weights)
+        return TransferFunction(self._transfer(fx, fy, types), *weights)
 
     def _transfer(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> np.ndarray:
         """H under the fade, with the way to the window's centre; whole waves are dropped in float64."""

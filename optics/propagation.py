@@ -28,7 +28,7 @@ from optics.fourier import (
     periodic_sum,
     predicted_seconds,
 )
-from optics.free_space import EVERYTHING, STEEPEST_SINE, FreeSpace, Passage, kept_band, kept_square, walk
+from optics.free_space import EVERYTHING, STEEPEST_SINE, Passage, TransferFunction, kept_band, kept_square, walk
 from optics.grid import Grid
 from optics.planner import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Plan
 from optics.precision import Precision, precision
@@ -172,8 +172,8 @@ def _sampling(method: str, source: Grid, window: Grid, wavelength: float, distan
     samples = fast_length(least / source.dx)
     # Evanescent waves are kept for their power, which is reported.
     highest = max(band.end, 0 if paraxial else 1 / wavelength)
-    wanted = 2 * highest * samples * source.dx + 3  # as a float: it may be infinite
-    across = 2 * math.ceil((wanted - 3) / 2) + 1 if band.fade and wanted < samples else samples
+    half = highest * samples * source.dx  # as a float: it may be infinite
+    across = 2 * math.ceil(half) + 1 if band.fade and 2 * half + 2 < samples else samples
     if max(across, *window.shape) > MOST_SAMPLES:
         raise AccuracyError(
             f"distance = {distance:g} m over a window of {2 * window.half_width:.3g} m needs {across} samples across; "
@@ -224,7 +224,7 @@ def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
 
 
 @lru_cache(maxsize=4)
-def _free_space(how: _Sampling, dtype: str) -> FreeSpace:
+def _free_space(how: _Sampling, dtype: str) -> TransferFunction:
     """Over the spectrum, with the sums' scale. The same distance is often travelled again; the transfer function costs
     more than the transforms."""
     step = 1 / (how.period * how.source.dx)
