@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+import optics
 from optics import Grid, PointSource, Pupil
 from optics.beam import Beam
+from optics.direct_sum import cached_nodes
 from optics.planner import choose
 from optics.point_spread import problem
 from optics.spot_check import CAUTION, spot_check
@@ -43,3 +45,14 @@ def test_single_precision_is_never_promised_more_than_it_carries():
     single = problem(beam, task.window, 1e-4, "float32")
     assert spot_check(beam, single, image, 1.0) >= np.finfo(np.float32).eps
     assert spot_check(beam, task, image, 1.0) < 1e-9
+
+
+@pytest.mark.parametrize("aperture", [optics.Circle(), optics.Annulus(0.4)])
+@pytest.mark.parametrize("cycles", [3.0, 3.7, 11.2])
+def test_half_the_nodes_sum_what_is_even_in_y(aperture, cycles):
+    """Exactly, up to rounding; a rule whose nodes were not mirrored at the x axis would not."""
+    whole, half = (cached_nodes(aperture, cycles, 8.0, halved) for halved in (False, True))
+    assert len(half) < 0.6 * len(whole)
+    for even in (lambda x, y: 1 + 0 * x, lambda x, y: np.cos(3 * x) * y**2, lambda x, y: np.exp(x) * np.cos(2 * y)):
+        sums = [float(np.sum(nodes.weight * even(nodes.x, nodes.y))) for nodes in (whole, half)]
+        assert sums[1] == pytest.approx(sums[0], rel=1e-12)
