@@ -63,10 +63,17 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", parser_class=_Parser)
 
     run = _command(commands, "run", "run.start", "begin a run: evolve eyes and brains for a task")
-    run.add_argument("task", metavar="TASK", help="navigation, detection or tracking (see: evolve tasks)")
     run.add_argument(
-        "--preset", default="paper", help="settings to begin with: quick (minutes) or paper (a day; default)"
+        "task", metavar="TASK", nargs="?", help="see: evolve tasks; may be left out where the preset has one of its own"
     )
+    run.add_argument(
+        "--preset",
+        metavar="NAME",
+        default="paper",
+        help="settings to begin with: quick (minutes), paper (a day; default), or an experiment: "
+        "bifurcation-navigation, bifurcation-detection, lens, scaling",
+    )
+    run.add_argument("--scale", help="of an experiment: laptop (hours on two cores; default) or paper (days)")
     run.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings; wins over the preset")
     run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="one setting; wins over the file")
     run.add_argument("--seed", type=int, help="same as --set seed=N")

@@ -1,5 +1,5 @@
-"""Where a run's configuration comes from: defaults, preset, task, TOML file, another run's animal, `--set key=value`;
-later ones win."""
+"""Where a run's configuration comes from: defaults, preset and its scale, task, TOML file, another run's animal,
+`--set key=value`; later ones win."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ from evolve.config_lines import Source
 from evolve.genes import ALL_GENES, CLUSTERS, GENES, GeneConfig, gene_table, group_members
 from evolve.relief import doe_names, refined
 
-__all__ = ["assemble", "from_toml", "nearest", "parse_assignment", "preset_names", "to_toml"]
+__all__ = ["SCALES", "assemble", "from_toml", "nearest", "parse_assignment", "preset_names", "to_toml"]
 
 Tree = dict[str, Any]
 GENE_FIELDS = tuple(f.name for f in fields(GeneConfig))
 TOP_LEVEL = ("task", "seed", "workers")
+SCALES = ("laptop", "paper")  # of the presets that have scales; the first unless asked otherwise
 SETTINGS = (*TOP_LEVEL, *(f"{section}.{f.name}" for section, cls in SECTIONS.items() for f in fields(cls)))
 # A maze's walls say the same at every height, so navigators' eyes are one row of receptors unless told otherwise.
 TASK_TREES: Mapping[str, Tree] = {
@@ -37,10 +38,13 @@ def assemble(
     file: Path | None = None,
     assignments: Iterable[str] = (),
     starts: Source | None = None,
+    scale: str | None = None,
 ) -> RunConfig:
     """A run's configuration from all its sources; `task` and `assignments` ("search.population=8") win.
 
+    task    may be missing where preset or file names one
     starts  where the genes start instead, as `evolve.ancestor` reads it from another run
+    scale   how much of its work a preset does, where it comes in several: one of SCALES, "laptop" if not given
 
     Raises:
         ConfigError: unknown key, wrong type, value out of range, contradiction, unreadable file; one line that names
@@ -50,17 +54,16 @@ def assemble(
     if starts is not None:
         asked.append(starts)
     asked += [Source(f"--set {text.strip()}", parse_assignment(text)) for text in assignments]
-    return _assembled(task, preset, asked)
+    return _assembled(task, _preset(preset, scale), asked)
 
 
-def _assembled(task: str | None, preset: str | None, asked: list[Source]) -> RunConfig:
+def _assembled(task: str | None, below: list[Source], asked: list[Source]) -> RunConfig:
     """From what was asked, later sources winning, over the task's and the preset's settings."""
     if task is not None:
         asked.append(Source("", {"task": task}))
-    known_task = [source.tree["task"] for source in asked if "task" in source.tree]
+    known_task = [source.tree["task"] for source in (*below, *asked) if "task" in source.tree]
     if not known_task:
         raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
-    below = [_preset(preset)] if preset else []
     layers = [*below, Source("", TASK_TREES.get(str(known_task[-1]), {})), *asked]
     trees = [_checked(source) for source in layers]
     try:
@@ -76,7 +79,7 @@ def from_toml(path: Path) -> RunConfig:
 
 def from_text(text: str) -> RunConfig:
     """As `from_toml`, from the text itself."""
-    return _assembled(None, None, [Source("config.toml", tomllib.loads(text), text)])
+    return _assembled(None, [], [Source("config.toml", tomllib.loads(text), text)])
 
 
 def to_toml(config: RunConfig) -> str:
@@ -132,11 +135,24 @@ def _read(path: Path) -> Source:
         raise ConfigError(f"{path}: is not valid TOML: {error}") from error
 
 
-def _preset(name: str) -> Source:
+def _preset(name: str | None, scale: str | None) -> list[Source]:
+    """A preset's settings, and over them those of its scale."""
+    if name is None:
+        return []
     if name not in preset_names():
         raise ConfigError(f"unknown preset {name!r}; {nearest(name, preset_names())}")
     text = (resources.files("evolve") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
-    return Source(f"preset {name}", tomllib.loads(text), text)
+    tree = tomllib.loads(text)
+    scales = tree.pop("scales", {})
+    settings = Source(f"preset {name}", tree, text)
+    if not scales:
+        if scale is not None:
+            raise ConfigError(f"scale {scale!r}: preset {name} comes in one scale only")
+        return [settings]
+    chosen = scale or SCALES[0]
+    if chosen not in scales:
+        raise ConfigError(f"unknown scale {chosen!r} of preset {name}; {nearest(chosen, scales)}")
+    return [settings, Source(f"preset {name} on {chosen} scale", scales[chosen])]
 
 
 def _checked(source: Source) -> Tree:
@@ -181,7 +197,7 @@ def _checked_entry(key: str, value: Any) -> Any:
 
 
 def _checked_genome(section: Tree) -> Tree:
-    """Per-gene settings; a cluster's name or "doe" stands for its genes, and the narrower name wins."""
+    """Per-gene settings; a cluster's name or a family's stands for its genes, and the narrower name wins."""
     result: Tree = {}
     for group in sorted(section, key=lambda name: -len(group_members(name))):
         key, members, use = f"genome.{group}", group_members(group), section[group]

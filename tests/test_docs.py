@@ -148,9 +148,11 @@ def check_evolve(arguments, capsys):
     assert stop.value.code == 0
     options = {word for word in arguments if word.startswith("--")}
     assert options <= set(re.findall(r"--[a-z-]+", capsys.readouterr().out)), arguments
-    if arguments[0] == "run" and arguments[1].isalpha() and arguments[1].islower():  # not TASK
-        preset = arguments[arguments.index("--preset") + 1] if "--preset" in arguments else "paper"
-        assemble(arguments[1], preset, None, [arguments[i + 1] for i, word in enumerate(arguments) if word == "--set"])
+    if arguments[0] == "run" and not {"TASK", "NAME"} & set(arguments):
+        named = {word: arguments[i + 1] for i, word in enumerate(arguments[:-1]) if word in ("--preset", "--scale")}
+        task = None if arguments[1].startswith("--") else arguments[1]
+        settings = [arguments[i + 1] for i, word in enumerate(arguments) if word == "--set"]
+        assemble(task, named.get("--preset", "paper"), None, settings, scale=named.get("--scale"))
 
 
 def check_options(program, arguments):

@@ -34,10 +34,12 @@ def start(arguments: Namespace) -> int:
     _require_scheduler(arguments)
     flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
     starts = starts_from(arguments.ancestor) if arguments.ancestor else None
-    config = assemble(arguments.task, arguments.preset, arguments.config, [*arguments.set, *flags], starts)
+    config = assemble(
+        arguments.task, arguments.preset, arguments.config, [*arguments.set, *flags], starts, arguments.scale
+    )
     Search(config)  # an unknown optimizer, say, is refused before anything is written
     backend.require()
-    directory = arguments.out or next_directory(config.task, arguments.preset)
+    directory = arguments.out or next_directory(config.task, arguments.preset.removesuffix(f"-{config.task}"))
     if arguments.dry_run:
         return _show(Plan.of(config, directory), arguments.json)
     run = Run.create(directory, config, starts.name.removeprefix("--from ") if starts else None)

@@ -1,0 +1,138 @@
+"""Presets of experiments: they ask what they say, start where they say, and do as much as their scale allows."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import evolve.plan
+import optics
+from evolve.calibration import Pace
+from evolve.cli import main
+from evolve.config import ConfigError
+from evolve.config_source import SCALES, assemble, preset_names
+from evolve.development import develop
+from evolve.genotype import Genotype
+from evolve.plan import idle_genes
+from evolve.search import Search
+
+EXPERIMENTS = ("bifurcation-detection", "bifurcation-navigation", "lens", "scaling")
+PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
+
+
+def animal(config):
+    return develop(Genotype(config.genome).start, config)
+
+
+def open_in(config, generation):
+    genes = Genotype(config.genome).open_genes
+    return {gene.name for gene in genes if config.genome[gene.name].opens_at <= generation}
+
+
+def test_experiments_are_the_presets_that_come_in_scales():
+    def scaled(name):
+        try:
+            return assemble("detection", name, scale="paper") is not None
+        except ConfigError:
+            return False
+
+    assert tuple(filter(scaled, preset_names())) == EXPERIMENTS
+
+
+@pytest.mark.parametrize("preset", EXPERIMENTS)
+def test_paper_scale_has_the_published_budget_and_laptop_a_tenth_of_it_at_most(preset):
+    laptop, paper = (assemble(preset=preset, scale=scale) for scale in SCALES)
+    assert assemble(preset=preset) == laptop
+    assert paper.search.population == 16
+    assert 50 <= paper.search.generations <= 150
+    assert paper.learning.total_steps == 1_000_000
+    steps = [config.candidates * config.learning.total_steps for config in (laptop, paper)]
+    assert steps[0] < steps[1] / 10
+    # Fewer steps than it takes to tell good eyes from bad give selection nothing to see (docs/design.md, "Measured").
+    assert laptop.learning.total_steps >= 200_000
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("preset", EXPERIMENTS)
+def test_every_open_gene_changes_something(preset, scale):
+    assert idle_genes(assemble(preset=preset, scale=scale)) == []
+
+
+def test_bifurcations_differ_in_their_task_and_begin_with_one_photoreceptor():
+    maze, field = (assemble(preset=f"bifurcation-{task}") for task in ("navigation", "detection"))
+    assert (maze.task, field.task) == ("navigation", "detection")
+    rows = field.genome["resolution_height"]
+    assert replace(maze, task="detection", genome={**maze.genome, "resolution_height": rows}) == field
+    for config in (maze, field):
+        start = animal(config)
+        assert (start.n_eyes, start.resolution, start.fov_deg, start.relief) == (1, (1, 1), 45.0, None)
+    assert open_in(field, 0) - open_in(maze, 0) == {"resolution_height"}
+    assert not {"memory_frames", "neurons"} & open_in(field, 0)
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_lens_opens_the_pupil_first_and_then_what_bends_light(scale):
+    config = assemble(preset="lens", scale=scale)
+    first, second = Genotype(config.genome).phases
+    assert first == 0
+    assert open_in(config, second - 1) == {"relative_aperture"}
+    joined = open_in(config, second) - {"relative_aperture"}
+    assert joined == {"refractive_index", *(f"doe_{i}{j}" for i in range(4) for j in range(4))}
+    assert second < config.search.generations / 2, "the harder phase has more time"
+
+
+@pytest.mark.parametrize(("index", "aperture"), [(1.5, 0.27), (2.0, 0.38)])
+def test_a_lens_in_focus_is_within_reach_of_the_lens_presets_genes(index, aperture):
+    """Up to the apertures that the preset names, and hardly beyond: control points span 16 R² / (4 f (n - 1))."""
+    config = assemble(preset="lens")
+    eye = animal(config).eyes(config.eye).eye()
+    focal_length = eye.sensor_distance
+
+    def span(a):
+        radius = a * config.eye.sensor_width / 2
+        points = optics.BSplineRelief.paraboloid(0.0, 1 / (focal_length * (index - 1)), radius).control_points
+        return np.ptp(points) / config.eye.relief_height
+
+    assert span(aperture) <= 1 < span(aperture + 0.015)
+
+
+def test_scaling_spreads_candidates_evenly():
+    config = assemble(preset="scaling")
+    search = Search(config)
+    genomes = np.array([search.propose().genome for _ in range(config.candidates)])
+    for gene, column in zip(Genotype(config.genome).open_genes, genomes.T, strict=True):
+        counts, _ = np.histogram(column, bins=5, range=(0, 1))
+        assert counts.min() >= 0.18 * len(column), gene.name
+    assert open_in(config, 0) == {"resolution_height", "resolution_width", "memory_frames", "neurons"}
+    assert open_in(assemble("navigation", "scaling"), 0) == {"resolution_width", "memory_frames", "neurons"}
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("preset", EXPERIMENTS)
+def test_dry_run_predicts_hours(preset, scale, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(evolve.plan, "calibrate", lambda config, animals, workers: dict.fromkeys(animals, PACE))
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "--preset", preset, "--scale", scale, "--dry-run", "--json", "--workers", "2"]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert plan["hours"]["start"] > 1
+    assert plan["notes"] == []
+    assert plan["directory"].startswith(f"runs/{plan['task']}-{preset.split('-')[0]}-")
+
+
+def test_scales_that_do_not_exist_are_refused():
+    with pytest.raises(ConfigError, match="unknown scale 'big' of preset lens; known: laptop, paper"):
+        assemble(preset="lens", scale="big")
+    with pytest.raises(ConfigError, match="scale 'laptop': preset quick comes in one scale only"):
+        assemble("detection", "quick", scale="laptop")
+
+
+def test_contradiction_with_a_scale_names_it():
+    with pytest.raises(ConfigError, match="opens_at = 5: must be below") as caught:
+        assemble(preset="lens", assignments=["search.generations=4"])
+    assert str(caught.value).endswith("(preset lens on laptop scale; --set search.generations=4)")
+
+
+def test_task_named_by_the_user_wins():
+    assert assemble("tracking", "scaling").task == "tracking"
+    assert assemble(preset="scaling", assignments=["task=foraging"]).task == "foraging"
