@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evolve.development import Phenotype
+from evolve.genes import LAMBDA_MAX
 
 if TYPE_CHECKING:
     import optics
@@ -126,7 +127,8 @@ def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], flo
 
 
 def _quantiles(values: Floats) -> tuple[float, float, float]:
-    """Low, median, high; NaN for no values."""
+    """Low, median, high of what there is; NaN for no values."""
+    values = values[np.isfinite(values)]
     if not values.size:
         return math.nan, math.nan, math.nan
     low, median, high = np.quantile(values, [SPREAD[0], 0.5, SPREAD[1]])
@@ -134,7 +136,8 @@ def _quantiles(values: Floats) -> tuple[float, float, float]:
 
 
 def gene_values(phenotype: Phenotype) -> dict[str, float]:
-    """Value of every gene that shows in the phenotype, under the genes' names; optical ones only with optics on."""
+    """Value of every gene that shows in the phenotype, under the genes' names; optical ones only with optics on,
+    spectral ones where receptors are inherited: NaN for the peaks of types that the animal has not."""
     values = {
         "n_eyes": float(phenotype.n_eyes),
         "placement_range_deg": phenotype.placement_range_deg,
@@ -152,7 +155,14 @@ def gene_values(phenotype: Phenotype) -> dict[str, float]:
         values["refractive_index"] = phenotype.refractive_index
         values |= {"dispersion": phenotype.dispersion, "aperture_shape": float(phenotype.aperture_shape)}
     brain = ("memory_frames", "neurons", "layers")
-    return values | {name: float(getattr(phenotype, name)) for name in brain}
+    values |= {name: float(getattr(phenotype, name)) for name in brain}
+    if phenotype.lambda_max_nm is not None:
+        values["receptor_types"] = float(len(phenotype.lambda_max_nm))
+        values |= {
+            **dict.fromkeys(LAMBDA_MAX, math.nan),
+            **dict(zip(LAMBDA_MAX, phenotype.lambda_max_nm, strict=False)),
+        }
+    return values
 
 
 def acuity_cpd(phenotype: Phenotype) -> float:

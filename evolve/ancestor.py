@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis import gene_values
+from evolve.config import INHERITED
 from evolve.config_lines import Source
 from evolve.genes import ALL_GENES
 from evolve.store import Run
@@ -23,10 +24,12 @@ def starts_from(text: str) -> Source:
     path, identity = _parsed(text)
     candidate = Run.open(path).candidate(identity)
     values = gene_values(candidate.phenotype)
-    genome = {name: {"start": _exact(name, value)} for name, value in values.items()}
-    tree: dict[str, Any] = {"genome": genome}
+    genome = {name: {"start": _exact(name, value)} for name, value in values.items() if not math.isnan(value)}
+    tree: dict[str, Any] = {"genome": genome, "eye": {}}
+    if candidate.phenotype.lambda_max_nm is not None:
+        tree["eye"]["receptors"] = INHERITED
     if candidate.phenotype.relief is not None and len(candidate.phenotype.relief) != 16:
-        tree["eye"] = {"relief_points": math.isqrt(len(candidate.phenotype.relief))}
+        tree["eye"]["relief_points"] = math.isqrt(len(candidate.phenotype.relief))
     return Source(f"--from {path}:{candidate.id}", tree)
 
 

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from evolve import anatomy
-from evolve.genes import GENES, RELIEF_POINTS, Gene, GeneConfig, gene_table
+from evolve.genes import CLUSTERS, GENES, RELIEF_POINTS, Gene, GeneConfig, gene_table
 from evolve.interval import Interval
+from optics.receptors import RECEPTORS
 
 __all__ = [
+    "INHERITED",
     "SECTIONS",
     "TASKS",
     "ConfigError",
@@ -33,6 +35,7 @@ TASKS: Mapping[str, str] = {
 }
 
 
+INHERITED = "genes"  # in place of receptors' name: each animal's are as its spectral genes say
 AUTO = "auto"  # in place of a number: chosen when it is needed
 
 
@@ -59,6 +62,9 @@ class EyeConfig:
     optics: bool = _setting(True, None, "see through pupil and relief; off: a perfect lens")
     sensor_width: float = _setting(200e-6, Interval(1e-6, 1e-2), "width of the retina [m]")
     noise_sigma: float = _setting(0.01, Interval(0, 10), "standard deviation of a receptor's noise [signal]")
+    receptors: str = _setting(
+        "rgb", None, "types of receptor: rgb, lms, honeybee or goldfish; genes: as an animal's spectral genes say"
+    )
     bands: int = _setting(4, Interval(1, 64), "spectral bands")
     relief_height: float = _setting(
         100e-6, Interval(0, 1e-2, open_low=True), "height that a relief gene of 1 means [m]"
@@ -142,6 +148,10 @@ class RunConfig:
     def __post_init__(self) -> None:
         if self.task not in TASKS:
             raise ConfigError(f"task = {self.task!r}: must be one of {', '.join(TASKS)}", "task")
+        if self.eye.receptors not in (known := (*RECEPTORS, INHERITED)):
+            raise ConfigError(
+                f"eye.receptors = {self.eye.receptors!r}: must be one of {', '.join(known)}", "eye.receptors"
+            )
         for name, gene in gene_table(self.eye.relief_points).items():
             _check_gene_use(gene, self.genome[name])
         self._check_clusters()
@@ -158,12 +168,20 @@ class RunConfig:
 
     def _check_clusters(self) -> None:
         """Something must be open, and nothing that the run leaves out."""
-        genes = gene_table(self.eye.relief_points)
-        optical = [name for name, gene in genes.items() if gene.cluster == "optical" and self.genome[name].open]
-        if not self.eye.optics and optical:
+        genes = [gene for name, gene in gene_table(self.eye.relief_points).items() if self.genome[name].open]
+        opened = {
+            cluster: [f"genome.{gene.name}.open" for gene in genes if gene.cluster == cluster] for cluster in CLUSTERS
+        }
+        if not self.eye.optics and opened["optical"]:
             raise ConfigError(
                 "eye.optics = false leaves no optical gene to evolve: set genome.optical.open = false",
-                *("eye.optics", *(f"genome.{name}.open" for name in optical)),
+                *("eye.optics", *opened["optical"]),
+            )
+        if self.eye.receptors != INHERITED and opened["spectral"]:
+            raise ConfigError(
+                f"eye.receptors = {self.eye.receptors!r} leaves no spectral gene to evolve: set eye.receptors = "
+                f"{INHERITED!r}, or genome.spectral.open = false",
+                *("eye.receptors", *opened["spectral"]),
             )
         if not any(use.open for use in self.genome.values()):
             keys = [f"genome.{name}.open" for name in self.genome]

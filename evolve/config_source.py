@@ -16,7 +16,7 @@ import numpy as np
 
 from evolve.config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig, check_gene_value, check_value
 from evolve.config_lines import Source
-from evolve.genes import ALL_GENES, CLUSTERS, GENES, GeneConfig, gene_table, group_members
+from evolve.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, GeneConfig, gene_table, group_members
 from evolve.relief import doe_names, refined
 
 __all__ = ["SCALES", "assemble", "from_toml", "nearest", "parse_assignment", "preset_names", "to_toml"]
@@ -202,7 +202,7 @@ def _checked_genome(section: Tree) -> Tree:
     for group in sorted(section, key=lambda name: -len(group_members(name))):
         key, members, use = f"genome.{group}", group_members(group), section[group]
         if not members:
-            raise ConfigError(f"unknown gene {group!r}; {nearest(group, (*GENES, *CLUSTERS, 'doe'))}", key)
+            raise ConfigError(f"unknown gene {group!r}; {nearest(group, (*GENES, *CLUSTERS, *FAMILIES))}", key)
         if not isinstance(use, dict):
             raise ConfigError(f"{key} = {use!r}: set {key}.open, .low, .high, .start or .opens_at", key)
         for name in use:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evolve.anatomy import fitted
-from evolve.config import EyeConfig, RunConfig
-from evolve.genes import APERTURE_SHAPES
+from evolve.config import INHERITED, EyeConfig, RunConfig
+from evolve.genes import APERTURE_SHAPES, LAMBDA_MAX
 from evolve.genotype import Genotype
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ class Phenotype:
     `relief` holds N x N heights in [0, 1], row-major (y, x): for N = 4 control points of a bicubic B-spline patch, for
     more the heights at cell centres that a cubic spline goes through.
     `aperture_shape` is a place in APERTURE_SHAPES, `dispersion` the inverse of the relief's Abbe number.
+    `lambda_max_nm` are the peaks of its receptor types' pigments; None: the receptors that all eyes of the run have.
     """
 
     n_eyes: int
@@ -47,6 +48,7 @@ class Phenotype:
     aperture_shape: int = 0
     dispersion: float = 0.0
     layers: int = 2
+    lambda_max_nm: tuple[float, ...] | None = None
 
     def pupil(self, eye: EyeConfig) -> optics.Pupil | None:
         """Pupil of each of the eyes; None for the perfect lens."""
@@ -77,6 +79,7 @@ class Phenotype:
             sensor_width=eye.sensor_width,
             noise_sigma=eye.noise_sigma,
             bands=eye.bands,
+            receptors=eye.receptors if self.lambda_max_nm is None else self.lambda_max_nm,
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -95,6 +98,7 @@ def develop(genome: NDArray[np.float64], config: RunConfig) -> Phenotype:
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
     side, seen_through = config.eye.relief_points, config.eye.optics
     relief = tuple(values[f"doe_{i}{j}"] for i in range(side) for j in range(side))
+    peaks = tuple(values[name] for name in LAMBDA_MAX)[: int(values["receptor_types"])]
     return Phenotype(
         n_eyes=int(values["n_eyes"]),
         placement_range_deg=values["placement_range_deg"],
@@ -108,6 +112,7 @@ def develop(genome: NDArray[np.float64], config: RunConfig) -> Phenotype:
         aperture_shape=int(values["aperture_shape"]) if seen_through else 0,
         dispersion=values["dispersion"] if seen_through else 0.0,
         layers=int(values["layers"]),
+        lambda_max_nm=peaks if config.eye.receptors == INHERITED else None,
     )
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -15,7 +16,9 @@ __all__ = [
     "ALL_GENES",
     "APERTURE_SHAPES",
     "CLUSTERS",
+    "FAMILIES",
     "GENES",
+    "LAMBDA_MAX",
     "RELIEF_POINTS",
     "Gene",
     "GeneConfig",
@@ -24,10 +27,15 @@ __all__ = [
     "groups_of",
 ]
 
-Cluster = Literal["morphological", "optical", "neural"]
-CLUSTERS: tuple[Cluster, ...] = ("morphological", "optical", "neural")
+Cluster = Literal["morphological", "optical", "neural", "spectral"]
+CLUSTERS: tuple[Cluster, ...] = ("morphological", "optical", "neural", "spectral")
+FAMILIES = ("doe", "lambda_max")  # genes of one kind: what their names begin with
 RELIEF_POINTS = Interval(4, 9)  # of a relief along one side; names of its genes have a digit for each side
+REAL: Literal["real"] = "real"
+INTEGER: Literal["integer"] = "integer"
 APERTURE_SHAPES = ("circle", "annulus", "slit", "triangle", "square", "pentagon", "hexagon")
+# Where the peaks of the types of receptor start [nm]: red, green and blue as of "rgb", then one in the ultraviolet.
+LAMBDA_MAX: Mapping[str, float] = {f"lambda_max_{i}_nm": peak for i, peak in enumerate((600, 520, 460, 360))}
 
 
 @dataclass(frozen=True)
@@ -85,90 +93,79 @@ class Gene:
 @lru_cache
 def gene_table(relief_points: int = 4) -> Mapping[str, Gene]:
     """Every gene by name, in the order in which they stand in a genome; the relief has relief_points² of them."""
-    genes = [*_body(), *_optics(relief_points), *_brain()]
+    genes = [*_body(), *_optics(relief_points), *_brain(), *_spectra()]
     return {gene.name: gene for gene in genes}
 
 
 def _body() -> list[Gene]:
+    gene = partial(_gene, "morphological")
     return [
-        _count("n_eyes", (1, 16), (1, 16, 1), "", "eyes around the body"),
-        _real("placement_range_deg", (0, 180), (0, 180, 90), "deg", "arc over which the eyes are spread"),
-        _real("fov_deg", (1, 100), (1, 100, 45), "deg", "an eye's horizontal field of view"),
-        _count("resolution_height", (1, 64), (1, 16, 1), "receptors", "an eye's receptors, top to bottom"),
-        _count("resolution_width", (1, 64), (1, 16, 1), "receptors", "an eye's receptors, left to right"),
+        gene("n_eyes", INTEGER, (1, 16), (1, 16, 1), "", "eyes around the body"),
+        gene("placement_range_deg", REAL, (0, 180), (0, 180, 90), "deg", "arc over which the eyes are spread"),
+        gene("fov_deg", REAL, (1, 100), (1, 100, 45), "deg", "an eye's horizontal field of view"),
+        gene("resolution_height", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, top to bottom"),
+        gene("resolution_width", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, left to right"),
     ]
 
 
 def _optics(relief_points: int) -> list[Gene]:
-    points = [(i, j) for i in range(relief_points) for j in range(relief_points)]
+    gene = partial(_gene, "optical")
+    places = list(product(range(relief_points), repeat=2))
     shapes = ", ".join(f"{number} {name}" for number, name in enumerate(APERTURE_SHAPES))
+    last = len(APERTURE_SHAPES) - 1
     return [
         # Below a hundredth (a radius of 1 µm in a 200 µm eye) the pupil is no wider than the wavelengths it admits.
-        _real("relative_aperture", (0.01, 1), (0.01, 1, 0.5), "", "pupil diameter / retina width", "optical"),
+        gene("relative_aperture", REAL, (0.01, 1), (0.01, 1, 0.5), "", "pupil diameter / retina width"),
         *(
-            _real(f"doe_{i}{j}", (0, 1), (0, 1, 0.5), "relief height", f"relief control point ({i}, {j})", "optical")
-            for i, j in points
+            gene(f"doe_{i}{j}", REAL, (0, 1), (0, 1, 0.5), "relief height", f"relief control point ({i}, {j})")
+            for i, j in places
         ),
-        _real("refractive_index", (1, 2), (1, 2, 1.5), "", "index of the relief's material, at 588 nm", "optical"),
+        gene("refractive_index", REAL, (1, 2), (1, 2, 1.5), "", "index of the relief's material, at 588 nm"),
         # Glasses reach from 1/90 to 1/20; 0 is a material that does not disperse.
-        _real(
-            "dispersion",
-            (0, 0.1),
-            (0, 0.05, 0),
-            "1 / Abbe number",
-            "fall of the index with wavelength",
-            "optical",
-            False,
-        ),
-        _count(
-            "aperture_shape",
-            (0, len(APERTURE_SHAPES) - 1),
-            (0, len(APERTURE_SHAPES) - 1, 0),
-            "",
-            f"pupil: {shapes}",
-            "optical",
-            False,
-        ),
+        _held(gene("dispersion", REAL, (0, 0.1), (0, 0.05, 0), "1 / Abbe number", "fall of the index with wavelength")),
+        _held(gene("aperture_shape", INTEGER, (0, last), (0, last, 0), "", f"pupil: {shapes}")),
     ]
 
 
 def _brain() -> list[Gene]:
+    gene = partial(_gene, "neural")
     return [
-        _count("memory_frames", (1, 32), (1, 10, 5), "frames", "past frames that the brain sees", "neural"),
-        _count("neurons", (1, 512), (1, 512, 64), "", "neurons in each hidden layer", "neural"),
-        _count("layers", (1, 4), (1, 4, 2), "", "hidden layers of actor and critic", "neural", False),
+        gene("memory_frames", INTEGER, (1, 32), (1, 10, 5), "frames", "past frames that the brain sees"),
+        gene("neurons", INTEGER, (1, 512), (1, 512, 64), "", "neurons in each hidden layer"),
+        _held(gene("layers", INTEGER, (1, 4), (1, 4, 2), "", "hidden layers of actor and critic")),
     ]
 
 
-def _real(
+def _spectra() -> list[Gene]:
+    """Types of receptor, and what each is most sensitive to. Pigments are known from 357 to 620 nm; the template's
+    limits, 330 and 700 nm, are optics'."""
+    gene, most = partial(_gene, "spectral"), len(LAMBDA_MAX)
+    return [
+        _held(gene("receptor_types", INTEGER, (1, most), (1, most, 3), "", "types of receptor, one channel each")),
+        *(
+            _held(gene(name, REAL, (330, 700), (330, 650, start), "nm", f"peak of receptor type {i}'s pigment"))
+            for i, (name, start) in enumerate(LAMBDA_MAX.items())
+        ),
+    ]
+
+
+def _gene(
+    cluster: Cluster,
     name: str,
+    kind: Literal["real", "integer"],
     valid: tuple[float, float],
     search: tuple[float, float, float],
     unit: str,
     meaning: str,
-    cluster: Cluster = "morphological",
-    opened: bool = True,
 ) -> Gene:
-    """A real gene; `search` is (low, high, start)."""
-    return Gene(name, cluster, "real", Interval(*valid), _use(opened, search), unit, meaning)
-
-
-def _count(
-    name: str,
-    valid: tuple[float, float],
-    search: tuple[float, float, float],
-    unit: str,
-    meaning: str,
-    cluster: Cluster = "morphological",
-    opened: bool = True,
-) -> Gene:
-    """An integer gene."""
-    return Gene(name, cluster, "integer", Interval(*valid), _use(opened, search), unit, meaning)
-
-
-def _use(opened: bool, search: tuple[float, float, float]) -> GeneConfig:
+    """A gene, open unless told otherwise; `search` is (low, high, start)."""
     low, high, start = map(float, search)
-    return GeneConfig(opened, low, high, start)
+    return Gene(name, cluster, kind, Interval(*valid), GeneConfig(True, low, high, start), unit, meaning)
+
+
+def _held(gene: Gene) -> Gene:
+    """The same gene, frozen unless told otherwise."""
+    return replace(gene, default=replace(gene.default, open=False))
 
 
 GENES: Mapping[str, Gene] = gene_table()
@@ -176,16 +173,13 @@ ALL_GENES: Mapping[str, Gene] = gene_table(int(RELIEF_POINTS.high))
 
 
 def group_members(name: str) -> tuple[str, ...]:
-    """Genes that a cluster's name, "doe" or a gene's own name stands for; () if it is none of them."""
-    if name in ALL_GENES:
-        return (name,)
-    if name == "doe":
-        return tuple(gene for gene in ALL_GENES if gene.startswith("doe_"))
-    return tuple(gene.name for gene in ALL_GENES.values() if gene.cluster == name)
+    """Genes that a cluster's name, a family's or a gene's own stands for; () if it is none of them."""
+    return tuple(gene for gene in ALL_GENES if name in (gene, *groups_of(gene)))
 
 
 def groups_of(name: str) -> tuple[str, ...]:
     """Groups that a gene belongs to, the narrowest first; () for what is no gene."""
     if name not in ALL_GENES:
         return ()
-    return (*(("doe",) if name.startswith("doe_") else ()), ALL_GENES[name].cluster)
+    families = tuple(family for family in FAMILIES if name.startswith(f"{family}_"))
+    return (*families, ALL_GENES[name].cluster)

@@ -15,13 +15,14 @@ from evolve.config import RunConfig
 from evolve.development import Phenotype, develop
 from evolve.evaluation import Evaluation
 from evolve.executors import cores
-from evolve.genes import CLUSTERS, gene_table
+from evolve.genes import CLUSTERS, LAMBDA_MAX, gene_table
 from evolve.genotype import Genotype
 
 __all__ = ["Plan", "idle_genes"]
 
 REPORT_BYTES = 5_000_000  # report and replay pages together
 EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60  # of the episode that is exported: see evolve.episode
+GREY_TASKS = ("navigation", "detection", "tracking")
 
 
 @dataclass(frozen=True)
@@ -144,6 +145,12 @@ def idle_genes(config: RunConfig) -> list[str]:
     for name in ("refractive_index", "dispersion"):
         if flat and uses[name].open:
             notes.append(f"genome.{name} is open but changes nothing: the relief is held flat")
+    if config.task in GREY_TASKS and any(uses[name].open for name in LAMBDA_MAX):
+        notes.append(f"genes of lambda_max are open but change nothing: the world of {config.task} is grey")
+    types = uses["receptor_types"]
+    most = int(types.high if types.open else types.start)
+    for name in [name for name in list(LAMBDA_MAX)[most:] if uses[name].open]:
+        notes.append(f"genome.{name} is open but changes nothing: genome.receptor_types is at most {most}")
     return notes
 
 

@@ -6,6 +6,7 @@ nothing that it does not, so a run that is continued writes them anew.
 
 from __future__ import annotations
 
+import math
 import shutil
 import time
 from collections import Counter
@@ -53,7 +54,7 @@ class Scalars:
         if candidate.failure is None:
             values = {"fitness": candidate.fitness, "success_rate": candidate.success_rate}
             genes = {**gene_values(candidate.phenotype), "acuity_cpd": acuity_cpd(candidate.phenotype)}
-            values |= {f"genes/{name}": value for name, value in genes.items()}
+            values |= {f"genes/{name}": value for name, value in genes.items() if math.isfinite(value)}
             self._add("candidates", values, candidate.id)
             for steps, value in candidate.curve:
                 self._add(f"learning/{candidate.id:06d}", {"return": value}, steps)

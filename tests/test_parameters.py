@@ -22,6 +22,7 @@ from evolve.config_source import assemble
 from evolve.development import develop
 from evolve.evaluation import Evaluation
 from evolve.fitness import evaluate
+from evolve.genes import LAMBDA_MAX
 from evolve.genotype import GENES, Genotype
 from evolve.loop import evolve as carry
 from evolve.store import Run
@@ -42,6 +43,7 @@ SMALL = (
     "genome.resolution_width.start=4",
 )
 PERFECT = ("eye.optics=false",)
+FOUR_TYPES = ("eye.receptors=genes", "genome.receptor_types.start=4", *PERFECT)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -127,6 +129,7 @@ FIELDS = {
     "eye.optics": Case("eye.optics=false", sight, ()),
     "eye.sensor_width": Case("eye.sensor_width=100e-6", point_image, ()),
     "eye.noise_sigma": Case("eye.noise_sigma=0.1", sight),
+    "eye.receptors": Case("eye.receptors=honeybee", sight),
     "eye.bands": Case("eye.bands=3", sight),
     "eye.relief_height": Case("eye.relief_height=80e-6", point_image, ()),
     "eye.rays_per_receptor": Case("eye.rays_per_receptor=2", life),
@@ -171,6 +174,8 @@ GENE_OUTPUTS = {
     "memory_frames": life,
     "neurons": life,
     "layers": life,
+    "receptor_types": sight,
+    **dict.fromkeys(LAMBDA_MAX, sight),
 }
 
 
@@ -214,10 +219,12 @@ def test_every_setting_moves_its_output(name):
 @pytest.mark.parametrize("name", GENE_OUTPUTS)
 def test_every_gene_moves_its_output(name):
     output = GENE_OUTPUTS[name]
-    given = () if output is point_image else PERFECT
-    before = _settled(output, "detection", given)
+    spectral = GENES[name].cluster == "spectral"
+    task = "foraging" if spectral else "detection"  # of the tasks, foraging alone is not grey
+    given = FOUR_TYPES if spectral else () if output is point_image else PERFECT
+    before = _settled(output, task, given)
     opened = () if GENES[name].default.open else (f"genome.{name}.open=true",)
-    config = assemble("detection", "quick", assignments=(*SMALL, *given, *opened))
+    config = assemble(task, "quick", assignments=(*SMALL, *given, *opened))
     genotype = Genotype(config.genome)
     genome = genotype.start
     place = [gene.name for gene in genotype.open_genes].index(name)

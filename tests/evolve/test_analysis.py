@@ -121,7 +121,22 @@ def test_gene_values_without_optics():
 def test_gene_values_know_every_gene():
     from evolve.genotype import GENES
 
-    assert set(gene_values(phenotype())) == set(GENES)
+    assert set(gene_values(phenotype(lambda_max_nm=(500.0,)))) == set(GENES)
+
+
+def test_gene_values_of_receptor_types_that_an_animal_has_not_are_none():
+    values = gene_values(phenotype(lambda_max_nm=(510.0, 350.0)))
+    assert [values[name] for name in ("receptor_types", "lambda_max_0_nm", "lambda_max_1_nm")] == [2, 510, 350]
+    assert np.isnan(values["lambda_max_2_nm"])
+    assert np.isnan(values["lambda_max_3_nm"])
+
+
+def test_a_trajectory_is_of_those_that_have_the_gene():
+    peaks = ((510.0, 350.0), (510.0, 370.0), (510.0, 390.0), (500.0,))
+    members = [candidate(i, 0, i, float(i), lambda_max_nm=p) for i, p in enumerate(peaks)]
+    path = trajectory(members, lambda p: gene_values(p)["lambda_max_1_nm"])
+    assert path.median.tolist() == [370.0]
+    assert np.isnan(path.best[0])  # the best has one type only
 
 
 def test_bootstrap_covers_the_mean():

@@ -4,7 +4,7 @@ import pytest
 
 from evolve.config import TASKS, ConfigError
 from evolve.config_source import assemble, from_toml, preset_names, to_toml
-from evolve.genotype import GENES
+from evolve.genotype import GENES, group_members
 
 
 @pytest.mark.parametrize("preset", preset_names())
@@ -56,6 +56,20 @@ def test_groups_of_genes_freeze_together_and_the_narrower_name_wins():
 def test_without_optics_the_optical_genes_are_frozen():
     config = assemble("detection", assignments=["eye.optics=false"])
     assert not any(config.genome[name].open for name, gene in GENES.items() if gene.cluster == "optical")
+
+
+def test_spectral_genes_are_for_receptors_that_are_inherited():
+    assert assemble("foraging").eye.receptors == "rgb"
+    assert not any(assemble("foraging").genome[name].open for name in group_members("spectral"))
+    config = assemble("foraging", assignments=["eye.receptors=genes", "genome.lambda_max.open=true"])
+    opened = [name for name in group_members("spectral") if config.genome[name].open]
+    assert opened == [f"lambda_max_{i}_nm" for i in range(4)]
+    with pytest.raises(ConfigError, match=r"eye\.receptors = 'rgb' leaves no spectral gene to evolve"):
+        assemble("foraging", assignments=["genome.receptor_types.open=true"])
+    with pytest.raises(ConfigError, match=r"eye\.receptors = 'bee': must be one of rgb, lms, .*, genes"):
+        assemble("foraging", assignments=["eye.receptors=bee"])
+    with pytest.raises(ConfigError, match=r"lambda_max_0_nm\.low = 300: must be in \[330, 700\]"):
+        assemble("foraging", assignments=["genome.lambda_max_0_nm.low=300"])
 
 
 def _from_text(text):

@@ -11,7 +11,7 @@ import sim
 from evolve.config import TASKS
 from evolve.config_source import assemble
 from evolve.development import Phenotype, develop
-from evolve.genes import ALL_GENES, APERTURE_SHAPES
+from evolve.genes import ALL_GENES, APERTURE_SHAPES, LAMBDA_MAX
 from evolve.genotype import CLUSTERS, GENES, Genotype, group_members
 from optics import BSplineRelief
 
@@ -93,6 +93,8 @@ def test_groups_cover_all_genes_once():
     assert sorted(members) == sorted(ALL_GENES)
     assert set(GENES) < set(ALL_GENES)
     assert len(group_members("doe")) == 81  # of 9 x 9, the largest relief
+    assert group_members("lambda_max") == tuple(LAMBDA_MAX)
+    assert group_members("spectral") == ("receptor_types", *LAMBDA_MAX)
     assert group_members("nonsense") == ()
 
 
@@ -143,3 +145,33 @@ def test_pupils_have_every_shape_and_glass():
     n_f, n_d, n_c = (flint.n.at(line) for line in (486.134e-9, 587.562e-9, 656.281e-9))
     assert (n_d - 1) / (n_f - n_c) == pytest.approx(30)
     assert n_d == pytest.approx(start.refractive_index)
+
+
+def test_receptors_are_as_many_as_the_genes_say_and_peak_where_they_say():
+    config = assemble("foraging", assignments=["eye.receptors=genes", "genome.spectral.open=true"])
+    genotype = Genotype(config.genome)
+    start = develop(genotype.start, config)
+    assert start.lambda_max_nm == (600, 520, 460)
+    genome = genotype.start
+    places = {gene.name: place for place, gene in enumerate(genotype.open_genes)}
+    genome[places["receptor_types"]] = 0.99
+    genome[places["lambda_max_3_nm"]] = 0.1
+    animal = develop(genome, config)
+    assert animal.lambda_max_nm == pytest.approx((600, 520, 460, 330 + 0.1 * 320))
+    assert Phenotype.from_json(animal.to_json()) == animal
+    eye = animal.eyes(config.eye).eye()
+    assert eye.channels == 4
+    weights = replace(eye, bands=64).spectral_bands.weights
+    wavelengths = 1e9 * replace(eye, bands=64).spectral_bands.wavelengths
+    # What a type catches of daylight peaks near its pigment's peak, within the 64 bands' 7 nm and daylight's slope.
+    for peak, caught in zip(animal.lambda_max_nm, weights, strict=True):
+        assert abs(wavelengths[np.argmax(caught)] - peak) < 25, peak
+
+
+def test_receptors_that_are_not_inherited_are_the_runs():
+    """And what the spectral genes say changes nothing: the same animal."""
+    config = assemble("foraging", assignments=["eye.receptors=honeybee", "genome.lambda_max_0_nm.start=400"])
+    animal = develop(Genotype(config.genome).start, config)
+    assert animal.lambda_max_nm is None
+    assert animal == develop(Genotype(assemble("foraging").genome).start, assemble("foraging"))
+    assert [kind.peak_nm for kind in animal.eyes(config.eye).receptors.types] == [544, 436, 344]

@@ -59,6 +59,11 @@ def test_genes_that_cannot_change_anything_are_named():
     assert "refractive_index is held at 1" in notes(*glass)[0]
     assert "the relief is held flat" in notes("genome.doe.open=false")[0]
     assert notes("genome.doe.open=false", "genome.doe_11.start=0.9") == []
+    inherited = ("eye.receptors=genes", "genome.lambda_max.open=true")
+    first, *others = notes(*inherited)
+    assert "the world of detection is grey" in first
+    assert others == ["genome.lambda_max_3_nm is open but changes nothing: genome.receptor_types is at most 3"]
+    assert len(notes(*inherited, "genome.receptor_types.open=true")) == 1
 
 
 def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, monkeypatch):
@@ -68,7 +73,7 @@ def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, mon
     out = capsys.readouterr().out
     assert "3 generations x 4 candidates = 12" in out
     assert "optical from generation 1: relative_aperture, refractive_index, doe_00 … doe_33 (16)" in out
-    assert "24 of 28" in out
+    assert "24 of 33" in out
     assert main(["run", "detection", "--preset", "quick", "--dry-run", "--json", *late]) == 0
     plan = json.loads(capsys.readouterr().out)
     assert plan["evaluations"] == 12
