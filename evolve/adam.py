@@ -6,7 +6,7 @@ worker process seconds.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import torch
@@ -55,3 +55,10 @@ class Adam:
     def state_dict(self) -> dict[str, Tensor | int]:
         """What a later step depends on, besides the parameters."""
         return {"mean": self.mean, "square": self.square, "steps": self.steps}
+
+    @torch.no_grad()
+    def load_state_dict(self, state: Mapping[str, Tensor | int]) -> None:
+        """Inverse of `state_dict`."""
+        for name in ("mean", "square"):
+            getattr(self, name).copy_(state[name])
+        self.steps = int(state["steps"])

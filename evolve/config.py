@@ -94,6 +94,12 @@ class SearchConfig:
     steady_state: bool = _setting(
         False, None, "propose the next candidate as soon as one is evaluated; off: generation by generation"
     )
+    rungs: int = _setting(
+        1, Interval(1, 10), "budgets on the way to a whole training, on each of which only the better ones go on"
+    )
+    promoted: float = _setting(
+        0.5, Interval(0, 0.9, open_low=True), "part that goes on from a rung, and of the next one's budget a rung has"
+    )
 
 
 @dataclass(frozen=True)

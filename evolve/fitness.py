@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import time
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import sim
+from evolve.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from evolve.config import RunConfig
 from evolve.development import Phenotype
 from evolve.evaluation import Evaluation
+from evolve.ladder import Stretch
 from evolve.learner import Episodes, Progress, Training, play, train
 from evolve.policy import TrainingDiverged, save_policy
 
@@ -20,19 +23,28 @@ __all__ = ["evaluate"]
 
 
 def evaluate(
-    phenotype: Phenotype, config: RunConfig, seed: int, policy_path: Path, progress: Progress | None = None
+    phenotype: Phenotype,
+    config: RunConfig,
+    seed: int,
+    policy_path: Path,
+    progress: Progress | None = None,
+    stretch: Stretch | None = None,
 ) -> Evaluation:
     """Train one candidate, write its policy, and measure its fitness; same arguments, same outcome on one machine.
 
     seed         of the policy's first weights, of all worlds and of all chance in learning
     policy_path  where the trained policy is written (safetensors); nothing is written if learning diverged
     progress     told (steps trained, steps planned) after every rollout
+    stretch      how far to train, and from where (`evolve.ladder`); None: a whole training
 
     A training that diverges is a failed Evaluation, not an exception.
     """
     began = time.perf_counter()
     try:
-        training, episodes = _live(phenotype, config, seed, progress)
+        if stretch is None:
+            training, episodes = _live(phenotype, config, seed, progress)
+        else:
+            training, episodes = _climb(phenotype, config, seed, progress, stretch)
     except TrainingDiverged as error:
         return Evaluation.failed(str(error), time.perf_counter() - began)
     save_policy(training.policy, policy_path)
@@ -46,9 +58,32 @@ def evaluate(
     )
 
 
-def _live(phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress | None) -> tuple[Training, Episodes]:
+def _climb(
+    phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress | None, stretch: Stretch
+) -> tuple[Training, Episodes]:
+    """Up to the stretch's last rung, from the highest one below whose checkpoint there is."""
+    begun, first = None, 0
+    for rung in reversed(range(stretch.rung)):
+        if begun is None and (begun := load_checkpoint(stretch.checkpoints[rung])) is not None:
+            first = rung + 1
+    for rung in range(first, stretch.rung + 1):
+        learning = replace(config.learning, total_steps=stretch.budgets[rung])
+        entropy = [seed, rung] if rung else seed  # the first rung begins as a whole training does
+        training, episodes = _live(phenotype, replace(config, learning=learning), entropy, progress, begun)
+        begun = training.end
+        save_checkpoint(begun, stretch.checkpoints[rung])
+    return training, episodes
+
+
+def _live(
+    phenotype: Phenotype,
+    config: RunConfig,
+    entropy: int | list[int],
+    progress: Progress | None,
+    begun: Checkpoint | None = None,
+) -> tuple[Training, Episodes]:
     """Training, and the evaluation episodes after it, in worlds never seen before."""
-    weights, worlds, evaluation = (int(s) for s in np.random.SeedSequence(seed).generate_state(3))
+    weights, worlds, evaluation = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     eyes = phenotype.eyes(config.eye)
     common: dict[str, Any] = {"memory": phenotype.memory_frames, "rays_per_receptor": config.eye.rays_per_receptor}
     training_worlds = sim.make_vec_env(config.task, eyes, config.learning.n_envs, worlds, mode="training", **common)
@@ -56,7 +91,7 @@ def _live(phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress
         config.task, eyes, config.evaluation.episodes, evaluation, mode="evaluation", **common
     )
     with closing(training_worlds), closing(evaluation_worlds):
-        brain = {"neurons": phenotype.neurons, "layers": phenotype.layers}
+        brain: dict[str, Any] = {"neurons": phenotype.neurons, "layers": phenotype.layers, "begun": begun}
         training = train(
             training_worlds, evaluation_worlds, config=config.learning, seed=weights, progress=progress, **brain
         )

@@ -16,6 +16,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
+from evolve.checkpoint import Checkpoint
 from evolve.config import LearningConfig
 from evolve.policy import EyePolicy, TrainingDiverged, learnt, set_learnt
 from evolve.rollout import FrameRolloutBuffer
@@ -33,11 +34,13 @@ class Training:
     policy  as it was at the best evaluation
     steps   environment steps taken, in whole rollouts
     curve   (steps, mean return of the evaluation episodes), every `eval_interval` steps
+    end     as it stands at its end, for a training that goes on from there
     """
 
     policy: EyePolicy
     steps: int
     curve: tuple[tuple[int, float], ...]
+    end: Checkpoint
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,19 @@ class AdaptingPPO(PPO):
         for parameter in self.policy.value_net.parameters():
             parameter.div_(change)
 
+    def checkpoint(self, curve: list[tuple[int, float]], best: dict[str, torch.Tensor]) -> Checkpoint:
+        """The training as it stands; curve and best are kept outside."""
+        now = {name: tensor.detach().clone() for name, tensor in learnt(self.policy).items()}
+        adam = self.policy.optimizer.state_dict()
+        return Checkpoint(self.num_timesteps, tuple(curve), float(self.env.unit), now, best, adam)
+
+    def restore(self, begun: Checkpoint) -> None:
+        """Go on from there; worlds and chance are this learner's own."""
+        self.num_timesteps = begun.steps
+        self.env.unit = begun.unit
+        set_learnt(self.policy, begun.now)
+        self.policy.optimizer.load_state_dict(begun.adam)
+
 
 def _require_finite(name: str, values: np.ndarray, steps: int) -> None:
     if not np.isfinite(values).all():
@@ -162,8 +178,10 @@ def train(
     seed: int,
     progress: Progress | None = None,
     layers: int = 2,
+    begun: Checkpoint | None = None,
 ) -> Training:
-    """Learn to act in `worlds`: same arguments, same policy, bit for bit (on one machine).
+    """Learn to act in `worlds`: same arguments, same policy, bit for bit (on one machine). A training `begun` goes on
+    from there, its steps counted.
 
     After every `eval_interval` steps the policy plays one episode in each of the evaluation worlds; learning ends
     after `patience` such evaluations without a better mean return, or after `total_steps`. The policy returned
@@ -175,6 +193,9 @@ def train(
     report = _Report(progress, config.total_steps) if progress else None
     curve: list[tuple[int, float]] = []
     best: dict[str, torch.Tensor] = {}
+    if begun is not None:
+        curve, best = list(begun.curve), dict(begun.best)
+        model.restore(begun)
     while model.num_timesteps < config.total_steps and not stuck(curve, config.patience):
         stretch = min(config.eval_interval, config.total_steps - model.num_timesteps)
         model.learn(stretch, callback=report, reset_num_timesteps=False)
@@ -182,8 +203,9 @@ def train(
         if not curve or mean_return > max(value for _, value in curve):
             best = {name: tensor.detach().clone() for name, tensor in learnt(model.policy).items()}
         curve.append((model.num_timesteps, mean_return))
+    end = model.checkpoint(curve, best)
     set_learnt(model.policy, best)
-    return Training(model.policy, model.num_timesteps, tuple(curve))
+    return Training(model.policy, model.num_timesteps, tuple(curve), end)
 
 
 def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
