@@ -1,0 +1,211 @@
+"""The best pupil: sharpness against light
+
+python -m experiments.best_pupil [--compute] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import optics
+from evolve.analysis import polychromatic
+from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
+from experiments.store import Origin, read_rows, write_rows
+from sim import materials
+
+__all__ = ["Row", "best", "computed", "measures"]
+
+Floats = NDArray[np.float64]
+PUPILS = ("hole", "lens")
+APERTURES = tuple(np.geomspace(0.04, 1.0, 29).tolist())
+NOISES = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
+MEASURES = ("image_quality", "contrast", "bits")
+RESOLUTION, FOV_DEG = 15, 45.0
+SCENE = (materials.WHITE - materials.BLACK) / 2  # standard deviation of the signal of black and white stripes
+GREEN = 550e-9
+COLORS = {"hole": "#D55E00", "lens": "#0072B2"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """What an eye is worth by three measures; see the page."""
+
+    pupil: str
+    relative_aperture: float
+    noise_sigma: float
+    image_quality: float
+    contrast: float
+    bits: float
+
+
+def eye(pupil: str, aperture: float) -> optics.Eye:
+    """An eye of default size behind an open hole or an ideal lens in focus."""
+    plain = optics.Eye(resolution=(RESOLUTION, RESOLUTION), fov_deg=FOV_DEG)
+    focus = plain.sensor_distance if pupil == "lens" else None
+    radius = aperture * plain.sensor_width / 2
+    return optics.Eye(optics.Pupil(radius, thin_lens_focal_length=focus), resolution=plain.resolution, fov_deg=FOV_DEG)
+
+
+def measures(contrasts: Floats, throughput: float, noise_sigma: float) -> tuple[float, float, float]:
+    """(image quality, contrast above the noise, bits per receptor) of an MTF at even steps from 0 to Nyquist.
+
+    With f in units of Nyquist's frequency, T the throughput and c the scene's contrast,
+
+        Q = T ∫ max(MTF - σ/T, 0) df,    C = Q / T,    B = (π/4) ∫ ½ log2(1 + (c T MTF / σ)²) f df
+
+    B is the information that white noise of σ per receptor leaves of a scene whose structures are all equally strong
+    (Shannon; for eyes Snyder, Laughlin and Stavenga 1977): π/4 f df counts what of the receptors' square lattice lies
+    at a frequency, over all directions.
+    """
+    f = np.linspace(0, 1, contrasts.size)
+    above = float(np.trapezoid(np.maximum(contrasts - noise_sigma / throughput, 0), f))
+    ratio = SCENE * throughput * contrasts / noise_sigma
+    bits = math.pi / 2 * float(np.trapezoid(0.5 * np.log2(1 + ratio**2) * f, f))
+    return throughput * above, above, bits
+
+
+def contrast_of(seen: optics.Eye) -> Floats:
+    """MTF in white daylight at 257 frequencies up to the retina's Nyquist frequency."""
+    white = polychromatic(seen, seen.psf())
+    frequencies = np.linspace(0, 1 / (2 * seen.receptor_pitch), 257)
+    return np.asarray(optics.mtf(white).profile(frequencies)[0], np.float64)
+
+
+def computed(apertures: Sequence[float] = APERTURES, noises: Sequence[float] = NOISES) -> list[Row]:
+    """All pupils at all noises."""
+    rows = []
+    for pupil in PUPILS:
+        for aperture in apertures:
+            seen = eye(pupil, aperture)
+            contrasts, light = contrast_of(seen), float(seen.throughput)
+            rows += [Row(pupil, aperture, sigma, *measures(contrasts, light, sigma)) for sigma in noises]
+    return rows
+
+
+def best(rows: Iterable[Row], pupil: str, noise_sigma: float, measure: str) -> float:
+    """The relative aperture at which a measure peaks: of the parabola, in log a, through the three best samples."""
+    chosen = [row for row in rows if row.pupil == pupil and math.isclose(row.noise_sigma, noise_sigma)]
+    place = np.log([row.relative_aperture for row in chosen])
+    value = np.array([getattr(row, measure) for row in chosen])
+    top = int(np.argmax(value))
+    if top in (0, len(chosen) - 1):
+        return chosen[top].relative_aperture
+    low, middle, high = value[top - 1 : top + 2]
+    shift = 0.5 * (low - high) / (low - 2 * middle + high)
+    return float(np.exp(place[top] + shift * (place[1] - place[0])))
+
+
+def rayleigh() -> float:
+    """Relative aperture of the sharpest pinhole for a distant point, diameter 1.9 √(λf) (Rayleigh 1891)."""
+    plain = optics.Eye(fov_deg=FOV_DEG)
+    return 1.9 * math.sqrt(GREEN * float(plain.sensor_distance)) / plain.sensor_width
+
+
+def page(rows: Sequence[Row], origin: Origin) -> Page:
+    """The page of the stored numbers."""
+    noises = sorted({row.noise_sigma for row in rows})
+    open_best = [best(rows, "hole", sigma, "contrast") for sigma in noises]
+    cells = [
+        [f"{s:g}", *(_shown(best(rows, p, s, m)) for p in PUPILS for m in ("contrast", "bits", "image_quality"))]
+        for s in noises
+    ]
+    header = ["noise σ", *(f"{p}: {m}" for p in PUPILS for m in ("contrast", "bits", "image quality"))]
+    return Page(
+        name="best_pupil",
+        title="The best pupil: sharpness against light",
+        question=(
+            "How wide should a pupil be, without and with a lens, if a narrow one is sharp and a wide one bright? "
+            "Evolution's pupils can be held against this."
+        ),
+        answer=(
+            f"It depends on what reads the retina. By contrast above the noise a hole is best at a = "
+            f"{_shown(open_best[0])} where σ = {noises[0]:g} and at {open_best[-1]:.2f} where σ = {noises[-1]:g}; at "
+            f"the default σ = 0.01 at {_shown(best(rows, 'hole', 0.01, 'contrast'))}. With little noise that is near "
+            f"Rayleigh's sharpest pinhole, a = {rayleigh():.2f}; noise opens it. But a hole that opens takes hardly "
+            "any signal away: contrast falls, light grows faster. A brain that could undo the blur would open the "
+            "pupil wide, by bits in all cases; and so would one that follows image quality as `optics.image_quality` "
+            "has it, contrast times throughput. If evolution's pupils close, it is because the brains that it gets cannot "
+            "do that. With a lens in focus the widest pupil is best by every measure."
+        ),
+        method=(
+            f"Eyes 200 µm wide, {FOV_DEG:g}°, {RESOLUTION} x {RESOLUTION} receptors, in white daylight; hole and ideal "
+            "lens; exact wave optics. σ is a receptor's noise in units of what white gives at a = 1. With f in units "
+            "of the receptors' Nyquist frequency and T = a²: *contrast* is C = ∫ max(MTF - σ/T, 0) df; *image quality* "
+            "is T C; *bits* per receptor are what noise leaves of a scene of black and white stripes "
+            f"(reflectances {materials.BLACK:g} and {materials.WHITE:g}) of all frequencies alike, "
+            "(π/2) ∫ ½ log2(1 + (c T MTF / σ)²) f df with c half their difference (Snyder, Laughlin and Stavenga "
+            f"1977). {len({row.relative_aperture for row in rows})} apertures, optima by parabolas."
+        ),
+        command="python -m experiments.best_pupil --compute",
+        figures=[
+            Figure(
+                "best_pupil",
+                lambda path: draw(rows, path),
+                f"Left: contrast above the noise over the pupil's width at three noises (σ = "
+                f"{', '.join(f'{s:g}' for s in shades(noises))}, pale to strong); dots are the peaks. Middle: bits per "
+                "receptor at the same. Right: the pupil of most contrast over the noise; dotted: Rayleigh's pinhole.",
+            )
+        ],
+        tables=["Best relative aperture a (pupil diameter / retina width):", markdown_table(header, cells)],
+        origin=origin,
+    )
+
+
+def _shown(aperture: float) -> str:
+    return f"{aperture:.2f}" if aperture > 0.1 else f"{aperture:.3f}"
+
+
+def shades(noises: Sequence[float]) -> tuple[float, float, float]:
+    """Three noises that are drawn."""
+    return noises[1], noises[len(noises) // 2], noises[-2]
+
+
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """Contrast and bits over the pupil's width, and the best width over noise."""
+    figure, axes = new_figure(11, 3.6, columns=3)
+    noises = sorted({row.noise_sigma for row in rows})
+    for place, measure in zip(axes[0], ("contrast", "bits"), strict=False):
+        for sigma, strength in zip(shades(noises), (0.35, 0.65, 1.0), strict=True):
+            for pupil in PUPILS:
+                chosen = [row for row in rows if row.pupil == pupil and math.isclose(row.noise_sigma, sigma)]
+                x, y = np.array([(row.relative_aperture, getattr(row, measure)) for row in chosen]).T
+                place.semilogx(x, y, color=COLORS[pupil], alpha=strength, lw=1.8)
+                place.plot(x[y.argmax()], y.max(), "o", color=COLORS[pupil], alpha=strength, ms=6)
+    left, middle, right = axes[0]
+    left.set(xlabel="relative aperture a", ylabel="contrast above the noise, C", ylim=(0, 1.02))
+    middle.set(xlabel="relative aperture a", ylabel="information, B [bits per receptor]", ylim=(0, None))
+    middle.text(0.03, 0.93, "lens in focus", color=COLORS["lens"], transform=middle.transAxes)
+    middle.text(0.03, 0.86, "hole", color=COLORS["hole"], transform=middle.transAxes)
+    for pupil in PUPILS:
+        found = [best(rows, pupil, sigma, "contrast") for sigma in noises]
+        right.loglog(noises, found, color=COLORS[pupil], marker="o", ms=4)
+    right.axhline(rayleigh(), color="#777777", ls=":", lw=1)
+    right.text(noises[-1], rayleigh() * 0.93, "Rayleigh's pinhole", color="#777777", ha="right", va="top")
+    right.set(xlabel="noise σ of a receptor", ylabel="a of most contrast", ylim=(0.06, 1.2))
+    save(figure, path)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compute and store if asked; make the page from the store."""
+    options = parser(__doc__ or "")
+    options.add_argument("--compute", action="store_true", help="compute the stored numbers anew")
+    chosen = options.parse_args(arguments)
+    data, origin = (chosen.docs / "data" / f"best_pupil.{kind}" for kind in ("csv", "json"))
+    if chosen.compute:
+        began = time.process_time()
+        write_rows(computed(), data)
+        Origin.here((time.process_time() - began) / 3600).write(origin)
+    page(read_rows(Row, data), Origin.read(origin)).publish(chosen.docs)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,174 @@
+"""What the eye sees, at five stages on the way to a lens
+
+python -m experiments.five_eyes [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import optics
+import sim
+from evolve.analysis import polychromatic, psnr
+from evolve.report.picture import display
+from evolve.vision import ssim
+from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
+from experiments.store import Origin
+from sim.state import WorldState
+
+__all__ = ["STAGES", "Stage", "View", "scene", "view"]
+
+Floats = NDArray[np.floating]
+FINE, COARSE, CELLS = 90, 30, 180  # receptors along a side of either retina, and cells of the scene
+SENSOR_WIDTH, FOV_DEG, NOISE, INDEX = 200e-6, 45.0, 0.003, 1.5
+WIDE = 0.38  # relative aperture of cup and lenses: the widest of which a focused lens is in the genes' reach
+SPP = 128
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A pupil. power: of its glass, in units of what focuses; 0: none."""
+
+    name: str
+    relative_aperture: float
+    power: float = 0.0
+
+    def pupil(self) -> optics.Pupil:
+        """The pupil, of glass with n = 1.5 where it has any."""
+        radius = self.relative_aperture * SENSOR_WIDTH / 2
+        if not self.power:
+            return optics.Pupil(radius)
+        focal_length = float(optics.Eye(fov_deg=FOV_DEG, sensor_width=SENSOR_WIDTH).sensor_distance)
+        curvature = self.power / ((INDEX - 1) * focal_length)
+        return optics.Pupil(radius, optics.BSplineRelief.paraboloid(0.0, curvature, radius), n=INDEX)
+
+
+STAGES = (
+    Stage("open", 1.0),
+    Stage("cup", WIDE),
+    Stage("pinhole", 0.11),
+    Stage("unfocused lens", WIDE, 0.6),
+    Stage("focused lens", WIDE, 1.0),
+)
+
+
+@dataclass(frozen=True)
+class View:
+    """What a stage makes of the scene: signals (channel, y, x) brought to the perfect lens's brightness, on the fine
+    retina without noise and on the coarse one with it; and how like the perfect lens's they are."""
+
+    fine: Floats
+    coarse: Floats
+    strehl: float
+    psnr_db: float
+    ssim: float
+    noisy_psnr_db: float
+
+
+def scene() -> Floats:
+    """Spectral radiance (band, y, x) before the eye on the tangent plane, cells of retina / 180, path-traced: the goal
+    left, an adversary right, as far around as light can come from through the widest pupil."""
+    world = sim.build_world("detection")
+    place, none = np.zeros((1, 2)), np.zeros(1, int)
+    objects = np.array([[[2.3, 0.46, 0.5], [2.9, -0.62, 0.5], [6.0, 0.25, 0.5]]])
+    state = WorldState(place, np.zeros(1), place, objects, np.zeros((1, 3)), place, none, none, none)
+    eyes = sim.Eyes(1, (FINE, FINE), FOV_DEG, optics=STAGES[0].pupil(), sensor_width=SENSOR_WIDTH)
+    renderer = sim.ReferenceRenderer(world, eyes, spp=SPP, samples_per_receptor=CELLS // FINE)
+    return np.asarray(renderer.pictures(state)[0, 0])
+
+
+def eye(pupil: optics.Pupil | None, side: int) -> optics.Eye:
+    """An eye with a square retina."""
+    return optics.Eye(pupil, (side, side), FOV_DEG, SENSOR_WIDTH, noise_sigma=NOISE)
+
+
+def view(pupil: optics.Pupil | None, radiance: Floats, seed: int = 0) -> View:
+    """What an eye sees of the scene; None: a perfect lens, with noise as well."""
+    fine, coarse = eye(pupil, FINE), eye(pupil, COARSE)
+    gain = 1 / float(fine.throughput)
+    sharp, blocks = (eye(None, side).see(radiance, CELLS // side) for side in (FINE, COARSE))
+    seen = gain * np.asarray(fine.see(radiance, CELLS // FINE))
+    noisy = gain * np.asarray(coarse.see(radiance, CELLS // COARSE, np.random.default_rng(seed)))
+    strehl = 1.0 if pupil is None else float(optics.strehl_ratio(polychromatic(fine, fine.psf()))[0])
+    return View(seen, noisy, strehl, psnr(seen, sharp), ssim(seen, sharp), psnr(noisy, blocks))
+
+
+def page(views: Sequence[View], perfect: View, origin: Origin) -> Page:
+    """The page."""
+    rows = [
+        [
+            s.name,
+            f"{s.relative_aperture:g}",
+            f"{v.strehl:.2g}",
+            f"{v.psnr_db:.1f}",
+            f"{v.ssim:.2f}",
+            f"{v.noisy_psnr_db:.1f}",
+        ]
+        for s, v in zip(STAGES, views, strict=True)
+    ]
+    header = ["", "a", "Strehl ratio", f"PSNR [dB], {FINE} x {FINE}", "SSIM", f"PSNR [dB], {COARSE} x {COARSE}, noise"]
+    _, cup, closed, blurred, focused = views
+    return Page(
+        name="five_eyes",
+        title="What the eye sees, at five stages on the way to a lens",
+        question="What does an eye see of one scene while its pupil closes and glass in it becomes a lens?",
+        answer=(
+            f"A pinhole shows the scene nearly as a lens does (SSIM {closed.ssim:.2f} beside {focused.ssim:.2f}), and "
+            f"loses it in the noise: {closed.noisy_psnr_db:.0f} dB beside {focused.noisy_psnr_db:.0f} dB on a retina "
+            f"of {COARSE} x {COARSE}. The cup (SSIM {cup.ssim:.2f}) with glass that bends light 0.6 times as strongly "
+            f"as it should stands halfway (SSIM {blurred.ssim:.2f})."
+        ),
+        method=(
+            "A scene of detection, path-traced; goal on the left, an adversary on the right, another behind. Eyes "
+            f"{1e6 * SENSOR_WIDTH:g} µm wide, {FOV_DEG:g}°; glass of n = {INDEX:g} whose heights are one bicubic "
+            f"patch, as genes have it. Signals are divided by a², and compared with the perfect lens's. Noise: σ = "
+            f"{NOISE:g} of what white gives at a = 1, per receptor."
+        ),
+        command="python -m experiments.five_eyes",
+        figures=[
+            Figure(
+                "five_eyes",
+                lambda path: draw(views, perfect, path),
+                f"Above: {FINE} x {FINE} receptors without noise. Below: {COARSE} x {COARSE} with noise.",
+            )
+        ],
+        tables=[markdown_table(header, rows)],
+        origin=origin,
+    )
+
+
+def draw(views: Sequence[View], perfect: View, path: Path) -> None:
+    """A column per stage, the perfect lens last."""
+    names = [
+        *(f"{s.name}\na = {s.relative_aperture:g}, SSIM {v.ssim:.2f}" for s, v in zip(STAGES, views, strict=True)),
+        "perfect lens\n",
+    ]
+    figure, axes = new_figure(12, 4.3, columns=6, rows=2)
+    for column, (name, one) in enumerate(zip(names, [*views, perfect], strict=True)):
+        for place, signals in zip(axes[:, column], (one.fine, one.coarse), strict=True):
+            place.imshow(display(signals), interpolation="nearest")
+            place.set_axis_off()
+        axes[0, column].set_title(name, fontsize=11)
+    save(figure, path)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Render, look, and make the page."""
+    options = parser(__doc__ or "").parse_args(arguments)
+    began = time.process_time()
+    radiance = scene()
+    views = [view(stage.pupil(), radiance) for stage in STAGES]
+    perfect = view(None, radiance)
+    page(views, perfect, Origin.here((time.process_time() - began) / 3600)).publish(options.docs)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

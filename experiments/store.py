@@ -1,0 +1,96 @@
+"""Numbers of experiments, stored beside their pages: rows of plain CSV, and with what they were made."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import platform
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from evolve.files import write_whole
+from evolve.versions import present
+
+__all__ = ["DATA", "Origin", "read_rows", "write_rows"]
+
+DATA = Path("docs/results/data")
+Row = TypeVar("Row")
+
+
+def read_rows(kind: type[Row], path: Path) -> list[Row]:
+    """Rows of a CSV file as instances of a dataclass whose fields are str, int or float; [] if there is no file."""
+    if not path.exists():
+        return []
+    types = get_type_hints(kind)
+    with path.open(encoding="utf-8", newline="") as file:
+        return [kind(**{name: types[name](text) for name, text in line.items()}) for line in csv.DictReader(file)]
+
+
+def write_rows(rows: Iterable[Any], path: Path) -> None:
+    """The file anew, whole or not at all; numbers are written with six digits."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lines = [asdict(row) for row in rows]
+    out = [",".join(lines[0])]
+    for line in lines:
+        out.append(
+            ",".join(f"{value:.6g}" if isinstance(value, float) else _cell(str(value)) for value in line.values())
+        )
+    write_whole(path, ("\n".join(out) + "\n").encode())
+
+
+def _cell(text: str) -> str:
+    return f'"{text}"' if "," in text else text
+
+
+@dataclass(frozen=True)
+class Origin:
+    """How stored numbers were made.
+
+    hours     of one core
+    machine   processor and cores
+    versions  of what decides the numbers
+    """
+
+    hours: float
+    machine: str
+    versions: Mapping[str, str]
+
+    @classmethod
+    def here(cls, hours: float) -> Origin:
+        """Made by this process."""
+        return cls(hours, f"{_processor()}, {os.cpu_count()} cores", present())
+
+    @classmethod
+    def read(cls, path: Path) -> Origin:
+        """As `write` left it."""
+        return cls(**json.loads(path.read_text(encoding="utf-8")))
+
+    def write(self, path: Path) -> None:
+        """JSON, whole or not at all."""
+        write_whole(path, (json.dumps(asdict(self), indent=1) + "\n").encode())
+
+    def sentence(self) -> str:
+        """Hours, machine and versions, for a page's end."""
+        names = {"rhabdom", "commit", "machine", "python"}
+        packages = ", ".join(f"{name} {self.versions[name]}" for name in self.versions if name not in names)
+        units = ((1, "hours"), (1 / 60, "minutes"), (0, "seconds"))
+        least, unit = next((least, unit) for least, unit in units if self.hours >= least)
+        took = f"{self.hours / (least or 1 / 3600):.2g} core {unit}"
+        commit = self.versions["commit"]
+        changed = " with changes" if commit.endswith("+") else ""
+        python = self.versions["python"]
+        return f"{took} on {self.machine}; rhabdom at {commit[:10]}{changed}, Python {python}, {packages}."
+
+
+def _processor() -> str:
+    """The processor's name, as far as the system tells it."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()

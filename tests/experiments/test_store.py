@@ -1,0 +1,39 @@
+"""The store of experiments: what is written reads back, and says with what it was made."""
+
+from dataclasses import dataclass
+
+import pytest
+
+from experiments.store import Origin, read_rows, write_rows
+
+
+@dataclass(frozen=True)
+class Row:
+    name: str
+    count: int
+    value: float
+
+
+def test_rows_read_back(tmp_path):
+    rows = [Row("hole, open", 3, 0.25), Row("lens", -1, 1.5e-7)]
+    write_rows(rows, tmp_path / "new" / "rows.csv")
+    assert read_rows(Row, tmp_path / "new" / "rows.csv") == rows
+    assert read_rows(Row, tmp_path / "absent.csv") == []
+
+
+def test_numbers_are_short(tmp_path):
+    write_rows([Row("a", 1, 1 / 3)], tmp_path / "rows.csv")
+    assert (tmp_path / "rows.csv").read_text() == "name,count,value\na,1,0.333333\n"
+
+
+def test_origin_reads_back_and_names_what_counts(tmp_path):
+    origin = Origin.here(2.5)
+    origin.write(tmp_path / "origin.json")
+    assert Origin.read(tmp_path / "origin.json") == origin
+    assert origin.sentence().startswith("2.5 core hours on ")
+    assert f"numpy {origin.versions['numpy']}" in origin.sentence()
+
+
+@pytest.mark.parametrize(("hours", "shown"), [(10.0, "10 core hours"), (0.5, "30 core m"), (0.005, "18 core seconds")])
+def test_time_is_told_in_a_fitting_unit(hours, shown):
+    assert Origin(hours, "a machine", {"python": "3", "commit": "abc+"}).sentence().startswith(shown)
