@@ -2,7 +2,8 @@
 
 A few walls are all solved; many are found by walking through a grid of cells (Amanatides and Woo 1987), which wants
 their faces to lie on one. Colours are Mitsuba's (`sim.atlas`). Where all lights have one spectrum and all materials
-share a few, light is traced in as many components as there are independent spectra, and not once per band.
+share a few, light is traced in as many components as there are independent spectra, and not once per band. Light that
+is reflected twice has products of the materials' spectra: with it, all bands are traced, unless all materials are grey.
 """
 
 from __future__ import annotations
@@ -15,15 +16,17 @@ import mitsuba as mi
 import numpy as np
 
 from sim import lighting, movers
-from sim.agent import BODY_RADIUS
+from sim.agent import EYE_HEIGHT
 from sim.atlas import Atlas, bake
 from sim.footprints import Footprints, footprints_of
 from sim.stage import Stage
-from sim.walls import Unsuited, walls_of
+from sim.walls import ALIGNED, Unsuited, Walls, walls_of
 from sim.world import World
 
 # Singular values below this share of the largest are float32 rounding.
 RANK_TOLERANCE = 1e-6
+# Deviation of a grey's reflectances from band to band, in Mitsuba's spectra of grey colours.
+GREY = 1e-4
 ROW = 12  # floats per face: column and row of the texel as affine functions of (x, y, z), then where the texture is
 
 
@@ -50,36 +53,65 @@ def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
     return Components(texels, irradiance, np.eye(n_bands) / np.pi)
 
 
+def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
+    """Those in which what a texel sends on is a product: its reflectance times the component that arrives."""
+    grey = texels.mean(axis=1, keepdims=True)
+    if np.abs(texels - grey).max() <= GREY:
+        few = components_of(np.tile(grey, texels.shape[1]), irradiance)
+        if len(few.basis) == 1:
+            scale = few.reflectance[:, 0] @ grey[:, 0] / (grey[:, 0] @ grey[:, 0])
+            return Components(few.reflectance / scale, few.levels, few.basis * scale)
+    return Components(texels, irradiance, np.eye(texels.shape[1]) / np.pi)
+
+
+@dataclass(frozen=True)
+class _Hit:
+    """Where rays end: lit tells whether light is seen that leaves there; reflectance: one array per component."""
+
+    t: Any
+    point: Any
+    normal: Any
+    lit: Any
+    reflectance: list[Any]
+
+
 class ClosedForm:
     """Traces rays through one world.
 
     name, why   of this way of tracing, for reports
+    light       what of it is followed, one of `lighting.LEVELS`
     basis       (component, band): what each component is worth in each band
 
-    Raises Unsuited for worlds that are not made of upright walls.
+    Raises Unsuited for worlds that are not made of upright walls, and, where light that is reflected twice is followed,
+    for walls of several heights or lower than what stands between them.
     """
 
     name = "closed_form"
 
-    def __init__(self, world: World, stage: Stage, wavelengths: np.ndarray) -> None:
+    def __init__(self, world: World, stage: Stage, wavelengths: np.ndarray, light: str = lighting.DIRECT) -> None:
         walls = walls_of(world.model, stage.geoms)
+        self.light = light
+        if light == lighting.BOUNCE:
+            _check_tops(world, walls, stage)
         self._footprints: Footprints = footprints_of(walls)
         self.why = f"{len(walls)} upright walls, {self._footprints.how}"
-        self._spheres, self._walls = stage.spheres, walls
+        self._bodies, self._walls = stage.bodies, walls
         self._lights = lighting.directional_lights(stage.scene, wavelengths)
-        if any(light.direction[2] <= 0 for light in self._lights):
+        if any(source.direction[2] <= 0 for source in self._lights):
             raise Unsuited("a light shines from below")
         geoms, place = np.unique(walls.geoms, return_inverse=True)
-        bsdfs = [*(stage.bsdfs[int(g)] for g in geoms), *stage.spheres.bsdfs]
-        atlas = bake(world.model, [*geoms, *stage.spheres.geoms], bsdfs, wavelengths)
-        irradiance = np.array([light.irradiance for light in self._lights]).reshape(-1, len(wavelengths))
-        self._components = components_of(atlas.texels, irradiance)
+        visible = stage.bodies if light == lighting.BOUNCE else stage.spheres
+        bsdfs = [*(stage.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
+        atlas = bake(world.model, [*geoms, *visible.geoms], bsdfs, wavelengths)
+        irradiance = np.array([source.irradiance for source in self._lights]).reshape(-1, len(wavelengths))
+        fewest = reflected_components_of if light == lighting.BOUNCE else components_of
+        self._components = fewest(atlas.texels, irradiance)
         self.basis = self._components.basis
         self._faces = _face_rows(walls.uv, atlas, place)
         self._n_faces = len(walls.geoms)
         self._one_dimensional = atlas.one_dimensional
         self._sphere_textures = [
-            (atlas.to_texels[len(geoms) + k], atlas.places[len(geoms) + k]) for k in range(len(stage.spheres))
+            (atlas.to_texels[len(geoms) + k], atlas.places[len(geoms) + k]) for k in range(len(visible))
         ]
         self._static = self._inputs()
 
@@ -99,9 +131,20 @@ class ClosedForm:
         return {name: mi.Float(table) for name, table in tables.items()}
 
     def radiance(
-        self, scene: None, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any]
+        self, scene: None, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any], place: Any = None
     ) -> tuple[list[Any], Any]:
         """What comes along each ray, one array per component, and from how far [m]."""
+        bodies = [*centres, agent]
+        hit = self._hit(ray, centres, inputs)
+        light = self._irradiance(hit, bodies, inputs)
+        if self.light == lighting.BOUNCE:
+            there = self._hit(lighting.onwards(hit.point, hit.normal, place), bodies, inputs)
+            second = zip(there.reflectance, self._irradiance(there, bodies, inputs), strict=True)
+            light = [dr.select(hit.lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
+        return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
+
+    def _hit(self, ray: Any, centres: list[Any], inputs: dict[str, Any]) -> _Hit:
+        """Where rays meet walls, floor or bodies first; those without a centre are not there."""
         t, face, normal = self._footprints.hit(ray, inputs)
         on_floor, t_floor = self._floor_hit(ray)
         floor_first = on_floor & (t_floor < t)
@@ -109,21 +152,20 @@ class ClosedForm:
         face = dr.select(floor_first, self._n_faces - 1, face)
         normal = dr.select(floor_first, mi.Normal3f(0, 0, 1), normal)
         seen = dr.isfinite(t)
-        t, which = movers.nearest(self._spheres, centres, ray, t)
+        t, which = movers.nearest(self._bodies, centres, ray, t)
         on_sphere = which < len(centres)
         point = ray(dr.select(seen | on_sphere, t, 0))
         offset, columns, rows, x, y = self._face_texel(face, point, inputs)
         if centres:
-            sphere_normal, uv = movers.normal_and_uv(self._spheres, centres, which, point)
+            sphere_normal, uv = movers.normal_and_uv(self._bodies, centres, which, point)
             normal = dr.select(on_sphere, sphere_normal, normal)
             found = self._sphere_texel(which, uv)
             offset, columns, rows, x, y = (
                 dr.select(on_sphere, mine, other)
                 for mine, other in zip(found, (offset, columns, rows, x, y), strict=True)
             )
-        irradiance = self._irradiance(point, normal, (seen | on_sphere) & (t > 0), ray, [agent, *centres], inputs)
-        reflectance = self._interpolate(offset, columns, rows, x, y, inputs)
-        return [r * e for r, e in zip(reflectance, irradiance, strict=True)], t
+        lit = (seen | on_sphere) & (t > 0) & (dr.dot(normal, ray.d) < 0)
+        return _Hit(t, point, normal, lit, self._interpolate(offset, columns, rows, x, y, inputs))
 
     def _floor_hit(self, ray: Any) -> tuple[Any, Any]:
         """Whether and where a ray from above meets the floor."""
@@ -133,22 +175,17 @@ class ClosedForm:
         inside = (x >= float(lower[0])) & (x <= float(upper[0])) & (y >= float(lower[1])) & (y <= float(upper[1]))
         return inside & (ray.d.z < 0) & (t > 0), t
 
-    def _irradiance(
-        self, point: Any, normal: Any, lit: Any, ray: Any, balls: list[Any], inputs: dict[str, Any]
-    ) -> list[Any]:
+    def _irradiance(self, hit: _Hit, bodies: list[Any], inputs: dict[str, Any]) -> list[Any]:
         """Per component: sum over the lights of level · cos θ, where nothing is in the way."""
         levels = self._components.levels
-        outside = lit & (dr.dot(normal, ray.d) < 0)
-        # As far from the surface as Mitsuba's own shadow rays start.
-        offset = (1 + dr.max(dr.abs(point))) * mi.math.RayEpsilon
-        start = mi.Point3f(dr.fma(normal, offset, point))
-        radii = [BODY_RADIUS, *map(float, self._spheres.radii)]
+        start = lighting.clear_of(hit.point, hit.normal)
+        radii = list(map(float, self._bodies.radii))
         total = [mi.Float(0) for _ in range(levels.shape[1])]
         for light, level in zip(self._lights, levels, strict=True):
             towards = mi.Vector3f(*map(float, light.direction))
             shadow = mi.Ray3f(start, towards)
-            cosine = dr.dot(normal, towards)
-            shines = outside & (cosine > 0) & ~movers.blocks(radii, balls, shadow)
+            cosine = dr.dot(hit.normal, towards)
+            shines = hit.lit & (cosine > 0) & ~movers.blocks(radii, bodies, shadow)
             shines &= ~self._footprints.blocks(start, light.direction, inputs)
             cosine = dr.select(shines, cosine, 0)
             total = [dr.fma(cosine, float(factor), sum_so_far) for factor, sum_so_far in zip(level, total, strict=True)]
@@ -182,6 +219,15 @@ class ClosedForm:
             taps = [(first + r * columns, c, wx * wy) for first, c, wx in taps for r, wy in ((y0, 1 - fy), (y1, fy))]
         index = [(mi.UInt32(first + column), weight) for first, column, weight in taps]
         return [sum(w * dr.gather(mi.Float, inputs[f"texels_{k}"], i) for i, w in index) for k in range(n)]
+
+
+def _check_tops(world: World, walls: Walls, stage: Stage) -> None:
+    """No top of a wall may be seen from where light is reflected: from any point of walls and movers."""
+    objects = [world.model.body(name).pos[2] for name in world.objects]
+    bodies = np.add(np.add([*objects, EYE_HEIGHT], stage.bodies.radii), stage.bodies.offsets[:, 2])
+    lowest, highest = walls.top.min(initial=np.inf), max(walls.top.max(initial=-np.inf), bodies.max())
+    if highest > lowest + ALIGNED:
+        raise Unsuited(f"light that is reflected twice sees the top of a wall {lowest:.2g} m high")
 
 
 def _face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:

@@ -16,11 +16,11 @@ import optics
 from sim.agent import Eyes
 from sim.depth import ONE_PSF, DepthLayers
 from sim.fields import Unseen
+from sim.lighting import BOUNCE, DIRECT, LEVELS
 from sim.pilot import Pilot
 from sim.sensor import Sampling, sampling_of
 from sim.stage import build_stage
-from sim.tracer import tracer_of
-from sim.variant import variant
+from sim.tracer import Tracers
 from sim.world import World
 
 SHARE_OF_NOISE = 0.5
@@ -29,8 +29,9 @@ LEAST_TOLERANCE = 5e-3
 CAUTION = 1.2  # of an error seen in a few glimpses
 PERFECT_LENS_RUNGS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 PUPIL_RUNGS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
-# Of the tolerance; errors add up as squares, so this much leaves 0.87 of it to the rays.
+# Of the tolerance; errors add up as squares, so at least 0.7 of it is left to the rays.
 SHARE_OF_DEPTH = SHARE_OF_BANDS = 0.35
+SHARE_OF_LIGHT = 0.5
 LAYERS = (1, 3, 5, 9)  # nodes of each are among those of the next
 NEAREST = 0.005  # quantile of the distances that counts as the nearest
 
@@ -52,10 +53,11 @@ class Fidelity:
     rays_per_receptor  on average; behind a pupil it may be below 1, since all receptors share all rays
     bands              spectral bands
     depth              distances for which the eye has a PSF
+    light              what of it is followed: "direct", or "bounce", which adds light that is reflected twice
     tolerance          error allowed to a receptor's signal (root mean square); None where nothing was chosen
     levels             what was chosen for each stage, and why
 
-    Raises ValueError for less than one band or rays_per_receptor that are not positive.
+    Raises ValueError for less than one band, rays_per_receptor that are not positive, or unknown light.
     """
 
     rays_per_receptor: float
@@ -63,17 +65,15 @@ class Fidelity:
     depth: DepthLayers = ONE_PSF
     tolerance: float | None = None
     levels: tuple[Level, ...] = ()
+    light: str = DIRECT
 
     def __post_init__(self) -> None:
         if not 0 < self.rays_per_receptor < math.inf:
             raise ValueError(f"rays_per_receptor = {self.rays_per_receptor!r}, must be positive, or 'auto'")
         if self.bands < 1:
             raise ValueError(f"bands = {self.bands!r}, must be at least 1")
-
-    @property
-    def light(self) -> str:
-        """What of the light is followed: the batched renderer knows "direct" light alone."""
-        return "direct"
+        if self.light not in LEVELS:
+            raise ValueError(f"light = {self.light!r}, must be one of {', '.join(map(repr, LEVELS))}")
 
     @property
     def predicted_error(self) -> float | None:
@@ -90,6 +90,7 @@ class Fidelity:
         levels = self.levels or (
             Level("bands", f"{self.bands}", None, "as asked"),
             Level("depth", f"{self.depth}", None, "as asked"),
+            Level("light", self.light, None, "as asked"),
             Level("rays", f"{self.rays_per_receptor:g} per receptor", None, "as asked"),
         )
         rows = [("stage", "level", "error", "why")]
@@ -112,9 +113,8 @@ def choose_fidelity(world: World, eyes: Eyes, tolerance: float | None = None) ->
     bands, level = _bands(eyes.eye(), SHARE_OF_BANDS * allowed)
     chosen_eyes = replace(eyes, bands=bands)
     stage, eye = build_stage(world), chosen_eyes.eye()
-    with variant(stage.variant):
-        tracer = tracer_of(world, stage, eye.spectral_bands.wavelengths, "auto")
-    fidelity, _ = chosen(Pilot(world, stage, tracer, chosen_eyes, eye), chosen_eyes, eye, allowed)
+    tracers = Tracers(world, stage, eye.spectral_bands.wavelengths)
+    fidelity, _ = chosen(Pilot(world, stage, tracers, chosen_eyes, eye), chosen_eyes, eye, allowed)
     return replace(fidelity, levels=(level, *fidelity.levels[1:]))
 
 
@@ -123,12 +123,29 @@ def chosen(pilot: Pilot, eyes: Eyes, eye: optics.Eye, tolerance: float | None = 
     allowed = _allowed(eyes, eye, tolerance)
     depth, depth_level = _depth(pilot, eye, SHARE_OF_DEPTH * allowed)
     sampling = sampling_of(eye, depth)
+    light_level = _light(pilot, sampling, SHARE_OF_LIGHT * allowed)
+    spent = (
+        SHARE_OF_DEPTH**2 + SHARE_OF_BANDS**2 + min((light_level.predicted_error or 0) / allowed, SHARE_OF_LIGHT) ** 2
+    )
     rungs = PERFECT_LENS_RUNGS if eye.pupil is None else PUPIL_RUNGS
-    left = allowed * math.sqrt(1 - SHARE_OF_DEPTH**2 - SHARE_OF_BANDS**2)
-    rays, rays_level = _fewest(pilot.errors(sampling), rungs, left)
+    errors = pilot.errors(sampling, light_level.level)
+    rays, rays_level = _fewest(errors, rungs, allowed * math.sqrt(1 - spent))
     bands_level = Level("bands", f"{eyes.bands}", None, "the eyes' own")
-    light_level = Level("light", "direct", None, "all that this renderer knows; what is reflected twice is left out")
-    return Fidelity(rays, eyes.bands, depth, allowed, (bands_level, depth_level, light_level, rays_level)), sampling
+    levels = bands_level, depth_level, light_level, rays_level
+    return Fidelity(rays, eyes.bands, depth, allowed, levels, light_level.level), sampling
+
+
+def _light(pilot: Pilot, sampling: Sampling, allowed: float) -> Level:
+    """Direct light where what is reflected twice is little; else both, and of all that is reflected more often only
+    its size is known: as small beside what is reflected twice as that is beside direct light."""
+    try:
+        twice, direct = pilot.reflected_twice(sampling)
+    except ValueError as error:
+        return Level("light", DIRECT, None, f"of what is reflected twice nothing is known: {error}")
+    if twice <= allowed:
+        return Level("light", DIRECT, twice, f"light that is reflected twice is no more than {allowed:.1e}")
+    rest = twice**2 / max(direct - twice, twice)
+    return Level("light", BOUNCE, rest, f"light that is reflected twice is worth {twice:.1e}, more than {allowed:.1e}")
 
 
 def _allowed(eyes: Eyes, eye: optics.Eye, tolerance: float | None) -> float:

@@ -121,14 +121,24 @@ def fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> Fields:
 def low_discrepancy(n: int) -> np.ndarray:
     """n points in the unit square, (n, 2): the Hammersley set (van der Corput in base 2 against i/n), moved to the
     strata's centres."""
-    index = np.arange(n)
-    inverse, scale, rest = np.zeros(n), 0.5, index.copy()
-    while rest.any():
-        inverse += scale * (rest & 1)
-        rest >>= 1
-        scale /= 2
     first_dyadic = 2.0 ** -np.ceil(np.log2(max(n, 2)))
-    return np.stack([(index + 0.5) / n, inverse + first_dyadic / 2], axis=-1)
+    return np.stack([(np.arange(n) + 0.5) / n, van_der_corput(n, 2) + first_dyadic / 2], axis=-1)
+
+
+def places(n: int) -> np.ndarray:
+    """n more points in the unit square, (n, 2), that together with `low_discrepancy` fill the hypercube evenly: the
+    next bases of Halton's sequence, from 1 on."""
+    return np.stack([van_der_corput(n + 1, 3), van_der_corput(n + 1, 5)], axis=-1)[1:]
+
+
+def van_der_corput(n: int, base: int) -> np.ndarray:
+    """0 ... n - 1 with their digits mirrored at the point, (n,)."""
+    inverse, scale, rest = np.zeros(n), 1 / base, np.arange(n)
+    while rest.any():
+        inverse += scale * (rest % base)
+        rest //= base
+        scale /= base
+    return inverse
 
 
 def _as_wide(kernels: list[np.ndarray]) -> np.ndarray:

@@ -87,7 +87,7 @@ class Cells:
             if (cells[first[1] : last[1], first[0] : last[0]] >= 0).any():
                 raise Unsuited("walls overlap")
             cells[first[1] : last[1], first[0] : last[0]] = i
-        self._climb = float(walls.top.max() - walls.floor)
+        self._climb, self._ceiling = float(walls.top.max() - walls.floor), float(walls.top.max())
         self.how = f"found in a grid of {shape[1]} x {shape[0]} cells"
         padded = np.pad(cells, 1, constant_values=-1)
         self._corner = origin - self._side
@@ -117,7 +117,8 @@ class Cells:
         z, dz, stop = ray.o.z, ray.d.z, inputs["stop"]
 
         def going(t: Any, cell: Any, next_x: Any, next_y: Any, through_x: Any) -> Any:
-            return dr.fma(dz, t, z) >= dr.gather(mi.Float, stop, cell)
+            height = dr.fma(dz, t, z)
+            return (height >= dr.gather(mi.Float, stop, cell)) & ((height <= self._ceiling) | (dz <= 0))
 
         def walk(t: Any, cell: Any, next_x: Any, next_y: Any, through_x: Any) -> tuple[Any, ...]:
             through_x = next_x < next_y
@@ -129,7 +130,7 @@ class Cells:
 
         state = (mi.Float(0), cell, next_x, next_y, mi.Bool(False))
         t, cell, _, _, through_x = dr.while_loop(state, going, walk, label="cells")
-        hit = dr.isfinite(dr.gather(mi.Float, inputs["top"], cell))
+        hit = dr.fma(dz, t, z) < dr.gather(mi.Float, inputs["top"], cell)
         face = SIDES * mi.UInt32(dr.gather(mi.Float, inputs["wall"], cell))
         return _finished(dr.select(hit, t, math.inf), face, through_x, dx, dy)
 

@@ -1,5 +1,10 @@
-"""Direct light from the scene's directional emitters, by hand: what Mitsuba's `direct` integrator converges to,
-without its noise, since each emitter has exactly one direction."""
+"""Light from the scene's directional emitters, by hand.
+
+Direct light is what Mitsuba's `direct` integrator converges to, without its noise, since each emitter has exactly one
+direction. Light that was reflected once more before is found at the end of one more ray, which leaves the surface in a
+fixed direction drawn from Lambert's cosine: each camera ray has a place of its own on the unit square for it
+(`sim.sensor`), so that the rays of a receptor together see the hemisphere.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 LANES = 4  # wavelengths in one mi.Spectrum
+DIRECT, BOUNCE = LEVELS = ("direct", "bounce")  # what of the light is followed: "bounce" adds what is reflected twice
 
 
 @dataclass(frozen=True)
@@ -83,9 +89,27 @@ def direct_light(
         chunks = np.pad(light.irradiance, (0, -len(light.irradiance) % LANES)).reshape(-1, LANES)
         for i, chunk in enumerate(chunks):
             irradiance[i] += cosine * mi.Spectrum(*map(float, chunk))
-    return [e * _reflectance(si, bsdf, b) * dr.inv_pi for e, b in zip(irradiance, bands, strict=True)]
+    return [e * reflectance(si, bsdf, b) * dr.inv_pi for e, b in zip(irradiance, bands, strict=True)]
 
 
-def _reflectance(si: Any, bsdf: Any, wavelengths: Any) -> Any:
+def onwards(point: Any, normal: Any, place: Any) -> Any:
+    """The ray that leaves a surface at a place (2,) of the unit square, which Lambert's cosine is laid out on: with the
+    radiance L that it brings, ρ L is what the surface sends on, averaged over places."""
+    local = mi.warp.square_to_cosine_hemisphere(place)
+    # Not mi.Frame3f(normal): on walls, whose normals are level to rounding, its axes are the rounding's.
+    beside = dr.select(dr.abs(normal.z) < 0.9, mi.Vector3f(0, 0, 1), mi.Vector3f(1, 0, 0))
+    s = dr.normalize(dr.cross(beside, mi.Vector3f(normal)))
+    direction = mi.Frame3f(s, dr.cross(mi.Vector3f(normal), s), normal).to_world(local)
+    return mi.Ray3f(clear_of(point, normal), direction)
+
+
+def clear_of(point: Any, normal: Any) -> Any:
+    """A point as far from the surface as Mitsuba's own shadow rays start."""
+    offset = (1 + dr.max(dr.abs(point))) * mi.math.RayEpsilon
+    return mi.Point3f(dr.fma(normal, offset, point))
+
+
+def reflectance(si: Any, bsdf: Any, wavelengths: Any) -> Any:
+    """Of a Lambertian surface."""
     si.wavelengths = wavelengths
     return bsdf.eval_diffuse_reflectance(si, si.is_valid())

@@ -37,7 +37,8 @@ class Spheres:
 
 
 def nearest(spheres: Spheres, centres: list[Any], ray: Any, t: Any) -> tuple[Any, Any]:
-    """Distance [m] to the nearest of `t` and the spheres along the ray, and which sphere that is (k: none)."""
+    """Distance [m] to the nearest of `t` and the spheres along the ray, and which sphere that is; none: len(spheres).
+    With fewer centres than spheres, the last ones are not there."""
     which = mi.UInt32(len(spheres))
     for k, centre in enumerate(centres):
         b, c = _quadratic(ray, centre, float(spheres.radii[k]))
@@ -63,11 +64,10 @@ def blocks(radii: list[float], centres: list[Any], ray: Any) -> Any:
 def normal_and_uv(spheres: Spheres, centres: list[Any], which: Any, point: Any) -> tuple[Any, Any]:
     """Outward normal in the world's frame and texture coordinates at a point on sphere `which`."""
     centre, local = mi.Point3f(0), mi.Vector3f(0)
-    for k in range(len(spheres)):
-        mine = which == k
-        centre = dr.select(mine, centres[k], centre)
+    for k, other in enumerate(centres):
+        centre = dr.select(which == k, other, centre)
     normal = dr.normalize(point - centre)
-    for k in range(len(spheres)):
+    for k in range(len(centres)):
         to_local = mi.Matrix3f(spheres.frames[k].T.tolist())
         local = dr.select(which == k, to_local @ normal, local)
     u = dr.atan2(local.y, local.x) * dr.inv_two_pi

@@ -15,13 +15,14 @@ import mitsuba as mi
 import numpy as np
 
 from optics import Eye
+from sim import lighting
 from sim.agent import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.depth import DepthLayers
 from sim.placement import CLEARANCE
 from sim.recording import aligned
 from sim.sensor import BoxSampling, Sampling, Trial, sampling_of
 from sim.stage import Stage
-from sim.tracer import Tracer
+from sim.tracer import Tracers
 from sim.variant import variant
 from sim.world import World
 
@@ -79,14 +80,14 @@ def _clear_of(objects: np.ndarray, cells: np.ndarray, rng: np.random.Generator) 
 
 
 class Pilot:
-    """Tries ways of sampling on one world, as these eyes see it; tracer: of the world at the eye's bands."""
+    """Tries ways of sampling on one world, as these eyes see it; tracers: of the world at the eye's bands."""
 
-    def __init__(self, world: World, stage: Stage, tracer: Tracer, eyes: Eyes, eye: Eye) -> None:
-        self._stage, self._tracer, self._eyes, self._eye = stage, tracer, eyes, eye
+    def __init__(self, world: World, stage: Stage, tracers: Tracers, eyes: Eyes, eye: Eye) -> None:
+        self._stage, self._tracers, self._eyes, self._eye = stage, tracers, eyes, eye
         self._views = glimpses(world, eyes, GLIMPSES[1])
         self._receptors = np.sort(np.random.default_rng(0).permutation(int(np.prod(eyes.resolution)))[:RECEPTORS])
 
-    def errors(self, sampling: Sampling) -> Callable[[float], float]:
+    def errors(self, sampling: Sampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
         """Root mean square error of the signals with so many rays per receptor; raises Unseen where a receptor has
         none."""
         truths: dict[int, np.ndarray] = {}
@@ -100,52 +101,60 @@ class Pilot:
             finer = max(2 * rays_per_receptor, min(max(FINER * rays_per_receptor, least), most))
             level = int(np.ceil(np.log(finer) / np.log(4) - 1e-9))
             if level not in truths:
-                truths[level] = self._signals(sampling.trial(4.0**level, self._receptors), sampling.depth)
+                truths[level] = self._signals(sampling.trial(4.0**level, self._receptors), sampling.depth, light)
             truth = truths[level]
-            found = self._signals(sampling.trial(rays_per_receptor, self._receptors), sampling.depth, len(truth))
-            return float(np.sqrt(np.mean((found - truth) ** 2)))
+            found = self._signals(sampling.trial(rays_per_receptor, self._receptors), sampling.depth, light, len(truth))
+            return _rms(found - truth)
 
         return error
+
+    def reflected_twice(self, sampling: Sampling) -> tuple[float, float]:
+        """Root mean square of what light that is reflected twice adds to the signals, and of direct light's signals.
+        Raises ValueError where it cannot be followed."""
+        trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
+        direct, both = (self._signals(trial, sampling.depth, light) for light in lighting.LEVELS)
+        return _rms(both - direct), _rms(direct)
 
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
         """Root mean square difference to the signals with the finest layers, all with the same rays; the nodes of
         each count must be among those of the finest. Raises optics.AccuracyError, see `optics.Eye.kernel`."""
         sampling = sampling_of(self._eye, finest)
         trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
-        truth = self._signals(trial, finest)
+        truth = self._signals(trial, finest, lighting.DIRECT)
         nodes = trial.weights.reshape(finest.count, -1, *trial.weights.shape[1:])
         found = {}
         for n in counts:
             chosen = np.linspace(0, finest.count - 1, n).astype(int) if n > 1 else [finest.count // 2]
             weights = nodes[chosen].reshape(-1, *trial.weights.shape[1:])
-            signals = self._signals(Trial(trial.directions, weights), replace(finest, count=n))
-            found[n] = float(np.sqrt(np.mean((signals - truth) ** 2)))
+            fewer = replace(finest, count=n)
+            signals = self._signals(replace(trial, weights=weights), fewer, lighting.DIRECT)
+            found[n] = _rms(signals - truth)
         return found
 
     def distances(self) -> np.ndarray:
         """Of what the eyes see, along their axes [m], sorted; infinite where they see nothing."""
-        directions = BoxSampling(self._eye).trial(4, self._receptors).directions
-        _, z = self._trace(self._views, directions)
+        _, z = self._trace(self._views, BoxSampling(self._eye).trial(4, self._receptors), lighting.DIRECT)
         return np.sort(np.array(z))
 
-    def _signals(self, trial: Trial, depth: DepthLayers, n: int | None = None) -> np.ndarray:
+    def _signals(self, trial: Trial, depth: DepthLayers, light: str, n: int | None = None) -> np.ndarray:
         """(view, channel, receptor), of as many views as the rays allow."""
         rays = len(trial.directions)
         views = self._views.take(n or int(np.clip(RAYS // rays, *GLIMPSES)))
-        components, z = self._trace(views, trial.directions)
+        components, z = self._trace(views, trial, light)
         with variant(self._stage.variant):
-            light = [np.array(share * c) for share in depth.shares(dr.rcp(z)) for c in components]
-        layers = np.reshape(light, (depth.count, len(components), len(views), rays))
+            shared = [np.array(share * c) for share in depth.shares(dr.rcp(z)) for c in components]
+        layers = np.reshape(shared, (depth.count, len(components), len(views), rays))
         # signals_c = sum_b mixing[c, b] sum_l sum_k basis[k, b] sum_p W_lb[r, p] light_lk[p]
-        factors = self._eye.throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, self._tracer.basis)
+        basis = self._tracers.of(light).basis
+        factors = self._eye.throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
         planes = trial.weights.reshape(depth.count, -1, *trial.weights.shape[1:])
         weights = np.einsum("ckb,lbrp->clkrp", factors, planes, optimize=True).astype(np.float32)
         return np.einsum("clkrp,lkvp->vcr", weights, layers, optimize=True)
 
-    def _trace(self, views: Glimpses, directions: np.ndarray) -> tuple[list[Any], Any]:
-        """Components of light along directions (ray, 3) of each view's eye, and from how far along its axis [m]:
-        Dr.Jit, flat (view, ray)."""
-        azimuths = self._eyes.azimuths()
+    def _trace(self, views: Glimpses, trial: Trial, light: str) -> tuple[list[Any], Any]:
+        """Components of light along a trial's rays of each view's eye, and from how far along its axis [m]: Dr.Jit,
+        flat (view, ray)."""
+        directions, azimuths = trial.directions, self._eyes.azimuths()
         in_agent = np.einsum("eij,rj->eir", eye_rotations(azimuths), directions)[views.eye]
         origins = eye_positions(azimuths)[views.eye]
         cos, sin = np.cos(views.heading), np.sin(views.heading)
@@ -154,7 +163,7 @@ class Pilot:
         world = np.einsum("ijv,vjr->ivr", turn, in_agent)
         agent = np.column_stack([views.position, np.full(len(views), EYE_HEIGHT)])
         start = agent + np.einsum("ijv,vj->vi", turn, origins)
-        rays, tracer = len(directions), self._tracer
+        rays, tracer = len(directions), self._tracers.of(light)
 
         def lanes(points: np.ndarray) -> Any:
             """The same for all rays of a view."""
@@ -163,10 +172,17 @@ class Pilot:
         with variant(self._stage.variant):
             ray = mi.Ray3f(lanes(start), mi.Vector3f([_lanes(d) for d in world]))
             centres = [lanes(views.objects[:, k]) for k in range(views.objects.shape[1])]
-            components, t = tracer.radiance(tracer.scene, ray, lanes(agent), centres, tracer.inputs)
+            place = None
+            if light == lighting.BOUNCE:
+                place = mi.Point2f([_lanes(np.tile(column, len(views))) for column in trial.places.T])
+            components, t = tracer.radiance(tracer.scene, ray, lanes(agent), centres, tracer.inputs, place)
             z = t * _lanes(np.tile(directions[:, 2], len(views)))
             dr.eval(components, z)
             return components, z
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _lanes(values: np.ndarray) -> Any:

@@ -23,7 +23,7 @@ from sim.recording import aligned, garbage_kept
 from sim.sensor import sampling_of
 from sim.stage import Stage, build_stage
 from sim.state import WorldState
-from sim.tracer import Tracer, tracer_of
+from sim.tracer import Tracer, Tracers
 from sim.variant import variant
 from sim.world import World
 
@@ -60,13 +60,14 @@ class BatchedRenderer:
         self.eye = self.eyes.eye()
         self.bands: optics.SpectralBands = self.eye.spectral_bands
         self._stage = build_stage(world)
+        tracers = Tracers(world, self._stage, self.bands.wavelengths, tracer)
         with variant(self._stage.variant):
-            self.tracer: Tracer = tracer_of(world, self._stage, self.bands.wavelengths, tracer)
             white = lighting.white_radiance(self._stage.scene, self.bands.wavelengths)
         if asked is None:
-            self.fidelity, sampling = chosen(Pilot(world, self._stage, self.tracer, eyes, self.eye), eyes, self.eye)
+            self.fidelity, sampling = chosen(Pilot(world, self._stage, tracers, eyes, self.eye), eyes, self.eye)
         else:
             self.fidelity, sampling = asked, sampling_of(self.eye, asked.depth)
+        self.tracer: Tracer = tracers.of(self.fidelity.light)
         self.sensor = sampling.sensor(self.fidelity.rays_per_receptor)
         mixing = self.eye.throughput * self.bands.weights
         self.brightest = float((mixing @ white).max())
@@ -89,6 +90,7 @@ class BatchedRenderer:
             self._inputs = {
                 "directions": mi.Float(_in_agent_frame(self.eyes, self.sensor.directions)),
                 "origins": mi.Float(_in_fours(eye_positions(self.eyes.azimuths()), 0.0)),
+                "places": mi.Float(self.sensor.places.ravel()),
                 **self.tracer.inputs,
             }
             wavefront = _Wavefront(self)
@@ -184,10 +186,11 @@ class _Wavefront:
         lane = inputs["lanes"]
         view = lane // self.n_rays
         world = view // self.n_eyes
-        ray, cosine, agent, centres = self._ray(
-            poses, inputs, world, view - world * self.n_eyes, lane - view * self.n_rays
-        )
-        components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs)
+        sample = lane - view * self.n_rays
+        ray, cosine, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, sample)
+        bounces = self.tracer.light == lighting.BOUNCE
+        place = dr.gather(mi.Point2f, inputs["places"], sample) if bounces else None
+        components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs, place)
         if self.depth.count > 1:
             shares = self.depth.shares(dr.rcp(distance * cosine))
             components = [component * share for share in shares for component in components]

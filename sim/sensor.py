@@ -15,7 +15,7 @@ import scipy.sparse
 
 import optics
 from sim.depth import ONE_PSF, DepthLayers
-from sim.fields import Fields, Unseen, fields_of, low_discrepancy
+from sim.fields import Draw, Fields, Unseen, fields_of, low_discrepancy, places
 from sim.readout import Readout, RowProduct, of_bands, of_components, of_receptors, within_stretches
 
 # Weights that together change no signal by more than this share of the receptors' noise are left out.
@@ -28,11 +28,13 @@ class BoxSensor:
 
     directions         unit vectors in the eye's frame (x right, y up, z optical axis), (ray, 3) float32;
                        ray = receptor * rays_per_receptor + sample
+    places             of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
     rays_per_receptor  samples of one receptor; the renderer sums them in its kernel
     depth              nothing is blurred, whatever its distance
     """
 
     directions: np.ndarray
+    places: np.ndarray
     rays_per_receptor: int
     depth: DepthLayers = ONE_PSF
 
@@ -61,12 +63,14 @@ class ReceptiveFieldSensor:
     NEGLIGIBLE of the receptors' noise.
 
     directions  unit vectors in the eye's frame, (ray, 3) float32
+    places      of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
     weights     per plane, a band of a depth layer, sparse (receptor, ray)
     resolution  receptors (height, width)
     depth       the layers
     """
 
     directions: np.ndarray
+    places: np.ndarray
     weights: tuple[scipy.sparse.csr_array, ...]
     resolution: tuple[int, int]
     depth: DepthLayers = ONE_PSF
@@ -108,9 +112,11 @@ Sensor = BoxSensor | ReceptiveFieldSensor
 
 @dataclass(frozen=True)
 class Trial:
-    """Some receptors of a sensor that need not be built: directions (ray, 3), weights (layer * band, receptor, ray)."""
+    """Some receptors of a sensor that need not be built: directions (ray, 3) and places (ray, 2) of rays, weights
+    (layer * band, receptor, ray)."""
 
     directions: np.ndarray
+    places: np.ndarray
     weights: np.ndarray
 
 
@@ -125,20 +131,22 @@ class BoxSampling:
     def sensor(self, rays_per_receptor: float) -> BoxSensor:
         """The sensor with so many rays per receptor."""
         rays = max(1, round(rays_per_receptor))
-        return BoxSensor(self._directions(rays, np.arange(np.prod(self.eye.resolution))), rays)
+        return BoxSensor(*self._rays(rays, np.arange(np.prod(self.eye.resolution))), rays)
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
         """What that sensor has for these receptors (numbered row by row)."""
         rays = max(1, round(rays_per_receptor))
         weights = np.kron(np.eye(len(receptors)), np.full((1, rays), 1 / rays))
-        return Trial(self._directions(rays, receptors), np.broadcast_to(weights, (self.eye.bands, *weights.shape)))
+        return Trial(*self._rays(rays, receptors), np.broadcast_to(weights, (self.eye.bands, *weights.shape)))
 
-    def _directions(self, rays: int, receptors: np.ndarray) -> np.ndarray:
+    def _rays(self, rays: int, receptors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Directions and places."""
         height, width = self.eye.resolution
-        shifts = np.random.default_rng(0).random((height * width, 1, 2))[receptors]
+        shifts, turns = (np.random.default_rng(seed).random((height * width, 1, 2))[receptors] for seed in (0, 1))
         row, column = np.divmod(receptors, width)
         corners = np.stack([column - width / 2, row - height / 2], axis=-1)[:, None]
-        return directions_of(self.eye, ((low_discrepancy(rays) + shifts) % 1.0 + corners).reshape(-1, 2))
+        directions = directions_of(self.eye, ((low_discrepancy(rays) + shifts) % 1.0 + corners).reshape(-1, 2))
+        return directions, ((places(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -162,7 +170,8 @@ class FieldSampling:
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
         """What that sensor has for these receptors. Raises Unseen where one has no ray."""
         draw = self.fields.draw(self._rays(rays_per_receptor))
-        return Trial(directions_of(self.eye, draw.points), self.fields.weights(draw, receptors))
+        weights = self.fields.weights(draw, receptors)
+        return Trial(directions_of(self.eye, draw.points), _places(draw), weights)
 
     def _rays(self, rays_per_receptor: float) -> int:
         return max(1, round(rays_per_receptor * np.prod(self.eye.resolution)))
@@ -175,7 +184,12 @@ class FieldSampling:
             rows.append([scipy.sparse.csr_array(plane) for plane in dense])
         weights = tuple(scipy.sparse.vstack(plane, format="csr") for plane in zip(*rows, strict=True))
         weights = within_stretches(weights, self.eye.resolution, negligible_share(self.eye))
-        return ReceptiveFieldSensor(directions_of(self.eye, draw.points), weights, self.eye.resolution, self.depth)
+        directions = directions_of(self.eye, draw.points)
+        return ReceptiveFieldSensor(directions, _places(draw), weights, self.eye.resolution, self.depth)
+
+
+def _places(draw: Draw) -> np.ndarray:
+    return places(len(draw)).astype(np.float32)
 
 
 # Makes sensors of one eye, with any number of rays.

@@ -29,6 +29,7 @@ class Stage:
     """scene    mi.Scene of the world's own geoms
     geoms    their ids · bsdfs: of each, by id
     spheres  the objects', in the order of World.objects
+    bodies   the same, and the agent's body: what light that was reflected may come from
     variant  of Mitsuba
     """
 
@@ -36,6 +37,7 @@ class Stage:
     geoms: tuple[int, ...]
     bsdfs: Mapping[int, Any]
     spheres: Spheres
+    bodies: Spheres
     variant: str
 
 
@@ -49,18 +51,23 @@ def build_stage(world: World) -> Stage:
     others = set(model.geom_bodyid.tolist()) - known
     if others:
         raise ValueError(f"body {model.body(others.pop()).name!r} moves, but is neither the agent nor an object")
+    spheres, bodies = (_spheres(static, g) for g in (geoms, [*geoms, _sphere_of(model, "agent")]))
+    standing = tuple(map(int, static.geoms))
+    with in_variant(static.variant):
+        scene = _static_scene(static)
+        return Stage(scene, standing, {g: static.bsdf(g) for g in standing}, spheres, bodies, static.variant)
+
+
+def _spheres(static: Mirror, geoms: list[int]) -> Spheres:
+    model = static.model
     poses = [_frame_and_offset(model, geom) for geom in geoms]
-    spheres = Spheres(
+    return Spheres(
         radii=model.geom_size[geoms, 0],
         frames=np.array([frame for frame, _ in poses]).reshape(-1, 3, 3),
         offsets=np.array([offset for _, offset in poses]).reshape(-1, 3),
         bsdfs=tuple(static.bsdf(geom) for geom in geoms),
         geoms=tuple(geoms),
     )
-    standing = tuple(map(int, static.geoms))
-    with in_variant(static.variant):
-        scene = _static_scene(static)
-        return Stage(scene, standing, {g: static.bsdf(g) for g in standing}, spheres, static.variant)
 
 
 def _static_scene(static: Mirror) -> Any:
@@ -103,7 +110,7 @@ def _refuse_glow(model: mujoco.MjModel, geom: int) -> None:
 def _sphere_of(model: mujoco.MjModel, body: str) -> int:
     geoms = np.flatnonzero(model.geom_bodyid == model.body(body).id)
     if len(geoms) != 1 or model.geom_type[geoms[0]] != mujoco.mjtGeom.mjGEOM_SPHERE:
-        raise ValueError(f"object {body!r} must be a single sphere geom")
+        raise ValueError(f"body {body!r} must be a single sphere geom")
     return int(geoms[0])
 
 

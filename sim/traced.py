@@ -9,7 +9,6 @@ import mitsuba as mi
 import numpy as np
 
 from sim import lighting, movers
-from sim.agent import BODY_RADIUS
 from sim.stage import Stage
 
 
@@ -24,42 +23,50 @@ class Traced:
 
     name = "mitsuba"
 
-    def __init__(self, stage: Stage, wavelengths: np.ndarray, why: str) -> None:
-        self.why = why
+    def __init__(self, stage: Stage, wavelengths: np.ndarray, why: str, light: str = lighting.DIRECT) -> None:
+        self.why, self.light = why, light
         self.basis = np.eye(len(wavelengths))
         self.scene = stage.scene
-        self._spheres = stage.spheres
+        self._bodies = stage.bodies
         self._lights = lighting.directional_lights(stage.scene, wavelengths)
         self._bands = lighting.spectra(wavelengths)
         # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.
-        self.inputs = {"bsdfs": mi.BSDFPtr([*stage.spheres.bsdfs, stage.scene.shapes()[0].bsdf()])}
+        self.inputs = {"bsdfs": mi.BSDFPtr([*stage.bodies.bsdfs, stage.scene.shapes()[0].bsdf()])}
 
     def radiance(
-        self, scene: Any, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any]
+        self, scene: Any, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any], place: Any = None
     ) -> tuple[list[Any], Any]:
         """What comes along each ray, one array per component, and from how far [m]."""
-        ray.wavelengths = self._bands[0]
-        si, bsdf = self._first_hit(scene, ray, centres, inputs)
-        radii = [BODY_RADIUS, *map(float, self._spheres.radii)]
+        bodies = [*centres, agent]
 
         def occluded(shadow: Any, active: Any) -> Any:
-            blocked = movers.blocks(radii, [agent, *centres], shadow)
+            blocked = movers.blocks(list(map(float, self._bodies.radii)), bodies, shadow)
             return blocked | scene.ray_test(shadow, active & ~blocked)
 
+        si, bsdf = self._first_hit(scene, ray, centres, inputs)
         spectra = lighting.direct_light(si, bsdf, self._lights, self._bands, occluded)
+        if self.light == lighting.BOUNCE:
+            seen_from = dr.copysign(mi.Float(1), dr.dot(si.n, si.to_world(si.wi)))
+            second = lighting.onwards(si.p, si.sh_frame.n * seen_from, place)
+            there = self._first_hit(scene, second, bodies, inputs)
+            bounced = lighting.direct_light(*there, self._lights, self._bands, occluded)
+            sent_on = [lighting.reflectance(si, bsdf, b) for b in self._bands]
+            valid = si.is_valid()
+            spectra = [dr.select(valid, dr.fma(r, b, s), s) for s, r, b in zip(spectra, sent_on, bounced, strict=True)]
         return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], si.t
 
     def _first_hit(self, scene: Any, ray: Any, centres: list[Any], inputs: dict[str, Any]) -> tuple[Any, Any]:
         """Where the ray meets the static scene or a sphere first, and the BSDF there."""
+        ray.wavelengths = self._bands[0]
         preliminary = scene.ray_intersect_preliminary(ray)
         si = preliminary.compute_surface_interaction(ray, mi.RayFlags.All)
         bsdf = si.bsdf()
         if not centres:
             return si, bsdf
-        t, which = movers.nearest(self._spheres, centres, ray, si.t)
+        t, which = movers.nearest(self._bodies, centres, ray, si.t)
         on_sphere = which < len(centres)
         point = ray(t)
-        normal, uv = movers.normal_and_uv(self._spheres, centres, which, point)
+        normal, uv = movers.normal_and_uv(self._bodies, centres, which, point)
         si.t = t
         si.p = dr.select(on_sphere, point, si.p)
         si.n = dr.select(on_sphere, normal, si.n)

@@ -99,7 +99,7 @@ def around(world, n, seed):
 @pytest.mark.parametrize(("n_boxes", "grid", "seed"), [(6, False, 0), (7, False, 1), (12, True, 2), (14, True, 3)])
 def test_coloured_walls_of_any_height_under_coloured_lights(n_boxes, grid, seed):
     world = furnished(n_boxes, grid=grid, seed=seed)
-    renderer = sim.BatchedRenderer(world, EYES, 1)
+    renderer = sim.BatchedRenderer(world, EYES, 1, 1)
     assert renderer.tracer.name == "closed_form"
     assert ("grid" in renderer.tracer.why) == grid
     ours, theirs = radiances(world, around(world, 32, seed))
@@ -121,7 +121,7 @@ def test_coloured_walls_of_any_height_under_coloured_lights(n_boxes, grid, seed)
 )
 def test_other_worlds_are_left_to_mitsuba(extra, reason):
     world = furnished(3, grid=False, extra=extra)
-    tracer = sim.BatchedRenderer(world, EYES, 1).tracer
+    tracer = sim.BatchedRenderer(world, EYES, 1, 1).tracer
     assert tracer.name == "mitsuba"
     assert reason in tracer.why
     with pytest.raises(ValueError, match="closed_form.*" + reason):

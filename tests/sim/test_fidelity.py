@@ -21,6 +21,7 @@ def behind_lens(eyes, a):
     return replace(eyes, optics=optics.Pupil(a * eyes.sensor_width / 2, thin_lens_focal_length=focal_length))
 
 
+FINER = 8
 CASES = {
     "detection, a = 1/4": ("detection", behind_lens(DETECTION, 0.25)),
     "detection, a = 0.6": ("detection", behind_lens(DETECTION, 0.6)),
@@ -29,7 +30,7 @@ CASES = {
 }
 
 
-def lived_through(world, n=32):
+def lived_through(world, n=16):
     """States that agents get into, which the pilot knows nothing of."""
     simulation = Simulation(world, n, 3, "training", 1)
     simulation.reset()
@@ -40,8 +41,12 @@ def lived_through(world, n=32):
     return simulation.state
 
 
-def actual_error(world, eyes, state, rays):
-    truth, found = (sim.BatchedRenderer(world, eyes, state.n, n).signals(state) for n in (rays * 16, rays))
+def actual_error(world, eyes, state, fidelity, rays):
+    """Of so many rays, beside many more of them in the same light."""
+    truth, found = (
+        sim.BatchedRenderer(world, eyes, state.n, replace(fidelity, rays_per_receptor=n)).signals(state)
+        for n in (rays * FINER, rays)
+    )
     return np.sqrt(np.mean((found - truth) ** 2))
 
 
@@ -51,13 +56,13 @@ def test_the_pick_is_enough_and_not_far_more_than_enough(name):
     world = sim.build_world(task, seed=11)
     fidelity = sim.choose_fidelity(world, eyes)
     state = lived_through(world)
-    error = actual_error(world, replace(eyes, bands=fidelity.bands), state, fidelity.rays_per_receptor)
+    error = actual_error(world, eyes, state, fidelity, fidelity.rays_per_receptor)
     assert error < eyes.noise_sigma / 2
     # A third as many rays would not do, or there is no lower rung: errors fall like n^-0.6 ... n^-1.
     rungs = PERFECT_LENS_RUNGS if eyes.optics is None else PUPIL_RUNGS
     fewer = max((n for n in rungs if n <= fidelity.rays_per_receptor / 3), default=None)
     if fewer is not None:
-        assert actual_error(world, eyes, state, fewer) > 0.35 * eyes.noise_sigma
+        assert actual_error(world, eyes, state, fidelity, fewer) > 0.35 * eyes.noise_sigma
 
 
 def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
@@ -67,6 +72,23 @@ def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
     assert rays[0] < 1 < rays[-1]
     calm = sim.choose_fidelity(world, behind_lens(replace(FEW, noise_sigma=0.0), 0.1))
     assert rays[0] < calm.rays_per_receptor < PUPIL_RUNGS[-1]
+
+
+def test_light_is_followed_as_far_as_it_matters():
+    """Walls light each other in a maze: behind a narrow pupil that is lost in the noise, behind a wide one not. What
+    the pilot expects of it is what agents see, to a factor of 1.5."""
+    world = sim.build_world("navigation", seed=11)
+    state = lived_through(world)
+    narrow, wide = (sim.choose_fidelity(world, behind_lens(NAVIGATION, a)) for a in (0.1, 0.6))
+    assert (narrow.light, wide.light) == ("direct", "bounce")
+    direct, both = (
+        sim.BatchedRenderer(world, behind_lens(NAVIGATION, 0.1), state.n, sim.Fidelity(64, 4, light=light))
+        for light in ("direct", "bounce")
+    )
+    missing = np.sqrt(np.mean((both.signals(state) - direct.signals(state)) ** 2))
+    assert missing / 1.5 < narrow.levels[2].predicted_error < missing * 1.5
+    assert wide.levels[2].predicted_error < wide.tolerance / 2
+    assert "light that is reflected twice is worth" in wide.why
 
 
 def test_the_same_pick_every_time_whatever_the_number_of_worlds():
@@ -107,6 +129,7 @@ def test_it_says_why():
         (lambda world: sim.BatchedRenderer(world, DETECTION, 1, "many"), "rays_per_receptor = 'many'"),
         (lambda world: sim.choose_fidelity(world, DETECTION, tolerance=0), "tolerance = 0"),
         (lambda world: sim.Fidelity(1.0, 0), "bands = 0"),
+        (lambda world: sim.Fidelity(1.0, 3, light="path"), "light = 'path', must be one of 'direct', 'bounce'"),
     ],
 )
 def test_bad_arguments_are_named(call, named):

@@ -186,7 +186,7 @@ def test_signals_weight_the_bands(references):
 @pytest.mark.parametrize("task", ["detection", "navigation"])
 def test_kernels_are_recorded_once_and_results_do_not_alias(references, task, tracer):
     world, state, _ = references[task]
-    renderer = sim.BatchedRenderer(world, EYES, state.n, tracer=tracer)
+    renderer = sim.BatchedRenderer(world, EYES, state.n, sim.Fidelity(2, EYES.bands, light="bounce"), tracer)
     first = renderer.signals(state)
     kept = first.copy()
     for step in range(20):
@@ -201,7 +201,7 @@ def test_kernels_are_recorded_once_and_results_do_not_alias(references, task, tr
 @pytest.mark.parametrize("task", ["detection", "navigation"])
 def test_a_world_looks_the_same_among_any_number_of_neighbours(references, task, tracer):
     world, state, _ = references[task]
-    alone = sim.BatchedRenderer(world, EYES, 1, tracer=tracer)
+    alone = sim.BatchedRenderer(world, EYES, 1, sim.Fidelity(2, EYES.bands, light="bounce"), tracer)
     many = alone.resized(16)
     crowd = state.take(np.arange(16) % 2)
     np.testing.assert_array_equal(many.signals(crowd)[3], alone.signals(state.take(np.array([1])))[0])
@@ -214,4 +214,4 @@ def test_bad_arguments_are_named(references):
     with pytest.raises(ValueError, match="rays_per_receptor"):
         sim.BatchedRenderer(world, EYES, 1, rays_per_receptor=0)
     with pytest.raises(ValueError, match="state has 2 worlds"):
-        sim.BatchedRenderer(world, EYES, 1).signals(state)
+        sim.BatchedRenderer(world, EYES, 1, 1).signals(state)
