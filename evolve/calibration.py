@@ -36,10 +36,13 @@ class Pace:
     policy_bytes: int
 
     def candidate_s(self, config: RunConfig) -> float:
-        """Seconds for one candidate that trains to the end."""
-        learning = config.learning
-        plays = -(-learning.total_steps // learning.eval_interval) + 1
-        return self.start_s + learning.total_steps / self.steps_per_s + plays * self.play_s
+        """Seconds for one candidate that trains to the end in one go."""
+        return self.stretch_s(config.learning.total_steps, config.learning.eval_interval)
+
+    def stretch_s(self, steps: int, eval_interval: int) -> float:
+        """Seconds for a training of so many steps, and the evaluation after it."""
+        plays = -(-steps // eval_interval) + 1
+        return self.start_s + steps / self.steps_per_s + plays * self.play_s
 
 
 def calibrate(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:

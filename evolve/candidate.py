@@ -21,6 +21,7 @@ class Candidate:
     """A genome, the animal it became, and how that one fared; see `Evaluation` for the fields it has in common.
 
     parents  ids of the candidates from which the search made it; () where it drew from none
+    rung     of the ladder, to which it was trained; steps and seconds are from the beginning
     """
 
     id: int
@@ -37,6 +38,7 @@ class Candidate:
     curve: tuple[tuple[int, float], ...]
     failure: str | None
     parents: tuple[int, ...] = ()
+    rung: int = 0
 
     @property
     def vector(self) -> NDArray[np.float64]:
@@ -69,7 +71,7 @@ class Candidate:
         """Inverse of `to_line`; raises ValueError that says what is wrong with the line."""
         record = json.loads(line)
         if isinstance(record, dict):
-            record.setdefault("parents", [])  # not written by the first runs
+            record = {"parents": [], "rung": 0, **record}  # not written by the first runs
         names = [f.name for f in fields(cls)]
         if not isinstance(record, dict) or sorted(record) != sorted(names):
             raise ValueError(f"must hold exactly {', '.join(names)}")
@@ -89,6 +91,7 @@ class Candidate:
                 curve=tuple((int(steps), _number(value)) for steps, value in record["curve"]),
                 failure=None if record["failure"] is None else str(record["failure"]),
                 parents=tuple(int(parent) for parent in record["parents"]),
+                rung=int(record["rung"]),
             )
         except (TypeError, AttributeError, KeyError) as error:
             raise ValueError(f"a value has the wrong type ({error})") from error

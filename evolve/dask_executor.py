@@ -144,13 +144,15 @@ class DaskExecutor:
                 raise ExecutorError(f"{self.scheduler}: {error}")
             return Evaluation.failed(f"{type(error).__name__}: {error}")
         try:
-            outcome, policy = remote.decode(future.result(timeout=REPLY_S))
+            outcome, policy, checkpoint = remote.decode(future.result(timeout=REPLY_S))
         except TimeoutError:
             return None
         future.release()  # else its worker's death would have it evaluated again
         trial.counter.delete()
         if policy:
             write_whole(trial.job.policy_path, policy)
+        if checkpoint and trial.job.stretch is not None:
+            write_whole(trial.job.stretch.checkpoints[-1], checkpoint)
         return outcome
 
     def _tell(self, progress: Progress | None) -> None:

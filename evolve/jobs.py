@@ -9,6 +9,7 @@ from typing import Any
 
 from evolve.config import RunConfig
 from evolve.development import Phenotype
+from evolve.ladder import Stretch
 
 __all__ = ["ATTEMPTS", "ExecutorError", "Job", "Progress"]
 
@@ -22,14 +23,19 @@ class ExecutorError(RuntimeError):
 
 @dataclass(frozen=True)
 class Job:
-    """One candidate to evaluate: arguments of `evolve.fitness.evaluate`, under the candidate's id."""
+    """One candidate to evaluate: arguments of `evolve.fitness.evaluate`, under the candidate's id.
+
+    stretch  how far it is trained, on a ladder; None: to the end
+    """
 
     id: int
     phenotype: Phenotype
     config: RunConfig
     seed: int
     policy_path: Path
+    stretch: Stretch | None = None
 
     @property
     def arguments(self) -> tuple[Any, ...]:
-        return self.phenotype, self.config, self.seed, self.policy_path
+        ladder = () if self.stretch is None else (self.stretch,)
+        return self.phenotype, self.config, self.seed, self.policy_path, *ladder

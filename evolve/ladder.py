@@ -16,7 +16,7 @@ from pathlib import Path
 
 from evolve.config import LearningConfig, RunConfig, SearchConfig
 
-__all__ = ["Stretch", "budgets", "climbers", "evaluations", "sizes", "steps"]
+__all__ = ["Stretch", "budgets", "climbers", "evaluations", "sizes", "steps", "stretches"]
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,11 @@ def budgets(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
     return tuple(math.ceil(learning.total_steps * search.promoted**above) for above in range(search.rungs - 1, -1, -1))
 
 
+def stretches(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
+    """Steps from one rung to the next, (rungs,)."""
+    return tuple(after - before for before, after in pairwise((0, *budgets(search, learning))))
+
+
 def sizes(search: SearchConfig) -> tuple[int, ...]:
     """Candidates of a generation that reach each rung, (rungs,), if none fails."""
     return tuple(max(1, math.ceil(search.population * search.promoted**rung)) for rung in range(search.rungs))
@@ -47,10 +52,8 @@ def sizes(search: SearchConfig) -> tuple[int, ...]:
 
 def steps(config: RunConfig) -> int:
     """Agent steps of the whole run, if all trainings take what they may."""
-    ends = budgets(config.search, config.learning)
-    stretches = [ends[0], *(after - before for before, after in pairwise(ends))]
-    each = sum(size * stretch for size, stretch in zip(sizes(config.search), stretches, strict=True))
-    return config.search.generations * each
+    climb = zip(sizes(config.search), stretches(config.search, config.learning), strict=True)
+    return config.search.generations * sum(size * stretch for size, stretch in climb)
 
 
 def evaluations(search: SearchConfig) -> int:

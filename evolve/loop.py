@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Protocol
 
 from evolve.candidate import Candidate
 from evolve.development import develop
 from evolve.evaluation import Evaluation
 from evolve.jobs import Job, Progress
+from evolve.ladder import Stretch, budgets
 from evolve.search import Proposal, Search, training_seed
 from evolve.store import Run, RunError
 from evolve.versions import present, recorded
@@ -57,15 +59,17 @@ def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
 
 
 def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Tell a generation, in the order of its candidates, once all of it is known."""
+    """Tell a generation, in the order of its candidates, once all of it is known: rung by rung, on a ladder."""
     for generation in range(run.config.search.generations):
         proposals = {proposal.id: proposal for proposal in search.propose_generation()}
-        known = {candidate.id for candidate in run.generation(generation)}
         for candidate in run.generation(generation):
             _require_same(run, proposals[candidate.id], candidate)
-        missing = deque(_job(run, proposal) for proposal in proposals.values() if proposal.id not in known)
-        for job, outcome in executor.run(missing, watcher.training):
-            _write_down(run, proposals[job.id], job, outcome, watcher)
+        for rung in range(run.config.search.rungs):
+            missing = sorted(run.climbers(generation, rung) - run.on_rung(rung))
+            jobs = deque(_job(run, proposals[identity], rung) for identity in missing)
+            for job, outcome in executor.run(jobs, watcher.training):
+                _write_down(run, proposals[job.id], job, outcome, watcher)
+        run.forget_trainings(generation)
         search.tell([(candidate.id, candidate.fitness) for candidate in run.generation(generation)])
 
 
@@ -91,15 +95,23 @@ def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) ->
         jobs.extend(_job(run, proposal) for proposal in refill())
 
 
-def _job(run: Run, proposal: Proposal) -> Job:
+def _job(run: Run, proposal: Proposal, rung: int = 0) -> Job:
     phenotype = develop(proposal.vector, run.config)
     seed = training_seed(run.config.seed, proposal.id)
-    return Job(proposal.id, phenotype, run.config, seed, run.policy_path(proposal.id))
+    stretch = None
+    if run.config.search.rungs > 1:
+        ends = budgets(run.config.search, run.config.learning)[: rung + 1]
+        stretch = Stretch(ends, tuple(run.checkpoint_path(proposal.id, i) for i in range(rung + 1)))
+    return Job(proposal.id, phenotype, run.config, seed, run.policy_path(proposal.id), stretch)
 
 
 def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, watcher: Watcher) -> Candidate:
     place = (proposal.id, proposal.generation, proposal.index)
     candidate = Candidate.of(place, proposal.genome, job.phenotype, job.seed, outcome, proposal.parents)
+    if job.stretch is not None:
+        candidate = replace(candidate, rung=job.stretch.rung)
+        if (before := run.before(candidate)) is not None:
+            candidate = replace(candidate, seconds=before.seconds + candidate.seconds)
     run.append(candidate)
     watcher.evaluated(candidate)
     return candidate

@@ -17,6 +17,8 @@ from evolve.evaluation import Evaluation
 from evolve.executors import cores
 from evolve.genes import CLUSTERS, LAMBDA_MAX, gene_table
 from evolve.genotype import Genotype
+from evolve.ladder import budgets, evaluations, sizes, stretches
+from evolve.ladder import steps as total_steps
 
 __all__ = ["Plan", "idle_genes"]
 
@@ -53,25 +55,38 @@ class Plan:
     @property
     def hours(self) -> dict[str, float]:
         """Wall time of the whole run if all candidates were like each of the animals, and trained to the end."""
-        search = self.config.search
+        search, learning = self.config.search, self.config.learning
         if search.steady_state:
             rounds = -(-self.config.candidates // self.workers)
-        else:
-            rounds = search.generations * -(-search.population // self.workers)
-        return {name: rounds * pace.candidate_s(self.config) / 3600 for name, pace in self.paces.items()}
+            return {name: rounds * pace.candidate_s(self.config) / 3600 for name, pace in self.paces.items()}
+        climb = list(zip(sizes(search), stretches(search, learning), strict=True))
+        return {
+            name: search.generations
+            * sum(-(-size // self.workers) * pace.stretch_s(steps, learning.eval_interval) for size, steps in climb)
+            / 3600
+            for name, pace in self.paces.items()
+        }
 
     @property
     def disk_bytes(self) -> int:
         """Policies, record, report and EXR files; of the larger animal."""
         policy = max(pace.policy_bytes for pace in self.paces.values())
         pictures = max(_exr_bytes(animal, self.config.eye.bands) for animal in self.animals.values())
-        return self.config.candidates * (policy + self._line_bytes()) + REPORT_BYTES + pictures
+        lines = evaluations(self.config.search) * self._line_bytes()
+        return self.config.candidates * policy + lines + REPORT_BYTES + pictures
 
     @property
     def free_bytes(self) -> int:
         """Free on the disk that will hold the run."""
         existing = next(path for path in (self.directory.resolve(), *self.directory.resolve().parents) if path.exists())
         return shutil.disk_usage(existing).free
+
+    def _ladder(self) -> list[str]:
+        """What a generation does on each rung."""
+        search = self.config.search
+        ends = zip(sizes(search), budgets(search, self.config.learning), strict=True)
+        rungs = ", ".join(f"{size} to {steps:,} steps" for size, steps in ends)
+        return [f"ladder         {rungs}"] if search.rungs > 1 else []
 
     def _line_bytes(self) -> int:
         """A candidate's line in the record."""
@@ -93,7 +108,8 @@ class Plan:
             f"task           {config.task}, seed {config.seed}",
             f"search         {search.optimizer}, {order}, on {self.workers} workers",
             f"evaluations    {search.generations} generations x {search.population} candidates = {config.candidates:,}",
-            f"steps          up to {learning.total_steps:,} each, {config.candidates * learning.total_steps:,} in all",
+            *self._ladder(),
+            f"steps          up to {learning.total_steps:,} each, {total_steps(config):,} in all",
             f"genes open     {genotype.dimension} of {len(config.genome)}",
             *_gene_lines(config),
         ]
@@ -122,7 +138,7 @@ class Plan:
             "workers": self.workers,
             "genes": opening,
             "evaluations": config.candidates,
-            "steps": config.candidates * config.learning.total_steps,
+            "steps": total_steps(config),
             "hours": self.hours,
             "pace": {name: asdict(pace) for name, pace in self.paces.items()},
             "disk_bytes": self.disk_bytes if self.paces else None,

@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Any, TextIO
 
 from evolve.candidate import Candidate
+from evolve.ladder import evaluations
 from evolve.store import Run
 
 __all__ = ["Bar", "Events", "Lines", "Tally", "Watchers", "clock", "watcher"]
@@ -24,24 +25,31 @@ class Tally:
     def __init__(self, run: Run, workers: int = 1) -> None:
         self._run, self._workers = run, workers
         self._began = time.monotonic()
-        self._known_before = len(run.candidates)
+        self._known_before = len(run.in_order_of_finish)
         self._steps_done = 0
         self._busy = 0.0
         self._in_training: dict[int, tuple[int, int]] = {}
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
-        self._in_training[candidate_id] = steps, planned
+        before = self._run.steps_of(candidate_id)
+        self._in_training[candidate_id] = max(steps - before, 0), planned - before
 
     def evaluated(self, candidate: Candidate) -> None:
         self._in_training.pop(candidate.id, None)
-        self._steps_done += candidate.steps
-        self._busy += candidate.seconds
+        below = self._run.before(candidate)
+        self._steps_done += candidate.steps - (below.steps if below else 0)
+        self._busy += candidate.seconds - (below.seconds if below else 0.0)
 
     @property
     def done(self) -> float:
-        """Candidates evaluated, those in training by the part that is over."""
+        """Evaluations done, those in training by the part that is over."""
         parts = (min(steps / planned, 1.0) for steps, planned in self._in_training.values() if planned)
-        return len(self._run.candidates) + sum(parts)
+        return len(self._run.in_order_of_finish) + sum(parts)
+
+    @property
+    def planned(self) -> int:
+        """Evaluations in all: of every candidate, on every rung of a ladder that it reaches."""
+        return evaluations(self._run.config.search)
 
     @property
     def seconds(self) -> float:
@@ -63,7 +71,7 @@ class Tally:
         since = self.done - self._known_before
         if since <= 0:
             return None
-        return self.seconds / since * (self._run.config.candidates - self.done)
+        return self.seconds / since * max(self.planned - self.done, 0.0)
 
     @property
     def median(self) -> float | None:
@@ -123,7 +131,7 @@ class Lines(_Watcher):
     def evaluated(self, candidate: Candidate) -> None:
         super().evaluated(candidate)
         outcome = f"failed ({candidate.failure})" if candidate.failure else f"fitness {candidate.fitness:.3g}"
-        count = f"{len(self.run.candidates)}/{self.run.config.candidates}"
+        count = f"{len(self.run.in_order_of_finish)}/{self.tally.planned}"
         print(f"candidate {candidate.id} ({count}): {outcome}; {self.tally.summary()}", file=self.out, flush=True)
 
 
@@ -172,7 +180,7 @@ class Bar(_Watcher):
         super().__init__(run, out, workers)
         columns: list[Any] = [BarColumn(), TextColumn("{task.percentage:>3.0f}%"), TimeElapsedColumn()]
         self._progress = Progress(*columns, TextColumn("{task.description}"), console=Console(file=out))
-        self._bar = self._progress.add_task(self.tally.summary(), total=run.config.candidates)
+        self._bar = self._progress.add_task(self.tally.summary(), total=self.tally.planned)
 
     def __enter__(self) -> Bar:
         self._progress.start()

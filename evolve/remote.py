@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -20,12 +20,14 @@ from evolve.config_source import from_text
 from evolve.development import Phenotype
 from evolve.evaluation import Evaluation
 from evolve.jobs import ATTEMPTS, Job
+from evolve.ladder import Stretch
 from evolve.versions import present
 from evolve.worker import evaluated, prepare_device
 
 __all__ = ["Order", "UnfitWorker", "decode", "encode", "evaluate"]
 
 COUNTER_S = 20.0  # for the scheduler to answer
+Reply = tuple[str, bytes, bytes]
 _one_at_a_time = threading.Lock()
 _prepared = False
 
@@ -45,6 +47,8 @@ class Order:
     function  "module:name" of what evaluates it
     counter   name of the scheduler's variable that counts its attempts
     topic     under which it tells its progress
+    budgets   on the rungs of a ladder up to where it trains; () without one
+    begun     (rung, checkpoint): where its training stands, if it has begun
     software  that the sender runs
     """
 
@@ -56,22 +60,30 @@ class Order:
     counter: str
     topic: str
     software: Mapping[str, str]
+    budgets: tuple[int, ...] = ()
+    begun: tuple[int, bytes] | None = None
 
 
 def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Order:
     """A job whose config is `toml`; `counter` and `topic` are names on the scheduler."""
-    return Order(function, job.id, json.dumps(job.phenotype.to_json()), toml, job.seed, counter, topic, _software())
+    phenotype = json.dumps(job.phenotype.to_json())
+    order = Order(function, job.id, phenotype, toml, job.seed, counter, topic, _software())
+    if job.stretch is None:
+        return order
+    kept = [(rung, path.read_bytes()) for rung, path in enumerate(job.stretch.checkpoints[:-1]) if path.exists()]
+    return replace(order, budgets=job.stretch.budgets, begun=kept[-1] if kept else None)
 
 
-def evaluate(order: Order) -> tuple[str, bytes]:
-    """Evaluate a candidate: its Evaluation as JSON, and its policy, empty where there is none."""
+def evaluate(order: Order) -> Reply:
+    """Evaluate a candidate: its Evaluation as JSON, its policy and its training's checkpoint, empty where there is
+    none."""
     from distributed import Variable, get_worker
 
     worker = get_worker()
     attempts = Variable(order.counter, client=worker._get_client())
     begun = int(attempts.get(timeout=COUNTER_S)) + 1
     if begun > ATTEMPTS:
-        return _text(Evaluation.failed(f"its worker process died {ATTEMPTS} times")), b""
+        return _text(Evaluation.failed(f"its worker process died {ATTEMPTS} times")), b"", b""
     attempts.set(begun)
     key = worker.get_current_task()
 
@@ -87,23 +99,31 @@ def evaluate(order: Order) -> tuple[str, bytes]:
         return _evaluate(getattr(import_module(module), name), order, progress)
 
 
-def decode(reply: tuple[str, bytes]) -> tuple[Evaluation, bytes]:
+def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:
     """Inverse of what `evaluate` makes of an Evaluation."""
-    record, policy = json.loads(reply[0]), reply[1]
+    text, policy, checkpoint = reply
+    record = json.loads(text)
     record["returns"] = tuple(record["returns"])
     record["curve"] = tuple((int(steps), float(value)) for steps, value in record["curve"])
-    return Evaluation(**record), policy
+    return Evaluation(**record), policy, checkpoint
 
 
-def _evaluate(
-    function: Callable[..., Evaluation], order: Order, progress: Callable[[int, int], None]
-) -> tuple[str, bytes]:
+def _evaluate(function: Callable[..., Evaluation], order: Order, progress: Callable[[int, int], None]) -> Reply:
     config = from_text(order.config)
     phenotype = Phenotype.from_json(json.loads(order.phenotype))
     with TemporaryDirectory() as folder:
         policy = Path(folder) / f"{order.id:06d}"
-        outcome = evaluated(function, (phenotype, config, order.seed, policy), progress)
-        return _text(outcome), policy.read_bytes() if policy.exists() else b""
+        checkpoints = tuple(policy.with_name(f"{policy.name}-{rung}") for rung in range(len(order.budgets)))
+        if order.begun is not None:
+            rung, content = order.begun
+            checkpoints[rung].write_bytes(content)
+        ladder = (Stretch(order.budgets, checkpoints),) if checkpoints else ()
+        outcome = evaluated(function, (phenotype, config, order.seed, policy, *ladder), progress)
+        return _text(outcome), _content(policy), _content(checkpoints[-1]) if checkpoints else b""
+
+
+def _content(path: Path) -> bytes:
+    return path.read_bytes() if path.exists() else b""
 
 
 def _prepare(order: Order) -> None:

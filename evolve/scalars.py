@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import shutil
 import time
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +32,7 @@ class Scalars:
     def __init__(self, run: Run) -> None:
         self._run = run
         self._writers: dict[str, Any] = {}
-        self._seen: Counter[int] = Counter()
+        self._shown: set[int] = set()  # generations
         _writer_class()
         shutil.rmtree(run.path / FOLDER, ignore_errors=True)
 
@@ -50,7 +49,8 @@ class Scalars:
         """Nothing: what is not on record is not shown."""
 
     def evaluated(self, candidate: Candidate) -> None:
-        """The candidate's values over its id, its generation's over the generation, its learning over steps."""
+        """The candidate's values over its id (on a ladder again on every rung), its generation's over the generation,
+        its learning over steps."""
         if candidate.failure is None:
             values = {"fitness": candidate.fitness, "success_rate": candidate.success_rate}
             genes = {**gene_values(candidate.phenotype), "acuity_cpd": acuity_cpd(candidate.phenotype)}
@@ -58,8 +58,8 @@ class Scalars:
             self._add("candidates", values, candidate.id)
             for steps, value in candidate.curve:
                 self._add(f"learning/{candidate.id:06d}", {"return": value}, steps)
-        self._seen[candidate.generation] += 1
-        if self._seen[candidate.generation] == self._run.config.search.population:
+        if candidate.generation not in self._shown and self._run.complete(candidate.generation):
+            self._shown.add(candidate.generation)
             rows = {row.generation: row for row in generation_statistics(self._run.candidates)}
             row = rows[candidate.generation]
             if row.evaluated > row.failed:

@@ -2,8 +2,9 @@
 
 config.toml        every setting
 versions.json      with which software the run was started, and continued
-candidates.jsonl   one line per evaluated candidate, in the order in which they finished
+candidates.jsonl   one line per evaluated candidate, and per rung of a ladder, in the order in which they finished
 policies/          trained policies
+trainings/         as they stand on the rungs of a ladder, until their generation is done
 lock               held by the process that works on the run
 """
 
@@ -13,6 +14,7 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from evolve import ladder
 from evolve.candidate import Candidate
 from evolve.config import RunConfig
 from evolve.config_source import from_toml, to_toml
@@ -27,6 +29,7 @@ __all__ = ["Candidate", "Run", "RunError", "next_directory"]
 CONFIG = "config.toml"
 CANDIDATES = "candidates.jsonl"
 POLICIES = "policies"
+TRAININGS = "trainings"
 
 
 class RunError(ValueError):
@@ -35,7 +38,7 @@ class RunError(ValueError):
 
 @dataclass
 class Run:
-    """A run directory; `candidates` are in order of their ids.
+    """A run directory; `candidates` are in order of their ids, each as it is on the highest rung that it has reached.
 
     `notice` is one line on what had to be left out when reading (a line that was being written when the power went).
     """
@@ -44,7 +47,7 @@ class Run:
     config: RunConfig
     candidates: tuple[Candidate, ...] = ()
     notice: str | None = None
-    _finished: tuple[int, ...] = field(default=(), repr=False)
+    _lines: dict[tuple[int, int], Candidate] = field(default_factory=dict, repr=False)
     _whole_bytes: int = field(default=0, repr=False)
 
     @classmethod
@@ -94,6 +97,7 @@ class Run:
         try:
             sweep(self.path)
             sweep(self.path / POLICIES)
+            sweep(self.path / TRAININGS)
             with (self.path / CANDIDATES).open("r+b") as file:
                 file.truncate(self._whole_bytes)
                 os.fsync(file.fileno())
@@ -106,7 +110,7 @@ class Run:
         Raises:
             RunError: the candidate is there already, or cannot be written; what was there before still is.
         """
-        if any(known.id == candidate.id for known in self.candidates):
+        if (candidate.id, candidate.rung) in self._lines:
             raise RunError(f"{self.path}: candidate {candidate.id} has been evaluated already")
         line = candidate.to_line().encode()
         try:
@@ -117,12 +121,21 @@ class Run:
         except OSError as error:
             raise RunError(f"{self.path / CANDIDATES}: cannot be written: {error.strerror}") from error
         self._whole_bytes += len(line)
-        self._finished += (candidate.id,)
-        self.candidates = tuple(sorted((*self.candidates, candidate), key=lambda known: known.id))
+        self._take({**self._lines, (candidate.id, candidate.rung): candidate})
 
     def policy_path(self, candidate_id: int) -> Path:
         """Where a candidate's trained policy is kept."""
         return self.path / POLICIES / f"{candidate_id:06d}.safetensors"
+
+    def checkpoint_path(self, candidate_id: int, rung: int) -> Path:
+        """Where a candidate's training is kept as it stands on a rung, until its generation is done."""
+        return self.path / TRAININGS / f"{candidate_id:06d}-{rung}.safetensors"
+
+    def forget_trainings(self, generation: int) -> None:
+        """Remove what trainings of a generation have left, now that none of them goes on."""
+        for candidate in self.generation(generation):
+            for rung in range(self.config.search.rungs):
+                self.checkpoint_path(candidate.id, rung).unlink(missing_ok=True)
 
     @property
     def best(self) -> Candidate | None:
@@ -151,13 +164,43 @@ class Run:
 
     @property
     def in_order_of_finish(self) -> list[Candidate]:
-        """Candidates in the order in which they were evaluated and written down."""
-        by_id = {candidate.id: candidate for candidate in self.candidates}
-        return [by_id[identity] for identity in self._finished]
+        """Candidates in the order in which they were evaluated and written down, on a ladder once for each rung."""
+        return list(self._lines.values())
+
+    def before(self, candidate: Candidate) -> Candidate | None:
+        """The candidate as it was one rung below."""
+        return self._lines.get((candidate.id, candidate.rung - 1))
+
+    def steps_of(self, candidate_id: int) -> int:
+        """Steps that a candidate has been trained so far, as far as is on record."""
+        return max((line.steps for (identity, _), line in self._lines.items() if identity == candidate_id), default=0)
+
+    def climbers(self, generation: int, rung: int) -> set[int]:
+        """Ids of a generation that reach a rung; all of it the first, {} any other before the one below is done."""
+        population = self.config.search.population
+        ids = set(range(generation * population, (generation + 1) * population))
+        for below in range(rung):
+            if not all((identity, below) in self._lines for identity in ids):
+                return set()
+            told = [(identity, self._lines[identity, below].fitness) for identity in ids]
+            ids = ladder.climbers(self.config.search, below, told)
+        return ids
+
+    def on_rung(self, rung: int) -> set[int]:
+        """Ids of all candidates that have been evaluated on a rung."""
+        return {identity for identity, reached in self._lines if reached == rung}
+
+    def complete(self, generation: int) -> bool:
+        """Whether all of a generation has been evaluated, on every rung that it reaches."""
+        return all(
+            (identity, rung) in self._lines
+            for rung in range(self.config.search.rungs)
+            for identity in self.climbers(generation, rung)
+        )
 
     @property
     def finished(self) -> bool:
-        return len(self.candidates) == self.config.candidates
+        return all(self.complete(generation) for generation in range(self.config.search.generations))
 
     def _read(self) -> None:
         file = self.path / CANDIDATES
@@ -171,21 +214,30 @@ class Run:
             self.notice = (
                 f"{file}: line {len(lines) + 1} is unfinished and is left out; its candidate counts as unevaluated"
             )
-        found: dict[int, Candidate] = {}
+        found: dict[tuple[int, int], Candidate] = {}
         for number, line in enumerate(lines, start=1):
             try:
                 candidate = Candidate.from_line(line.decode())
                 self._check(candidate, found)
             except ValueError as error:
                 raise RunError(f"{file}, line {number}: is damaged: {error}") from error
-            found[candidate.id] = candidate
-        self.candidates = tuple(found[key] for key in sorted(found))
-        self._finished = tuple(found)
+            found[candidate.id, candidate.rung] = candidate
+        self._take(found)
 
-    def _check(self, candidate: Candidate, found: dict[int, Candidate]) -> None:
+    def _take(self, lines: dict[tuple[int, int], Candidate]) -> None:
+        """These are the record's lines, in its order."""
+        self._lines = lines
+        furthest = {identity: lines[identity, rung] for identity, rung in sorted(lines)}
+        self.candidates = tuple(furthest.values())
+
+    def _check(self, candidate: Candidate, found: dict[tuple[int, int], Candidate]) -> None:
         population, dimension = self.config.search.population, Genotype(self.config.genome).dimension
-        if candidate.id in found:
+        if (candidate.id, candidate.rung) in found:
             raise ValueError(f"candidate {candidate.id} is there twice")
+        if not 0 <= candidate.rung < self.config.search.rungs:
+            raise ValueError(f"rung {candidate.rung} is none of a ladder of {self.config.search.rungs}")
+        if candidate.rung and (candidate.id, candidate.rung - 1) not in found:
+            raise ValueError(f"candidate {candidate.id} is on rung {candidate.rung}, but has not been one below")
         if candidate.id != candidate.generation * population + candidate.index or not 0 <= candidate.index < population:
             raise ValueError(
                 f"candidate {candidate.id} can't be number {candidate.index} of generation {candidate.generation} "

@@ -15,6 +15,7 @@ from typing import Any, Literal
 from evolve.config import RunConfig
 from evolve.development import Phenotype
 from evolve.evaluation import Evaluation
+from evolve.ladder import Stretch
 
 __all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "work"]
 
@@ -60,12 +61,18 @@ def prepare_device() -> None:
 
 
 def evaluate_candidate(
-    phenotype: Phenotype, config: RunConfig, seed: int, policy_path: Path, progress: Callable[[int, int], None]
+    phenotype: Phenotype,
+    config: RunConfig,
+    seed: int,
+    policy_path: Path,
+    stretch: Stretch | None = None,
+    *,
+    progress: Callable[[int, int], None],
 ) -> Evaluation:
     """`evolve.fitness.evaluate`, whose libraries are loaded in workers alone."""
     from evolve.fitness import evaluate
 
-    return evaluate(phenotype, config, seed, policy_path, progress)
+    return evaluate(phenotype, config, seed, policy_path, progress, stretch)
 
 
 def evaluated(

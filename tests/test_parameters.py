@@ -89,6 +89,14 @@ def history(config, animal):
         return [(candidate.genome, candidate.phenotype, candidate.seed) for candidate in run.candidates]
 
 
+def ladder(config, animal):
+    """On which rungs candidates are evaluated, and how far each is trained."""
+    with TemporaryDirectory() as folder:
+        run = Run.create(Path(folder) / "run", config)
+        carry(run, _ClosedForm(), mock.Mock())
+        return [(candidate.id, candidate.rung, candidate.steps) for candidate in run.in_order_of_finish]
+
+
 def hired(config, animal):
     """Workers that a run starts."""
     with TemporaryDirectory() as folder, mock.patch.object(evolve.commands.run, "LocalExecutor") as executor:
@@ -105,7 +113,8 @@ class _ClosedForm:
     def run(self, jobs, progress) -> Iterator:
         while jobs:
             job = jobs.popleft()
-            yield job, Evaluation(fitness=-abs(job.phenotype.fov_deg - 70))
+            steps = job.stretch.budgets[-1] if job.stretch else job.config.learning.total_steps
+            yield job, Evaluation(fitness=-abs(job.phenotype.fov_deg - 70), steps=steps)
 
 
 # --- what moves what
@@ -141,6 +150,8 @@ FIELDS = {
     "search.population": Case("search.population=4", history),
     "search.generations": Case("search.generations=3", history),
     "search.sigma": Case("search.sigma=0.1", history),
+    "search.rungs": Case("search.rungs=2", ladder),
+    "search.promoted": Case("search.promoted=0.7", ladder, ("search.rungs=2", *PERFECT)),
     "learning.total_steps": Case("learning.total_steps=96", life),
     "learning.n_envs": Case("learning.n_envs=2", life),
     "learning.n_steps": Case("learning.n_steps=16", life),
@@ -150,6 +161,7 @@ FIELDS = {
     "learning.gamma": Case("learning.gamma=0.5", life),
     "learning.gae_lambda": Case("learning.gae_lambda=0.5", life),
     "learning.value_weight": Case("learning.value_weight=0.5", life),
+    "learning.rays_per_eye": Case("learning.rays_per_eye=32", life),
     "learning.eval_interval": Case("learning.eval_interval=32", life),
     "learning.patience": Case("learning.patience=1", life, STAGNANT),
     "evaluation.episodes": Case("evaluation.episodes=2", life),

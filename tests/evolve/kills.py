@@ -15,12 +15,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from closed_form import tiny
+from remote_form import climbing
 
 from evolve.evaluation import Evaluation
 from evolve.files import write_whole
 from evolve.loop import evolve
 from evolve.search import Search
 from evolve.store import Run
+
+LADDER = ("search.rungs=3", "learning.total_steps=16384")
+KINDS = ((), ("search.steady_state=true",), LADDER)  # of runs
 
 
 class Here:
@@ -33,8 +37,11 @@ class Here:
         while jobs:
             job = jobs.popleft()
             with self.log.open("a") as log:
-                log.write(f"{job.id}\n")
+                log.write(f"{job.id} {job.stretch.rung if job.stretch else 0}\n")
             time.sleep(0.001)
+            if job.stretch is not None:
+                yield job, climbing(*job.arguments, lambda *steps: None)
+                continue
             write_whole(job.policy_path, f"policy {job.seed}".encode())
             fitness = -abs(job.phenotype.fov_deg - 70.0)
             yield job, Evaluation(fitness, (fitness, fitness / 3), 0.5, 4096, 0.01, ((4096, fitness),))
@@ -81,12 +88,14 @@ def child_killed_after(seconds, path, config):
 
 
 def history(run):
-    return [(c.id, c.genome, c.seed, c.fitness, c.returns, c.curve, c.phenotype, c.parents) for c in run.candidates]
+    return [
+        (c.id, c.rung, c.genome, c.seed, c.fitness, c.returns, c.curve, c.phenotype, c.parents) for c in run.candidates
+    ]
 
 
 def begun(log):
-    """How often each candidate's evaluation was begun."""
-    names = [int(line) for line in log.read_text().splitlines()]
+    """How often each candidate's evaluation was begun, on each rung."""
+    names = log.read_text().splitlines()
     return {name: names.count(name) for name in names}
 
 
@@ -94,8 +103,7 @@ def endure(kills, seed, folder):
     """Runs that are killed `kills` times in all; asserts what a week-long run relies on. Returns runs finished."""
     chance, done, finished = random.Random(seed), 0, 0
     while done < kills:
-        settings = (f"seed={finished}", *(("search.steady_state=true",) * (finished % 2)))
-        config = tiny(*settings)
+        config = tiny(f"seed={finished}", *KINDS[finished % len(KINDS)])
         whole, path = folder / f"whole-{finished}", folder / f"run-{finished}"
         began = time.monotonic()
         assert not child_killed_after(60.0, whole, config)
@@ -113,7 +121,8 @@ def endure(kills, seed, folder):
         assert history(run) == history(Run.open(whole)), "another history than that of a run that nobody killed"
         again = {name: count - 1 for name, count in begun(folder / f"{path.name}.log").items() if count > 1}
         assert sum(again.values()) <= deaths, "a completed candidate was evaluated again"
-        left = [entry.name for place in (path, path / "policies") for entry in place.glob(".*")]
+        places = (path, path / "policies", path / "trainings")
+        left = [entry.name for place in places if place.exists() for entry in place.glob(".*")]
         assert not left, f"files half written are left: {left}"
         done, finished = done + deaths, finished + 1
     return finished
@@ -124,6 +133,7 @@ def main(kills, seed=None):
     seed = random.randrange(2**32) if seed is None else seed
     print(f"seed {seed}", flush=True)
     with TemporaryDirectory() as folder:
+        os.environ["RHABDOM_TEST"] = folder
         finished = endure(kills, seed, Path(folder))
     print(f"{kills} kills at least, {finished} runs finished as if nothing had happened")
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from closed_form import tiny
-from remote_form import bowl
+from remote_form import bowl, climbing
 from test_executors import jobs
 from test_loop import Onlooker, history
 
@@ -104,6 +104,21 @@ def test_history_is_the_local_one(tmp_path, cluster):
     assert cluster.calls() == dict.fromkeys(range(12), 1)
     for candidate in local.candidates:
         assert far.policy_path(candidate.id).read_bytes() == f"policy {candidate.seed}".encode()
+
+
+def test_history_on_a_ladder_is_the_local_one(tmp_path, cluster, monkeypatch):
+    """Trainings go from worker to worker, and a worker has no files of another's."""
+    monkeypatch.setenv("RHABDOM_TEST", str(tmp_path))
+    config = tiny("search.rungs=3", "learning.total_steps=16384")
+    far, _ = carried(tmp_path / "dask", config, cluster.executor("climbing"))
+    local, _ = carried(tmp_path / "local", config, LocalExecutor(climbing, 2))
+    assert history(far) == history(local)
+    assert far.finished
+    whole = [candidate for candidate in local.candidates if candidate.rung == 2]
+    assert len(whole) == 3
+    for candidate in whole:
+        assert far.policy_path(candidate.id).read_bytes() == local.policy_path(candidate.id).read_bytes()
+    assert set(cluster.calls().values()) == {1, 2, 3}, "nobody begins a rung twice"
 
 
 def test_failures_and_infinities_come_through(tmp_path, cluster):

@@ -66,6 +66,17 @@ def test_genes_that_cannot_change_anything_are_named():
     assert len(notes(*inherited, "genome.receptor_types.open=true")) == 1
 
 
+def test_a_ladder_costs_what_its_rungs_cost(tmp_path, paced):
+    settings = ("search.population=6", "search.generations=10", "learning.total_steps=100000", "workers=4")
+    climb = ("search.rungs=2", "search.promoted=0.25")
+    config = assemble("detection", assignments=[*settings, *climb, "learning.eval_interval=30000"])
+    plan = Plan.of(config, tmp_path).measured()
+    first, second = 10 + 25 + (1 + 1) * 5, 10 + 75 + (3 + 1) * 5
+    assert plan.hours["start"] == pytest.approx(10 * (2 * first + 1 * second) / 3600), "6 and 2 on 4 workers"
+    assert plan.record()["steps"] == 10 * (6 * 25_000 + 2 * 75_000)
+    assert "ladder         6 to 25,000 steps, 2 to 100,000 steps" in "\n".join(plan.lines())
+
+
 def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     late = ["--set", "genome.optical.opens_at=1", "--set", "genome.n_eyes.open=false"]
