@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 import optics
-from sim import lighting
+from sim import lighting, room
 from sim.agent import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.fidelity import Fidelity, chosen
 from sim.pilot import Pilot
@@ -43,8 +43,8 @@ class BatchedRenderer:
     tracer             "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto";
                        the one in use is in `.tracer.name`, why in `.tracer.why`
 
-    Raises ValueError for less than one world or ray, for lights other than directional ones, and for a world that has
-    no closed form where that is asked for.
+    Raises ValueError for less than one world or ray, for more rays than there is memory for, for lights other than
+    directional ones, and for a world that has no closed form where that is asked for.
     """
 
     def __init__(
@@ -68,6 +68,7 @@ class BatchedRenderer:
         else:
             self.fidelity, sampling = asked, sampling_of(self.eye, asked.depth)
         self.tracer: Tracer = tracers.of(self.fidelity.light)
+        self._check_room(n_envs)
         self.sensor = sampling.sensor(self.fidelity.rays_per_receptor)
         mixing = self.eye.throughput * self.bands.weights
         self.brightest = float((mixing @ white).max())
@@ -77,12 +78,27 @@ class BatchedRenderer:
     def resized(self, n_envs: int) -> BatchedRenderer:
         """The same eyes and scene for another number of worlds; the scene is shared, not loaded again."""
         other = copy.copy(self)
+        other._check_room(n_envs)
         other._set_width(n_envs)
         return other
 
-    def _set_width(self, n_envs: int) -> None:
+    def _check_room(self, n_envs: int) -> None:
         if n_envs < 1:
             raise ValueError(f"n_envs = {n_envs!r}, must be at least 1")
+        fidelity, layers = self.fidelity, self.fidelity.depth.count
+        planes, weights = layers * len(self.tracer.basis), layers * len(self.bands.wavelengths)
+        room.check(
+            room.Demand(
+                fidelity.rays_per_receptor,
+                n_envs,
+                self.eyes.n_eyes,
+                self.eyes.resolution,
+                planes,
+                weights if self.eye.pupil else 0,
+            )
+        )
+
+    def _set_width(self, n_envs: int) -> None:
         self.n_envs = n_envs
         stage = self._stage
         self._poses = _PoseBuffer(n_envs, len(stage.spheres))

@@ -250,6 +250,8 @@ def _checked(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
             f"mirror: data of {len(data.geom_xpos)} geoms and {len(data.xpos)} bodies is not the model's, which has "
             f"{model.ngeom} and {model.nbody}"
         )
+    if not data.geom_xmat.any():
+        raise ValueError("mirror: data says nothing yet of where things are; call mujoco.mj_forward(model, data) first")
     lost = ~(np.isfinite(data.geom_xpos).all(axis=1) & np.isfinite(data.geom_xmat).all(axis=1))
     if lost.any():
         name = model.geom(int(np.argmax(lost))).name or str(int(np.argmax(lost)))

@@ -65,6 +65,8 @@ def test_data_of_another_model_and_lost_bodies_are_named():
     with pytest.raises(ValueError, match="data of 2 geoms and 1 bodies is not the model's, which has 1 and 2"):
         mirror.sync(mujoco.MjData(other))
     data = mujoco.MjData(mirror.model)
+    with pytest.raises(ValueError, match=r"call mujoco.mj_forward\(model, data\) first"):
+        sim.mirror(mirror.model, data)
     mujoco.mj_forward(mirror.model, data)
     mirror.sync(data)
     data.geom_xpos[0, 1] = np.nan

@@ -1,0 +1,81 @@
+"""Whether what is about to be rendered has room in memory: told before it is begun, since later the process would be
+killed without a word."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+INDICES = 2**32  # of one Dr.Jit array
+RAY_BYTES = 64  # direction and place of a ray, and what they are made from
+GIB = 2**30
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What rendering takes, at the least.
+
+    rays_per_receptor · worlds · eyes of one agent · resolution: receptors (height, width) of an eye
+    planes    components of light times depth layers, along every ray
+    weights   planes of weights behind a pupil (bands times depth layers); 0: none
+    """
+
+    rays_per_receptor: float
+    worlds: int
+    eyes: int
+    resolution: tuple[int, int]
+    planes: int
+    weights: int
+
+    @property
+    def rays(self) -> float:
+        """Of one eye."""
+        return self.rays_per_receptor * math.prod(self.resolution)
+
+    @property
+    def elements(self) -> float:
+        """Of the array that the kernel writes."""
+        return self.rays * self.eyes * self.worlds * self.planes
+
+    @property
+    def bytes(self) -> float:
+        """The kernel's array, the rays, and the weights of one row of receptors, all rays to each, at double length."""
+        return 4 * self.elements + self.rays * (RAY_BYTES * self.eyes + 16 * self.weights * self.resolution[1])
+
+
+def check(demand: Demand) -> None:
+    """Raise ValueError for more rays than there is room for, with how many there is room for."""
+    free = available()
+    excess = max(demand.bytes / free, demand.elements / INDICES)
+    if excess <= 1:
+        return
+    height, width = demand.resolution
+    most = _rounded_down(demand.rays_per_receptor / excess)
+    raise ValueError(
+        f"rays_per_receptor = {demand.rays_per_receptor:g}: {demand.worlds} worlds with {demand.eyes} eyes of "
+        f"{height} x {width} receptors would take {demand.bytes / GIB:.3g} GiB of memory, {free / GIB:.3g} are free; "
+        f"use at most {most:g} rays per receptor, or fewer worlds at once"
+    )
+
+
+def available() -> float:
+    """Bytes that can be had without swapping; infinite where the system does not say."""
+    try:
+        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+            name, _, value = line.partition(":")
+            if name == "MemAvailable":
+                return 1024.0 * int(value.split()[0])
+    except OSError:
+        pass
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, OSError, ValueError):
+        return math.inf
+
+
+def _rounded_down(value: float) -> float:
+    """To two digits."""
+    digit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.floor(value / digit) * digit
