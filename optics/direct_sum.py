@@ -140,21 +140,25 @@ def direct_sum(beam: Beam, rule: Rule, x: Any, y: Any, types: Precision) -> Fiel
     found = cached_nodes(*rule)
     radius = opaque(types, beam.radius)
     nodes_x, nodes_y = types.Float64(found.x) * radius, types.Float64(found.y) * radius
-    weight = types.Float64(found.weight) * dr.square(radius)
+    z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.pupil.medium_n)
+    weight = types.Float64(found.weight) * dr.square(radius) * z / (2 * math.pi)
     waves = beam.waves(nodes_x, nodes_y, types)
     dr.eval(nodes_x, nodes_y, weight, waves, x, y)
     count = dr.opaque(types.Index, len(found.weight))
-    z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.pupil.medium_n)
-    k = 2 * math.pi / wavelength
+    cycles, k = (
+        1 / wavelength,
+        2 * math.pi / wavelength,
+    )  # divisions cost most of a node
 
     def add(i: Any, re: Any, im: Any) -> tuple[Any, Any, Any]:
         dx, dy = x - dr.gather(types.Float64, nodes_x, i), y - dr.gather(types.Float64, nodes_y, i)
         d2 = dx * dx + dy * dy
         distance = dr.sqrt(d2 + z * z)
-        phase = d2 / (distance + z) / wavelength + dr.gather(types.Float64, waves, i)
+        phase = d2 / (distance + z) * cycles + dr.gather(types.Float64, waves, i)
         sin, cos = dr.sincos(types.Float((phase - dr.round(phase)) * (2 * math.pi)))
-        size = dr.gather(types.Float64, weight, i) * z / (2 * math.pi * distance * distance)
-        near, far, sin, cos = size / distance, size * k, types.Float64(sin), types.Float64(cos)
+        nearness = 1 / distance
+        size = dr.gather(types.Float64, weight, i) * nearness * nearness
+        near, far, sin, cos = size * nearness, size * k, types.Float64(sin), types.Float64(cos)
         return i + 1, re + near * cos + far * sin, im + near * sin - far * cos
 
     zero = dr.zeros(types.Float64, dr.width(x))

@@ -26,6 +26,8 @@ from optics.radial import RadialLine
 __all__ = ["HankelSampling", "hankel"]
 
 MOST_NODES = 3000
+# From this tolerance on J₀ need not be right to the last digit.
+LOOSE = 1e-8
 
 
 @dataclass(frozen=True)
@@ -103,26 +105,33 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
     theta = types.Float64(nodes * edge)
     sine, cosine = types.Float64(np.sin(nodes * edge)), types.Float64(np.cos(nodes * edge))
     f = sine / opaque(types, problem.wavelength)
-    spectrum = _transform(pupil, r, f, types)
+    exactly = problem.tolerance < LOOSE
+    spectrum = _transform(pupil, r, f, types, exactly)
     fade = how.taper.fade(f, types)
     ring = types.Float64(2 * np.pi * edge * weights) * f * cosine / opaque(types, problem.wavelength)
     waves = -opaque(types, beam.distance) / opaque(types, problem.wavelength) * 2 * dr.square(dr.sin(theta / 2))
     grid = Grid((1, how.angles), 1.0)
     spectrum = spectrum * Field.from_waves(ring * types.Float64(fade), waves, grid, types)
-    return _transform(spectrum, f, types.Float64(how.line.positions), types)
+    return _transform(spectrum, f, types.Float64(how.line.positions), types, exactly)
 
 
-def _transform(field: Field, at: Any, to: Any, types: Precision) -> Field:
+def _transform(field: Field, at: Any, to: Any, types: Precision, exactly: bool) -> Field:
     """Σ_j u_j J₀(2π at_j to_k) for every k."""
     import drjit as dr
 
     n, m = dr.width(at), dr.width(to)
     dr.eval(field.re, field.im, at, to)
-    index = dr.arange(types.Index, n * m)
-    row = types.Index(dr.floor((types.Float64(index) + 0.5) / dr.opaque(types.Float64, n)))
-    column = index - row * dr.opaque(types.Index, n)
-    weight = bessel_j0(dr.gather(types.Float64, at, column) * dr.gather(types.Float64, to, row), types)
-    re, im = (weight * dr.gather(types.Float, part, column) for part in (field.re, field.im))
-    dr.eval(re, im)
-    re, im = (dr.block_reduce(dr.ReduceOp.Add, part, n) for part in (re, im))
-    return Field(re, im, Grid((1, m), 1.0), types)
+    count = dr.opaque(types.Index, n)
+
+    def add(j: Any, re: Any, im: Any) -> tuple[Any, Any, Any]:
+        weight = bessel_j0(dr.gather(types.Float64, at, j) * to, types, exactly)
+        re, im = (
+            so_far + types.Float64(weight * dr.gather(types.Float, part, j))
+            for part, so_far in ((field.re, re), (field.im, im))
+        )
+        return j + 1, re, im
+
+    zero = dr.zeros(types.Float64, m)
+    start = dr.zeros(types.Index, m)
+    _, re, im = dr.while_loop((start, zero, zero), lambda j, re, im: j < count, add, max_iterations=-1)
+    return Field(types.Float(re), types.Float(im), Grid((1, m), 1.0), types)

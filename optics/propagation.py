@@ -13,7 +13,7 @@ grazing for either is counted into the predicted error.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -21,16 +21,16 @@ import numpy as np
 
 from optics.arguments import finite, in_range, positive
 from optics.fourier import (
-    fast_length,
     fourier_sum,
     kept_indices,
     periodic_spectrum,
     periodic_sum,
     predicted_seconds,
 )
-from optics.free_space import EVERYTHING, STEEPEST_SINE, Passage, TransferFunction, kept_band, kept_square, walk
+from optics.free_space import EVERYTHING, Passage, TransferFunction
 from optics.grid import Grid
-from optics.planner import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Plan
+from optics.period import Sampling, blurred_back, most_spare, sampling
+from optics.planner import FLOAT_NOISE, AccuracyError, Plan
 from optics.precision import Precision, precision
 
 __all__ = ["PROPAGATION_METHODS", "RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
@@ -38,9 +38,8 @@ __all__ = ["PROPAGATION_METHODS", "RIPPLE_PER_TOLERANCE", "PropagationResult", "
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 # Share of faded light that strays into the window: small, because the window may hold far less than is faded.
 RIPPLE_PER_TOLERANCE = 3e-3
-# Pitches are one and the same where they differ by less than this share of a sample over the whole window.
-SAME_PITCH = 1e-9
-
+# First room for the blur of light cut at Nyquist's frequency [√(λz)].
+SPARE = 3.0
 
 ONE = np.ones(1)  # the weight of what counts whole
 
@@ -57,23 +56,6 @@ class PropagationResult:
     dx: float
     plan: Plan
     evanescent_power: float
-
-
-@dataclass(frozen=True)
-class _Sampling:
-    """period: in samples of the source; across: frequencies kept along each axis; step: the window's pitch in samples
-    of the source where it is a whole number of them, else 0."""
-
-    passage: Passage
-    source: Grid
-    window: Grid
-    period: int
-    across: int
-    step: int
-
-    @property
-    def method(self) -> str:
-        return "fresnel" if self.passage.paraxial else "angular_spectrum"
 
 
 def propagate(
@@ -108,24 +90,23 @@ def propagate(
     field = _lit(field)
     source = Grid(field.shape[-2:], dx)
     in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5)
-    how = _sampling(
-        "angular_spectrum" if method == "auto" else method,
-        source,
-        window,
+    passage = Passage(
         positive("wavelength", wavelength) / in_range("medium_n", medium_n, 1.0, 10.0),
         finite("distance", distance),
+        method == "fresnel",
+        EVERYTHING,
         RIPPLE_PER_TOLERANCE * tolerance,
+        window.centre,
     )
-    types = precision(dtype)
-    planes = [_one(plane, how, types) for plane in field.reshape(-1, *source.shape)]
-    out = np.stack([plane for plane, _, _ in planes]).reshape(*field.shape[:-2], *window.shape)
-    error = max(error for _, error, _ in planes) + FLOAT_NOISE[dtype]
+    how, planes = _with_room(field.reshape(-1, *source.shape), passage, (source, window), tolerance, precision(dtype))
+    out = np.stack([plane.u for plane in planes]).reshape(*field.shape[:-2], *window.shape)
+    error = max(plane.error for plane in planes)
     if error > tolerance:
         raise AccuracyError(
             f"tolerance = {tolerance:g}: too much of the light leaves so flat, or so little of it meets the window, "
             f"that the error reaches {error:.1g}; ask for that, or for a larger out_shape"
         )
-    return PropagationResult(out, window.dx, _plan(how, error, dtype), max(lost for _, _, lost in planes))
+    return PropagationResult(out, window.dx, _plan(how, error, dtype), max(plane.evanescent for plane in planes))
 
 
 def _field(u: np.ndarray) -> np.ndarray:
@@ -149,54 +130,47 @@ def _lit(field: np.ndarray) -> np.ndarray:
     return field
 
 
-@lru_cache(maxsize=64)
-def _sampling(method: str, source: Grid, window: Grid, wavelength: float, distance: float, ripple: float) -> _Sampling:
-    z, nyquist, paraxial = abs(distance), math.sqrt(0.5) / source.dx, method == "fresnel"  # along the diagonal
-    halves = [
-        (n // 2 + 1) * source.dx + (m // 2) * window.dx + abs(middle)
-        for n, m, middle in zip(source.shape, window.shape, window.centre[::-1], strict=True)
-    ]
-    corner = source.half_diagonal + source.dx + window.half_diagonal
-    bands = (
-        kept_square(max(halves), wavelength, z, ripple, paraxial),
-        kept_band(corner, wavelength, z, ripple, paraxial),
-    )
-    band = min(bands, key=lambda band: band.walk)
-    far = band.walk
-    # Where nothing can fade, all that the samples hold may matter.
-    if band.end >= (0.5 / source.dx if band.square else nyquist):
-        end = nyquist if paraxial else min(nyquist, STEEPEST_SINE / wavelength)
-        # To the corner's walk along either axis: what ends at Nyquist's frequency as if cut blurs far.
-        band, far = EVERYTHING, walk(end, wavelength, z, paraxial)
-    least = max(max(halves) + far, 2 * (max(source.shape) // 2 + 1) * source.dx)
-    samples = fast_length(least / source.dx)
-    # Evanescent waves are kept for their power, which is reported.
-    highest = max(band.end, 0 if paraxial else 1 / wavelength)
-    half = highest * samples * source.dx  # as a float: it may be infinite
-    across = 2 * math.ceil(half) + 1 if band.fade and 2 * half + 2 < samples else samples
-    if max(across, *window.shape) > MOST_SAMPLES:
-        raise AccuracyError(
-            f"distance = {distance:g} m over a window of {2 * window.half_width:.3g} m needs {across} samples across; "
-            f"the limit is {MOST_SAMPLES}: shrink the window, or sample u more coarsely if it allows"
-        )
-    step = round(window.dx / source.dx)
-    exactly = abs(window.dx - step * source.dx) <= SAME_PITCH * source.dx / max(window.shape)
-    passage = Passage(wavelength, distance, paraxial, band, ripple, window.centre)
-    return _Sampling(passage, source, window, samples, across, step if exactly else 0)
+@dataclass(frozen=True)
+class _Carried:
+    """u (y, x): the propagated plane; error: predicted, of its intensity; blur: beyond that, by what the samples
+    hold at Nyquist's frequency; evanescent: fraction of the power."""
+
+    u: np.ndarray
+    error: float
+    blur: float
+    evanescent: float
 
 
-def _one(plane: np.ndarray, how: _Sampling, types: Precision) -> tuple[np.ndarray, float, float]:
-    """The propagated plane, the predicted error of its intensity, and the fraction of evanescent power."""
+def _with_room(
+    field: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
+) -> tuple[Sampling, list[_Carried]]:
+    """The field's planes, carried with as much room as their light at Nyquist's frequency asks for.
+
+    Beyond `most_spare` no room is made: what blurs so far belongs to the error of the samples themselves.
+    """
+    spare, most = SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most_spare(passage, grids[0])
+    how = sampling(passage, *grids, min(spare, most))
+    planes = [_one(plane, how, types) for plane in field]
+    blur = max(plane.blur for plane in planes)
+    rest = tolerance - max(plane.error for plane in planes)
+    if spare < most and blur > rest > 0:
+        how = sampling(passage, *grids, min(1.2 * blur / rest * spare, most))  # it falls at least like 1 / spare
+        planes = [_one(plane, how, types) for plane in field]
+    return how, planes
+
+
+def _one(plane: np.ndarray, how: Sampling, types: Precision) -> _Carried:
     plane = np.ascontiguousarray(plane, dtype=types.complex_dtype)
     total = _power(plane)
     if total == 0:
-        return np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0
+        return _Carried(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0, 0.0)
     space = _free_space(how, types.dtype)
     if how.step:
         spectrum = periodic_spectrum(plane, how.period, how.across)
     else:
         spectrum = fourier_sum(plane, how.period, (how.across, how.across), -1)
     grazing, evanescent = (_power(spectrum, weight) / how.period**2 for weight in (space.grazing, space.evanescent))
+    blurred = blurred_back(spectrum, how)
     spectrum *= space.transfer
     # Parseval: what neither passes nor is evanescent was faded. In float32 the difference is rounding, which is little
     # beside what the fade leaves of it.
@@ -207,14 +181,14 @@ def _one(plane: np.ndarray, how: _Sampling, types: Precision) -> tuple[np.ndarra
         result = fourier_sum(spectrum, how.period * how.source.dx / how.window.dx, how.window.shape, +1)
     arrived = _power(result) * (how.window.dx / how.source.dx) ** 2
     if not arrived:
-        return result, math.inf, min(evanescent / total, 1.0)
-    rounding = FLOAT_NOISE[types.dtype] * math.sqrt(total / arrived)
+        return _Carried(result, math.inf, math.inf, min(evanescent / total, 1.0))
+    rounding = FLOAT_NOISE[types.dtype] * (1 + math.sqrt(total / arrived))
     error = 2 * math.sqrt(grazing / arrived) + rounding + 2 * how.passage.ripple * math.sqrt(faded / arrived)
-    return result, error, min(evanescent / total, 1.0)
+    return _Carried(result, error, 2 * math.sqrt(blurred / arrived), min(evanescent / total, 1.0))
 
 
 def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
-    """Σ w |u|², weights (y, 2 x) of real and imaginary parts; 0 without a weight."""
+    """Σ w |u|², weights of real and imaginary parts; 0 without a weight."""
     if weight is None:
         return 0.0
     if weight is ONE:
@@ -224,20 +198,21 @@ def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
 
 
 @lru_cache(maxsize=4)
-def _free_space(how: _Sampling, dtype: str) -> TransferFunction:
+def _free_space(how: Sampling, dtype: str) -> TransferFunction:
     """Over the spectrum, with the sums' scale. The same distance is often travelled again; the transfer function costs
     more than the transforms."""
     step = 1 / (how.period * how.source.dx)
-    if how.step:
+    if how.step:  # the spectrum is (fx, fy)
         fx, fy = (kept_indices(how.period, n) * step for n in (how.across, how.period))
+        space = replace(how.passage, centre=how.passage.centre[::-1]).over(fy, fx, precision(dtype))
     else:
         fx = fy = Grid.square(how.across, step).x
-    space = how.passage.over(fx, fy, precision(dtype))
+        space = how.passage.over(fx, fy, precision(dtype))
     space.transfer[:] *= 1 / how.period**2
     return space
 
 
-def _plan(how: _Sampling, error: float, dtype: str) -> Plan:
+def _plan(how: Sampling, error: float, dtype: str) -> Plan:
     band = how.passage.band
     kept = f"band {band.kept * how.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
     period = how.period * how.source.dx
