@@ -109,6 +109,8 @@ def _parser() -> argparse.ArgumentParser:
         if name != "report":
             product.add_argument("--candidate", type=int, metavar="ID", help="which candidate (default: the best)")
             product.add_argument("--seed", type=int, default=0, help="seed of the episode (default: 0)")
+        if name == "replay":
+            product.add_argument("--rrd", action="store_true", help="also write a recording for rerun")
     _command(commands, "validate", "checks.validate", "compare the optics with closed forms (needs a checkout)")
     doctor = _command(commands, "doctor", "checks.doctor", "what is installed, and whether it works")
     doctor.add_argument("--json", action="store_true", help="for machines")

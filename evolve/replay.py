@@ -5,20 +5,27 @@ from __future__ import annotations
 from pathlib import Path
 
 from evolve.episode import Episode, record
+from evolve.recording import require_rerun, write_recording
 from evolve.report.player import write_player
 from evolve.store import Run
 
 __all__ = ["main", "summary"]
 
 
-def main(run: Run, candidate_id: int | None = None, seed: int = 0) -> Path:
-    """Record an episode (default: of the best candidate), print how it went, and write a page that plays it.
+def main(run: Run, candidate_id: int | None = None, seed: int = 0, rrd: bool = False) -> list[Path]:
+    """Record an episode (default: of the best candidate), print how it went, and write a page that plays it; with `rrd`
+    a recording for rerun as well.
 
-    Returns the page's path, in the run directory. Raises RunError where there is no such candidate, or no policy of it.
+    Returns the paths, in the run directory. Raises RunError where there is no such candidate, or no policy of it, and
+    ConfigError where rerun is asked for, but not installed.
     """
+    if rrd:
+        require_rerun()
     episode = record(run, candidate_id, seed)
     print(summary(episode))
-    return write_player(episode, run.path / f"replay_candidate{episode.candidate_id:06d}_seed{seed}.html")
+    path = run.path / f"replay_candidate{episode.candidate_id:06d}_seed{seed}.html"
+    page = write_player(episode, path)
+    return [page, write_recording(episode, path.with_suffix(".rrd"))] if rrd else [page]
 
 
 def summary(episode: Episode) -> str:

@@ -15,7 +15,8 @@ def replay(arguments: Namespace) -> int:
     run = _open(arguments)
     from evolve.replay import main
 
-    print(f"replay: {main(run, arguments.candidate, arguments.seed)}")
+    for path in main(run, arguments.candidate, arguments.seed, arguments.rrd):
+        print(f"replay: {path}")
     return 0
 
 

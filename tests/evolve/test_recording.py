@@ -1,0 +1,114 @@
+"""A recording for rerun, read back: it holds the episode, number by number."""
+
+import sys
+
+import numpy as np
+import pytest
+from small_run import small_run
+
+from evolve import replay
+from evolve.cli import main
+from evolve.episode import record
+from evolve.recording import write_recording
+from evolve.report.stage import Stage
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return small_run(tmp_path_factory.mktemp("run") / "run")
+
+
+@pytest.fixture(scope="module")
+def episode(run):
+    return record(run, seed=3, radiance_every=64)
+
+
+@pytest.fixture(scope="module")
+def columns(run, episode, tmp_path_factory):
+    """Of each entity and component its values in order of the actions; of what is static, its value."""
+    pytest.importorskip("rerun", reason="the extra rerun is not installed")
+    from rerun.chunk import RrdReader
+
+    path = write_recording(episode, tmp_path_factory.mktemp("rrd") / "episode.rrd")
+    assert [file.name for file in path.parent.iterdir()] == ["episode.rrd"], "nothing half written is left"
+    rows = {}
+    for chunk in RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        actions = [0] * chunk.num_rows if chunk.is_static else batch.column("action").to_pylist()
+        for name in batch.schema.names:
+            if ":" in name or name == "time":
+                found = rows.setdefault((chunk.entity_path, name), [])
+                found += zip(actions, batch.column(name).to_pylist(), strict=True)
+    return {key: [value for _, value in sorted(values, key=lambda row: row[0])] for key, values in rows.items()}
+
+
+def vectors(columns, entity, component):
+    return np.array([value[0] for value in columns[entity, component]])
+
+
+def test_actions_rewards_and_contact_are_numbers_over_time(columns, episode):
+    for name, values in {
+        "action/speed": episode.action[:, 0],
+        "action/turn": episode.action[:, 1],
+        "reward/total": episode.reward,
+        "contact": episode.contact,
+        **{f"reward/{name}": term for name, term in episode.reward_terms.items()},
+    }.items():
+        assert vectors(columns, f"/{name}", "Scalars:scalars").tolist() == values.astype(float).tolist(), name
+
+
+def test_agent_and_objects_move_as_they_did(columns, episode):
+    place = vectors(columns, "/world/agent", "Transform3D:translation")
+    np.testing.assert_allclose(place[:, :2], episode.position, atol=1e-5)
+    x, y, z, w = vectors(columns, "/world/agent", "Transform3D:quaternion").T
+    assert not x.any()
+    assert not y.any()
+    np.testing.assert_allclose(np.cos(2 * np.arctan2(z, w) - episode.heading), 1, atol=1e-6)
+    for i, name in enumerate(("goal", "adversary_0", "adversary_1")):
+        place = vectors(columns, f"/world/{name}", "Transform3D:translation")
+        np.testing.assert_allclose(place, episode.objects[:, i], atol=1e-5)
+
+
+def test_signals_are_those_that_the_brain_got(columns, episode):
+    for eye, name in enumerate(("left", "right")):
+        tensors = columns[f"/signals/{name}", "Tensor:data"]
+        assert tensors[0][0]["shape"] == list(episode.signals.shape[2:])
+        signals = np.array([tensor[0]["buffer"] for tensor in tensors]).reshape(-1, *episode.signals.shape[2:])
+        np.testing.assert_array_equal(signals, episode.signals[:, eye])
+
+
+def test_pictures_are_there_of_every_eye_at_every_time(columns, episode):
+    for name in ("left", "right"):
+        for entity, times in (("world/agent/eyes", 256), ("perfect_lens", 256), ("scene", 4)):
+            pictures = columns[f"/{entity}/{name}", "Image:buffer"]
+            assert len(pictures) == times
+        assert len(pictures[0][0]) == 48 * 60 * 3
+
+
+def test_eyes_are_cameras_that_look_where_the_eyes_look(columns, episode):
+    """A point straight ahead of an eye is on its camera's axis: R (0, 0, 1) = (cos azimuth, sin azimuth, 0)."""
+    for name, azimuth in zip(("left", "right"), np.radians([30, -30]), strict=True):
+        frame = np.reshape(columns[f"/world/agent/eyes/{name}", "Transform3D:mat3x3"][0][0], (3, 3)).T  # by columns
+        np.testing.assert_allclose(frame @ [0, 0, 1], [np.cos(azimuth), np.sin(azimuth), 0], atol=1e-6)
+        np.testing.assert_allclose(frame @ [0, -1, 0], [0, 0, 1], atol=1e-6, err_msg="up")
+        assert np.linalg.det(frame) == pytest.approx(1, abs=1e-6)
+        camera = columns[f"/world/agent/eyes/{name}", "Pinhole:image_from_camera"][0][0]
+        assert camera[0] == pytest.approx(5 / (2 * np.tan(np.radians(45) / 2)), rel=1e-6)
+
+
+def test_time_is_the_worlds(columns, episode):
+    seconds = np.array([value.total_seconds() for value in columns["/contact", "time"]])
+    np.testing.assert_allclose(seconds, np.arange(256) * Stage.of(episode).seconds, atol=1e-6)
+
+
+def test_replay_writes_page_and_recording(run, columns, capsys):
+    page, recording = replay.main(run, seed=3, rrd=True)
+    assert (page.suffix, recording.suffix) == (".html", ".rrd")
+    assert recording.stat().st_size > 100_000
+    assert [path.suffix for path in replay.main(run, seed=3)] == [".html"]
+
+
+def test_without_the_extra_one_line_says_so(run, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    assert main(["replay", str(run.path), "--rrd"]) == 2
+    assert capsys.readouterr().err == "evolve: error: --rrd needs rerun: pip install 'rhabdom[rerun]'\n"
