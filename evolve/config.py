@@ -115,6 +115,17 @@ class LearningConfig:
     gamma: float = _setting(0.9, Interval(0, 1), "discount per step")
     gae_lambda: float = _setting(0.9, Interval(0, 1), "share of what follows in an action's advantage, per step")
     value_weight: float = _setting(4.0, Interval(0, 1000), "weight of the critic's loss beside the actor's")
+    first_speed: float = _setting(
+        0.5, Interval(0, 1, open_low=True), "speed of the first actions, and twice its spread, as a part of the highest"
+    )
+    contact_ramp: int = _setting(
+        0, Interval(0, 10**10), "steps until contact costs its all: a tenth for a third of them, then evenly more"
+    )
+    rays_per_eye: float = _setting(
+        256.0,
+        Interval(0, 10**7, open_low=True),
+        "rays per eye and frame of a training, at most; one per receptor at least",
+    )
     eval_interval: int = _setting(50_000, Interval(1, 10**10), "training steps between evaluations")
     patience: int = _setting(5, Interval(1, 10**6), "evaluations without improvement before training stops")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from contextlib import closing
 from dataclasses import replace
@@ -85,10 +86,22 @@ def _live(
     """Training, and the evaluation episodes after it, in worlds never seen before."""
     weights, worlds, evaluation = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     eyes = phenotype.eyes(config.eye)
-    common: dict[str, Any] = {"memory": phenotype.memory_frames, "rays_per_receptor": config.eye.rays_per_receptor}
-    training_worlds = sim.make_vec_env(config.task, eyes, config.learning.n_envs, worlds, mode="training", **common)
+    common: dict[str, Any] = {"eyes": eyes, "memory": phenotype.memory_frames}
     evaluation_worlds = sim.make_vec_env(
-        config.task, eyes, config.evaluation.episodes, evaluation, mode="evaluation", **common
+        config.task,
+        n_envs=config.evaluation.episodes,
+        seed=evaluation,
+        mode="evaluation",
+        rays_per_receptor=config.eye.rays_per_receptor,
+        **common,
+    )
+    training_worlds = sim.make_vec_env(
+        config.task,
+        n_envs=config.learning.n_envs,
+        seed=worlds,
+        mode="training",
+        rays_per_receptor=_coarser(evaluation_worlds.renderer.fidelity, eyes, config.learning.rays_per_eye),
+        **common,
     )
     with closing(training_worlds), closing(evaluation_worlds):
         brain: dict[str, Any] = {"neurons": phenotype.neurons, "layers": phenotype.layers, "begun": begun}
@@ -96,3 +109,10 @@ def _live(
             training_worlds, evaluation_worlds, config=config.learning, seed=weights, progress=progress, **brain
         )
         return training, play(training.policy, evaluation_worlds, evaluation)
+
+
+def _coarser(fidelity: sim.Fidelity, eyes: sim.Eyes, rays_per_eye: float) -> sim.Fidelity:
+    """With so many rays at most, but one per receptor: what to learn from. Noise of the signals averages out over a
+    training, and errors of so few rays are the same at every look."""
+    most = max(1.0, rays_per_eye / math.prod(eyes.resolution))
+    return replace(fidelity, rays_per_receptor=min(fidelity.rays_per_receptor, most))

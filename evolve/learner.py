@@ -21,6 +21,7 @@ from evolve.config import LearningConfig
 from evolve.policy import EyePolicy, TrainingDiverged, learnt, set_learnt
 from evolve.rollout import FrameRolloutBuffer
 
+CONTACT_FIRST = 0.1  # of what contact costs in the end; with a third, agents turned on the spot
 UNIT_RATE = 0.2  # of the way to the spread of the last returns, per rollout
 FLAT = 1e-6  # spread of returns that all are the same
 
@@ -60,11 +61,11 @@ class Episodes:
 
 
 class RewardsInUnits(VecEnvWrapper):
-    """Worlds whose rewards come in units that the learner sets."""
+    """Worlds whose rewards come in units that the learner sets, and in which contact costs a share of its price."""
 
     def __init__(self, worlds: VecEnv) -> None:
         super().__init__(worlds)
-        self.unit = 1.0
+        self.unit = self.contact_share = 1.0
 
     def reset(self) -> dict[str, np.ndarray]:
         observation: dict[str, np.ndarray] = self.venv.reset()
@@ -72,6 +73,9 @@ class RewardsInUnits(VecEnvWrapper):
 
     def step_wait(self) -> VecEnvStepReturn:
         observation, reward, done, infos = self.venv.step_wait()
+        if self.contact_share < 1:
+            price = np.array([terms["contact"] for terms in map(_terms, infos)], np.float32)
+            reward = reward - np.float32(1 - self.contact_share) * price
         return observation, reward / np.float32(self.unit), done, infos
 
 
@@ -81,12 +85,14 @@ class AdaptingPPO(PPO):
 
     rollout_buffer: FrameRolloutBuffer
     policy: EyePolicy
+    contact_ramp = 0  # steps
 
     def collect_rollouts(
         self, env: VecEnv, callback: BaseCallback, rollout_buffer: RolloutBuffer, n_rollout_steps: int
     ) -> bool:
         if self.num_timesteps == 0:
             self.policy.features_extractor.adapt(torch.from_numpy(self._last_obs["eyes"][:, -1]))
+        self.env.contact_share = contact_share(self.num_timesteps, self.contact_ramp)
         return super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps)
 
     def train(self) -> None:
@@ -126,6 +132,17 @@ class AdaptingPPO(PPO):
         self.policy.optimizer.load_state_dict(begun.adam)
 
 
+def contact_share(steps: int, ramp: int) -> float:
+    """Of its whole price, what contact costs after so many steps: CONTACT_FIRST for a third of the ramp, then more by
+    the same factor each step.
+
+    Agents that pay for contact before they can steer learn to stand still, which costs nothing, and never steer.
+    """
+    if steps >= ramp:
+        return 1.0
+    return float(CONTACT_FIRST ** min(1.0, 1.5 * (1 - steps / ramp)))
+
+
 def _require_finite(name: str, values: np.ndarray, steps: int) -> None:
     if not np.isfinite(values).all():
         raise TrainingDiverged(f"{name} not finite after {steps} steps")
@@ -162,10 +179,11 @@ def learner(worlds: VecEnv, neurons: int, config: LearningConfig, seed: int, lay
         vf_coef=config.value_weight,
         seed=seed,
         device="cpu",
-        policy_kwargs={"neurons": neurons, "layers": layers},
+        policy_kwargs={"neurons": neurons, "layers": layers, "first_speed": config.first_speed},
         rollout_buffer_class=FrameRolloutBuffer,
         rollout_buffer_kwargs={"seed": seed},
     )
+    model.contact_ramp = config.contact_ramp
     model.set_logger(Logger(None, []))
     return model
 

@@ -31,8 +31,7 @@ from evolve.files import write_whole
 
 ENCODER_WIDTHS = (16, 16, 16)  # hidden, hidden, code of one frame
 EYE_FEATURES = 16  # what the temporal layer makes of an eye's remembered codes
-# Standard deviation 0.5 of the first actions: with 1, a third of the commands are clipped and turns are mostly noise.
-INITIAL_LOG_STD = -0.7
+FIRST_TURN = 0.5  # standard deviation of the first turns: with 1, a third of them are clipped
 DARK = 1e-6  # spread of signals that all are the same: keeps weights finite
 CONTRAST = 0.4  # what a signal one spread off its mean counts: small enough for tanh units to start out linear
 
@@ -167,8 +166,30 @@ class EyeFeatures(BaseFeaturesExtractor):
         return torch.where(back > age, first_codes[:, :, None], windows)
 
 
+class _Within(torch.autograd.Function):
+    """Means of actions whose gradient may push them up to the bounds, -1 and 1, and back, but not further out.
+
+    Commands beyond the bounds are clipped: a mean far out acts as if it did not explore at all, so nothing would ever
+    bring it back (Hausknecht and Stone 2016, section 5.2, "zeroing gradients").
+    """
+
+    @staticmethod
+    def forward(ctx: Any, mean: Tensor) -> Tensor:
+        ctx.save_for_backward(mean)
+        return mean.clone()
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> Tensor:
+        (mean,) = ctx.saved_tensors
+        # Descent raises the mean where the gradient is negative.
+        return gradient * torch.where(gradient < 0, mean < 1, mean > -1)
+
+
 class EyePolicy(MultiInputActorCriticPolicy):
-    """SB3's actor-critic over EyeFeatures, with `layers` hidden layers of `neurons` each for actor and critic."""
+    """SB3's actor-critic over EyeFeatures, with `layers` hidden layers of `neurons` each for actor and critic.
+
+    first_speed: mean of the untrained policy's speeds, and twice their standard deviation, as a part of the highest.
+    """
 
     def __init__(
         self,
@@ -178,16 +199,19 @@ class EyePolicy(MultiInputActorCriticPolicy):
         *,
         neurons: int,
         layers: int = 2,
+        first_speed: float = 0.5,
         **kwargs: Any,
     ) -> None:
         kwargs |= {
             "features_extractor_class": EyeFeatures,
             "net_arch": [neurons] * layers,
-            "log_std_init": INITIAL_LOG_STD,
             "optimizer_class": Adam,
         }
         super().__init__(observation_space, action_space, lr_schedule, **kwargs)
         self.config = PolicyConfig(tuple(observation_space["eyes"].shape), neurons, layers)
+        with torch.no_grad():
+            self.action_net.bias.copy_(torch.tensor([2 * first_speed - 1, 0.0]))
+            self.log_std.copy_(torch.tensor([first_speed, FIRST_TURN]).log())
 
     def extract_features(
         self, obs: dict[str, Tensor], features_extractor: BaseFeaturesExtractor | None = None
@@ -198,7 +222,8 @@ class EyePolicy(MultiInputActorCriticPolicy):
     def _get_action_dist_from_latent(self, latent_pi: Tensor) -> Distribution:
         if not torch.isfinite(latent_pi).all():
             raise TrainingDiverged("policy's actions not finite")
-        return super()._get_action_dist_from_latent(latent_pi)
+        mean = _Within.apply(self.action_net(latent_pi))
+        return self.action_dist.proba_distribution(mean, self.log_std)
 
 
 def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy:

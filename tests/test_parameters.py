@@ -131,6 +131,8 @@ class Case:
 
 # Steps too small to move a weight: but for the receptors' adapting, evaluations play the same, and soon none improves.
 STAGNANT = ("learning.learning_rate=1e-30", "learning.total_steps=256", "learning.eval_interval=32", *PERFECT)
+# Long enough, and fast enough, to come to a wall.
+TOUCHING = ("learning.first_speed=1", "learning.total_steps=1024", "learning.n_steps=32", *PERFECT)
 FIELDS = {
     "task": Case("task=tracking", life),
     "seed": Case("seed=1", history),
@@ -161,6 +163,8 @@ FIELDS = {
     "learning.gamma": Case("learning.gamma=0.5", life),
     "learning.gae_lambda": Case("learning.gae_lambda=0.5", life),
     "learning.value_weight": Case("learning.value_weight=0.5", life),
+    "learning.first_speed": Case("learning.first_speed=0.25", life),
+    "learning.contact_ramp": Case("learning.contact_ramp=1000", life, TOUCHING),
     "learning.rays_per_eye": Case("learning.rays_per_eye=32", life),
     "learning.eval_interval": Case("learning.eval_interval=32", life),
     "learning.patience": Case("learning.patience=1", life, STAGNANT),

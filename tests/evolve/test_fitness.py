@@ -1,6 +1,7 @@
 """A candidate's life in sim's worlds."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,6 +52,26 @@ def test_same_seed_same_life(outcome, tmp_path):
     assert again.curve == evaluation.curve
     assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
     assert other.returns != evaluation.returns
+
+
+@pytest.mark.parametrize(("rays_per_eye", "expected"), [(1e6, None), (36.0, 3.0), (1.0, 1.0)])
+def test_training_looks_less_closely_than_evaluation(rays_per_eye, expected, tmp_path, monkeypatch):
+    """At most so many rays for an eye of 12 receptors, one per receptor at least; None: as many as the noise asks for.
+    Evaluation traces those in any case."""
+    rays = {}
+
+    def recorded(*args, make=sim.make_vec_env, **kwargs):
+        worlds = make(*args, **kwargs)
+        rays[kwargs["mode"]] = worlds.renderer.fidelity.rays_per_receptor
+        return worlds
+
+    monkeypatch.setattr(sim, "make_vec_env", recorded)
+    config = small_config()
+    learning = replace(config.learning, rays_per_eye=rays_per_eye)
+    config = replace(config, eye=replace(config.eye, rays_per_receptor="auto"), learning=learning)
+    assert evaluate(replace(PHENOTYPE, resolution=(3, 4)), config, 5, tmp_path / "0.safetensors").failure is None
+    assert rays["evaluation"] > 3
+    assert rays["training"] == (expected or rays["evaluation"])
 
 
 def test_a_training_that_diverges_is_a_failure_with_a_reason(tmp_path, monkeypatch):

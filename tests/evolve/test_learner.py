@@ -1,12 +1,14 @@
 """The learner on a world that takes seconds: it learns, repeats itself exactly, stops in time and fails by name."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 from bright_spot import BrightSpot
 
 from evolve.config import LearningConfig
-from evolve.learner import learner, play, stuck, train
+from evolve.learner import contact_share, learner, play, stuck, train
 from evolve.policy import TrainingDiverged, learnt
 
 QUICK = LearningConfig(total_steps=8192, n_envs=16, n_steps=32, batch_size=128, eval_interval=2048, patience=100)
@@ -92,6 +94,32 @@ class Dear(BrightSpot):
 def test_the_unit_of_rewards_does_not_matter():
     training = learn(worlds=Dear(16))
     assert play(training.policy, BrightSpot(64), 99).successes.mean() > 0.9
+
+
+@pytest.mark.parametrize(
+    ("steps", "ramp", "share"),
+    [(0, 0, 1.0), (0, 900, 0.1), (300, 900, 0.1), (600, 900, 0.1**0.5), (900, 900, 1.0), (5000, 900, 1.0)],
+)
+def test_contact_costs_a_tenth_at_first_and_its_whole_price_at_the_end_of_the_ramp(steps, ramp, share):
+    assert contact_share(steps, ramp) == pytest.approx(share)
+
+
+class Touching(BrightSpot):
+    """Every action is in contact, and costs nothing else."""
+
+    def step_wait(self):
+        observation, reward, done, infos = super().step_wait()
+        for info in infos:
+            info["reward_terms"]["contact"] = -1.0
+        return observation, np.full_like(reward, -1), done, infos
+
+
+@pytest.mark.parametrize(("ramp", "cost"), [(0, 1.0), (10_000, 0.1)])
+def test_learners_pay_their_share_of_contact(ramp, cost):
+    model = learner(Touching(16), 16, replace(QUICK, contact_ramp=ramp), 0)
+    model.learn(512)
+    # Truncated episodes have the critic's guess of what follows added to their last reward.
+    assert np.median(-model.rollout_buffer.rewards) == pytest.approx(cost, rel=1e-6)
 
 
 class Favouring(BrightSpot):

@@ -6,8 +6,9 @@ import pickle
 import numpy as np
 import pytest
 import torch
+from gymnasium import spaces
 
-from evolve.policy import CONTRAST, PolicyConfig, build_policy, learnt, load_policy, save_policy
+from evolve.policy import CONTRAST, EyePolicy, PolicyConfig, build_policy, learnt, load_policy, save_policy
 
 CONFIG = PolicyConfig(eyes=(3, 2, 3, 2, 4), neurons=8)
 
@@ -151,3 +152,30 @@ def test_a_damaged_file_is_refused_by_name(policy, tmp_path):
             load_policy(path)
     with pytest.raises(ValueError, match="no policy at"):
         load_policy(tmp_path / "b.safetensors")
+
+
+def test_means_come_back_from_beyond_the_bounds_and_go_no_further():
+    """Gradients of a loss that wants every mean higher (lower): none for means above 1 (below -1)."""
+    policy = build_policy(PolicyConfig((1, 1, 1, 1, 1), 1))
+    policy.action_net.weight.data = torch.eye(2)[:, :1] + 0.0
+    policy.action_net.bias.data.zero_()
+    gradients = {}
+    for wish in (-1.0, 1.0):
+        latent = torch.tensor([[-3.0], [-0.5], [0.5], [3.0]], requires_grad=True)
+        mean = policy._get_action_dist_from_latent(latent).distribution.mean[:, 0]
+        assert torch.equal(mean, latent[:, 0])
+        (-wish * mean).sum().backward()
+        gradients[wish] = latent.grad.ravel().tolist()
+    assert gradients == {1.0: [-1, -1, -1, 0], -1.0: [0, 1, 1, 1]}
+
+
+def test_first_actions_are_as_fast_as_asked():
+    torch.manual_seed(0)
+    space = CONFIG.observation_space()
+    slow = EyePolicy(space, spaces.Box(-1.0, 1.0, (2,)), lambda _: 1e-3, neurons=8, first_speed=0.25)
+    n = 4000
+    blank = {name: torch.zeros(n, *box.shape) for name, box in space.spaces.items()}
+    speed, turn = ((slow(blank)[0] + torch.tensor([1.0, 0.0])) * torch.tensor([0.5, 1.0])).detach().T
+    for values, mean, spread in ((speed, 0.25, 0.125), (turn, 0.0, 0.5)):
+        assert abs(values.mean() - mean) < 5 * spread / n**0.5
+        assert abs(values.std() - spread) < 5 * spread / (2 * n) ** 0.5
