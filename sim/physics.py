@@ -119,7 +119,7 @@ class Physics:
         unstable = ~np.isfinite(states[:, -1]).all(axis=-1)  # an earlier state that is not sets the clock back
         unstable |= np.abs(states[:, -1, 0] - due) > self._model.opt.timestep / 2
         unstable |= ~(np.abs(velocity) < UNSTABLE_SPEED).all(axis=-1)
-        contact: np.ndarray = (sensors[:, :, self._touch] > 0).any(axis=(1, 2))
+        contact = np.asarray((sensors[:, :, self._touch] > 0).any(axis=(1, 2)))
         if unstable.any():
             path[unstable] = np.nan_to_num(state.position)[unstable, None]
             velocity = np.where(unstable[:, None], 0.0, velocity)
