@@ -132,8 +132,8 @@ def page(rows: Sequence[Row], origin: Origin) -> Page:
             f"Rayleigh's sharpest pinhole, a = {rayleigh():.2f}; noise opens it. But a hole that opens takes hardly "
             "any signal away: contrast falls, light grows faster. A brain that could undo the blur would open the "
             "pupil wide, by bits in all cases; and so would one that follows image quality as `optics.image_quality` "
-            "has it, contrast times throughput. If evolution's pupils close, it is because the brains that it gets cannot "
-            "do that. With a lens in focus the widest pupil is best by every measure."
+            "has it, contrast times throughput. If evolution's pupils close, it is because the brains that it gets "
+            "cannot do that. With a lens in focus the widest pupil is best by every measure."
         ),
         method=(
             f"Eyes 200 µm wide, {FOV_DEG:g}°, {RESOLUTION} x {RESOLUTION} receptors, in white daylight; hole and ideal "

@@ -1,4 +1,4 @@
-"""The best pupil: measures against closed forms, the sharpest pinhole against Rayleigh's, the page against the store."""
+"""The best pupil: measures against closed forms, the sharpest pinhole against Rayleigh's, the page against it."""
 
 from pathlib import Path
 

@@ -1,0 +1,149 @@
+"""Brains and acuity: error against what eyes resolve and brains hold
+
+python -m experiments.brains_and_acuity [--runs TASK=DIR ...] [--answer TEXT] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments import evolved
+from experiments.evolved import Interval, Row, Store
+from experiments.page import Figure, Page, markdown_table, new_figure, save
+
+__all__ = ["PowerLaw", "error", "fitted", "page"]
+
+NAME = "brains_and_acuity"
+COLORS = {"navigation": "#D55E00", "detection": "#0072B2", "tracking": "#009E73"}
+PUBLISHED = {"navigation": 0.69, "detection": 0.74, "tracking": 0.59}
+RESAMPLES = 2000
+CLASSES = 4  # of acuity
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """error = scale · (size / 10⁴)^-exponent; explained: share of the variance of log error."""
+
+    exponent: Interval
+    scale: float
+    explained: float
+
+
+def error(row: Row) -> float:
+    """Share of episodes in which the goal did not come first, (k + 1/2) / (n + 1), so that no error has no logarithm
+    (Jeffreys' mean)."""
+    return ((1 - row.success_rate) * row.episodes + 0.5) / (row.episodes + 1)
+
+
+def size(row: Row) -> float:
+    """Acuity x parameters x memory [cycles/degree · frames]."""
+    return row.cpd * row.parameters * row.memory_frames
+
+
+def fitted(rows: Sequence[Row], seed: int = 0) -> PowerLaw:
+    """Least squares in logarithms, with a bootstrap over candidates; raises ValueError with fewer than three sizes."""
+    x = np.log([size(row) / 1e4 for row in rows])
+    y = np.log([error(row) for row in rows])
+    if np.unique(x).size < 3:
+        raise ValueError("a power law needs candidates of at least three sizes")
+    slope, offset = np.polyfit(x, y, 1)
+    chance = np.random.default_rng(seed)
+    slopes = []
+    for _ in range(RESAMPLES):
+        chosen = chance.integers(len(x), size=len(x))
+        if np.ptp(x[chosen]) > 0:
+            slopes.append(np.polyfit(x[chosen], y[chosen], 1)[0])
+    low, high = np.quantile(slopes, [0.025, 0.975])
+    left = np.var(y - slope * x - offset) / np.var(y) if np.var(y) > 0 else 1.0
+    return PowerLaw(Interval(-float(slope), -float(high), -float(low)), math.exp(offset), 1 - float(left))
+
+
+def trained(store: Store, group: str) -> list[Row]:
+    """Candidates that have a policy."""
+    return [row for row in store.group(group) if not row.failed and row.parameters]
+
+
+def page(store: Store) -> Page:
+    """The page of stored runs."""
+    return Page(
+        name=NAME,
+        title="Brains and acuity",
+        question=(
+            "How does error fall with acuity, parameters and memory? Published: as a power of their product, with "
+            "exponents 0.69 for navigation, 0.74 for detection, 0.59 for tracking, and with ceilings for each acuity."
+        ),
+        answer=store.answer,
+        method=(
+            "Candidates are spread evenly over receptors, memory and neurons, each trained once from its own seed. "
+            "Error: the share of evaluation episodes in which the goal did not come first. Power laws by least "
+            "squares in logarithms; 95 % intervals by a bootstrap over candidates. Parameters are all of a policy's, "
+            "critic included. The best of an acuity is the mean of its best quarter, which bounds what brains add."
+        ),
+        command=(
+            "evolve run --preset scaling    # and: evolve run navigation --preset scaling, evolve run tracking ...\n"
+            "python -m experiments.brains_and_acuity --runs detection=DIR navigation=DIR tracking=DIR"
+        ),
+        figures=[Figure(NAME, lambda path: draw(store, path), "Each dot is a candidate, darker for finer acuity.")],
+        tables=[exponents(store), ceilings(store)],
+        origin=store.origin,
+    )
+
+
+def exponents(store: Store) -> str:
+    """A row per task."""
+    lines = []
+    for group in store.groups:
+        rows = trained(store, group)
+        law = fitted(rows)
+        published = f"{PUBLISHED[group]:g}" if group in PUBLISHED else "-"
+        lines.append([group, str(len(rows)), str(law.exponent), published, f"{law.explained:.2f}"])
+    return markdown_table(["task", "candidates", "exponent", "published", "variance explained"], lines)
+
+
+def ceilings(store: Store) -> str:
+    """Mean error and that of the best quarter, by class of acuity."""
+    lines = []
+    for group in store.groups:
+        rows = sorted(trained(store, group), key=lambda row: row.cpd)
+        for part in np.array_split(np.arange(len(rows)), CLASSES):
+            mine = [rows[i] for i in part]
+            if mine:
+                errors = np.sort([error(row) for row in mine])
+                best = errors[: max(1, len(errors) // 4)].mean()
+                acuity = f"{mine[0].cpd:.2g} to {mine[-1].cpd:.2g}"
+                lines.append([group, acuity, str(len(mine)), f"{errors.mean():.2f}", f"{best:.2f}"])
+    return markdown_table(["task", "acuity [cycles/°]", "candidates", "mean error", "of the best quarter"], lines)
+
+
+def draw(store: Store, path: Path) -> None:
+    """A panel per task."""
+    figure, axes = new_figure(3.6 * len(store.groups) + 0.5, 3.6, columns=len(store.groups), sharey=True)
+    for place, group in zip(axes[0], store.groups, strict=True):
+        rows, color = trained(store, group), COLORS.get(group, "#777777")
+        ranks = np.argsort(np.argsort([row.cpd for row in rows])) / max(len(rows) - 1, 1)
+        for row, rank in zip(rows, ranks, strict=True):
+            place.loglog(size(row), error(row), "o", color=color, alpha=0.2 + 0.75 * rank, ms=5, mec="none")
+        law = fitted(rows)
+        ends = np.array([min(map(size, rows)), max(map(size, rows))])
+        place.loglog(ends, law.scale * (ends / 1e4) ** -law.exponent.mean, color="#222222", lw=1.2)
+        place.set_title(f"{group}: exponent {law.exponent}", fontsize=10)
+        place.set_xlabel("acuity x parameters x memory")
+    axes[0, 0].set_ylabel("error")
+    save(figure, path)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Collect runs if asked, and make the page."""
+    return evolved.main(NAME, __doc__ or "", page, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

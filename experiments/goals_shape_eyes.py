@@ -1,0 +1,122 @@
+"""Goals shape eyes: evolution from one photoreceptor, for navigation and for detection
+
+python -m experiments.goals_shape_eyes [--runs navigation=DIR ... detection=DIR ...] [--answer TEXT] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from experiments import evolved
+from experiments.evolved import LAST, Row, Store, last_mean, of_generation
+from experiments.page import Figure, Page, markdown_table, new_figure, save
+
+__all__ = ["page"]
+
+NAME = "goals_shape_eyes"
+COLORS = {"navigation": "#D55E00", "detection": "#0072B2"}
+QUANTITIES: dict[str, Callable[[Row], float]] = {
+    "eyes": lambda row: row.n_eyes,
+    "receptors per eye, across": lambda row: row.width,
+    "receptors per eye, up": lambda row: row.height,
+    "placement range [°]": lambda row: row.placement_range_deg if row.n_eyes > 1 else float("nan"),
+    "field of view [°]": lambda row: row.fov_deg,
+    "acuity [cycles/°]": lambda row: row.cpd,
+    "fitness": lambda row: row.fitness,
+    "success rate": lambda row: row.success_rate,
+}
+PUBLISHED = {
+    "navigation": ("10", "4", "1", "135", "", "", "", ""),
+    "detection": ("2", "15", "15", "forward", "", "", "", ""),
+}
+
+
+def page(store: Store) -> Page:
+    """The page of stored runs."""
+    return Page(
+        name=NAME,
+        title="Goals shape eyes",
+        question=(
+            "From one eye with one photoreceptor, do finding the way through a maze and telling a goal from its "
+            "doubles make different eyes? Published: many narrow eyes around the body for navigation, two with many "
+            "receptors that look ahead for detection."
+        ),
+        answer=store.answer,
+        method=(
+            "Lines are means over the candidates of a generation, one line per seed; all seeds are shown. The table "
+            f"has means of the last {LAST} generations, over seeds, with 95 % intervals by a bootstrap over seeds and "
+            "candidates; with few seeds they are too narrow. Eyes have perfect lenses, brains are given. Placement "
+            "counts where there is more than one eye."
+        ),
+        command=(
+            "evolve run --preset bifurcation-navigation --seed 0    # and 1, 2\n"
+            "evolve run --preset bifurcation-detection --seed 0\n"
+            "python -m experiments.goals_shape_eyes --runs navigation=DIR detection=DIR"
+        ),
+        figures=[
+            Figure(NAME, lambda path: draw(store, path), f"Generation by generation: {_legend(store)}."),
+        ],
+        tables=[table(store), "Every seed:", seeds_table(store)],
+        origin=store.origin,
+    )
+
+
+def _legend(store: Store) -> str:
+    names = {"navigation": "orange", "detection": "blue"}
+    return ", ".join(f"{group} {names.get(group, 'grey')}" for group in store.groups)
+
+
+def table(store: Store) -> str:
+    """A row per quantity: what came out and what was published, group by group."""
+    header = ["mean of the last generations", *(f"{g}{what}" for g in store.groups for what in ("", ", published"))]
+    lines = []
+    for place, (name, value) in enumerate(QUANTITIES.items()):
+        cells = [[_shown(store.group(g), value), PUBLISHED[g][place] if g in PUBLISHED else ""] for g in store.groups]
+        lines.append([name, *(cell for pair in cells for cell in pair)])
+    return markdown_table(header, lines)
+
+
+def seeds_table(store: Store) -> str:
+    """A row per run."""
+    lines = []
+    for group in store.groups:
+        for seed in sorted({row.seed for row in store.group(group)}):
+            rows = [row for row in store.group(group) if row.seed == seed]
+            found = [last_mean(rows, value) for value in QUANTITIES.values()]
+            lines.append([f"{group}, seed {seed}", *("-" if f is None else f"{f.mean:.3g}" for f in found)])
+    return markdown_table(["run", *QUANTITIES], lines)
+
+
+def _shown(rows: Sequence[Row], value: Callable[[Row], float]) -> str:
+    found = last_mean(rows, value)
+    return "-" if found is None else str(found)
+
+
+def draw(store: Store, path: Path) -> None:
+    """A panel per quantity, a line per seed."""
+    figure, axes = new_figure(11, 5.2, columns=4, rows=2, sharex=True)
+    for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=True):
+        for group in store.groups:
+            rows, color = store.group(group), COLORS.get(group, "#777777")
+            for seed in sorted({row.seed for row in rows}):
+                place.plot(*of_generation([row for row in rows if row.seed == seed], value), color=color, lw=1.2)
+            found = last_mean(rows, value)
+            if found is not None:
+                end = max(row.generation for row in rows) + (1 if group == store.groups[0] else 1.5)
+                place.plot([end, end], [found.low, found.high], color=color, lw=2.5, alpha=0.5)
+                place.plot(end, found.mean, "o", color=color, ms=4)
+        place.set_title(name, fontsize=10)
+    for place in axes[1]:
+        place.set_xlabel("generation")
+    save(figure, path)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Collect runs if asked, and make the page."""
+    return evolved.main(NAME, __doc__ or "", page, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

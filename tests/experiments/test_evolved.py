@@ -1,0 +1,139 @@
+"""Runs become rows, rows means with intervals, power laws and pages."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from evolve.candidate import Candidate
+from evolve.config_source import assemble
+from evolve.development import develop
+from evolve.evaluation import Evaluation
+from evolve.genotype import Genotype
+from evolve.store import Run
+from experiments import bending_light, brains_and_acuity, goals_shape_eyes
+from experiments.evolved import Row, last_mean, main, rows_of
+from experiments.store import Origin, write_rows
+from optics import backend
+
+SMALL = ("search.population=2", "search.generations=2")
+PHASES = (*SMALL, "genome.doe.opens_at=1", "genome.refractive_index.opens_at=1")
+
+
+def run_of(path, preset, settings, fitness):
+    """A run whose candidates were never trained; fitness None: that one failed."""
+    config = assemble(preset=preset, assignments=settings)
+    run = Run.create(path, config)
+    start = Genotype(config.genome).start
+    for identity, value in enumerate(fitness):
+        outcome = Evaluation.failed("too weak") if value is None else Evaluation(value, (value,) * 4, 0.25, 10, 1.0)
+        place = (identity, *divmod(identity, 2))
+        genome = np.clip(start + 0.01 * identity, 0, 1)
+        run.append(Candidate.of(place, tuple(genome), develop(genome, config), identity, outcome))
+    return run
+
+
+ROW = Row(*("a", 0, 0, 0, 0, 0, 1.0, 0.5, 4, 2, 60.0, 45.0, 8, 8, 0.1, 5, 64, 1000))
+
+
+def test_candidates_become_rows(tmp_path):
+    rows = rows_of(run_of(tmp_path / "run", "bifurcation-detection", SMALL, (1.0, None, 3.0, 2.0)), "detection")
+    assert [(r.generation, r.index, r.failed, r.fitness) for r in rows] == [
+        *((0, 0, 0, 1.0), (0, 1, 1, -math.inf), (1, 0, 0, 3.0), (1, 1, 0, 2.0))
+    ]
+    first = rows[0]
+    assert (first.n_eyes, first.height, first.width, first.episodes, first.parameters) == (1, 1, 1, 4, 0)
+    assert first.cpd == pytest.approx(1 / 90)
+    assert math.isnan(first.relative_aperture)
+
+
+def test_the_best_of_each_generation_is_looked_through(tmp_path):
+    backend.require()
+    small = ("genome.resolution_height.start=4", "genome.resolution_width.start=4", "genome.n_eyes.start=1")
+    rows = rows_of(run_of(tmp_path / "run", "lens", (*PHASES, *small), (1.0, 4.0, None, 2.0)), "lens")
+    assert [math.isfinite(row.strehl) for row in rows] == [False, True, False, True]
+    assert [row.phase for row in rows] == [0, 0, 1, 1]
+    best = rows[1]
+    assert 0 < best.image_quality < best.above_noise < 1
+    assert len(best.relief.split()) == 16
+
+
+def test_mean_is_over_the_last_generations_that_succeeded():
+    rows = [replace(ROW, generation=g, fitness=float(g), failed=int(g == 9)) for g in range(10)]
+    assert last_mean(rows, lambda row: row.fitness).mean == 7.5
+    assert last_mean(rows, lambda row: math.nan) is None
+
+
+def test_seeds_that_differ_make_the_interval_wide():
+    """Two seeds, far apart and each of one mind: a bootstrap over candidates alone would be sure of their mean."""
+    rows = [replace(ROW, seed=seed, index=i, fitness=1.0 + 2 * seed) for seed in (0, 1) for i in range(50)]
+    found = last_mean(rows, lambda row: row.fitness)
+    assert (found.mean, found.low, found.high) == (2.0, 1.0, 3.0)
+
+
+def with_error(wanted, size):
+    """A row of this error and size."""
+    episodes = 10_000
+    failures = wanted * (episodes + 1) - 0.5
+    changes = {"episodes": episodes, "success_rate": 1 - failures / episodes, "memory_frames": 1, "cpd": 1.0}
+    return replace(ROW, parameters=size, **changes)
+
+
+def test_power_law_is_found():
+    sizes = (1000, 5000, 20_000, 100_000)
+    law = brains_and_acuity.fitted([with_error(0.3 * (size / 1e4) ** -0.4, size) for size in sizes])
+    assert law.exponent.mean == pytest.approx(0.4)
+    assert law.exponent.low == pytest.approx(0.4)
+    assert law.scale == pytest.approx(0.3)
+    assert law.explained == pytest.approx(1.0)
+    with pytest.raises(ValueError, match="three sizes"):
+        brains_and_acuity.fitted([with_error(0.3, 1000)] * 5)
+
+
+def test_no_error_still_has_a_logarithm():
+    assert brains_and_acuity.error(replace(ROW, success_rate=1.0, episodes=4)) == pytest.approx(0.1)
+
+
+def test_fittest_and_least_fit_are_of_the_last_phase():
+    rows = [replace(ROW, generation=g, phase=int(g > 0), fitness=-float(g), relief="0.5") for g in range(4)]
+    best, worst = bending_light.extremes(rows)
+    assert (best.generation, worst.generation) == (1, 3)
+
+
+@pytest.mark.parametrize("experiment", [goals_shape_eyes, bending_light, brains_and_acuity])
+def test_pages_come_from_their_stores(experiment, tmp_path, capsys):
+    chance = np.random.default_rng(0)
+    rows = [
+        replace(
+            *(ROW,), group=group, seed=seed, generation=g, phase=int(g > 1), index=i, fitness=chance.random(),
+            cpd=chance.random(), parameters=int(chance.integers(100, 10_000)), relative_aperture=chance.random(),
+            refractive_index=1.5, strehl=0.1, relief=" ".join(f"{u:.2f}" for u in chance.random(16)),
+        )
+        for group in ("navigation", "detection") for seed in (3, 4) for g in range(4) for i in range(3)
+    ]  # fmt: skip
+    stem = tmp_path / "data" / experiment.NAME
+    write_rows(rows, stem.with_suffix(".csv"))
+    Origin.here(1.0).write(stem.with_suffix(".json"))
+    assert experiment.main(["--docs", str(tmp_path), "--answer", "Partly, because nobody learnt."]) == 0
+    assert experiment.main(["--docs", str(tmp_path)]) == 0, "the answer is kept"
+    text = (tmp_path / f"{experiment.NAME}.md").read_text()
+    assert "**Answer.** Partly, because nobody learnt." in text
+    for line in text.splitlines():
+        if line.startswith("!["):
+            assert (tmp_path / line.rpartition("(")[2][:-1]).stat().st_size > 5000
+    if experiment is goals_shape_eyes:
+        assert "| navigation, seed 3 |" in text
+        assert "| detection, seed 4 |" in text
+
+
+def test_what_cannot_be_collected_gets_one_line(tmp_path, capsys):
+    def page(store):
+        raise AssertionError("there is nothing to make it of")
+
+    assert main("x", "X", page, ["--docs", str(tmp_path)]) == 2
+    assert "holds no runs" in capsys.readouterr().err
+    assert main("x", "X", page, ["--docs", str(tmp_path), "--runs", "lens"]) == 2
+    assert "--runs: must be GROUP=DIR" in capsys.readouterr().err
+    assert main("x", "X", page, ["--docs", str(tmp_path), "--runs", "lens=/absent"]) == 2
+    assert "/absent is no run" in capsys.readouterr().err
