@@ -1,0 +1,101 @@
+"""How much room a finite transform leaves: for light at Nyquist's frequency, which ends as if cut, and blurs."""
+
+import math
+
+import numpy as np
+import pytest
+
+import optics
+from optics.free_space import EVERYTHING, Passage
+from optics.grid import Grid
+from optics.period import blurred_back, most_spare, sampling
+
+WAVELENGTH = 550e-9
+FAR = 1.2e-3  # [m] of room: blur falls to a twentieth of what it is with next to none
+# How far the estimate may be off. It takes Nyquist's light for incoherent and even over the source; where it is neither
+# (all rows of a square are alike) a factor of three was the largest found.
+FACTOR = 5
+
+
+def disk(n, dx, radius):
+    x = (np.arange(n) - n // 2) * dx
+    return (np.hypot.outer(x, x) <= radius).astype(complex)
+
+
+def square(n, dx, radius):
+    inside = np.abs((np.arange(n) - n // 2) * dx) <= radius
+    return np.outer(inside, inside).astype(complex)
+
+
+def noise(n, dx, radius):
+    return disk(n, dx, radius) * np.exp(2j * np.pi * np.random.default_rng(0).random((n, n)))
+
+
+def carried(u, dx, z, window, spare, paraxial):
+    """The field in the window, and the relative error of its intensity that `blurred_back` says."""
+    how = sampling(Passage(WAVELENGTH, z, paraxial, EVERYTHING, 3e-6, window.centre), Grid(u.shape, dx), window, spare)
+    assert how.passage.band == EVERYTHING  # or nothing would be cut
+    period, n, m = how.period, u.shape[0], window.shape[0]
+    wrapped = np.zeros((period, period), complex)
+    wrapped[:n, :n] = u
+    spectrum = np.fft.fft2(np.roll(wrapped, (-(n // 2), -(n // 2)), (0, 1)))
+    f = np.fft.fftfreq(period, dx)
+    f2 = f[:, None] ** 2 + f[None, :] ** 2
+    waves = z / WAVELENGTH - z * WAVELENGTH * f2 / 2 if paraxial else z * np.sqrt(np.maximum(WAVELENGTH**-2 - f2, 0))
+    waves = waves + f[None, :] * window.centre[0] + f[:, None] * window.centre[1]
+    out = np.fft.ifft2(spectrum * np.exp(2j * np.pi * waves))
+    at = (np.arange(m) - m // 2) * round(window.dx / dx) % period
+    out = out[np.ix_(at, at)]
+    power = np.sum(np.abs(out) ** 2) * (window.dx / dx) ** 2
+    return out, 2 * math.sqrt(blurred_back(spectrum.T, how) / power)
+
+
+class TestBlur:
+    @pytest.mark.parametrize("source", [disk, square, noise])
+    @pytest.mark.parametrize(
+        ("dx", "z", "radius", "m", "step", "centre", "paraxial"),
+        [
+            (0.47e-6, 200e-6, 50e-6, 129, 2, (0.0, 0.0), False),
+            (0.47e-6, 200e-6, 50e-6, 129, 2, (0.0, 0.0), True),
+            (0.4e-6, 100e-6, 20e-6, 65, 1, (20e-6, 0.0), True),
+            (0.34e-6, 60e-6, 20e-6, 65, 1, (0.0, 10e-6), True),
+        ],
+    )
+    def test_is_about_what_it_is_said_to_be(self, source, dx, z, radius, m, step, centre, paraxial):
+        u, window = source(2 * int(radius / dx) + 3, dx, radius), Grid((m, m), step * dx, centre)
+        exact, _ = carried(u, dx, z, window, FAR, paraxial)
+        found, said = carried(u, dx, z, window, 1e-6, paraxial)
+        actual = np.linalg.norm(np.abs(found) ** 2 - np.abs(exact) ** 2) / np.linalg.norm(np.abs(exact) ** 2)
+        assert actual / FACTOR < said < actual * FACTOR
+
+    def test_falls_with_the_room(self):
+        """Like 1 / room far away; the nearest light of 130 µm source and 120 µm window is nearer."""
+        u, window = disk(215, 0.47e-6, 50e-6), Grid((129, 129), 0.94e-6)
+        said = [carried(u, 0.47e-6, 200e-6, window, room, True)[1] for room in (200e-6, 400e-6, 800e-6)]
+        assert 1.4 < said[0] / said[1] < 2
+        assert 1.6 < said[1] / said[2] < 2.1
+
+    def test_is_nothing_for_what_ends_before_nyquist(self):
+        """A smooth beam: all that its spectrum holds at Nyquist's frequency is next to nothing."""
+        n, dx = 215, 0.47e-6
+        x = (np.arange(n) - n // 2) * dx
+        u = np.exp(-np.add.outer(x**2, x**2) / (15e-6) ** 2).astype(complex)
+        assert carried(u, dx, 200e-6, Grid((129, 129), 0.94e-6), 1e-6, False)[1] < 1e-6
+
+    @pytest.mark.parametrize("tolerance", [3e-3, 1e-3])
+    def test_propagate_makes_room_for_it(self, tolerance):
+        u, dx, z, window = disk(215, 0.47e-6, 50e-6), 0.47e-6, 200e-6, Grid((129, 129), 0.94e-6)
+        settings = {"dx": dx, "wavelength": WAVELENGTH, "distance": z, "out_dx": window.dx, "out_shape": window.shape}
+        found = np.abs(optics.propagate(u, **settings, tolerance=tolerance, dtype="float64").u) ** 2
+        far = np.abs(carried(u, dx, z, window, FAR, False)[0]) ** 2
+        assert np.linalg.norm(found - far) < tolerance * np.linalg.norm(far)
+
+
+def test_no_more_room_than_pays():
+    """White noise holds so much light at Nyquist's frequency that no room would do: it is part of its sampling."""
+    u = noise(101, 0.47e-6, 22e-6)
+    result = optics.propagate(u, dx=0.47e-6, wavelength=WAVELENGTH, distance=200e-6, tolerance=1e-6, dtype="float64")
+    passage = Passage(WAVELENGTH, 200e-6, False, EVERYTHING, 3e-9, (0.0, 0.0))
+    source = Grid((95, 95), 0.47e-6)
+    most = sampling(passage, source, Grid(u.shape, 0.47e-6), most_spare(passage, source))
+    assert result.plan.samples == (most.period, most.period)
