@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import drjit as dr
+import numpy as np
+from stable_baselines3.common.vec_env import VecEnvWrapper
 
 import sim
 from evolve.config import LearningConfig
@@ -38,7 +40,9 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """One evaluation. cpu_seconds: of rollouts and updates so far, one thread; update_seconds: of updates alone."""
+    """One evaluation. cpu_seconds: of rollouts and updates so far, one thread; update_seconds: of updates alone;
+    contacts: actions in contact per episode; distance: of an episode's end from its start [m]; errors are standard
+    errors of means. Not a number: not measured."""
 
     case: str
     seed: int
@@ -49,6 +53,30 @@ class Row:
     adversaries: int
     episodes: int
     mean_return: float
+    return_error: float = math.nan
+    contacts: float = math.nan
+    distance: float = math.nan
+    distance_error: float = math.nan
+
+
+class Journey(VecEnvWrapper):
+    """Worlds that note how their first episodes since a reset went: contacts (n,), distance from the start [m] (n,)."""
+
+    def reset(self) -> Any:
+        observation = self.venv.reset()
+        self.contacts, self.distance = np.zeros(self.num_envs), np.zeros(self.num_envs)
+        self.playing = np.ones(self.num_envs, bool)
+        self.start = self.venv.state.start.copy()
+        return observation
+
+    def step_wait(self) -> Any:
+        observation, reward, done, infos = self.venv.step_wait()
+        position = np.array([info["position"] for info in infos])
+        contact = np.array([info["reward_terms"]["contact"] != 0 for info in infos])
+        self.contacts += self.playing & contact
+        self.distance[self.playing] = np.linalg.norm(position - self.start, axis=1)[self.playing]
+        self.playing &= ~done
+        return observation, reward, done, infos
 
 
 def watched(case: Case, seed: int) -> Iterable[Row]:
@@ -56,7 +84,7 @@ def watched(case: Case, seed: int) -> Iterable[Row]:
     dr.set_thread_count(1)
     common: dict[str, Any] = {"memory": case.memory, "rays_per_receptor": case.rays_per_receptor}
     worlds = sim.make_vec_env(case.task, case.eyes, case.learning.n_envs, seed, **common)
-    unseen = sim.make_vec_env(case.task, case.eyes, case.episodes, seed + UNSEEN, **common)
+    unseen = Journey(sim.make_vec_env(case.task, case.eyes, case.episodes, seed + UNSEEN, **common))
     model = learner(worlds, case.neurons, case.learning, seed)
     cpu_seconds = update_seconds = 0.0
     update = model.train
@@ -83,7 +111,16 @@ def watched(case: Case, seed: int) -> Iterable[Row]:
             adversaries=int((episodes.first_events < 0).sum()),
             episodes=case.episodes,
             mean_return=round(float(episodes.returns.mean()), 4),
+            return_error=_error(episodes.returns),
+            contacts=round(float(unseen.contacts.mean()), 2),
+            distance=round(float(unseen.distance.mean()), 2),
+            distance_error=_error(unseen.distance),
         )
+
+
+def _error(values: np.ndarray) -> float:
+    """Standard error of the mean."""
+    return round(float(values.std(ddof=1)) / math.sqrt(len(values)), 4)
 
 
 def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:

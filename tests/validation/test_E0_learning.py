@@ -2,16 +2,53 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from gymnasium import spaces
+from stable_baselines3.common.vec_env import VecEnv
 
 import sim
 from evolve.config import LearningConfig
+from evolve.policy import PolicyConfig
 from validation import E0_learning
-from validation.learning import Case, Row, read_rows, steps_to, watched, wilson, write_rows
+from validation.learning import Case, Journey, Row, read_rows, steps_to, watched, wilson, write_rows
 
 ROOT = Path(__file__).parents[2]
-ROW = Row("detection, 2 x (15 x 15)", 0, 50_000, 10.0, 4.0, 30, 60, 100, 1.5)
+ROW = Row("detection, 2 x (15 x 15)", 0, 50_000, 10.0, 4.0, 30, 60, 100, 1.5, 0.1, 20.0, 7.0, 0.3)
+
+
+class Walkers(VecEnv):
+    """Two that walk along x; every second action touches something; the first one's episodes take two actions."""
+
+    def __init__(self):
+        super().__init__(2, PolicyConfig((1, 1, 1, 1, 1), 1).observation_space(), spaces.Box(-1, 1, (2,)))
+        self.state = SimpleNamespace(start=np.array([[3.0, 4.0], [3.0, 4.0]]))
+
+    def reset(self):
+        self.x, self.steps = np.array([3.0, 3.0]), 0
+
+    def step_async(self, actions):
+        self.x, self.steps = self.x + 1, self.steps + 1
+
+    def step_wait(self):
+        touching = -1.0 if self.steps % 2 else 0.0
+        infos = [{"position": (x, 4.0), "reward_terms": {"contact": touching}} for x in self.x]
+        done = np.array([self.steps % 2 == 0, False])
+        self.x = np.where(done, 3.0, self.x)
+        return None, np.zeros(2), done, infos
+
+    def close(self): ...
+
+    def get_attr(self, *_):
+        return [None, None]
+
+    def set_attr(self, *_): ...
+
+    def env_method(self, *_): ...
+
+    def env_is_wrapped(self, *_): ...
 
 
 def learning(case, *goals, seed=0):
@@ -45,6 +82,29 @@ def test_verdicts_name_what_is_not_learnt():
         "detection, 1 receptor, seed 0: better than chance",
         "tracking, seed 0: not solved",
     ]
+
+
+def test_ten_eyes_must_beat_one_by_more_than_chance():
+    """Standard errors .1 and .3: a difference of returns by .28 is the 95 % limit, of distances by .83 m."""
+    many = replace(ROW, case="navigation, 10 x (1 x 4)")
+    one = replace(ROW, case="navigation, 1 x (1 x 4)", mean_return=1.2, distance=6.0)
+    assert E0_learning.verdicts([many, one]) == []
+    assert E0_learning.verdicts([many, replace(one, mean_return=1.3, distance=6.2)]) == [
+        "navigation, seed 0: ten eyes do not beat one (mean_return)",
+        "navigation, seed 0: ten eyes do not beat one (distance)",
+    ]
+    assert "1.50 ± 0.20" in E0_learning.table([many])
+    assert "7.0 ± 0.6" in E0_learning.table([many])
+
+
+def test_a_journey_ends_where_its_first_episode_ends():
+    """Two worlds walk 1 m per action from (3, 4); the first one's episode ends after two actions, and starts anew."""
+    worlds = Journey(Walkers())
+    worlds.reset()
+    for _ in range(4):
+        worlds.step(np.zeros((2, 2)))
+    assert worlds.distance.tolist() == [2.0, 4.0]
+    assert worlds.contacts.tolist() == [1, 2]
 
 
 def test_a_training_is_watched():
