@@ -1,7 +1,7 @@
 """D1: speed against accuracy of what agents see
 
 Every way to render a world for its agents' eyes, by its error and its speed. The error is the root mean square, over
-receptors, channels, eyes and states that agents got into, of the difference to a reference: Mitsuba's path tracer in 16
+receptors, channels, eyes and states that agents got into, of the difference to a reference: Mitsuba's path tracer in 8
 bands, then the convolution `Eye.see`; it is in units of the photoreceptors' noise, σ = 0.01. Errors below σ/2 change
 nothing that a brain can tell. Speed is agent-steps (all eyes of one agent, once) per second of one core's CPU time, the
 best of several interleaved rounds, behind the pupil, without physics.
@@ -37,7 +37,7 @@ from validation.scenes import SCENES, SIGMA, Scene, lived_through, rms
 from validation.speed_accuracy import Chart, Point, Setting, draw, rows_of, table
 from validation.stored import write_table
 
-BANDS = 16  # of the references
+BANDS = 8  # of the references: good to 0.7 % of a signal, since their weights are exact
 SPP = 64
 FEW, MANY = 8, 64  # worlds rendered at once: few where rays are many
 SLACK = 0.8  # of the front's speed

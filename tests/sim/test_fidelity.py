@@ -101,7 +101,7 @@ def test_the_same_pick_every_time_whatever_the_number_of_worlds():
 
 def test_it_can_be_overruled():
     world = sim.build_world("detection")
-    eyes = behind_lens(DETECTION, 0.25)
+    eyes = behind_lens(FEW, 0.25)
     strict = sim.choose_fidelity(world, eyes, tolerance=2e-3)
     assert strict.tolerance == 2e-3
     assert strict.rays_per_receptor > sim.choose_fidelity(world, eyes).rays_per_receptor
@@ -109,7 +109,7 @@ def test_it_can_be_overruled():
     assert renderer.fidelity is strict
     assert len(renderer.bands.wavelengths) == strict.bands
     asked = sim.BatchedRenderer(world, eyes, 1, 2)
-    assert len(asked.sensor.directions) == 2 * 99
+    assert len(asked.sensor.directions) == 2 * math.prod(FEW.resolution)
     assert "as asked" in str(asked.fidelity)
 
 
