@@ -156,7 +156,8 @@ def _plan(config: RunConfig) -> str:
     search, steps = config.search, config.learning.total_steps
     genes = sum(use.open for use in config.genome.values())
     return (
-        f"{config.task}, {search.generations} generations x {search.population} candidates x {steps:,} steps, "
+        f"{config.task}, {search.generations} generations x {search.population} candidates x {steps:,} steps"
+        f"{f' on a ladder of {search.rungs} rungs' if search.rungs > 1 else ''}, "
         f"{genes} genes open"
     )
 
