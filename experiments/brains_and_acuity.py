@@ -88,7 +88,9 @@ def page(store: Store) -> Page:
             "critic included. The best of an acuity is the mean of its best quarter, which bounds what brains add."
         ),
         command=(
-            "evolve run --preset scaling    # and: evolve run navigation --preset scaling, evolve run tracking ...\n"
+            "evolve run --preset scaling\n"
+            "evolve run tracking --preset scaling\n"
+            "evolve run navigation --preset scaling --set learning.total_steps=600_000\n"
             "python -m experiments.brains_and_acuity --runs detection=DIR navigation=DIR tracking=DIR"
         ),
         figures=[Figure(NAME, lambda path: draw(store, path), "Each dot is a candidate, darker for finer acuity.")],

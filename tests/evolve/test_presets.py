@@ -63,7 +63,9 @@ def test_bifurcations_differ_in_their_task_and_begin_with_one_photoreceptor():
     maze, field = (assemble(preset=f"bifurcation-{task}") for task in ("navigation", "detection"))
     assert (maze.task, field.task) == ("navigation", "detection")
     rows = field.genome["resolution_height"]
-    assert replace(maze, task="detection", genome={**maze.genome, "resolution_height": rows}) == field
+    same = {"task": field.task, "search": field.search, "learning": field.learning}
+    assert replace(maze, **same, genome={**maze.genome, "resolution_height": rows}) == field
+    assert maze.learning.total_steps > maze.learning.contact_ramp, "contact has its price in the end"
     for config in (maze, field):
         start = animal(config)
         assert (start.n_eyes, start.resolution, start.fov_deg, start.relief) == (1, (1, 1), 45.0, None)
