@@ -128,18 +128,20 @@ def draw(charts: Sequence[Chart], path: Path) -> None:
     panels = figure.subplots(rows, columns, squeeze=False, sharey=True)
     for axes, chart in zip(panels.ravel(), charts, strict=False):
         _panel(axes, chart)
+    errors = [p.error for chart in charts for p in chart.points]
+    panels[0, 0].set_ylim(0.7 * min(errors), 1.6 * max(errors))
     for axes in panels[-1]:
         axes.set_xlabel("agent-steps per CPU second")
     for axes in panels[:, 0]:
         axes.set_ylabel("error [σ of the receptors' noise]")
-    _legend(figure)
+    _legend(figure, 2 * columns)
     figure.savefig(path, dpi=110)
 
 
 def _panel(axes: Any, chart: Chart) -> None:
     front = chart.front
     axes.axhspan(1e-3, 0.5, color="#009E73", alpha=0.08, lw=0)
-    axes.step([p.speed for p in front], [p.error for p in front], where="pre", color="black", lw=0.9, zorder=1)
+    axes.step([p.speed for p in front], [p.error for p in front], where="post", color="black", lw=0.9, zorder=1)
     for p in chart.points:
         s = p.setting
         if s.rays is None:
@@ -153,8 +155,8 @@ def _panel(axes: Any, chart: Chart) -> None:
     for p in (p for p in chart.points if p.setting.rays and p.setting == _plain(p.setting.rays, "direct")):
         axes.annotate(f"{p.setting.rays:g}", (p.speed, p.error), xytext=(3, 5), textcoords="offset points", fontsize=7)
     axes.plot(chart.auto.speed, chart.auto.error, "*", color="#D55E00", ms=16, mec="white", mew=0.8, zorder=5)
-    errors = [p.error for p in chart.points]
-    axes.set(xscale="log", yscale="log", ylim=(0.7 * min(errors), 1.6 * max(errors)))
+    axes.set(xscale="log", yscale="log")
+    axes.margins(x=0.08)
     axes.set_title(chart.scene, fontsize=10)
 
 
@@ -162,7 +164,7 @@ def _plain(rays: float, light: str) -> Setting:
     return Setting("closed_form", rays, light=light)
 
 
-def _legend(figure: Any) -> None:
+def _legend(figure: Any, columns: int) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -178,4 +180,4 @@ def _legend(figure: Any) -> None:
         mark("reflected light, too", "o", color="black"),
         *(mark(f"{bands} band{'s' * (bands > 1)}", m, color="black", mfc="none") for bands, m in MARKS.items()),
     ]
-    figure.legend(handles=entries, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+    figure.legend(handles=entries, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
