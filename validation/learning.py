@@ -17,6 +17,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 import sim
 from evolve.config import LearningConfig
 from evolve.learner import learner, play
+from sim.reward import EVALUATION, TRAINING
 
 __all__ = ["Case", "Row", "read_rows", "steps_to", "watched", "wilson", "write_rows"]
 
@@ -57,6 +58,23 @@ class Row:
     contacts: float = math.nan
     distance: float = math.nan
     distance_error: float = math.nan
+
+    @property
+    def fitness(self) -> float:
+        """Of an episode in the maze, where progress adds up to the distance from the start."""
+        weights = EVALUATION
+        return (
+            weights.progress * self.distance
+            + weights.contact * self.contacts
+            + weights.goal * self.goals / self.episodes
+        )
+
+    @property
+    def fitness_error(self) -> float:
+        """No less than its standard error: contact is what the return lacks of the price of the distance, and errors
+        that go together add up at worst. Without goals."""
+        contacts_error = TRAINING.progress * self.distance_error + self.return_error
+        return EVALUATION.progress * self.distance_error - EVALUATION.contact * contacts_error
 
 
 class Journey(VecEnvWrapper):
