@@ -39,7 +39,7 @@ PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 # Share of faded light that strays into the window: small, because the window may hold far less than is faded.
 RIPPLE_PER_TOLERANCE = 3e-3
 # First room for the blur of light cut at Nyquist's frequency [√(λz)].
-SPARE = 3.0
+SPARE = 1.0
 
 ONE = np.ones(1)  # the weight of what counts whole
 
