@@ -1,0 +1,276 @@
+"""E2: does little training tell who will be good?
+
+Budget ladders (`search.rungs`, `evolve.ladder`) train all of a generation a little and only the better part on. That
+saves time only if the order after little training is the order after a whole one. Here animals drawn from the genome,
+one to four eyes with 1 x 1 to 15 x 15 receptors behind a perfect lens, learn detection up a ladder of four rungs, none
+held back, as a run would train them; the table compares their order on each rung with that on the last (Spearman's
+rank correlation, and its 90 % interval by bootstrap over animals).
+
+"6 episodes" is what a run sees: each rung's fitness by its own six evaluation episodes. "48 episodes" measures each
+rung's policy longer and leaves out most of that luck; its last line compares the last rung's own two measurements, 6
+episodes and 48, which is as well as anything could foretell six episodes.
+
+Ladders: what halving (or quartering) these animals as one generation would have cost in CPU seconds, against training
+all of them to the end; and which place, in the order of the last rung by 48 episodes, the animal has that it declares
+the best.
+
+What was found: no rung reaches a correlation of 0.8. Six episodes are too few to tell these animals apart at all, even
+after the whole training, whose own six episodes say nothing of what 48 find: what one collision or one more goal adds
+to a mean of six is more than what lies between the animals. Measured by 48 episodes, half of the training foretells
+the whole one fairly well (0.7), a quarter hardly, an eighth not. So a ladder is worth having where fitness is measured
+by many episodes (`evaluation.episodes`), and with few rungs: two, from half of the budget on, save a fifth of the time
+(a third rung nearly half, and misses the best by a place). It is off unless asked for. The whole training here, 163,840
+steps, is short of what solves detection ([E0](E0.md)); how ranks hold on the way to a million is not measured.
+
+Trainings are stored (`docs/validation/data/E2.csv`), because they take minutes each; the page comes from the store.
+
+    python -m validation.E2_ladder [--train N] [--out DIR] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import spearmanr
+
+import sim
+from evolve.config import RunConfig, SearchConfig
+from evolve.config_source import assemble
+from evolve.development import Phenotype
+from evolve.files import write_whole
+from evolve.fitness import evaluate
+from evolve.ladder import Stretch, budgets, climbers
+from evolve.learner import play
+from evolve.policy import load_policy
+from evolve.worker import prepare_device
+from validation.page import Page, parser
+from validation.workprec import MUTED, OURS, OURS_TOO
+
+STORED = Path("docs/validation/data/E2.csv")
+TOTAL = 163_840  # steps of a whole training: 40 rollouts
+RUNGS = 4
+MANY = 48  # episodes of the longer look
+HOLDS = 0.8  # rank correlation at which a rung can be trusted
+LADDERS = ((2, 0.5), (2, 0.25), (3, 0.5), (4, 0.5))  # (rungs, part that goes on)
+UNSEEN = 10_000  # added to an animal's number: the longer look is into worlds it never saw
+RAYS = 96  # of an eye, and at least one per receptor
+
+
+@dataclass(frozen=True)
+class Row:
+    """One animal on one rung. steps: trained, fewer than the budget where it stopped early; fitness: of a run's six
+    episodes; fitness_many: of MANY; cpu_seconds: of this rung."""
+
+    animal: int
+    eyes: int
+    height: int
+    width: int
+    budget: int
+    steps: int
+    fitness: float
+    fitness_many: float
+    cpu_seconds: float
+
+
+def animals(count: int) -> list[Phenotype]:
+    """The first `count` of a sequence of random animals."""
+    found = []
+    for number in range(count):
+        chance = np.random.default_rng([2, number])
+        found.append(
+            Phenotype(
+                n_eyes=int(chance.integers(1, 5)),
+                placement_range_deg=float(chance.uniform(30, 120)),
+                fov_deg=float(chance.uniform(20, 90)),
+                resolution=(int(chance.integers(1, 16)), int(chance.integers(1, 16))),
+                relative_aperture=None,
+                relief=None,
+                refractive_index=None,
+                memory_frames=int(chance.integers(1, 6)),
+                neurons=int(chance.integers(16, 65)),
+            )
+        )
+    return found
+
+
+def config(animal: Phenotype) -> RunConfig:
+    """A run of detection whose ladder has RUNGS rungs; rays enough for this animal's eyes."""
+    rays = max(1, RAYS // (animal.resolution[0] * animal.resolution[1]))
+    settings = (f"learning.total_steps={TOTAL}", f"learning.eval_interval={TOTAL // 2 ** (RUNGS - 1)}")
+    optics = ("eye.optics=false", f"eye.rays_per_receptor={rays}")
+    return assemble("detection", assignments=[*settings, *optics, f"search.rungs={RUNGS}"])
+
+
+def climbed(number: int, animal: Phenotype) -> list[Row]:
+    """An animal's rows, from the first rung to the last."""
+    run, rows = config(animal), []
+    worlds = sim.make_vec_env(
+        run.task,
+        animal.eyes(run.eye),
+        MANY,
+        UNSEEN + number,
+        memory=animal.memory_frames,
+        mode="evaluation",
+        rays_per_receptor=run.eye.rays_per_receptor,
+    )
+    with tempfile.TemporaryDirectory() as folder, closing(worlds):
+        policy = Path(folder) / "policy"
+        kept = tuple(Path(folder) / f"rung-{rung}" for rung in range(RUNGS))
+        ends = budgets(run.search, run.learning)
+        for rung in range(RUNGS):
+            began = time.process_time()
+            outcome = evaluate(animal, run, number, policy, stretch=Stretch(ends[: rung + 1], kept[: rung + 1]))
+            spent = time.process_time() - began
+            if outcome.failure is not None:
+                raise RuntimeError(f"animal {number}: {outcome.failure}")
+            many = float(play(load_policy(policy), worlds, UNSEEN + number).returns.mean())
+            place = (number, animal.n_eyes, *animal.resolution, ends[rung], outcome.steps)
+            rows.append(Row(*place, outcome.fitness, many, round(spent, 1)))
+    return rows
+
+
+def read_rows(path: Path) -> list[Row]:
+    """What is stored; [] without a file."""
+    if not path.exists():
+        return []
+    kinds = {f.name: {"int": int, "float": float}[str(f.type)] for f in fields(Row)}
+    with path.open(encoding="utf-8", newline="") as file:
+        return [Row(**{name: kinds[name](value) for name, value in row.items()}) for row in csv.DictReader(file)]
+
+
+def write_rows(rows: Sequence[Row], path: Path) -> None:
+    """All rows, whole or not at all."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, [f.name for f in fields(Row)], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(row) for row in rows)
+    write_whole(path, text.getvalue().encode())
+
+
+def store(count: int, path: Path) -> None:
+    """Train the animals that the file does not have yet."""
+    rows = read_rows(path)
+    for number, animal in enumerate(animals(count)):
+        if any(row.animal == number for row in rows):
+            continue
+        rows += climbed(number, animal)
+        write_rows(rows, path)
+        for row in rows[-RUNGS:]:
+            print(row, flush=True)
+
+
+def columns(rows: Sequence[Row], name: str) -> np.ndarray:
+    """One column of the rows, (animal, rung)."""
+    values = [getattr(row, name) for row in sorted(rows, key=lambda row: (row.animal, row.budget))]
+    return np.array(values).reshape(-1, RUNGS)
+
+
+def correlation(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
+    """Spearman's rank correlation, and the ends of its 90 % interval."""
+    chance = np.random.default_rng(0)
+    draws = chance.integers(len(a), size=(2000, len(a)))
+    found = [spearmanr(a[draw], b[draw]).statistic for draw in draws if np.ptp(a[draw]) > 0 and np.ptp(b[draw]) > 0]
+    low, high = np.quantile(found, [0.05, 0.95])
+    return float(spearmanr(a, b).statistic), float(low), float(high)
+
+
+@dataclass(frozen=True)
+class Halving:
+    """A ladder, climbed by the stored animals as one generation. cost: CPU seconds, in parts of all whole trainings.
+    place: of the animal that it declares the best in the order of whole trainings by MANY episodes, 1 the best."""
+
+    rungs: int
+    promoted: float
+    cost: float
+    place: int
+
+
+def halving(rows: Sequence[Row], rungs: int, promoted: float, by: str = "fitness") -> Halving:
+    """Where budgets of the ladder are stored ones: promoted is 1/2, or 1/4 with every other rung. `by` is what decides
+    who goes on: "fitness" or "fitness_many"."""
+    fitness, many, spent = (columns(rows, name) for name in (by, "fitness_many", "cpu_seconds"))
+    search = replace(SearchConfig(), population=len(fitness), rungs=rungs, promoted=promoted)
+    stride = round(-np.log2(promoted))
+    stored = [RUNGS - 1 - stride * above for above in range(rungs - 1, -1, -1)]
+    reached, total, below = set(range(len(fitness))), 0.0, 0
+    for rung, place in enumerate(stored):
+        total += spent[sorted(reached), below : place + 1].sum()
+        below = place + 1
+        told = [(number, float(fitness[number, place])) for number in sorted(reached)]
+        reached = climbers(search, rung, told) or reached
+    best = max(reached, key=lambda number: (fitness[number, -1], -number))
+    place = 1 + int((many[:, -1] > many[best, -1]).sum())
+    return Halving(rungs, promoted, total / spent.sum(), place)
+
+
+def table(rows: Sequence[Row]) -> str:
+    """A line per rung, then a line per ladder."""
+    fitness, many, spent = (columns(rows, name) for name in ("fitness", "fitness_many", "cpu_seconds"))
+    lines = [f"{len(fitness)} animals", f"{'steps':>9}{'CPU time':>10}{'6 episodes':>26}{f'{MANY} episodes':>26}"]
+    share = spent.cumsum(axis=1).sum(axis=0) / spent.sum()
+    for rung, budget in enumerate(columns(rows, "budget")[0]):
+        cells = "".join(_shown(correlation(measured[:, rung], measured[:, -1])) for measured in (fitness, many))
+        last = _shown(correlation(fitness[:, -1], many[:, -1])) + "  (6 against 48 episodes)"
+        lines.append(f"{budget:9,}{share[rung]:10.0%}" + (cells if rung < RUNGS - 1 else last))
+    lines += ["", f"{'ladder':26}{'CPU time':>10}{'place of its best, by 6 episodes':>36}{f'by {MANY}':>8}"]
+    for rungs, promoted in LADDERS:
+        by_six, by_many = (halving(rows, rungs, promoted, by) for by in ("fitness", "fitness_many"))
+        name = f"{rungs} rungs, {promoted:g} goes on"
+        lines.append(f"{name:26}{by_six.cost:10.0%}{by_six.place:36}{by_many.place:8}")
+    return "\n".join(lines)
+
+
+def verdicts(rows: Sequence[Row]) -> list[str]:
+    """Every bound that the stored trainings break, in words."""
+    many = columns(rows, "fitness_many")
+    return [] if len(many) >= 16 else [f"{len(many)} animals are too few"]
+
+
+def _shown(found: tuple[float, float, float]) -> str:
+    return f"{found[0]:12.2f} [{found[1]:5.2f}, {found[2]:4.2f}]"
+
+
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """Fitness on each rung over fitness on the last, by MANY episodes."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot
+
+    many, ends = columns(rows, "fitness_many"), columns(rows, "budget")[0]
+    figure, axes = pyplot.subplots(1, RUNGS - 1, figsize=(9, 3.2), layout="constrained", sharey=True)
+    for rung, one in enumerate(axes):
+        one.plot(many[:, rung], many[:, -1], "o", ms=4, color=OURS if rung == RUNGS - 2 else OURS_TOO)
+        rho = spearmanr(many[:, rung], many[:, -1]).statistic
+        one.annotate(f"rank correlation {rho:.2f}", (0.03, 0.93), xycoords="axes fraction", fontsize=8, color=MUTED)
+        one.set(xlabel=f"fitness after {ends[rung]:,} steps")
+        one.spines[["top", "right"]].set_visible(False)
+    axes[0].set(ylabel=f"fitness after {ends[-1]:,} steps")
+    figure.savefig(path, dpi=150)
+    pyplot.close(figure)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train what is asked for, then make the page of all that is stored."""
+    options_parser = parser(__doc__ or "")
+    options_parser.add_argument("--train", type=int, default=0, metavar="N", help="animals that must be stored")
+    options_parser.add_argument("--stored", type=Path, default=STORED, help="file of the stored trainings")
+    options = options_parser.parse_args(arguments)
+    if options.train:
+        prepare_device()
+        store(options.train, options.stored)
+    rows = read_rows(options.stored)
+    return Page("E2_ladder", __doc__ or "", table(rows), verdicts(rows)).publish(options, lambda path: draw(rows, path))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
