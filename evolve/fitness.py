@@ -87,21 +87,14 @@ def _live(
     weights, worlds, evaluation = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     eyes = phenotype.eyes(config.eye)
     common: dict[str, Any] = {"eyes": eyes, "memory": phenotype.memory_frames}
+    closely: dict[str, Any] = {"rays_per_receptor": config.eye.rays_per_receptor}
     evaluation_worlds = sim.make_vec_env(
-        config.task,
-        n_envs=config.evaluation.episodes,
-        seed=evaluation,
-        mode="evaluation",
-        rays_per_receptor=config.eye.rays_per_receptor,
-        **common,
+        config.task, n_envs=config.evaluation.episodes, seed=evaluation, mode="evaluation", **common, **closely
     )
+    coarse = _coarser(evaluation_worlds.renderer.fidelity, eyes, config.learning.rays_per_eye)
+    coarsely: dict[str, Any] = {"rays_per_receptor": coarse}
     training_worlds = sim.make_vec_env(
-        config.task,
-        n_envs=config.learning.n_envs,
-        seed=worlds,
-        mode="training",
-        rays_per_receptor=_coarser(evaluation_worlds.renderer.fidelity, eyes, config.learning.rays_per_eye),
-        **common,
+        config.task, n_envs=config.learning.n_envs, seed=worlds, mode="training", **common, **coarsely
     )
     with closing(training_worlds), closing(evaluation_worlds):
         brain: dict[str, Any] = {"neurons": phenotype.neurons, "layers": phenotype.layers, "begun": begun}
