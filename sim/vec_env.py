@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env.base_vec_env import tile_images
 from optics.tabulated import Spectrum
 from sim.agent import Eyes
 from sim.eye_images import side_by_side
+from sim.fidelity import Fidelity
 from sim.noise import NoiseModel, Normals
 from sim.observation import STANDING, Memory, action_space, observation_space
 from sim.picture import Onlooker, check_render_mode
@@ -219,7 +220,7 @@ def make_vec_env(
     *,
     memory: int = 1,
     mode: str = "training",
-    rays_per_receptor: float | str = "auto",
+    rays_per_receptor: float | str | Fidelity = "auto",
     world_seed: int = 0,
     mazes: int = 1,
     spectra: Mapping[str, Spectrum | str] | None = None,
@@ -233,7 +234,8 @@ def make_vec_env(
     seed               of episodes and noise; None draws one
     memory             frames in an observation
     mode               "training", or "evaluation" (objects respawn; rewards weighted as fitness)
-    rays_per_receptor  rays traced for each receptor; "auto": as few as its noise allows, see `sim.BatchedRenderer`
+    rays_per_receptor  rays traced for each receptor; "auto": as few as its noise allows, see `sim.BatchedRenderer`;
+                       or a whole Fidelity
     world_seed, mazes  of the layout that all worlds share: navigation's mazes, and how many
     spectra            of materials and lights, by name, in the place of their colours: see `sim.build_world`
     render_mode        "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye
