@@ -1,5 +1,5 @@
 """Where a run's configuration comes from: defaults, preset and its scale, task, TOML file, another run's animal,
-`--set key=value`; later ones win."""
+`--set key=value`; later ones win, but a preset made for the task wins over the task's settings."""
 
 from __future__ import annotations
 
@@ -68,7 +68,10 @@ def _assembled(task: str | None, below: list[Source], asked: list[Source]) -> Ru
     known_task = [source.tree["task"] for source in (*below, *asked) if "task" in source.tree]
     if not known_task:
         raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
-    layers = [*below, Source("", TASK_TREES.get(str(known_task[-1]), {})), *asked]
+    task_tree = Source("", TASK_TREES.get(str(known_task[-1]), {}))
+    # A preset that is made for this task knows better than the task's own settings; one for any task does not.
+    made_for_it = any(source.tree.get("task") == known_task[-1] for source in below)
+    layers = [task_tree, *below, *asked] if made_for_it else [*below, task_tree, *asked]
     trees = [_checked(source) for source in layers]
     try:
         return _build(trees, layers)

@@ -22,7 +22,7 @@ from optics.precision import Precision, opaque
 from optics.soft_edge import kaiser_beta
 from optics.table import Table
 
-__all__ = ["STEEPEST_SINE", "Band", "TransferFunction", "kept_band", "kept_square", "walk"]
+__all__ = ["STEEPEST_SINE", "Band", "TransferFunction", "evanescent", "kept_band", "kept_square", "walk"]
 
 # Steepest light that a period makes room for, as sin θ; z tan θ has no bound beyond.
 STEEPEST_SINE = 0.995
@@ -106,6 +106,15 @@ def _gradient(sine: float) -> float:
     return math.sqrt((1 + sine**4 / cosine2) / cosine2)
 
 
+@lru_cache(maxsize=4)
+def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
+    """How much of each frequency of a whole spectrum, (samples, samples) in FFT order, does not propagate. A cell of
+    frequencies on the circle f = n/λ counts by how far it reaches outside: an error of its width squared."""
+    f = np.fft.fftfreq(samples) * wavelength / dx
+    share: np.ndarray = np.clip((np.hypot(f[None, :], f[:, None]) - 1) * samples * dx / wavelength + 0.5, 0, 1)
+    return share
+
+
 @lru_cache(maxsize=8)
 def _fade_table(ripple: float) -> Table:
     """1 at 0, 0 at 1: the rest of a Kaiser window's integral. It blurs by β/(π fade) and, beyond, by `ripple`."""
@@ -126,11 +135,10 @@ def _fade_table(ripple: float) -> Table:
 @dataclass(frozen=True, eq=False)
 class TransferFunction:
     """Over a spectrum: the transfer function, with everything that does not depend on the field, and how much of each
-    frequency is too near grazing or evanescent, for real and imaginary parts (fy, 2 fx) (None: nothing is)."""
+    frequency is too near grazing, for real and imaginary parts (fy, 2 fx) (None: nothing is)."""
 
     transfer: np.ndarray
     grazing: np.ndarray | None
-    evanescent: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -146,18 +154,13 @@ class Passage:
     centre: tuple[float, float]
 
     def over(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> TransferFunction:
-        """At frequencies fx (column), fy (row) [1/m], in steps of fx[1] - fx[0]."""
-        step = abs(fx[1] - fx[0]) if len(fx) > 1 else 0.0
-        sine = np.hypot(fx[None, :], fy[:, None]) * self.wavelength
-        every = math.isinf(self.band.kept) and self.z != 0 and not self.paraxial
-        grazing = (sine > STEEPEST_SINE) & (sine < 1) if every else None
-        # A frequency's cell on the circle f = n/λ counts by how far it reaches outside: an error of its width squared.
-        outside = np.clip((sine - 1) / (step * self.wavelength or 1) + 0.5, 0, 1)
-        weights = (
-            None if weight is None or not weight.any() else np.repeat(weight, 2, axis=1).astype(types.dtype)
-            for weight in (grazing, outside)
-        )
-        return TransferFunction(self._transfer(fx, fy, types), *weights)
+        """At frequencies fx (column), fy (row) [1/m]."""
+        grazing = None
+        if math.isinf(self.band.kept) and self.z != 0 and not self.paraxial:
+            sine = np.hypot(fx[None, :], fy[:, None]) * self.wavelength
+            grazing = (sine > STEEPEST_SINE) & (sine < 1)
+        weight = None if grazing is None or not grazing.any() else np.repeat(grazing, 2, axis=1).astype(types.dtype)
+        return TransferFunction(self._transfer(fx, fy, types), weight)
 
     def _transfer(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> np.ndarray:
         """H under the fade, with the way to the window's centre; whole waves are dropped in float64."""

@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from optics.fourier import fast_length
-from optics.free_space import EVERYTHING, STEEPEST_SINE, Band, Passage, kept_band, kept_square, walk
+from optics.free_space import EVERYTHING, STEEPEST_SINE, Passage, kept_band, kept_square, walk
 from optics.grid import Grid
 from optics.planner import MOST_SAMPLES, AccuracyError
 
@@ -70,7 +70,8 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Samp
         band, far = EVERYTHING, _farthest(nyquist, wavelength, z, paraxial) + spare
     least = max(reach + far, 2 * (max(source.shape) // 2 + 1) * source.dx)
     samples = fast_length(least / source.dx)
-    across = _across(band, samples, source.dx, 0 if paraxial else 1 / wavelength)
+    half = band.end * samples * source.dx  # as a float: it may be infinite
+    across = 2 * math.ceil(half) + 1 if band.fade and 2 * half + 2 < samples else samples
     if max(across, *window.shape) > MOST_SAMPLES:
         raise AccuracyError(
             f"distance = {passage.z:g} m over a window of {2 * window.half_width:.3g} m needs {across} samples across; "
@@ -79,12 +80,6 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Samp
     step = round(window.dx / source.dx)
     exactly = abs(window.dx - step * source.dx) <= SAME_PITCH * source.dx / max(window.shape)
     return Sampling(replace(passage, band=band), source, window, samples, across, step if exactly else 0, reach)
-
-
-def _across(band: Band, samples: int, dx: float, evanescent: float) -> int:
-    """Frequencies kept along each axis: evanescent waves too, for their power, which is reported."""
-    half = max(band.end, evanescent) * samples * dx  # as a float: it may be infinite
-    return 2 * math.ceil(half) + 1 if band.fade and 2 * half + 2 < samples else samples
 
 
 def most_spare(passage: Passage, source: Grid) -> float:

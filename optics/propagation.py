@@ -13,8 +13,8 @@ grazing for either is counted into the predicted error.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from optics.fourier import (
     periodic_sum,
     predicted_seconds,
 )
-from optics.free_space import EVERYTHING, Passage, TransferFunction
+from optics.free_space import EVERYTHING, Passage, TransferFunction, evanescent
 from optics.grid import Grid
 from optics.period import Sampling, blurred_back, most_spare, sampling
 from optics.planner import FLOAT_NOISE, AccuracyError, Plan
@@ -40,22 +40,27 @@ PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 RIPPLE_PER_TOLERANCE = 3e-3
 # First room for the blur of light cut at Nyquist's frequency [√(λz)].
 SPARE = 1.0
+# So many times the light that arrives may be missing and cost next to nothing of the tolerance.
+MUCH = 100.0
 
 ONE = np.ones(1)  # the weight of what counts whole
 
 
 @dataclass(frozen=True, eq=False)
 class PropagationResult:
-    """u: complex field (…, y, x) at pitch dx [m], centre sample n//2. plan: how it was computed, and how well.
-
-    evanescent_power: fraction of the input's power in waves that do not propagate. Forwards they decay; backwards they
-        are dropped, since undoing the decay would amplify noise without bound.
-    """
+    """u: complex field (…, y, x) at pitch dx [m], centre sample n//2. plan: how it was computed, and how well."""
 
     u: np.ndarray
     dx: float
     plan: Plan
-    evanescent_power: float
+    _source: np.ndarray = field(repr=False)  # (plane, y, x)
+    _sampling: Sampling = field(repr=False)
+
+    @cached_property
+    def evanescent_power(self) -> float:
+        """Fraction of the input's power in waves that do not propagate (of several planes, the largest). Forwards they
+        decay; backwards they are dropped, since undoing the decay would amplify noise without bound."""
+        return max(_evanescent_share(plane, self._sampling) for plane in self._source)
 
 
 def propagate(
@@ -85,10 +90,13 @@ def propagate(
     """
     if method not in ("auto", *PROPAGATION_METHODS):
         raise ValueError(f"method = {method!r}: must be 'auto' or one of {', '.join(PROPAGATION_METHODS)}")
-    field = _field(u)
-    window = Grid(out_shape or field.shape[-2:], dx if out_dx is None else out_dx, out_centre)
-    field = _lit(field)
-    source = Grid(field.shape[-2:], dx)
+    given = _field(u)
+    window = Grid(out_shape or given.shape[-2:], dx if out_dx is None else out_dx, out_centre)
+    lit = _lit(given)
+    source = Grid(lit.shape[-2:], dx)
+    sources = lit.reshape(-1, *source.shape)
+    if np.may_share_memory(sources, u):  # the result keeps them, whatever becomes of u
+        sources = sources.copy()
     in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5)
     passage = Passage(
         positive("wavelength", wavelength) / in_range("medium_n", medium_n, 1.0, 10.0),
@@ -98,15 +106,15 @@ def propagate(
         RIPPLE_PER_TOLERANCE * tolerance,
         window.centre,
     )
-    how, planes = _with_room(field.reshape(-1, *source.shape), passage, (source, window), tolerance, precision(dtype))
-    out = np.stack([plane.u for plane in planes]).reshape(*field.shape[:-2], *window.shape)
+    how, planes = _with_room(sources, passage, (source, window), tolerance, precision(dtype))
+    out = np.stack([plane.u for plane in planes]).reshape(*given.shape[:-2], *window.shape)
     error = max(plane.error for plane in planes)
     if error > tolerance:
         raise AccuracyError(
             f"tolerance = {tolerance:g}: too much of the light leaves so flat, or so little of it meets the window, "
             f"that the error reaches {error:.1g}; ask for that, or for a larger out_shape"
         )
-    return PropagationResult(out, window.dx, _plan(how, error, dtype), max(plane.evanescent for plane in planes))
+    return PropagationResult(out, window.dx, _plan(how, error, dtype), sources, how)
 
 
 def _field(u: np.ndarray) -> np.ndarray:
@@ -133,29 +141,28 @@ def _lit(field: np.ndarray) -> np.ndarray:
 @dataclass(frozen=True)
 class _Carried:
     """u (y, x): the propagated plane; error: predicted, of its intensity; blur: beyond that, by what the samples
-    hold at Nyquist's frequency; evanescent: fraction of the power."""
+    hold at Nyquist's frequency."""
 
     u: np.ndarray
     error: float
     blur: float
-    evanescent: float
 
 
 def _with_room(
-    field: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
+    sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
 ) -> tuple[Sampling, list[_Carried]]:
-    """The field's planes, carried with as much room as their light at Nyquist's frequency asks for.
+    """The planes, carried with as much room as their light at Nyquist's frequency asks for.
 
     Beyond `most_spare` no room is made: what blurs so far belongs to the error of the samples themselves.
     """
     spare, most = SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most_spare(passage, grids[0])
     how = sampling(passage, *grids, min(spare, most))
-    planes = [_one(plane, how, types) for plane in field]
+    planes = [_one(plane, how, types) for plane in sources]
     blur = max(plane.blur for plane in planes)
     rest = tolerance - max(plane.error for plane in planes)
     if spare < most and blur > rest > 0:
         how = sampling(passage, *grids, min(1.2 * blur / rest * spare, most))  # it falls at least like 1 / spare
-        planes = [_one(plane, how, types) for plane in field]
+        planes = [_one(plane, how, types) for plane in sources]
     return how, planes
 
 
@@ -163,28 +170,41 @@ def _one(plane: np.ndarray, how: Sampling, types: Precision) -> _Carried:
     plane = np.ascontiguousarray(plane, dtype=types.complex_dtype)
     total = _power(plane)
     if total == 0:
-        return _Carried(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0, 0.0)
+        return _Carried(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
     space = _free_space(how, types.dtype)
     if how.step:
         spectrum = periodic_spectrum(plane, how.period, how.across)
     else:
         spectrum = fourier_sum(plane, how.period, (how.across, how.across), -1)
-    grazing, evanescent = (_power(spectrum, weight) / how.period**2 for weight in (space.grazing, space.evanescent))
+    grazing = _power(spectrum, space.grazing) / how.period**2
     blurred = blurred_back(spectrum, how)
     spectrum *= space.transfer
-    # Parseval: what neither passes nor is evanescent was faded. In float32 the difference is rounding, which is little
+    # Parseval: what does not pass was faded or evanescent. In float32 the difference is rounding, which is little
     # beside what the fade leaves of it.
-    faded = max(total - _power(spectrum) * how.period**2 - evanescent, 0.0) if how.passage.band.fade else 0.0
+    faded = max(total - _power(spectrum) * how.period**2, 0.0) if how.passage.band.fade else 0.0
     if how.step:
         result = periodic_sum(spectrum, how.period, how.step, how.window.shape)
     else:
         result = fourier_sum(spectrum, how.period * how.source.dx / how.window.dx, how.window.shape, +1)
     arrived = _power(result) * (how.window.dx / how.source.dx) ** 2
     if not arrived:
-        return _Carried(result, math.inf, math.inf, min(evanescent / total, 1.0))
+        return _Carried(result, math.inf, math.inf)
+    if faded > MUCH * arrived:
+        faded = max(faded - total * _evanescent_share(plane, how), 0.0)
     rounding = FLOAT_NOISE[types.dtype] * (1 + math.sqrt(total / arrived))
     error = 2 * math.sqrt(grazing / arrived) + rounding + 2 * how.passage.ripple * math.sqrt(faded / arrived)
-    return _Carried(result, error, 2 * math.sqrt(blurred / arrived), min(evanescent / total, 1.0))
+    return _Carried(result, error, 2 * math.sqrt(blurred / arrived))
+
+
+def _evanescent_share(plane: np.ndarray, how: Sampling) -> float:
+    """Of a plane's power."""
+    total = _power(plane)
+    if total == 0 or how.passage.paraxial:
+        return 0.0
+    spectrum = periodic_spectrum(plane, how.period, how.period)
+    weights = evanescent(how.period, how.source.dx, how.passage.wavelength)
+    lost = float(np.sum(weights * (spectrum.real**2 + spectrum.imag**2), dtype=np.float64)) / how.period**2
+    return min(lost / total, 1.0)
 
 
 def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:

@@ -11,6 +11,7 @@ import optics
 from evolve.calibration import Pace
 from evolve.cli import main
 from evolve.config import ConfigError
+from evolve.config_lines import Source
 from evolve.config_source import SCALES, assemble, preset_names
 from evolve.development import develop
 from evolve.genotype import Genotype
@@ -138,3 +139,12 @@ def test_contradiction_with_a_scale_names_it():
 def test_task_named_by_the_user_wins():
     assert assemble("tracking", "scaling").task == "tracking"
     assert assemble(preset="scaling", assignments=["task=foraging"]).task == "foraging"
+
+
+def test_a_preset_made_for_a_task_wins_over_the_tasks_settings(monkeypatch):
+    """And one for any task does not: navigators' eyes are one row of receptors whatever it says."""
+    own = {"task": "navigation", "learning": {"gamma": 0.5}}
+    monkeypatch.setattr("evolve.config_source._preset", lambda name, scale: [Source("preset", own)])
+    assert assemble(preset="any").learning.gamma == 0.5
+    monkeypatch.undo()
+    assert assemble("navigation", "quick").genome["resolution_height"].start == 1

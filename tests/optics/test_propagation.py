@@ -200,3 +200,12 @@ def test_darkness_around_the_light_costs_nothing():
     np.testing.assert_allclose(framed.u[0], alone.u, atol=1e-6 * np.abs(alone.u).max())
     assert np.abs(framed.u[1]).max() == 0
     assert framed.plan.samples == alone.plan.samples
+
+
+def test_evanescent_power_is_the_given_fields_whatever_becomes_of_it():
+    """It is worked out when asked for; by then the array may hold something else."""
+    waist, dx = 0.2 * WAVELENGTH, WAVELENGTH / 20
+    u = gaussian(81, dx, waist)
+    result = optics.propagate(u, dx=dx, wavelength=WAVELENGTH, distance=0.5e-6, tolerance=2e-2)
+    u[:] = 1
+    assert result.evanescent_power == pytest.approx(reference.gaussian_evanescent_power(WAVELENGTH, waist), rel=0.02)
