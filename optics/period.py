@@ -24,7 +24,7 @@ __all__ = ["Sampling", "blurred_back", "most_spare", "sampling"]
 # Pitches are one and the same where they differ by less than this share of a sample over the whole window.
 SAME_PITCH = 1e-9
 # How much of the spectrum, and how many of its lines, tell its power about Nyquist's frequency.
-NYQUIST_SHARE, NYQUIST_LINES = 1 / 16, 8
+NYQUIST_SHARE, NYQUIST_LINES = 1 / 16, 9
 
 
 @dataclass(frozen=True)

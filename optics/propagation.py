@@ -40,6 +40,8 @@ PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 RIPPLE_PER_TOLERANCE = 3e-3
 # First room for the blur of light cut at Nyquist's frequency [√(λz)].
 SPARE = 1.0
+# The estimate of that blur is good to a factor of two or three: carried again is only what is clearly too much.
+CLEARLY = 1.5
 # So many times the light that arrives may be missing and cost next to nothing of the tolerance.
 MUCH = 100.0
 
@@ -160,7 +162,7 @@ def _with_room(
     planes = [_one(plane, how, types) for plane in sources]
     blur = max(plane.blur for plane in planes)
     rest = tolerance - max(plane.error for plane in planes)
-    if spare < most and blur > rest > 0:
+    if spare < most and blur > CLEARLY * rest > 0:
         how = sampling(passage, *grids, min(1.2 * blur / rest * spare, most))  # it falls at least like 1 / spare
         planes = [_one(plane, how, types) for plane in sources]
     return how, planes

@@ -37,9 +37,8 @@ def free_spot(
     rng: np.random.Generator, agent: np.ndarray, others: np.ndarray, object_spawn: np.ndarray
 ) -> np.ndarray | None:
     """A cell's centre (2,) clear of the agent and of the other objects (k, 2); None where there is none."""
-    free = np.linalg.norm(object_spawn - agent, axis=-1) >= CLEARANCE
-    if len(others):
-        gaps = np.linalg.norm(object_spawn[:, None] - others[None], axis=-1)
-        free &= (gaps >= SEPARATION).all(axis=1)
+    free = np.hypot(object_spawn[:, 0] - agent[0], object_spawn[:, 1] - agent[1]) >= CLEARANCE
+    for x, y in others:
+        free &= np.hypot(object_spawn[:, 0] - x, object_spawn[:, 1] - y) >= SEPARATION
     spots = np.flatnonzero(free)
     return object_spawn[rng.choice(spots)] if len(spots) else None

@@ -7,6 +7,7 @@ event reward for reaching the goal or an adversary, and a penalty per action in 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -61,6 +62,11 @@ class FindGoal:
     world: World
     moving: bool
 
+    @cached_property
+    def _goals(self) -> np.ndarray:
+        """Which objects are goals, (k,) bool."""
+        return np.array([name.startswith("goal") for name in self.world.objects])
+
     def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         return place(rng, self.world.agent_spawn, self.world.object_spawn, len(self.world.objects))
 
@@ -72,7 +78,7 @@ class FindGoal:
         return wander(state, rngs, bounds, seconds)
 
     def judge(self, before: WorldState, after: WorldState, path: np.ndarray, ends: bool) -> Outcome:
-        goals = np.array([name.startswith("goal") for name in self.world.objects])
+        goals = self._goals
         first = first_reached(path, before.objects, after.objects)
         never = path.shape[1]
         goal_at = first[:, goals].min(axis=1)
@@ -137,11 +143,18 @@ def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: n
 
     path (n, substep, 2): the agent at the *end* of each substep; objects move evenly from before to after.
     """
-    substeps = path.shape[1]
-    t = (np.arange(substeps) + 1.0)[:, None, None] / substeps
-    objects = objects_before[:, None, :, :2] + t * (objects_after - objects_before)[:, None, :, :2]
-    near = ((path[:, :, None] - objects) ** 2).sum(axis=-1) < REACH**2
-    return np.where(near.any(axis=1), near.argmax(axis=1), substeps)
+    substeps, end = path.shape[1], path[:, -1, None]
+    found = np.full(objects_after.shape[:2], substeps)
+    # Most objects are so far away that nobody can have come near.
+    moved = np.abs(path - end).sum(axis=-1).max(axis=1)[:, None] + np.abs(objects_after - objects_before).sum(axis=-1)
+    offset = objects_after[..., :2] - end
+    worlds, which = np.nonzero(np.hypot(offset[..., 0], offset[..., 1]) < REACH + moved)
+    if len(worlds):
+        t = (np.arange(substeps) + 1.0)[:, None] / substeps
+        before, after = (objects[worlds, which, None, :2] for objects in (objects_before, objects_after))
+        near = ((path[worlds] - (before + t * (after - before))) ** 2).sum(axis=-1) < REACH**2
+        found[worlds, which] = np.where(near.any(axis=1), near.argmax(axis=1), substeps)
+    return found
 
 
 def respawned(task: Task, state: WorldState, which: np.ndarray, rngs: list[np.random.Generator]) -> WorldState:
@@ -161,4 +174,6 @@ def respawned(task: Task, state: WorldState, which: np.ndarray, rngs: list[np.ra
 
 def _distance(state: WorldState, goals: np.ndarray) -> np.ndarray:
     """From the agent to the nearest goal [m], (n,)."""
-    return np.linalg.norm(state.objects[:, goals, :2] - state.position[:, None], axis=-1).min(axis=1)
+    offset = state.objects[:, goals, :2] - state.position[:, None]
+    distance: np.ndarray = np.hypot(offset[..., 0], offset[..., 1]).min(axis=1)
+    return distance

@@ -78,7 +78,8 @@ class EyesVecEnv(VecEnv):
         actions = np.asarray(actions, np.float32)
         if actions.shape != (self.num_envs, 2):
             raise ValueError(f"actions have shape {actions.shape}, must be ({self.num_envs}, 2)")
-        self._commanded, self._actions = actions, np.clip(np.nan_to_num(actions), -1, 1)
+        finite = actions if np.isfinite(actions).all() else np.nan_to_num(actions)
+        self._commanded, self._actions = actions, np.clip(finite, -1, 1)
 
     def step_once(
         self, actions: np.ndarray
