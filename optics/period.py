@@ -19,7 +19,7 @@ from optics.free_space import EVERYTHING, STEEPEST_SINE, Passage, kept_band, kep
 from optics.grid import Grid
 from optics.planner import MOST_SAMPLES, AccuracyError
 
-__all__ = ["Sampling", "blurred_back", "most_spare", "sampling"]
+__all__ = ["Sampling", "blur_left", "blurred_back", "most_spare", "sampling"]
 
 # Pitches are one and the same where they differ by less than this share of a sample over the whole window.
 SAME_PITCH = 1e-9
@@ -115,6 +115,12 @@ def blurred_back(spectrum: np.ndarray, how: Sampling) -> float:
         power = u.real**2 + u.imag**2
         total += float(power.mean(axis=1 - across) @ _blur_weights(how, axis))
     return total
+
+
+def blur_left(how: Sampling, roomier: Sampling) -> float:
+    """What a roomier sampling leaves of the blur's amplitude, if Nyquist's light is even along the other axis."""
+    power, left = (sum(float(_blur_weights(sampling, axis).sum()) for axis in (0, 1)) for sampling in (how, roomier))
+    return math.sqrt(left / power) if power else 1.0
 
 
 @lru_cache(maxsize=8)

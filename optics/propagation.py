@@ -29,7 +29,7 @@ from optics.fourier import (
 )
 from optics.free_space import EVERYTHING, Passage, TransferFunction, evanescent
 from optics.grid import Grid
-from optics.period import Sampling, blurred_back, most_spare, sampling
+from optics.period import Sampling, blur_left, blurred_back, most_spare, sampling
 from optics.planner import FLOAT_NOISE, AccuracyError, Plan
 from optics.precision import Precision, precision
 
@@ -155,15 +155,17 @@ def _with_room(
 ) -> tuple[Sampling, list[_Carried]]:
     """The planes, carried with as much room as their light at Nyquist's frequency asks for.
 
-    Beyond `most_spare` no room is made: what blurs so far belongs to the error of the samples themselves.
+    None is made where even all that is worth making would not do: what blurs so far belongs to the error of the
+    samples themselves, and more room brings them no nearer to what they stand for.
     """
-    spare, most = SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most_spare(passage, grids[0])
-    how = sampling(passage, *grids, min(spare, most))
+    most = most_spare(passage, grids[0])
+    spare = min(SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most)
+    how = sampling(passage, *grids, spare)
     planes = [_one(plane, how, types) for plane in sources]
     blur = max(plane.blur for plane in planes)
-    rest = tolerance - max(plane.error for plane in planes)
-    if spare < most and blur > CLEARLY * rest > 0:
-        how = sampling(passage, *grids, min(1.2 * blur / rest * spare, most))  # it falls at least like 1 / spare
+    allowed = CLEARLY * (tolerance - max(plane.error for plane in planes))
+    if spare < most and blur > allowed and blur * blur_left(how, sampling(passage, *grids, most)) < allowed:
+        how = sampling(passage, *grids, min(1.2 * CLEARLY * blur / allowed * spare, most))  # it falls like 1 / spare
         planes = [_one(plane, how, types) for plane in sources]
     return how, planes
 
