@@ -21,16 +21,17 @@ def wander(
     a random heading instead.
     """
     k = state.objects.shape[1]
-    drift = np.stack([rng.standard_normal(k) for rng in rngs])
-    escape = np.stack([rng.uniform(-np.pi, np.pi, k) for rng in rngs])
+    drift = np.array([rng.standard_normal(k) for rng in rngs])
     heading = wrap_angle(state.object_heading + TURN * drift)
     objects = state.objects.copy()
     for i in range(k):
-        way = np.stack([np.cos(heading[:, i]), np.sin(heading[:, i])], axis=-1)
-        target = objects[:, i, :2] + SPEED * seconds * way
-        inside = ((target >= bounds[:2]) & (target <= bounds[2:])).all(axis=-1)
-        gaps = np.linalg.norm(np.delete(objects[:, :, :2], i, axis=1) - target[:, None], axis=-1)
-        free = inside & (gaps >= SEPARATION).all(axis=-1)
-        objects[free, i, :2] = target[free]
-        heading[:, i] = np.where(free, heading[:, i], escape[:, i])
+        x = objects[:, i, 0] + SPEED * seconds * np.cos(heading[:, i])
+        y = objects[:, i, 1] + SPEED * seconds * np.sin(heading[:, i])
+        free = (x >= bounds[0]) & (y >= bounds[1]) & (x <= bounds[2]) & (y <= bounds[3])
+        for j in range(k):
+            if j != i:
+                free &= np.hypot(objects[:, j, 0] - x, objects[:, j, 1] - y) >= SEPARATION
+        objects[free, i, 0], objects[free, i, 1] = x[free], y[free]
+        for world in np.flatnonzero(~free):
+            heading[world, i] = rngs[world].uniform(-np.pi, np.pi)
     return objects, heading
