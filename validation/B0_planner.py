@@ -252,7 +252,7 @@ _COLORS = ("#0072B2", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#555555", "#5
 
 def main(arguments: list[str] | None = None) -> int:
     options_parser = parser(__doc__)
-    options_parser.add_argument("--cases", type=int, default=500)
+    options_parser.add_argument("--cases", type=int, default=510)
     options_parser.add_argument("--seed", type=int, default=0)
     options_parser.add_argument("--methods", type=int, default=0, help="time every method on so many of the cases")
     options = options_parser.parse_args(arguments)
