@@ -123,11 +123,10 @@ def lights_without_shadows(monkeypatch):
     monkeypatch.setattr(movers, "blocks", lambda radii, centres, ray: dr.zeros(mi.Bool))
 
 
+@pytest.mark.parametrize("seen", ["bounce"], indirect=True)  # the direct light's own are in test_render.py
 @pytest.mark.parametrize("sabotage", [left_out, bodies_in_each_others_place, lights_without_shadows])
 def test_a_wrong_bounce_is_noticed(seen, monkeypatch, sabotage):
     light, worlds = seen
-    if light != "bounce":
-        pytest.skip("the direct light's own are in test_render.py")
     with variant():
         sabotage(monkeypatch)
         ours = [pictures(world, state, light) for world, state, _ in worlds[3:7]]
