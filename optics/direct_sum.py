@@ -145,10 +145,8 @@ def direct_sum(beam: Beam, rule: Rule, x: Any, y: Any, types: Precision) -> Fiel
     waves = beam.waves(nodes_x, nodes_y, types)
     dr.eval(nodes_x, nodes_y, weight, waves, x, y)
     count = dr.opaque(types.Index, len(found.weight))
-    cycles, k = (
-        1 / wavelength,
-        2 * math.pi / wavelength,
-    )  # divisions cost most of a node
+    cycles = 1 / wavelength  # per metre: divisions cost most of a node
+    k = 2 * math.pi * cycles
 
     def add(i: Any, re: Any, im: Any) -> tuple[Any, Any, Any]:
         dx, dy = x - dr.gather(types.Float64, nodes_x, i), y - dr.gather(types.Float64, nodes_y, i)

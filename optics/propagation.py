@@ -83,7 +83,8 @@ def propagate(
 
     u: complex (…, y, x), pitch dx [m], centre sample n//2. wavelength: vacuum [m].
     out_dx, out_shape, out_centre: pitch, shape (y, x) and centre (x, y) [m] wanted; default as u's, on the axis.
-    tolerance: relative L2 error of the intensity over the window, beyond that of the sampling of u itself.
+    tolerance: relative L2 error of the intensity over the window, beyond that of the sampling of u itself;
+        where what u holds at Nyquist's frequency errs by more, the plan says so.
     method: "auto" and "angular_spectrum" are exact; "fresnel" is the paraxial approximation, only on request.
 
     Raises:
@@ -116,7 +117,7 @@ def propagate(
             f"tolerance = {tolerance:g}: too much of the light leaves so flat, or so little of it meets the window, "
             f"that the error reaches {error:.1g}; ask for that, or for a larger out_shape"
         )
-    return PropagationResult(out, window.dx, _plan(how, error, dtype), sources, how)
+    return PropagationResult(out, window.dx, _plan(how, error, _untold(planes, tolerance), dtype), sources, how)
 
 
 def _field(u: np.ndarray) -> np.ndarray:
@@ -236,11 +237,19 @@ def _free_space(how: Sampling, dtype: str) -> TransferFunction:
     return space
 
 
-def _plan(how: Sampling, error: float, dtype: str) -> Plan:
+def _untold(planes: list[_Carried], tolerance: float) -> str:
+    """What the samples themselves err by, if it is more than the tolerance: that is not in the predicted error."""
+    blur = max(plane.blur for plane in planes)
+    if blur <= tolerance:
+        return ""
+    return f"; u's light at Nyquist's frequency blurs by about {blur:.1g}: sample u more finely, or soften its edges"
+
+
+def _plan(how: Sampling, error: float, untold: str, dtype: str) -> Plan:
     band = how.passage.band
     kept = f"band {band.kept * how.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
     period = how.period * how.source.dx
-    why = f"period {period:.3g} m, {kept}" + ("; paraxial, as asked" if how.passage.paraxial else "")
+    why = f"period {period:.3g} m, {kept}" + ("; paraxial, as asked" if how.passage.paraxial else "") + untold
     spectrum = how.across, how.across
     seconds = predicted_seconds(how.source.shape, how.period, spectrum)
     seconds += predicted_seconds(spectrum, period / how.window.dx, how.window.shape)

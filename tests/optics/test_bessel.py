@@ -1,0 +1,27 @@
+"""J₀ against SciPy's."""
+
+import numpy as np
+import pytest
+from scipy.special import j0
+
+from optics.bessel import bessel_j0
+from optics.precision import precision
+
+
+# Rounding of the phase grows with x in float64 too: 2π x 1000 cycles have an ulp of 1e-12.
+@pytest.mark.parametrize(
+    ("dtype", "exactly", "bound"), [("float32", True, 1e-6), ("float64", True, 3e-15), ("float64", False, 1e-12)]
+)
+def test_error_is_as_promised(dtype, exactly, bound):
+    """Up to 20 cycles, across x = 8 where one series takes over from the other."""
+    types = precision(dtype)
+    waves = np.linspace(0, 20, 20_001)
+    found = bessel_j0(types.Float64(waves), types, exactly).numpy()
+    assert np.abs(found - j0(2 * np.pi * waves)).max() < bound
+
+
+def test_what_is_not_exact_is_cheaper_for_a_reason():
+    """The shorter series is another function: else there would be no use for two."""
+    types, waves = precision("float64"), np.linspace(0, 2, 1001)
+    exact, near = (bessel_j0(types.Float64(waves), types, exactly).numpy() for exactly in (True, False))
+    assert np.abs(exact - near).max() > 1e-15
