@@ -19,6 +19,8 @@ from evolve.optimizers import Optimizer, Space, build
 
 __all__ = ["Proposal", "Search", "training_seed"]
 
+LOWEST = -1e9  # below any mean return: what a failure counts as while no candidate has succeeded
+
 
 @dataclass(frozen=True)
 class Proposal:
@@ -84,7 +86,8 @@ class Search:
         return [self.propose() for _ in range(self._config.search.population)]
 
     def tell(self, fitness: Sequence[tuple[int, float]]) -> None:
-        """(candidate id, fitness) of candidates proposed; -inf (failed) counts as the worst fitness so far.
+        """(candidate id, fitness) of candidates proposed; -inf (failed) counts as the worst fitness so far, and as
+        worse than any that may come before there is one.
 
         Raises:
             ValueError: a candidate was not proposed, or has been told already.
@@ -94,9 +97,9 @@ class Search:
                 raise ValueError(f"tell: candidate {identity} has not been proposed, or has been told already")
             if math.isfinite(value):
                 self._worst = min(self._worst, value)
+        worst = self._worst if math.isfinite(self._worst) else LOWEST
         for identity, value in fitness:
             optimizer, proposal = self._asked.pop(identity)
-            worst = self._worst if math.isfinite(self._worst) else 0.0
             optimizer.tell(identity, value if math.isfinite(value) else worst)
             if value > self._best:
                 self._best, self._fittest = value, proposal.vector

@@ -157,6 +157,15 @@ def test_generation_of_failures_alone_is_survived():
     assert np.all(np.isfinite(history(tiny(), lambda genomes: [-math.inf] * 4)))
 
 
+def test_failure_before_any_success_is_no_parent():
+    """In the steady state fitness comes one by one, and mean returns are often negative."""
+    search = Search(tiny("search.optimizer=mutation"))
+    search.propose_generation()
+    for told in ((0, -math.inf), (1, -5.0), (2, -6.0), (3, -7.0)):
+        search.tell([told])
+    assert {parent for proposal in search.propose_generation() for parent in proposal.parents} == {1}
+
+
 def test_tell_must_match_what_was_proposed():
     search = Search(tiny())
     search.propose_generation()
