@@ -149,7 +149,7 @@ def gene_figure(
 
 
 def relief_figure(paths: dict[str, Trajectory]) -> str:
-    """The relief's 16 control points, laid out as they lie over the pupil (row 0 at y = -a, at the bottom)."""
+    """The relief's genes, laid out as they lie over the pupil (row 0 at y = -a, at the bottom)."""
     with drawing(440, 340) as figure:
         rows = sorted({name[-2] for name in paths}, reverse=True)
         columns = sorted({name[-1] for name in paths})
@@ -166,8 +166,8 @@ def relief_figure(paths: dict[str, Trajectory]) -> str:
                 panel.set_yticks([0, 1])
                 panel.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=3, min_n_ticks=1))
         figure.supxlabel("generation", color=MUTED, fontsize=11)
-        figure.supylabel("control point / relief height", color=MUTED, fontsize=11)
-        return inline(figure, "relief", "The 16 control points of the pupil's relief over the generations.")
+        figure.supylabel("gene (height / relief height)", color=MUTED, fontsize=11)
+        return inline(figure, "relief", f"The {len(paths)} genes of the pupil's relief over the generations.")
 
 
 def _trajectory(axes: Axes, path: Trajectory, marker_size: float = 3) -> None:

@@ -9,7 +9,7 @@ from evolve.candidate import Candidate
 from evolve.config import TASKS
 from evolve.episode import Episode
 from evolve.genealogy import descent
-from evolve.genotype import CLUSTERS, GENES, Gene
+from evolve.genes import CLUSTERS, Gene, gene_table
 from evolve.report import tables
 from evolve.report.eye_figures import eye_figures
 from evolve.report.figures import (
@@ -88,11 +88,9 @@ def genes_section(run: Run) -> str:
         f"<p>{KEY.format('accent')} value in the best candidate so far, {POPULATION}. "
         "The vertical axes span the range that evolution may search.</p>\n"
     ]
-    shown = gene_values(run.candidates[0].phenotype)
+    shown, table = gene_values(run.candidates[0].phenotype), gene_table(run.config.eye.relief_points).values()
     for cluster in CLUSTERS:
-        genes = [
-            g for g in GENES.values() if g.cluster == cluster and run.config.genome[g.name].open and g.name in shown
-        ]
+        genes = [g for g in table if g.cluster == cluster and run.config.genome[g.name].open and g.name in shown]
         figures = "".join(_gene(run, gene) for gene in genes if not gene.name.startswith("doe_"))
         if cluster == "morphological":
             figures += _acuity(run)
@@ -127,8 +125,8 @@ def _acuity(run: Run) -> str:
 def _relief(run: Run, genes: list[Gene]) -> str:
     paths = {g.name: trajectory(run.candidates, lambda p, name=g.name: gene_values(p)[name]) for g in genes}  # type: ignore[misc]
     caption = (
-        "<b>doe_00 … doe_33</b>: the relief's control points, each panel where its point lies over the pupil "
-        "(x to the right, y up). Frozen points are left out."
+        f"<b>{genes[0].name} … {genes[-1].name}</b>: the relief, each panel where its gene lies over the pupil "
+        "(x to the right, y up). Frozen genes are left out."
     )
     return f'<div class="wide">{figure(relief_figure(paths), caption)}</div>\n'
 

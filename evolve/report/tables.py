@@ -6,7 +6,7 @@ from evolve.analysis import acuity_cpd, bootstrap_interval, gene_values, succeed
 from evolve.candidate import Candidate
 from evolve.config_source import to_toml
 from evolve.development import Phenotype
-from evolve.genotype import GENES
+from evolve.genes import ALL_GENES
 from evolve.report.markup import exact, number, table, text
 from evolve.store import Run
 from evolve.versions import recorded
@@ -58,11 +58,11 @@ def best_genes(run: Run, best: Candidate) -> str:
 
 
 def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str]:
-    """One gene, or a row of the relief's control points side by side."""
-    genes, uses = [GENES[name] for name in names], [run.config.genome[name] for name in names]
+    """One gene, or a row of the relief's side by side."""
+    genes, uses = [ALL_GENES[name] for name in names], [run.config.genome[name] for name in names]
     name, meaning = names[0], genes[0].meaning
     if len(names) > 1:
-        name, meaning = f"{names[0]} … {names[-1]}", f"relief control points, row {names[0][-2]}"
+        name, meaning = f"{names[0]} … {names[-1]}", f"relief, row {names[0][-2]}"
     best = [exact(values[g.name]) if g.kind == "integer" else number(values[g.name]) for g in genes]
     searched = list(dict.fromkeys(f"{exact(u.low)} to {exact(u.high)}" if u.open else "frozen" for u in uses))
     columns = (best, [exact(u.start) for u in uses], searched)

@@ -4,22 +4,11 @@ import pickle
 
 import numpy as np
 import pytest
-from small_run import small_run
 
 import sim
 from evolve import export, replay
 from evolve.episode import Episode, record
 from evolve.store import RunError
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    return small_run(tmp_path_factory.mktemp("run") / "run")
-
-
-@pytest.fixture(scope="module")
-def episode(run):
-    return record(run, seed=3, radiance_every=64)
 
 
 def test_shapes(episode):

@@ -4,23 +4,11 @@ import sys
 
 import numpy as np
 import pytest
-from small_run import small_run
 
 from evolve import replay
 from evolve.cli import main
-from evolve.episode import record
 from evolve.recording import write_recording
 from evolve.report.stage import Stage
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    return small_run(tmp_path_factory.mktemp("run") / "run")
-
-
-@pytest.fixture(scope="module")
-def episode(run):
-    return record(run, seed=3, radiance_every=64)
 
 
 @pytest.fixture(scope="module")

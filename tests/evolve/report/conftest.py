@@ -1,0 +1,27 @@
+"""One run, one episode of its best and one page of both, for all tests of the report."""
+
+import pytest
+from reported import Page, make_run
+
+from evolve.episode import record
+from evolve.report.page import render
+
+
+@pytest.fixture(scope="package")
+def run(tmp_path_factory):
+    return make_run(tmp_path_factory.mktemp("report") / "first")
+
+
+@pytest.fixture(scope="package")
+def episode(run):
+    return record(run, radiance_every=64)
+
+
+@pytest.fixture(scope="package")
+def content(run, episode):
+    return render(run, episode).decode()
+
+
+@pytest.fixture(scope="package")
+def page(content):
+    return Page(content)

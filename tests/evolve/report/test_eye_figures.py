@@ -1,0 +1,66 @@
+"""Figures of an eye against closed forms, and its view against rays."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import optics
+from evolve.episode import record
+from evolve.report.eye_figures import Light, diffraction_limit, relief_heights
+from evolve.report.views import through
+from evolve.store import Run
+from optics.spectrum import daylight
+
+
+def test_noise_free_view_is_what_the_animal_sees(run):
+    """Convolution of the fine picture against rays drawn from the receptive fields: two ways to the same signals."""
+    calm = replace(run.config, eye=replace(run.config.eye, noise_sigma=0.0, rays_per_receptor=64))
+    episode = record(Run(run.path, calm, run.candidates), radiance_every=64)
+    eye = episode.eyes.eye()
+    views = np.array([[through(eye, one) for one in frame] for frame in episode.radiance])
+    seen = episode.signals[episode.radiance_frames]
+    assert seen.max() > 0.02  # at most a² = 0.09
+    # what remains: edges of objects between 64 rays, and the scene beyond the picture, which the view can only guess
+    error = np.sqrt(np.mean((views - seen) ** 2))
+    assert error < 0.03 * seen.max()
+    for turned in (views[..., ::-1, :], views[..., ::-1]):
+        assert np.sqrt(np.mean((turned - seen) ** 2)) > 3 * error
+
+
+def test_height_map_is_the_pupils():
+    """A paraboloid is inside the gene's space; its height is a closed form."""
+    radius, curvature = 30e-6, 8e3
+    relief = optics.BSplineRelief.paraboloid(20e-6, curvature, radius)
+    heights, inside = relief_heights(optics.Pupil(radius, relief))
+    n = len(heights)
+    x = radius * ((np.arange(n) + 0.5) / n * 2 - 1)
+    np.testing.assert_allclose(heights, 20e-6 - curvature * (x[:, None] ** 2 + x**2) / 2, atol=1e-15)
+    assert inside.mean() == pytest.approx(np.pi / 4, abs=0.01)
+
+
+def test_mtf_of_a_perfect_lens_is_the_diffraction_limit():
+    """The PSF's window lacks up to 1 % of the light, which lifts the contrast by as much."""
+    eye = optics.Eye(optics.Pupil(20e-6, thin_lens_focal_length=100e-6 / np.tan(np.radians(22.5))), (15, 15), 45.0)
+    light = Light.through(eye)
+    frequency = np.array([0.1, 0.3, 0.5, 0.8]) * optics.mtf(light.psf).cutoff.max()
+    contrast = optics.mtf(light.white).profile(frequency)[0]
+    np.testing.assert_allclose(contrast, diffraction_limit(light, frequency), atol=0.01)
+
+
+def test_diffraction_limit_weighs_the_bands_by_their_light():
+    """At the shortest band's cutoff nothing passes; at that of the longest, only what the shorter ones pass."""
+    eye = optics.Eye(optics.Pupil(20e-6, thin_lens_focal_length=241e-6), (15, 15), 45.0, bands=2)
+    light = Light.through(eye)
+    short, long = optics.mtf(light.psf).cutoff
+    s = long / short
+    weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
+    expected = weights[0] * 2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
+    np.testing.assert_allclose(diffraction_limit(light, np.array([0.0, long, short])), [1, expected, 0], atol=1e-6)
+
+
+def test_height_map_lies_the_right_way_up():
+    points = np.zeros((4, 4))
+    points[3] = 1e-6  # row index and y grow together
+    heights, _ = relief_heights(optics.Pupil(30e-6, optics.BSplineRelief(points)))
+    assert heights[-1].mean() > 100 * max(heights[0].mean(), 1e-12)
