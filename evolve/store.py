@@ -56,16 +56,18 @@ class Run:
 
         Raises:
             RunError: the directory holds something already, or cannot be written.
+            LockedError: another process creates a run there.
         """
         path = Path(path)
         try:
             path.mkdir(parents=True, exist_ok=True)
-            if not _holds_no_run(path):
-                raise RunError(f"{path} is not empty: choose another name, or continue it with: evolve resume {path}")
-            (path / POLICIES).mkdir(exist_ok=True)
-            (path / CANDIDATES).touch()
-            record_start(path, 0, origin)
-            write_whole(path / CONFIG, to_toml(config).encode())
+            _require_no_run(path)  # before the lock, which leaves a file
+            with RunLock(path):
+                _require_no_run(path)
+                (path / POLICIES).mkdir(exist_ok=True)
+                (path / CANDIDATES).touch()
+                record_start(path, 0, origin)
+                write_whole(path / CONFIG, to_toml(config).encode())
         except OSError as error:
             raise RunError(f"{path} cannot be written: {error.strerror}") from error
         return cls(path, config)
@@ -247,15 +249,15 @@ class Run:
             raise ValueError(f"genome has {len(candidate.genome)} values, {dimension} genes are open")
 
 
-def _holds_no_run(path: Path) -> bool:
-    """Whether a directory is empty, or as a process leaves it that is killed while it creates a run: config.toml, which
+def _require_no_run(path: Path) -> None:
+    """A directory must be empty, or as a process leaves it that is killed while it creates a run: config.toml, which
     makes it one, is written last."""
     begun = {RunLock.NAME, VERSIONS, CANDIDATES, POLICIES}
     names = {entry.name for entry in path.iterdir() if not entry.name.endswith(UNFINISHED)}
-    if not names <= begun:
-        return False
     record, policies = path / CANDIDATES, path / POLICIES
-    return not (record.exists() and record.stat().st_size) and not (policies.exists() and any(policies.iterdir()))
+    filled = (record.exists() and record.stat().st_size) or (policies.exists() and any(policies.iterdir()))
+    if filled or not names <= begun:
+        raise RunError(f"{path} is not empty: choose another name, or continue it with: evolve resume {path}")
 
 
 def next_directory(task: str, preset: str, base: Path = Path("runs")) -> Path:

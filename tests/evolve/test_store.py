@@ -127,6 +127,19 @@ def test_directory_with_something_in_it_is_refused(tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+def test_two_that_create_at_once_do_not_mix(tmp_path, monkeypatch):
+    """The second comes while the first is between its look at the directory and its config."""
+
+    def meanwhile(*arguments):
+        with pytest.raises(LockedError, match=f"in use by process {os.getpid()}"):
+            Run.create(tmp_path / "run", tiny("seed=2"))
+        record_start(*arguments)
+
+    monkeypatch.setattr("evolve.store.record_start", meanwhile)
+    Run.create(tmp_path / "run", CONFIG)
+    assert Run.open(tmp_path / "run").config == CONFIG
+
+
 def test_file_in_the_way_and_unwritable_place_are_named(tmp_path):
     (tmp_path / "file").write_text("")
     for path in (tmp_path / "file", tmp_path / "file" / "run", "/proc/run"):
@@ -194,7 +207,8 @@ def test_second_process_is_refused_by_name_and_the_lock_dies_with_its_process(ru
 
 def test_lock_alone_does_not_make_a_directory_full(tmp_path):
     with RunLock(tmp_path):
-        Run.create(tmp_path, CONFIG)
+        pass
+    Run.create(tmp_path, CONFIG)
 
 
 def test_versions_are_recorded_at_each_start(run):
