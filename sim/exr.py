@@ -14,7 +14,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -215,8 +214,7 @@ def _views(parts: list[tuple[str, dict[str, np.ndarray], dict[str, Any]]]) -> li
 
 def _write_whole(path: Path, write: Any) -> None:
     """Write to a neighbouring temporary file, flush it to the disk, and give it its name."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent or Path("."), prefix=f".{path.name}.", suffix=".tmp")
-    os.close(handle)
+    temporary = str(path.with_name(f".{path.name}.{os.getpid()}.tmp"))  # not tempfile's, which none but we may read
     try:
         write(temporary)
         with open(temporary, "rb+") as file:

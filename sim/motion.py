@@ -6,14 +6,13 @@ import numpy as np
 
 from sim.placement import SEPARATION
 from sim.state import WorldState, wrap_angle
+from sim.streams import Motion
 
 SPEED = 0.5  # [m/s]
 TURN = 0.4  # standard deviation of the change of heading per action [rad]
 
 
-def wander(
-    state: WorldState, rngs: list[np.random.Generator], bounds: np.ndarray, seconds: float
-) -> tuple[np.ndarray, np.ndarray]:
+def wander(state: WorldState, chance: Motion, bounds: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """Object positions (n, k, 3) and headings (n, k) one action later.
 
     Every object walks at SPEED with a heading that drifts at random. A step that would leave `bounds`
@@ -21,17 +20,15 @@ def wander(
     a random heading instead.
     """
     k = state.objects.shape[1]
-    drift = np.array([rng.standard_normal(k) for rng in rngs])
+    drift, turn = chance.next(k)
     heading = wrap_angle(state.object_heading + TURN * drift)
+    step = SPEED * seconds * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     objects = state.objects.copy()
     for i in range(k):
-        x = objects[:, i, 0] + SPEED * seconds * np.cos(heading[:, i])
-        y = objects[:, i, 1] + SPEED * seconds * np.sin(heading[:, i])
-        free = (x >= bounds[0]) & (y >= bounds[1]) & (x <= bounds[2]) & (y <= bounds[3])
-        for j in range(k):
-            if j != i:
-                free &= np.hypot(objects[:, j, 0] - x, objects[:, j, 1] - y) >= SEPARATION
-        objects[free, i, 0], objects[free, i, 1] = x[free], y[free]
-        for world in np.flatnonzero(~free):
-            heading[world, i] = rngs[world].uniform(-np.pi, np.pi)
+        there = objects[:, i, :2] + step[:, i]
+        apart = ((objects[..., :2] - there[:, None]) ** 2).sum(axis=-1) >= SEPARATION**2
+        apart[:, i] = True
+        free = apart.all(axis=1) & ((there >= bounds[:2]) & (there <= bounds[2:])).all(axis=1)
+        objects[:, i, :2] = np.where(free[:, None], there, objects[:, i, :2])
+        heading[:, i] = np.where(free, heading[:, i], np.pi * turn[:, i])
     return objects, heading

@@ -39,15 +39,9 @@ class Normals:
         """Draw from the first frame on, under these keys (n,)."""
         self._keys, self._frames = keys, np.zeros(len(keys), np.uint32)
 
-    def begin(self) -> Running:
-        """Start drawing the next frame of all worlds; it runs beside whatever comes next."""
-        return self._launch(np.arange(len(self._keys)))
-
-    def of(self, worlds: np.ndarray) -> np.ndarray:
-        """The next frame of these worlds alone, (len(worlds), *shape) float32."""
-        return self._launch(worlds).values()
-
-    def _launch(self, worlds: np.ndarray) -> Running:
+    def begin(self, worlds: np.ndarray) -> Running:
+        """Start drawing the next frame of these worlds; it runs beside whatever comes next, but for more of its kind:
+        wait for one draw of many worlds before the next, and for one of a few."""
         n = len(self._keys)
         width = FEW if len(worlds) <= FEW < n else n
         if width not in self._kernels:

@@ -41,4 +41,4 @@ def free_spot(
     for x, y in others:
         free &= np.hypot(object_spawn[:, 0] - x, object_spawn[:, 1] - y) >= SEPARATION
     spots = np.flatnonzero(free)
-    return object_spawn[rng.choice(spots)] if len(spots) else None
+    return object_spawn[spots[rng.integers(len(spots))]] if len(spots) else None

@@ -7,6 +7,7 @@ wavelengths are fixed, so a call does nothing but upload poses and launch the ke
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -136,9 +137,18 @@ class BatchedRenderer:
     def signals(self, state: WorldState) -> np.ndarray:
         """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
         a² sum_b weights[channel, b] radiance_b."""
-        light = self._components(self._sums, state)
-        signals = self._readout(light.reshape(len(light) * len(self.tracer.basis), state.n * self.eyes.n_eyes, -1))
-        signals = signals.reshape(state.n, self.eyes.n_eyes, len(self.bands.weights), *self.eye.resolution)
+        return self.begin(state)()
+
+    def begin(self, state: WorldState) -> Callable[[], np.ndarray]:
+        """Start looking; it runs beside whatever comes next. A call of what is returned waits for the signals, and has
+        to come before the next look."""
+        light = self._launch(self._sums, state)
+        return lambda: self._signals(_waited_for(light))
+
+    def _signals(self, light: np.ndarray) -> np.ndarray:
+        planes = self.sensor.depth.count * len(self.tracer.basis)
+        signals = self._readout(light.reshape(planes, self.n_envs * self.eyes.n_eyes, -1))
+        signals = signals.reshape(self.n_envs, self.eyes.n_eyes, len(self.bands.weights), *self.eye.resolution)
         mosaic = self.eye.mosaic
         return signals if mosaic is None else np.take_along_axis(signals, mosaic[None, None, None], axis=2)
 
@@ -149,13 +159,21 @@ class BatchedRenderer:
 
     def _components(self, frozen: Any, state: WorldState) -> np.ndarray:
         """(layer, component, all rays of all views, or their sums)"""
+        light = _waited_for(self._launch(frozen, state))
+        return light.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)
+
+    def _launch(self, frozen: Any, state: WorldState) -> Any:
+        """The kernel at work on this state; its poses are in a buffer that must not be written before it is done."""
         if state.n != self.n_envs:
             raise ValueError(f"state has {state.n} worlds, this renderer was built for n_envs = {self.n_envs}")
         with variant(self._stage.variant), garbage_kept():
-            poses = mi.Float(self._poses.pack(state, self._stage))
-            # numpy() waits for the kernel: only then may the buffer, whose memory Dr.Jit shares, be written again.
-            light = np.array(frozen(self.tracer.scene, poses, self._inputs).numpy())
-        return light.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)
+            poses = mi.Float(self._poses.pack(state, self._stage))  # shares the buffer's memory
+            return frozen(self.tracer.scene, poses, self._inputs)
+
+
+def _waited_for(light: Any) -> np.ndarray:
+    with garbage_kept():
+        return np.array(light.numpy())
 
 
 def _asked(rays_per_receptor: float | str | Fidelity, eyes: Eyes) -> Fidelity | None:

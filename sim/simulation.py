@@ -28,7 +28,7 @@ class Step:
     state         after the action; where `failure` is set, the last good one
     reward_terms  name -> (n,)
     terminated, truncated, contact, success  (n,) bool; success: the goal was reached in this episode
-    failure       why a world could not go on ("unstable physics", "action is not finite"), or None, per world
+    failure       world that could not go on -> why: "unstable physics" or "action is not finite"
     """
 
     state: WorldState
@@ -37,12 +37,13 @@ class Step:
     truncated: np.ndarray
     contact: np.ndarray
     success: np.ndarray
-    failure: tuple[str | None, ...]
+    failure: dict[int, str]
 
     @property
     def reward(self) -> np.ndarray:
         """Sum of the terms, (n,)."""
-        return np.sum(list(self.reward_terms.values()), axis=0)
+        first, *others = self.reward_terms.values()
+        return sum(others, start=first)
 
     @property
     def done(self) -> np.ndarray:
@@ -128,7 +129,7 @@ class Simulation:
             truncated=(final.steps >= EPISODE_STEPS) & ~terminated,
             contact=motion.contact,
             success=final.goals_reached > 0,
-            failure=tuple(_reason(*flags) for flags in zip(acted, broken, strict=True)),
+            failure={int(i): UNSTABLE if acted[i] else NO_ACTION for i in np.flatnonzero(~good)},
         )
 
     def _steer(self, state: WorldState, actions: np.ndarray) -> tuple[WorldState, np.ndarray]:
@@ -157,10 +158,3 @@ class Simulation:
             goals_reached=np.zeros(1, int),
             adversaries_reached=np.zeros(1, int),
         )
-
-
-def _reason(acted: bool, broken: bool) -> str | None:
-    """Why a world cannot go on, if it cannot."""
-    if not acted:
-        return NO_ACTION
-    return UNSTABLE if broken else None

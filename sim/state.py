@@ -40,10 +40,11 @@ class WorldState:
     @property
     def finite(self) -> np.ndarray:
         """Worlds in which every number is one, (n,) bool."""
-        moving = (self.position, self.heading, self.velocity, self.objects, self.object_heading)
         # NaN and infinity survive any sum, and one test of a sum costs less than one of every term.
-        total: np.ndarray = sum((a.reshape(self.n, -1).sum(axis=1) for a in moving), np.zeros(self.n))
-        return np.isfinite(total)
+        total = self.heading + self.position.sum(axis=1) + self.velocity.sum(axis=1)
+        total += self.objects.sum(axis=(1, 2)) + self.object_heading.sum(axis=1)
+        finite: np.ndarray = np.isfinite(total)
+        return finite
 
     def repaired(self) -> WorldState:
         """The same worlds with 0 for whatever is not finite."""

@@ -6,7 +6,7 @@ event reward for reaching the goal or an adversary, and a penalty per action in 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -15,6 +15,7 @@ import numpy as np
 from sim.motion import wander
 from sim.placement import REACH, free_spot, place
 from sim.state import WorldState
+from sim.streams import Motion
 from sim.world import TASKS, World
 
 
@@ -43,7 +44,7 @@ class Task(Protocol):
     def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """Start of an episode in one world: agent (2,) and objects (k, 2)."""
 
-    def move(self, state: WorldState, rngs: list[np.random.Generator], seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    def move(self, state: WorldState, chance: Motion, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         """Objects (n, k, 3) and their headings (n, k) one action later."""
 
     def judge(self, before: WorldState, after: WorldState, path: np.ndarray, ends: bool) -> Outcome:
@@ -67,15 +68,19 @@ class FindGoal:
         """Which objects are goals, (k,) bool."""
         return np.array([name.startswith("goal") for name in self.world.objects])
 
+    @cached_property
+    def _bounds(self) -> np.ndarray:
+        """Of where objects move: x_min, y_min, x_max, y_max [m]."""
+        spots = self.world.object_spawn
+        return np.concatenate([spots.min(axis=0), spots.max(axis=0)])
+
     def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         return place(rng, self.world.agent_spawn, self.world.object_spawn, len(self.world.objects))
 
-    def move(self, state: WorldState, rngs: list[np.random.Generator], seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    def move(self, state: WorldState, chance: Motion, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         if not self.moving:
             return state.objects, state.object_heading
-        spots = self.world.object_spawn
-        bounds = np.concatenate([spots.min(axis=0), spots.max(axis=0)])
-        return wander(state, rngs, bounds, seconds)
+        return wander(state, chance, self._bounds, seconds)
 
     def judge(self, before: WorldState, after: WorldState, path: np.ndarray, ends: bool) -> Outcome:
         goals = self._goals
@@ -110,7 +115,7 @@ class LeaveMaze:
     def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         return self.world.agent_spawn[rng.integers(len(self.world.agent_spawn))], np.empty((0, 2))
 
-    def move(self, state: WorldState, rngs: list[np.random.Generator], seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    def move(self, state: WorldState, chance: Motion, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         return state.objects, state.object_heading
 
     def judge(self, before: WorldState, after: WorldState, path: np.ndarray, ends: bool) -> Outcome:
@@ -146,9 +151,10 @@ def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: n
     substeps, end = path.shape[1], path[:, -1, None]
     found = np.full(objects_after.shape[:2], substeps)
     # Most objects are so far away that nobody can have come near.
-    moved = np.abs(path - end).sum(axis=-1).max(axis=1)[:, None] + np.abs(objects_after - objects_before).sum(axis=-1)
+    moved = np.abs(path - end).max(axis=(1, 2))[:, None] + np.abs(objects_after - objects_before).max(axis=-1)
     offset = objects_after[..., :2] - end
-    worlds, which = np.nonzero(np.hypot(offset[..., 0], offset[..., 1]) < REACH + moved)
+    reach = REACH + np.sqrt(2) * moved
+    worlds, which = ((offset**2).sum(axis=-1) < reach**2).nonzero()
     if len(worlds):
         t = (np.arange(substeps) + 1.0)[:, None] / substeps
         before, after = (objects[worlds, which, None, :2] for objects in (objects_before, objects_after))
@@ -162,6 +168,8 @@ def respawned(task: Task, state: WorldState, which: np.ndarray, rngs: list[np.ra
 
     Raises ValueError where the world has no free spot left.
     """
+    if not which.any():
+        return state
     objects = state.objects.copy()
     for world, index in zip(*np.nonzero(which), strict=True):
         others = np.delete(objects[world, :, :2], index, axis=0)
@@ -169,11 +177,11 @@ def respawned(task: Task, state: WorldState, which: np.ndarray, rngs: list[np.ra
         if spot is None:
             raise ValueError("object_spawn: no free spot left to respawn an object; it needs more cells")
         objects[world, index, :2] = spot
-    return WorldState(**{**vars(state), "objects": objects})
+    return replace(state, objects=objects)
 
 
 def _distance(state: WorldState, goals: np.ndarray) -> np.ndarray:
     """From the agent to the nearest goal [m], (n,)."""
     offset = state.objects[:, goals, :2] - state.position[:, None]
-    distance: np.ndarray = np.hypot(offset[..., 0], offset[..., 1]).min(axis=1)
+    distance: np.ndarray = np.sqrt((offset**2).sum(axis=-1).min(axis=1))
     return distance

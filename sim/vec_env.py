@@ -14,15 +14,14 @@ from optics.tabulated import Spectrum
 from sim.agent import Eyes
 from sim.eye_images import side_by_side
 from sim.fidelity import Fidelity
-from sim.noise import NoiseModel, Normals
 from sim.observation import STANDING, Memory, action_space, observation_space
 from sim.picture import Onlooker, check_render_mode
 from sim.render import BatchedRenderer
+from sim.reward import per_world
+from sim.sight import Sight
 from sim.simulation import Simulation, Step
 from sim.state import WorldState
 from sim.world import build_world
-
-TERMINAL_WIDTH = 8  # worlds of the small renderer that looks at final states
 
 
 class EyesVecEnv(VecEnv):
@@ -39,15 +38,10 @@ class EyesVecEnv(VecEnv):
         self.simulation, self.renderer, self.eyes = simulation, renderer, renderer.eyes
         self.render_mode = render_mode
         self._onlooker: Onlooker | None = None
-        self._terminal_renderer: BatchedRenderer | None = None
         self._memory = Memory(memory)
-        channels = renderer.eye.channels
-        self._noise = NoiseModel.of(renderer.eye)
-        spread = self._noise.largest(renderer.brightest) if self._noise else 0.0
-        space = observation_space(self.eyes, channels, memory, renderer.brightest, spread)
+        self._sight = Sight(renderer, simulation.streams.noise_keys)
+        space = observation_space(self.eyes, renderer.eye.channels, memory, renderer.brightest, self._sight.spread)
         super().__init__(simulation.n, space, action_space())
-        frame = self.observation_space["eyes"].shape[1:]
-        self._normals = Normals(simulation.streams.noise_keys, frame) if self._noise else None
         self._commanded = self._actions = np.zeros((self.num_envs, 2), np.float32)
         self._returns, self._lengths = np.zeros(self.num_envs), np.zeros(self.num_envs, int)
 
@@ -59,15 +53,14 @@ class EyesVecEnv(VecEnv):
     def reset(self) -> dict[str, np.ndarray]:
         if self._seeds[0] is not None:
             self.simulation.seed(self._seeds[0])
-            if self._normals:
-                self._normals.restart(self.simulation.streams.noise_keys)
+            self._sight.restart(self.simulation.streams.noise_keys)
         self.simulation.reset()
         self._reset_seeds()
         self._reset_options()
         self._returns[:], self._lengths[:] = 0.0, 0
-        self.reset_infos = self._infos_of(self.state, {}, np.zeros(self.num_envs, bool))
+        self.reset_infos = self._infos_of(self.state, [{} for _ in range(self.num_envs)], np.zeros(self.num_envs, bool))
         everyone = np.ones(self.num_envs, bool)
-        return self._observe(everyone, ~everyone)
+        return self._observation(self._sight.begin(self.state)(), everyone, ~everyone)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed all random streams at the next reset. World i draws from streams derived from (seed, i)."""
@@ -88,22 +81,27 @@ class EyesVecEnv(VecEnv):
         terminated, truncated, info."""
         self.step_async(actions)
         step = self.simulation.step(self._commanded)
+        looking = self._sight.begin(self.state)
         reward = step.reward
         infos = self._infos(step, reward)
-        observation = self._observe(np.zeros(self.num_envs, bool), step.contact)
+        observation = self._observation(looking(), np.zeros(self.num_envs, bool), step.contact)
         return observation, reward, step.terminated, step.truncated, infos
 
     def step_wait(self) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, list[dict[str, Any]]]:
         step = self.simulation.step(self._commanded)
-        reward = step.reward
-        infos = self._infos(step, reward)
         done = step.done
         ended = np.flatnonzero(done)
+        last_look = self._sight.begin_some(step.state, ended) if len(ended) else None
         if len(ended):
-            self._add_terminal_observations(infos, step, ended)
             self.simulation.restart(ended)
+        looking = self._sight.begin(self.state)
+        # While the eyes look: all that does not need what they see.
+        reward = step.reward
+        infos = self._infos(step, reward)
+        if last_look:
+            self._add_terminal_observations(infos, step, ended, last_look())
             self._returns[ended], self._lengths[ended] = 0.0, 0
-        observation = self._observe(done, step.contact & ~done)
+        observation = self._observation(looking(), done, step.contact & ~done)
         return observation, reward.astype(np.float32), done, infos
 
     def close(self) -> None:
@@ -130,22 +128,17 @@ class EyesVecEnv(VecEnv):
 
     # --- observations
 
-    def _observe(self, fresh: np.ndarray, contact: np.ndarray) -> dict[str, np.ndarray]:
-        running = self._normals.begin() if self._normals else None  # they are drawn while the state is packed
-        frame = self.renderer.signals(self.state)
-        if self._noise and running:
-            frame = self._noise(frame, running.values())
+    def _observation(self, seen: np.ndarray, fresh: np.ndarray, contact: np.ndarray) -> dict[str, np.ndarray]:
         return {
-            "eyes": self._memory.remember(frame, fresh),
+            "eyes": self._memory.remember(seen, fresh),
             "contact": contact.astype(np.float32)[:, None],
             "previous_action": np.where(fresh[:, None], np.array(STANDING, np.float32), self._actions),
         }
 
-    def _add_terminal_observations(self, infos: list[dict[str, Any]], step: Step, ended: np.ndarray) -> None:
-        frame = self._terminal_signals(step.state, ended)
-        if self._noise and self._normals:
-            frame = self._noise(frame, self._normals.of(ended))
-        stacks = self._memory.preview(frame, ended)
+    def _add_terminal_observations(
+        self, infos: list[dict[str, Any]], step: Step, ended: np.ndarray, seen: np.ndarray
+    ) -> None:
+        stacks = self._memory.preview(seen, ended)
         for stack, world in zip(stacks, ended, strict=True):
             infos[world]["terminal_observation"] = {
                 "eyes": stack,
@@ -153,41 +146,24 @@ class EyesVecEnv(VecEnv):
                 "previous_action": self._actions[world].copy(),
             }
 
-    def _terminal_signals(self, state: WorldState, ended: np.ndarray) -> np.ndarray:
-        """Signals of these worlds alone. Few of them: a small renderer, its width filled up by repetition."""
-        if self.num_envs <= TERMINAL_WIDTH or len(ended) > TERMINAL_WIDTH:
-            return self.renderer.signals(state)[ended]
-        if self._terminal_renderer is None:
-            self._terminal_renderer = self.renderer.resized(TERMINAL_WIDTH)
-        padded = np.resize(ended, TERMINAL_WIDTH)
-        return self._terminal_renderer.signals(state.take(padded))[: len(ended)]
-
     # --- info
 
     def _infos(self, step: Step, reward: np.ndarray) -> list[dict[str, Any]]:
-        infos = self._infos_of(step.state, step.reward_terms, step.success)
+        infos = self._infos_of(step.state, per_world(step.reward_terms), step.success)
         self._returns += reward
         self._lengths += 1
         for world in np.flatnonzero(step.done):
             infos[world]["TimeLimit.truncated"] = bool(step.truncated[world])
             infos[world]["episode"] = {"r": float(self._returns[world]), "l": int(self._lengths[world])}
-        for index, reason in enumerate(step.failure):
-            if reason is not None:
-                infos[index]["failure"] = reason
+        for index, reason in step.failure.items():
+            infos[index]["failure"] = reason
         return infos
 
-    def _infos_of(self, state: WorldState, terms: dict[str, np.ndarray], success: np.ndarray) -> list[dict[str, Any]]:
-        names = tuple(terms)
-        columns = zip(*(terms[name].tolist() for name in names), strict=True) if names else [()] * self.num_envs
+    def _infos_of(self, state: WorldState, terms: list[dict[str, float]], success: np.ndarray) -> list[dict[str, Any]]:
         return [
-            {
-                "reward_terms": dict(zip(names, values, strict=True)),
-                "is_success": reached,
-                "position": (x, y),
-                "heading": heading,
-            }
-            for values, reached, (x, y), heading in zip(
-                columns, success.tolist(), state.position.tolist(), state.heading.tolist(), strict=True
+            {"reward_terms": of_world, "is_success": reached, "position": (x, y), "heading": heading}
+            for of_world, reached, (x, y), heading in zip(
+                terms, success.tolist(), state.position.tolist(), state.heading.tolist(), strict=True
             )
         ]
 

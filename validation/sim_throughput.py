@@ -7,7 +7,8 @@ Medians over repeated calls after warm-up, in agent-steps per second (one step o
     render_mitsuba the same where Mitsuba traces the rays, and not the closed form that a world of walls has
     render_optics  the same behind a pupil: receptive fields, weights, bands
     step           the whole VecEnv step behind that pupil: physics, rewards, rendering, optics, noise, infos
-    overhead       share of a step's time that is neither physics nor rendering, optics and noise: at most OVERHEAD
+    overhead       how much longer a step takes than its physics and its rendering, optics and noise by themselves, done
+                   again from the same states right after it: at most OVERHEAD
     mujoco         mujoco.Renderer drawing the same eyes of one world, one after the other (RGB, no optics, no shadows)
     mujoco_shadows the same with shadows, which the batched renderer has; in software they are what it mostly does
     mi_render      the mirror's Mitsuba scene of one world, posed and rendered eye by eye with as many samples
@@ -36,8 +37,8 @@ import numpy as np
 import optics
 import sim
 from sim.picture import pose
+from sim.sight import Sight
 from sim.simulation import Simulation
-from sim.vec_env import TERMINAL_WIDTH
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ BARS = {
     "detection": {"render_optics": 18.0, "step": 14.0},
 }
 OVERHEAD = 0.15
+WARM_UP = 3  # calls
 
 
 def with_pupil(eyes: sim.Eyes) -> sim.Eyes:
@@ -70,14 +72,12 @@ def with_pupil(eyes: sim.Eyes) -> sim.Eyes:
 
 
 def seconds(call: Callable[[], Any], budget: float) -> float:
-    """Median duration of a call: three to warm up, then for `budget` seconds, five at least."""
-    for _ in range(3):
+    """Median duration of a call: some to warm up, then for `budget` seconds, five at least."""
+    for _ in range(WARM_UP):
         call()
     times: list[float] = []
     while len(times) < 5 or sum(times) < budget:
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
+        times.append(_duration(call))
     return statistics.median(times)
 
 
@@ -101,7 +101,8 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
         chosen[name] = f"{renderer.tracer.name}, {renderer.fidelity.rays_per_receptor:g} rays per receptor"
         rates[name] = n_envs / seconds(lambda renderer=renderer: renderer.signals(moved()), budget)  # type: ignore[misc]
     step = _Step(case, n_envs)
-    rates["step"] = n_envs / seconds(step, budget)
+    seconds(step, 2 * budget)
+    rates["step"] = n_envs / statistics.median(step.wholes[WARM_UP:])
     for name, shadows in (("mujoco", False), ("mujoco_shadows", True)):
         rates[name] = _mujoco_rate(world, case.eyes, state, budget, shadows)
     rates["mi_render"] = _mitsuba_rate(world, case.eyes, state, budget)
@@ -113,50 +114,49 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
         "chosen": chosen,
         "agent_steps_per_second": rates,
         "ratio_to_mujoco": {name: rates[name] / base for name in names} if base else None,  # type: ignore[operator]
-        "overhead": step.overhead,
+        "overhead": statistics.median(step.shares[WARM_UP:]),
     }
 
 
 class _Step:
-    """One step of all worlds, behind the pupil, with random actions; it keeps account of where time goes."""
+    """One step of all worlds, behind the pupil, with random actions; and by themselves, right after it and from the
+    same states, its parts: physics, and looks (rendering, optics and noise)."""
 
     def __init__(self, case: Case, n_envs: int) -> None:
         self._worlds = sim.make_vec_env(case.task, with_pupil(case.eyes), n_envs)
         self._worlds.reset()
+        self._alone = Sight(self._worlds.renderer, self._worlds.simulation.streams.noise_keys)
         self._rng = np.random.default_rng(0)
-        # Made now, or it would be a copy of the renderer that is being timed.
-        self._worlds._terminal_renderer = self._worlds.renderer.resized(TERMINAL_WIDTH)
-        self._inside = 0.0
-        self._shares: list[float] = []
-        for owner, name in (
-            (self._worlds.simulation._physics, "step"),
-            (self._worlds.renderer, "signals"),
-            (self._worlds, "_terminal_signals"),
-            (self._worlds, "_noise"),
-            (self._worlds._normals, "begin"),
-        ):
-            setattr(owner, name, self._timed(getattr(owner, name)))
+        self._parts: list[Callable[[], Any]] = []
+        self.wholes: list[float] = []
+        self.shares: list[float] = []
+        self._note(self._worlds.simulation._physics, "step", self._worlds.simulation._physics.step)
+        self._note(self._worlds._sight, "begin", lambda *asked: self._alone.begin(*asked)())
+        self._note(self._worlds._sight, "begin_some", lambda *asked: self._alone.begin_some(*asked)())
+
+    def _note(self, owner: Any, name: str, alone: Callable[..., Any]) -> None:
+        """Remember what the step asks of this method, for doing it again `alone`."""
+        method = getattr(owner, name)
+
+        def noted(*asked: Any) -> Any:
+            self._parts.append(lambda: alone(*asked))
+            return method(*asked)
+
+        setattr(owner, name, noted)
 
     def __call__(self) -> None:
-        self._inside = 0.0
-        start = time.perf_counter()
-        self._worlds.step(self._rng.uniform(-1, 1, (self._worlds.num_envs, 2)))
-        self._shares.append(1 - self._inside / (time.perf_counter() - start))
+        self._parts.clear()
+        actions = self._rng.uniform(-1, 1, (self._worlds.num_envs, 2))
+        whole = _duration(lambda: self._worlds.step(actions))
+        parts = sum(_duration(part) for part in self._parts)
+        self.wholes.append(whole)
+        self.shares.append(whole / parts - 1)
 
-    @property
-    def overhead(self) -> float:
-        """Median over the steps of (whole - parts) / parts."""
-        share = statistics.median(self._shares)
-        return share / (1 - share)
 
-    def _timed(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        def timed(*arguments: Any, **options: Any) -> Any:
-            start, before = time.perf_counter(), self._inside
-            result = function(*arguments, **options)
-            self._inside = before + time.perf_counter() - start  # what it called in turn counts once
-            return result
-
-        return timed
+def _duration(call: Callable[[], Any]) -> float:
+    start = time.perf_counter()
+    call()
+    return time.perf_counter() - start
 
 
 def _mitsuba_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float) -> float:

@@ -122,7 +122,7 @@ def test_a_broken_world_ends_its_episode_with_a_reason(world):
     velocity[1] = 1e12
     simulation._state = dataclasses.replace(state, velocity=velocity)
     step = simulation.step(np.zeros((3, 2)))
-    assert step.failure == (None, "unstable physics", None)
+    assert step.failure == {1: "unstable physics"}
     assert step.terminated.tolist() == [False, True, False]
     assert np.isfinite(step.reward).all()
 

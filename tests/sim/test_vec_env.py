@@ -7,9 +7,9 @@ import pytest
 
 import optics
 import sim
+from sim.noise import FEW
 from sim.observation import Memory
 from sim.simulation import EPISODE_STEPS, MAX_TURN
-from sim.vec_env import TERMINAL_WIDTH
 
 EYES = sim.Eyes(n_eyes=2, resolution=(4, 5), fov_deg=60, noise_sigma=0.05)
 QUIET = dataclasses.replace(EYES, noise_sigma=0.0)
@@ -92,7 +92,7 @@ def test_observations_are_those_of_the_state_they_come_with():
 
 def test_terminal_observation_shows_the_final_state(monkeypatch):
     """Few and many endings at once (small and whole renderer) give the same pictures."""
-    venv = make(TERMINAL_WIDTH + 2, eyes=QUIET, memory=3)
+    venv = make(FEW + 2, eyes=QUIET, memory=3)
     whole = venv.renderer
     seen = {}
     step = venv.simulation.step

@@ -1,0 +1,65 @@
+"""What all agents' eyes report, noise included; started early and waited for late, so that it runs beside the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from sim.noise import FEW, NoiseModel, Normals
+from sim.render import BatchedRenderer
+from sim.state import WorldState
+
+Pending = Callable[[], np.ndarray]  # waits for signals (env, eye, channel, height, width) float32
+
+
+class Sight:
+    """Renderer and receptor noise of one batch of worlds.
+
+    renderer  of all worlds
+    keys      of their noise, (n,) uint64
+    spread    largest standard deviation of a signal's noise
+    """
+
+    def __init__(self, renderer: BatchedRenderer, keys: np.ndarray) -> None:
+        self.renderer = renderer
+        self._noise = NoiseModel.of(renderer.eye)
+        self.spread = self._noise.largest(renderer.brightest) if self._noise else 0.0
+        frame = (renderer.eyes.n_eyes, renderer.eye.channels, *renderer.eyes.resolution)
+        self._normals = Normals(keys, frame) if self._noise else None
+
+    @cached_property
+    def _few(self) -> BatchedRenderer:
+        """For a few of the worlds."""
+        return self.renderer.resized(FEW)
+
+    def restart(self, keys: np.ndarray) -> None:
+        """Noise from its first frame on, under these keys (n,)."""
+        if self._normals:
+            self._normals.restart(keys)
+
+    def begin(self, state: WorldState) -> Pending:
+        """Look at all worlds; to be waited for before the next look."""
+        everyone = np.arange(state.n)
+        return self._noisy(self.renderer.begin(state), everyone, everyone)
+
+    def begin_some(self, state: WorldState, worlds: np.ndarray) -> Pending:
+        """Look at these of the worlds alone; `begin` may follow before it is waited for."""
+        if len(worlds) <= FEW < state.n:
+            signals = self._few.begin(state.take(np.resize(worlds, FEW)))
+            return self._noisy(signals, np.arange(len(worlds)), worlds)
+        seen = self._noisy(
+            self.renderer.begin(state), worlds, worlds
+        )()  # with what `begin` works with, so not beside it
+        return lambda: seen
+
+    def _noisy(self, signals: Pending, rows: np.ndarray, worlds: np.ndarray) -> Pending:
+        """These rows of the signals, and on them the noise of these worlds."""
+        normals = self._normals.begin(worlds) if self._normals else None
+
+        def wait() -> np.ndarray:
+            seen = signals()[rows]
+            return self._noise(seen, normals.values()) if self._noise and normals else seen
+
+        return wait
