@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 import optics
 from evolve.analysis import acuity_cpd, polychromatic, succeeded
 from evolve.candidate import Candidate
+from evolve.files import write_whole
 from evolve.store import Run, RunError
 from evolve.versions import recorded
 from evolve.vision import vision
@@ -41,6 +42,7 @@ class Row:
     parameters   of its trained policy, critic included
     above_noise  contrast above the noise; see experiments.best_pupil
     relief       heights in [0, 1], row by row, of an eye with optics
+    peaks_nm     of the pigments, of an eye that inherits them
     """
 
     group: str
@@ -69,6 +71,7 @@ class Row:
     psnr_db: float = NO_NUMBER
     ssim: float = NO_NUMBER
     relief: str = ""
+    peaks_nm: str = ""
 
 
 def rows_of(run: Run, group: str) -> list[Row]:
@@ -107,6 +110,7 @@ def _row(run: Run, group: str, candidate: Candidate, champion: bool) -> Row:
         relative_aperture=animal.relative_aperture if animal.relative_aperture is not None else NO_NUMBER,
         refractive_index=animal.refractive_index if animal.refractive_index is not None else NO_NUMBER,
         relief=" ".join(f"{height:.3g}" for height in animal.relief or ()) if has_optics else "",
+        peaks_nm=" ".join(f"{peak:.1f}" for peak in animal.lambda_max_nm or ()),
         **seen,
     )
 
@@ -239,7 +243,7 @@ def _collect(chosen: Namespace, stem: Path) -> None:
         here = Origin.here(hours)
         Origin(hours, here.machine, recorded(runs[0][1].path) or here.versions).write(stem.with_suffix(".json"))
     if chosen.answer:
-        stem.with_suffix(".txt").write_text(chosen.answer + "\n", encoding="utf-8")
+        write_whole(stem.with_suffix(".txt"), f"{chosen.answer}\n".encode())
 
 
 def _stored(stem: Path) -> Store:

@@ -1,0 +1,142 @@
+"""Seeing ultraviolet: do pigments move to where goal and adversary differ?
+
+python -m experiments.seeing_ultraviolet [--runs foraging=DIR ...] [--answer TEXT] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+import optics
+from experiments import evolved
+from experiments.evolved import LAST, NO_NUMBER, Row, Store, last_mean, of_generation
+from experiments.page import Figure, Page, markdown_table, new_figure, save
+from sim.tasks.foraging import ULTRAVIOLET, petal
+
+__all__ = ["contrast", "difference", "page"]
+
+NAME = "seeing_ultraviolet"
+BANDS = 16
+SHORTEST, LONGEST = "#6A3D9A", "#D55E00"
+FITNESS = "#0072B2"
+
+
+@lru_cache
+def difference(peak_nm: float) -> float:
+    """What a receptor with a pigment of this peak makes of goal and adversary in daylight: the difference of its
+    signals, white being 1."""
+    eye = optics.Eye(resolution=(1, 1), bands=BANDS, receptors=(peak_nm,))
+    wavelengths = eye.spectral_bands.wavelengths
+    daylight = optics.illuminant("D65").at(wavelengths)
+    goal, adversary = (
+        eye.see((petal(share).at(wavelengths) * daylight)[:, None, None], 1).item() for share in ULTRAVIOLET.values()
+    )
+    return abs(goal - adversary)
+
+
+def contrast(row: Row) -> float:
+    """Difference of goal and adversary to a candidate's best type of receptor."""
+    return max((difference(peak) for peak in peaks(row)), default=NO_NUMBER)
+
+
+def peaks(row: Row) -> list[float]:
+    """Of its types of receptor [nm], shortest first."""
+    return sorted(float(text) for text in row.peaks_nm.split())
+
+
+def shortest(row: Row) -> float:
+    """Peak [nm] of the type that sees most of the ultraviolet."""
+    return min(peaks(row), default=NO_NUMBER)
+
+
+def longest(row: Row) -> float:
+    """Peak [nm] of the other type."""
+    return max(peaks(row), default=NO_NUMBER)
+
+
+QUANTITIES = {
+    "shortest peak [nm]": shortest,
+    "longest peak [nm]": longest,
+    "difference of goal and adversary": contrast,
+    "fitness": lambda row: row.fitness,
+    "goal first": lambda row: row.success_rate,
+}
+
+
+def page(store: Store) -> Page:
+    """The page of stored runs."""
+    return Page(
+        name=NAME,
+        title="Seeing ultraviolet",
+        question=(
+            "Goal and adversaries of `foraging` are alike but for what they reflect below 400 nm. Do the peaks of an "
+            "eye's pigments move there? (With three channels for red, green and blue the question cannot be asked.)"
+        ),
+        answer=store.answer,
+        method=(
+            "Two types of receptor begin at 600 and 520 nm; nothing but their peaks evolves. Left: what a receptor's "
+            "signals of goal and adversary differ by in daylight, computed for every peak, and where each seed's "
+            f"candidates of the last {LAST} generations have theirs. Pigments of long peaks have a second, weak band "
+            "in the ultraviolet (Govardovskii et al. 2000), so that even the first eyes are not quite blind to it. "
+            "Lines are means over the candidates of a generation, one per seed; the table compares the first "
+            f"generation's with the last {LAST} generations', over all seeds, with 95 % intervals by a bootstrap over "
+            "seeds and candidates."
+        ),
+        command=(
+            "evolve run --preset ultraviolet --seed 0    # and others\n"
+            "python -m experiments.seeing_ultraviolet --runs foraging=DIR foraging=DIR"
+        ),
+        figures=[
+            Figure(
+                NAME,
+                lambda path: draw(store.rows, path),
+                "Violet: the type with the shorter peak; orange: the other. All seeds are shown.",
+            )
+        ],
+        tables=[table(store.rows)],
+        origin=store.origin,
+    )
+
+
+def table(rows: Sequence[Row]) -> str:
+    """First generation and last ones."""
+    first = [row for row in rows if row.generation == 0]
+    header = ["mean", "first generation", f"last {LAST} generations"]
+    lines = [[name, str(last_mean(first, value)), str(last_mean(rows, value))] for name, value in QUANTITIES.items()]
+    return markdown_table(header, lines)
+
+
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """What can be seen where, where the pigments went, and what it was good for."""
+    figure, axes = new_figure(11, 3.4, columns=3)
+    seen, moved, worth = axes[0]
+    nm = np.linspace(330, 650, 65)
+    seen.semilogy(nm, [difference(float(peak)) for peak in nm], color="#222222", lw=1.2)
+    seen.set(xlabel="peak of the pigment [nm]", title="difference of goal and adversary")
+    for seed in sorted({row.seed for row in rows}):
+        mine = [row for row in rows if row.seed == seed]
+        last = [row for row in mine if row.generation > max(r.generation for r in mine) - LAST]
+        for value, color in ((shortest, SHORTEST), (longest, LONGEST)):
+            found = [value(row) for row in last]
+            seen.semilogy(found, [difference(peak) for peak in found], "o", color=color, ms=4, alpha=0.5, mec="none")
+            moved.plot(*of_generation(mine, value), color=color, lw=1.2)
+        worth.plot(*of_generation(mine, lambda row: row.success_rate), color=FITNESS, lw=1.2)
+    moved.axhspan(330, 400, color=SHORTEST, alpha=0.08, lw=0)
+    moved.set(xlabel="generation", title="peaks [nm]")
+    worth.axhline(1 / 3, color="#999999", lw=0.8, ls=":")
+    worth.set(xlabel="generation", title="goal reached before any adversary", ylim=(0, 1))
+    save(figure, path)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Collect runs if asked, and make the page."""
+    return evolved.main(NAME, __doc__ or "", page, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
