@@ -71,7 +71,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME",
         default="paper",
         help="settings to begin with: quick (minutes), paper (a day; default), or an experiment: "
-        "bifurcation-navigation, bifurcation-detection, lens, scaling",
+        "bifurcation-navigation, bifurcation-detection, lens, scaling, ultraviolet",
     )
     run.add_argument("--scale", help="of an experiment: laptop (hours on two cores; default) or paper (days)")
     run.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings; wins over the preset")

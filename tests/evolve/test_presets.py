@@ -18,7 +18,7 @@ from evolve.genotype import Genotype
 from evolve.plan import idle_genes
 from evolve.search import Search
 
-EXPERIMENTS = ("bifurcation-detection", "bifurcation-navigation", "lens", "scaling")
+EXPERIMENTS = ("bifurcation-detection", "bifurcation-navigation", "lens", "scaling", "ultraviolet")
 PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
 
 
