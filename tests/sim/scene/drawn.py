@@ -1,7 +1,8 @@
 """MuJoCo's own renderer, in a child process: a machine's OpenGL may bring an LLVM of its own, which does not always
 live in peace with the one that Dr.Jit loads.
 
-As a program: drawn.py OUT WIDTH HEIGHT MODEL.mjb ... draws camera 0 of each model, colours and geom ids.
+As a program: drawn.py OUT WIDTH HEIGHT MATERIALS MODEL.mjb ... draws camera 0 of each model, colours and geom ids;
+where MATERIALS is above 1, once with all geoms of each of the model's first materials.
 """
 
 import os
@@ -14,14 +15,16 @@ import mujoco
 import numpy as np
 
 
-def draw(models, width, height):
-    """Colours (n, y, x, 3) uint8 and geom ids (n, y, x), -1 for none; None where there is no OpenGL."""
+def draw(models, width, height, materials=1):
+    """Colours (n, y, x, 3) uint8 and geom ids (n, y, x), -1 for none; None where there is no OpenGL. A renderer takes
+    much longer to make than a picture: for several `materials` each model is drawn in one after the other, which makes
+    n = models x materials."""
     with tempfile.TemporaryDirectory() as folder:
         names = [str(Path(folder) / f"{i}.mjb") for i in range(len(models))]
         for model, name in zip(models, names, strict=True):
             mujoco.mj_saveModel(model, name)
         out = str(Path(folder) / "out.npz")
-        command = [sys.executable, __file__, out, str(width), str(height), *names]
+        command = [sys.executable, __file__, out, *map(str, (width, height, materials)), *names]
         # EGL needs no display; where someone has set another way, that one is taken.
         child = subprocess.run(command, env={"MUJOCO_GL": "egl", **os.environ}, capture_output=True, check=False)
         if child.returncode:
@@ -30,17 +33,23 @@ def draw(models, width, height):
             return pictures["colors"], pictures["ids"]
 
 
-def main(out, width, height, *names):
+def main(out, width, height, materials, *names):
     colors, ids = [], []
     for name in names:
         model = mujoco.MjModel.from_binary_path(name)
+        if model.nlight == 0:
+            model.vis.quality.shadowsize = 0  # nothing casts a shadow, and its buffer takes long to make
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         with mujoco.Renderer(model, int(height), int(width)) as renderer:
-            renderer.update_scene(data, 0)
-            colors.append(renderer.render())
-            renderer.enable_segmentation_rendering()
-            ids.append(renderer.render()[..., 0])
+            for material in range(int(materials)):
+                if int(materials) > 1:
+                    model.geom_matid[:] = material
+                renderer.disable_segmentation_rendering()
+                renderer.update_scene(data, 0)
+                colors.append(renderer.render())
+                renderer.enable_segmentation_rendering()
+                ids.append(renderer.render()[..., 0])
     np.savez(out, colors=np.array(colors), ids=np.array(ids))
 
 

@@ -38,6 +38,7 @@ CASES = {
     "mesh-uniform": (GEOM.mjGEOM_MESH, [0, 0, 0], OVER, True, 6),
     "hfield": (GEOM.mjGEOM_HFIELD, [0, 0, 0], [1, 0, 0, 0.3], False, 6),
 }
+ANGULAR = (GEOM.mjGEOM_BOX, GEOM.mjGEOM_MESH, GEOM.mjGEOM_HFIELD)
 CODES = ("face", "column", "row", "white")
 
 
@@ -48,19 +49,22 @@ def picture(code, faces):
     return values[code].reshape(-1, TEXELS).astype(np.uint8)
 
 
-def build(case, code, emission=0.0):
+def build(case, *codes, emission=0.0):
+    """The geom, in the first of its materials, one per code."""
     kind, size, quat, uniform, faces = CASES[case]
     spec = mujoco.MjSpec()
     spec.visual.headlight.active = 0
     spec.visual.map.znear = 1e-3
-    spec.visual.quality.numslices = spec.visual.quality.numstacks = 120
+    if kind not in ANGULAR:
+        spec.visual.quality.numslices = spec.visual.quality.numstacks = 120
     spec.visual.quality.offsamples = 0
-    texture = spec.add_texture(
-        name="code", type=mujoco.mjtTexture.mjTEXTURE_CUBE, width=TEXELS, height=faces * TEXELS, nchannel=3
-    )
-    texture.data = np.repeat(picture(code, faces)[..., None], 3, axis=2).tobytes()
-    material = spec.add_material(name="code", texuniform=uniform, emission=emission, specular=0, shininess=0)
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "code"
+    for code in codes:
+        texture = spec.add_texture(
+            name=code, type=mujoco.mjtTexture.mjTEXTURE_CUBE, width=TEXELS, height=faces * TEXELS, nchannel=3
+        )
+        texture.data = np.repeat(picture(code, faces)[..., None], 3, axis=2).tobytes()
+        material = spec.add_material(name=code, texuniform=uniform, emission=emission, specular=0, shininess=0)
+        material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = code
     where = {"size": size}
     if kind == GEOM.mjGEOM_MESH:
         # Skew, and not centred on its frame: the directions on its faces are not those of a box.
@@ -72,7 +76,7 @@ def build(case, code, emission=0.0):
         field = spec.add_hfield(name="hills", nrow=5, ncol=7, size=[0.9, 0.7, 0.6, 0.3])
         field.userdata = np.random.default_rng(2).uniform(0, 1, 35).tolist()
         where = {"hfieldname": "hills"}
-    spec.worldbody.add_geom(type=kind, quat=quat, material="code", **where)
+    spec.worldbody.add_geom(type=kind, quat=quat, material=codes[0], **where)
     if emission == 0:
         light = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         spec.worldbody.add_light(type=light, dir=[0.2, 0.5, -0.7], diffuse=[1, 1, 1])
@@ -105,7 +109,7 @@ def decoded(levels):
 @pytest.fixture(scope="module")
 def drawn():
     """What MuJoCo draws, by case."""
-    pictures = draw([build(case, code, emission=1.0) for case in CASES for code in CODES[:3]], WIDTH, HEIGHT)
+    pictures = draw([build(case, *CODES[:3], emission=1.0) for case in CASES], WIDTH, HEIGHT, 3)
     if pictures is None:
         pytest.skip("no OpenGL context: compared with OpenGL's definition alone")
     levels = np.where(pictures[1] == 0, pictures[0][..., 0].astype(float), np.nan)

@@ -5,6 +5,8 @@ gives the coordinate. Tried and seen to fail, one at a time: a box's u and v swa
 axis, a plane's v upwards, image upside down, a capsule's caps swapped, uniform repeats ignored, sRGB not decoded.
 """
 
+from functools import cache
+
 import mujoco
 import numpy as np
 import pytest
@@ -43,6 +45,7 @@ CASES = {
     "hfield": (GEOM.mjGEOM_HFIELD, [0.9, 0.7, 0.5], [1, 0, 0, 0.3], (0.6, 0.8), False),
     "hfield-uniform": (GEOM.mjGEOM_HFIELD, [0.9, 0.7, 0.5], [1, 0, 0, 0.3], (0.6, 0.8), True),
 }
+ANGULAR = (GEOM.mjGEOM_PLANE, GEOM.mjGEOM_BOX, GEOM.mjGEOM_MESH, GEOM.mjGEOM_HFIELD)
 WITH_FORMULA = [case for case in CASES if not case.startswith("mesh")]
 QUAD = np.array([[-0.8, -0.8, 0], [0.8, -0.8, 0], [0.8, 0.8, 0], [-0.8, 0.8, 0.05]])
 QUAD_UV = np.array([[0.1, 0.9], [0.8, 0.7], [0.9, 0.2], [0.2, 0.05]])
@@ -54,22 +57,25 @@ CODES = {
 }
 
 
-def build(case, code, emission=0.0):
+def build(case, *codes, emission=0.0):
+    """The geom, in the first of its materials, one per code."""
     kind, size, quat, repeat, uniform = CASES[case]
     spec = mujoco.MjSpec()
     spec.visual.headlight.active = 0
     spec.visual.headlight.ambient = [0, 0, 0]
     spec.visual.map.znear = 1e-3
-    spec.visual.quality.numslices = spec.visual.quality.numstacks = 120
+    if kind not in ANGULAR:
+        spec.visual.quality.numslices = spec.visual.quality.numstacks = 120
     spec.visual.quality.offsamples = 0
-    texture = spec.add_texture(
-        name="code", type=mujoco.mjtTexture.mjTEXTURE_2D, width=TEXELS, height=TEXELS, nchannel=3
-    )
-    texture.data = np.repeat(CODES[code].astype(np.uint8)[..., None], 3, axis=2).tobytes()
-    material = spec.add_material(
-        name="code", texrepeat=repeat, texuniform=uniform, emission=emission, specular=0, shininess=0
-    )
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "code"
+    for code in codes:
+        texture = spec.add_texture(
+            name=code, type=mujoco.mjtTexture.mjTEXTURE_2D, width=TEXELS, height=TEXELS, nchannel=3
+        )
+        texture.data = np.repeat(CODES[code].astype(np.uint8)[..., None], 3, axis=2).tobytes()
+        material = spec.add_material(
+            name=code, texrepeat=repeat, texuniform=uniform, emission=emission, specular=0, shininess=0
+        )
+        material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = code
     if kind == GEOM.mjGEOM_MESH:
         back = QUAD - [0, 0, 0.3]  # a mesh must enclose a volume: the same quad again, turned over
         spec.add_mesh(
@@ -83,7 +89,7 @@ def build(case, code, emission=0.0):
         hills = spec.add_hfield(name="hills", nrow=3, ncol=4, size=[*size, 0.2])
         hills.userdata = np.random.default_rng(3).uniform(0, 0.4, 12).tolist()
         where = {"hfieldname": "hills"}
-    spec.worldbody.add_geom(type=kind, quat=quat, material="code", **where)
+    spec.worldbody.add_geom(type=kind, quat=quat, material=codes[0], **where)
     if emission == 0:
         light = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         spec.worldbody.add_light(type=light, dir=[0.2, 0.5, -0.7], diffuse=[1, 1, 1])
@@ -91,6 +97,7 @@ def build(case, code, emission=0.0):
     return spec.compile()
 
 
+@cache
 def coordinates(case):
     """(u, v) that the mirror's radiance tells at each pixel, NaN where dark, and the points seen, in the geom's frame.
 
@@ -103,7 +110,10 @@ def coordinates(case):
     lit = pictures["white"] > 0.02
     with np.errstate(divide="ignore", invalid="ignore"):
         uv = [_display(np.where(lit, pictures[code] / pictures["white"], np.nan)) for code in "uv"]
-    return np.stack(uv, axis=-1), local_points(case)
+    found = np.stack(uv, axis=-1), local_points(case)
+    for array in found:
+        array.flags.writeable = False
+    return found
 
 
 def _display(linear):
@@ -215,7 +225,7 @@ def _barycentric(points, triangle, values):
 @pytest.fixture(scope="module")
 def drawn():
     """(u, v) that MuJoCo draws, by case."""
-    pictures = draw([build(case, code, emission=1.0) for case in CASES for code in "uv"], WIDTH, HEIGHT)
+    pictures = draw([build(case, *"uv", emission=1.0) for case in CASES], WIDTH, HEIGHT, 2)
     if pictures is None:
         pytest.skip("no OpenGL context: compared with the formulas alone")
     levels = np.where(pictures[1] == 0, (pictures[0][..., 0] + 0.5) / TEXELS, np.nan)
