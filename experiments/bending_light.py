@@ -5,6 +5,7 @@ python -m experiments.bending_light [--runs VARIANT=DIR ...] [--answer TEXT] [--
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -103,12 +104,20 @@ def draw(store: Store, path: Path) -> None:
     save(figure, path)
 
 
-def extremes(rows: Sequence[Row]) -> tuple[Row, Row]:
-    """The fittest and the least fit of the last generations, of the last phase if that was shorter."""
+def extremes(rows: Sequence[Row]) -> tuple[Row, Row] | tuple[()]:
+    """The fittest and the least fit of the last generations, of the last phase if that was shorter; () where none of
+    them succeeded."""
     first = max(row.generation for row in rows) - LAST + 1
     late = [r for r in rows if r.generation >= first and r.phase == max(row.phase for row in rows)]
     done = sorted((row for row in late if row.relief and not row.failed), key=lambda row: row.fitness)
-    return done[-1], done[0]
+    return (done[-1], done[0]) if done else ()
+
+
+def relief_of(row: Row) -> optics.BSplineRelief | np.ndarray:
+    """A row's relief as a pupil of radius 1 takes it: one patch of 4 x 4 genes, or the heights that more genes are."""
+    points = np.array(row.relief.split(), float)
+    side = math.isqrt(points.size)
+    return optics.BSplineRelief(points.reshape(side, side)) if side == 4 else points.reshape(side, side)
 
 
 def draw_reliefs(store: Store, path: Path) -> None:
@@ -117,12 +126,12 @@ def draw_reliefs(store: Store, path: Path) -> None:
     figure, axes = new_figure(max(4.0, 1.7 * len(runs)), 3.8, columns=len(runs), rows=2)
     for column, (group, seed) in enumerate(runs):
         chosen = extremes([row for row in store.group(group) if row.seed == seed])
-        for place, row, what in zip(axes[:, column], chosen, ("fittest", "least fit"), strict=True):
-            points = np.array(row.relief.split(), float)
-            heights, inside = relief_heights(optics.Pupil(1.0, optics.BSplineRelief(points.reshape(4, 4))))
+        for place in axes[:, column]:
+            place.set_axis_off()
+        for place, row, what in zip(axes[:, column], chosen, ("fittest", "least fit"), strict=False):
+            heights, inside = relief_heights(optics.Pupil(1.0, relief_of(row)))
             shown = place.imshow(np.where(inside, heights, np.nan), origin="lower")
             figure.colorbar(shown, ax=place, shrink=0.7)
-            place.set_axis_off()
             place.set_title(
                 f"{group}, seed {seed}\n{what}: a = {row.relative_aperture:.2f}, n = {row.refractive_index:.2f}",
                 fontsize=7,

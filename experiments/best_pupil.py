@@ -59,11 +59,11 @@ def measures(contrasts: Floats, throughput: float, noise_sigma: float) -> tuple[
 
     With f in units of Nyquist's frequency, T the throughput and c the scene's contrast,
 
-        Q = T ∫ max(MTF - σ/T, 0) df,    C = Q / T,    B = (π/4) ∫ ½ log2(1 + (c T MTF / σ)²) f df
+        Q = T ∫ max(MTF - σ/T, 0) df,    C = Q / T,    B = (π/2) ∫ ½ log2(1 + (c T MTF / σ)²) f df
 
     B is the information that white noise of σ per receptor leaves of a scene whose structures are all equally strong
-    (Shannon; for eyes Snyder, Laughlin and Stavenga 1977): π/4 f df counts what of the receptors' square lattice lies
-    at a frequency, over all directions.
+    (Shannon; for eyes Snyder, Laughlin and Stavenga 1977): (π/2) f df is the ring 2π f df of frequencies in all
+    directions over the square [-1, 1]² of those that the receptors' lattice tells apart.
     """
     f = np.linspace(0, 1, contrasts.size)
     above = float(np.trapezoid(np.maximum(contrasts - noise_sigma / throughput, 0), f))

@@ -175,11 +175,10 @@ def last_mean(rows: Sequence[Row], value: Callable[[Row], float], seed: int = 0)
     groups = list(_last_values(rows, value))
     if not groups:
         return None
-    chance = np.random.default_rng(seed)
-    means = []
-    for _ in range(RESAMPLES):
-        chosen = [groups[i] for i in chance.integers(len(groups), size=len(groups))]
-        means.append(np.mean([values[chance.integers(values.size, size=values.size)].mean() for values in chosen]))
+    chance, shape = np.random.default_rng(seed), (RESAMPLES, len(groups))
+    # Of each seed a mean for every place that it may be drawn for: a seed drawn twice has its candidates drawn twice.
+    drawn = np.stack([v[chance.integers(v.size, size=(*shape, v.size))].mean(axis=-1) for v in groups])
+    means = np.take_along_axis(drawn, chance.integers(len(groups), size=(1, *shape)), axis=0)[0].mean(axis=1)
     low, high = np.quantile(means, [0.025, 0.975])
     return Interval(float(np.mean([values.mean() for values in groups])), float(low), float(high))
 

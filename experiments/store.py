@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
 import platform
@@ -30,19 +31,15 @@ def read_rows(kind: type[Row], path: Path) -> list[Row]:
 
 
 def write_rows(rows: Iterable[Any], path: Path) -> None:
-    """The file anew, whole or not at all; numbers are written with six digits."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """The file anew, whole or not at all; numbers are written with six digits. Raises ValueError without rows."""
     lines = [asdict(row) for row in rows]
-    out = [",".join(lines[0])]
-    for line in lines:
-        out.append(
-            ",".join(f"{value:.6g}" if isinstance(value, float) else _cell(str(value)) for value in line.values())
-        )
-    write_whole(path, ("\n".join(out) + "\n").encode())
-
-
-def _cell(text: str) -> str:
-    return f'"{text}"' if "," in text else text
+    if not lines:
+        raise ValueError(f"{path}: there are no rows to write")
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(lines[0])
+    table.writerows([f"{v:.6g}" if isinstance(v, float) else v for v in line.values()] for line in lines)
+    write_whole(path, text.getvalue().encode())
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,12 @@ from evolve.config_source import assemble
 from evolve.development import develop
 from evolve.evaluation import Evaluation
 from evolve.genotype import Genotype
+from evolve.report.eye_figures import relief_heights
 from evolve.store import Run
 from experiments import bending_light, brains_and_acuity, goals_shape_eyes
-from experiments.evolved import Row, last_mean, main, rows_of
+from experiments.evolved import Row, Store, last_mean, main, rows_of
 from experiments.store import Origin, write_rows
-from optics import backend
+from optics import Pupil, backend
 
 SMALL = ("search.population=2", "search.generations=2")
 PHASES = (*SMALL, "genome.doe.opens_at=1", "genome.refractive_index.opens_at=1")
@@ -99,6 +100,19 @@ def test_fittest_and_least_fit_are_of_the_last_phase():
     rows = [replace(ROW, generation=g, phase=int(g > 0), fitness=-float(g), relief="0.5") for g in range(4)]
     best, worst = bending_light.extremes(rows)
     assert (best.generation, worst.generation) == (1, 3)
+    assert bending_light.extremes([replace(row, failed=1) for row in rows]) == ()
+
+
+@pytest.mark.parametrize("side", [4, 7])
+def test_reliefs_of_any_number_of_genes_are_drawn(tmp_path, side):
+    """Heights that rise like the row number rise everywhere and are symmetric, whichever surface joins them."""
+    rows = np.repeat(np.arange(side) / (side - 1), side)
+    heights, _ = relief_heights(Pupil(1.0, bending_light.relief_of(replace(ROW, relief=" ".join(map(str, rows))))))
+    assert (np.diff(heights, axis=0) > 0).all()
+    assert heights.mean() == pytest.approx(0.5)
+    failed = [replace(ROW, failed=1, relief="0.5 " * 16, seed=1)]
+    store = Store([replace(ROW, relief=" ".join(map(str, rows))), *failed], Origin.here(1.0), "")
+    bending_light.draw_reliefs(store, tmp_path / "reliefs.png")
 
 
 @pytest.mark.parametrize("experiment", [goals_shape_eyes, bending_light, brains_and_acuity])

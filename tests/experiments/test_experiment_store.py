@@ -15,10 +15,17 @@ class Row:
 
 
 def test_rows_read_back(tmp_path):
-    rows = [Row("hole, open", 3, 0.25), Row("lens", -1, 1.5e-7)]
+    rows = [Row('hole, "open"', 3, 0.25), Row("lens", -1, 1.5e-7)]
     write_rows(rows, tmp_path / "new" / "rows.csv")
     assert read_rows(Row, tmp_path / "new" / "rows.csv") == rows
     assert read_rows(Row, tmp_path / "absent.csv") == []
+
+
+def test_no_rows_are_refused_and_what_was_there_stays(tmp_path):
+    write_rows([Row("a", 1, 2.0)], tmp_path / "rows.csv")
+    with pytest.raises(ValueError, match="no rows to write"):
+        write_rows([], tmp_path / "rows.csv")
+    assert len(read_rows(Row, tmp_path / "rows.csv")) == 1
 
 
 def test_numbers_are_short(tmp_path):
