@@ -213,7 +213,8 @@ def bootstrap_interval(
 
     statistic  called as statistic(resamples, axis=1)
 
-    Narrow for few samples: of six normal ones, the 95 % interval of the mean covers it in about 88 %.
+    Narrow for few samples: of six normal ones, the 95 % interval of the mean covers it in about 88 %. A single one
+    says nothing about its spread: (NaN, NaN).
     Raises ValueError without samples, with one that is not finite, or for a level outside (0, 1).
     """
     values = np.asarray(samples, dtype=np.float64)
@@ -221,6 +222,8 @@ def bootstrap_interval(
         raise ValueError(f"samples: must be one or more finite numbers, got {values}")
     if not 0 < level < 1:
         raise ValueError(f"level = {level!r}: must be in (0, 1)")
+    if values.size == 1:
+        return math.nan, math.nan
     chosen = np.random.default_rng(seed).integers(values.size, size=(PERCENTILE_RESAMPLES, values.size))
     low, high = np.quantile(statistic(values[chosen], axis=1), [(1 - level) / 2, (1 + level) / 2])
     return float(low), float(high)

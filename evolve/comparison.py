@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -19,8 +20,10 @@ OF_THE_BEST = ("best candidate", "fitness", "95 % interval", "success rate", "ac
 
 
 def summary(run: Run) -> dict[str, Any]:
-    """One run as plain values; those of the best candidate are None before one has succeeded."""
+    """One run as plain values, all of which JSON has; those of the best candidate are None before one has succeeded, its
+    interval also after a single episode."""
     best = run.best
+    interval = None if best is None else bootstrap_interval(best.returns)
     return {
         "run": str(run.path),
         "task": run.config.task,
@@ -30,12 +33,14 @@ def summary(run: Run) -> dict[str, Any]:
         "best": None if best is None else best.id,
         "generation": None if best is None else best.generation,
         "fitness": None if best is None else best.fitness,
-        "fitness_interval": None if best is None else bootstrap_interval(best.returns),
+        "fitness_interval": None if interval is None or math.isnan(interval[0]) else interval,
         "success_rate": None if best is None else best.success_rate,
         "acuity_cpd": None if best is None else acuity_cpd(best.phenotype),
         "steps": sum(candidate.steps for candidate in run.candidates),
         "hours": sum(candidate.seconds for candidate in run.candidates) / 3600,
-        "best_so_far": [row.best_so_far for row in generation_statistics(run.candidates)],
+        "best_so_far": [
+            None if math.isnan(row.best_so_far) else row.best_so_far for row in generation_statistics(run.candidates)
+        ],
     }
 
 
@@ -83,11 +88,11 @@ def _column(one: Mapping[str, Any]) -> dict[str, str]:
     }
     if one["best"] is None:
         return column | dict.fromkeys(OF_THE_BEST, "-")
-    low, high = one["fitness_interval"]
+    interval = one["fitness_interval"]
     values = (
         f"{one['best']}, generation {one['generation']}",
         f"{one['fitness']:.4g}",
-        f"{low:.4g} to {high:.4g}",
+        "-" if interval is None else f"{interval[0]:.4g} to {interval[1]:.4g}",
         f"{one['success_rate']:.0%}",
         f"{one['acuity_cpd']:.3g}",
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import threading
+import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -79,10 +80,11 @@ def evaluated(
     evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], progress: Callable[[int, int], None]
 ) -> Evaluation:
     """The candidate's evaluation; whatever goes wrong in it becomes its failure."""
+    began = time.perf_counter()
     try:
         return evaluate(*arguments, progress=progress)
     except Exception as error:
-        return Evaluation.failed(_one_line(error))
+        return Evaluation.failed(_one_line(error), time.perf_counter() - began)
 
 
 def _one_line(error: Exception) -> str:

@@ -62,6 +62,7 @@ def standing(run: Run) -> dict[str, Any]:
             "failed": sum(candidate.failure is not None for candidate in run.candidates),
             "planned": run.config.candidates,
         },
+        "last_failure": next((c.failure for c in reversed(run.in_order_of_finish) if c.failure), None),
         "steps": sum(candidate.steps for candidate in run.candidates),
         "best": None
         if best is None
@@ -88,6 +89,8 @@ def _lines(now: dict[str, Any]) -> list[str]:
         f"{now['directory']}: {now['task']}, {now['state']}{by}",
         f"{count['evaluated']} of {count['planned']} candidates evaluated{failed}, {now['steps']:,} steps trained",
     ]
+    if now["last_failure"]:
+        lines.append(f"last failure: {now['last_failure']}")
     if best is not None:
         lines.append(f"best: candidate {best['id']}, fitness {best['fitness']:.4g}")
     told = [(number, g) for number, g in enumerate(now["generations"]) if g["best"] is not None]

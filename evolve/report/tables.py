@@ -38,7 +38,9 @@ def headline(run: Run) -> str:
 
 def _best_tiles(best: Candidate) -> list[tuple[str, str, str]]:
     low, high = bootstrap_interval(best.returns)
-    spread = f"mean of {len(best.returns)} episodes; 95 % interval {number(low)} to {number(high)}"
+    spread = "a single episode"
+    if len(best.returns) > 1:
+        spread = f"mean of {len(best.returns)} episodes; 95 % interval {number(low)} to {number(high)}"
     return [
         ("Best fitness", number(best.fitness, 4), spread),
         ("Best candidate", f"no. {best.id}", f"generation {best.generation}"),

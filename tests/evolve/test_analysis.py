@@ -168,6 +168,10 @@ def test_bootstrap_is_seeded():
     assert bootstrap_interval(samples, seed=4) != bootstrap_interval(samples, seed=5)
 
 
+def test_a_single_sample_has_no_interval():
+    assert all(math.isnan(end) for end in bootstrap_interval([3.0]))
+
+
 @pytest.mark.parametrize(
     ("samples", "level", "says"),
     [([], 0.95, "samples"), ([1.0, math.nan], 0.95, "samples"), ([1.0], 1.0, r"level = 1.0: must be in \(0, 1\)")],

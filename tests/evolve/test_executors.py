@@ -62,6 +62,7 @@ def test_exception_is_its_candidates_failure_and_nobody_elses(tmp_path):
     found = outcomes(fails_for_some, tmp_path)
     assert [found[i].failure is None for i in range(4)] == [True, False, True, False]
     assert found[1].failure.startswith("ValueError: no such luck (closed_form.py:")
+    assert found[1].seconds > 0, "a failure takes time too"
 
 
 def test_killed_worker_is_replaced_and_its_candidate_evaluated_again(tmp_path):

@@ -1,8 +1,10 @@
 """Progress: what it counts, and that it suits a terminal and a log."""
 
 import io
+import json
 import os
 import pty
+from dataclasses import replace
 
 import pytest
 from closed_form import tiny
@@ -12,7 +14,7 @@ from evolve.candidate import Candidate
 from evolve.development import develop
 from evolve.evaluation import Evaluation
 from evolve.genotype import Genotype
-from evolve.progress import Bar, Lines, Tally, watcher
+from evolve.progress import Bar, Events, Lines, Tally, watcher
 from evolve.store import Run
 
 CONFIG = tiny("search.generations=2")  # 2 x 4 candidates
@@ -43,6 +45,19 @@ def add(run, identity, fitness, steps=1000, failure=None):
     place = (identity, identity // 4, identity % 4)
     run.append(Candidate.of(place, tuple(GENOME.tolist()), develop(GENOME, CONFIG), 1, outcome))
     return run.candidates[-1]
+
+
+def test_events_count_every_rung_of_a_ladder(tmp_path):
+    run = Run.create(tmp_path / "ladder", tiny("search.generations=1", "search.rungs=2", "learning.total_steps=8192"))
+    out = io.StringIO()
+    events = Events(run, out, 1)
+    for identity in range(4):
+        events.evaluated(add(run, identity, float(identity)))
+    run.append(replace(run.candidates[3], rung=1))
+    events.evaluated(run.candidates[3])
+    told = [json.loads(line) for line in out.getvalue().splitlines()]
+    counts = [(event["rung"], event["evaluated"], event["planned"]) for event in told]
+    assert counts == [(0, 1, 6), (0, 2, 6), (0, 3, 6), (0, 4, 6), (1, 5, 6)]
 
 
 def test_pace_and_time_left_count_what_is_in_training(run, clock):

@@ -1,0 +1,24 @@
+"""Scalars for TensorBoard: they are the record's."""
+
+import shutil
+
+import pytest
+
+from evolve.scalars import Scalars
+from evolve.store import Run
+
+
+def test_scalars_are_the_records(finished, tmp_path):
+    accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    run = Run.open(shutil.copytree(finished, tmp_path / "run"))
+    with Scalars(run):
+        pass
+    shown = {}
+    for name in ("candidates", "generations"):
+        events = accumulator.EventAccumulator(str(run.path / "tensorboard" / name))
+        events.Reload()
+        shown[name] = {tag: {e.step: e.value for e in events.Scalars(tag)} for tag in events.Tags()["scalars"]}
+    assert shown["candidates"]["fitness"] == pytest.approx({c.id: c.fitness for c in run.candidates}, rel=1e-6)
+    assert shown["candidates"]["genes/fov_deg"] == pytest.approx({c.id: c.phenotype.fov_deg for c in run.candidates})
+    best = {g: max(c.fitness for c in run.generation(g)) for g in range(3)}
+    assert shown["generations"]["fitness/best"] == pytest.approx(best, rel=1e-6)
