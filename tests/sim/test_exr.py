@@ -143,6 +143,12 @@ def test_a_failed_write_leaves_the_old_file_alone(tmp_path):
     assert len(list(tmp_path.iterdir())) == 1
 
 
+def test_files_may_be_read_by_whoever_may_read_others(tmp_path):
+    write_exr(tmp_path / "a.exr", views())
+    (tmp_path / "plain").touch()
+    assert (tmp_path / "a.exr").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
 def test_preview_of_daylight_is_white():
     nm = np.linspace(400, 700, 8)
     radiance = 0.5 * daylight(nm * 1e-9)[:, None, None] * np.ones((8, 2, 3))
