@@ -134,7 +134,7 @@ class LearningConfig:
 class EvaluationConfig:
     """Fitness of a trained candidate."""
 
-    episodes: int = _setting(6, Interval(1, 10_000), "evaluation episodes whose mean return is the fitness")
+    episodes: int = _setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the fitness")
 
 
 SECTIONS: Mapping[str, type] = {

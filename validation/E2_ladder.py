@@ -6,7 +6,7 @@ one to four eyes with 1 x 1 to 15 x 15 receptors behind a perfect lens, learn de
 held back, as a run would train them; the table compares their order on each rung with that on the last (Spearman's
 rank correlation, and its 90 % interval by bootstrap over animals).
 
-"6 episodes" is what a run sees: each rung's fitness by its own six evaluation episodes. "48 episodes" measures each
+"6 episodes" is what a run sees that plays so few: each rung's fitness by its own six evaluation episodes. "48 episodes" measures each
 rung's policy longer and leaves out most of that luck; its last line compares the last rung's own two measurements, 6
 episodes and 48, which is as well as anything could foretell six episodes.
 
@@ -58,6 +58,7 @@ from validation.workprec import MUTED, OURS, OURS_TOO
 STORED = Path("docs/validation/data/E2.csv")
 TOTAL = 163_840  # steps of a whole training: 40 rollouts
 RUNGS = 4
+FEW = 6  # episodes of each rung's own evaluation
 MANY = 48  # episodes of the longer look
 HOLDS = 0.8  # rank correlation at which a rung can be trusted
 LADDERS = ((2, 0.5), (2, 0.25), (3, 0.5), (4, 0.5))  # (rungs, part that goes on)
@@ -67,7 +68,7 @@ RAYS = 96  # of an eye, and at least one per receptor
 
 @dataclass(frozen=True)
 class Row:
-    """One animal on one rung. steps: trained, fewer than the budget where it stopped early; fitness: of a run's six
+    """One animal on one rung. steps: trained, fewer than the budget where it stopped early; fitness: of FEW
     episodes; fitness_many: of MANY; cpu_seconds: of this rung."""
 
     animal: int
@@ -107,7 +108,7 @@ def config(animal: Phenotype) -> RunConfig:
     rays = max(1, RAYS // (animal.resolution[0] * animal.resolution[1]))
     settings = (f"learning.total_steps={TOTAL}", f"learning.eval_interval={TOTAL // 2 ** (RUNGS - 1)}")
     optics = ("eye.optics=false", f"eye.rays_per_receptor={rays}")
-    return assemble("detection", assignments=[*settings, *optics, f"search.rungs={RUNGS}"])
+    return assemble("detection", assignments=[*settings, *optics, f"search.rungs={RUNGS}", f"evaluation.episodes={FEW}"])
 
 
 def climbed(number: int, animal: Phenotype) -> list[Row]:

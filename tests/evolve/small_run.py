@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from evolve.candidate import Candidate
-from evolve.config import EyeConfig, LearningConfig, RunConfig
+from evolve.config import EvaluationConfig, EyeConfig, LearningConfig, RunConfig
 from evolve.development import Phenotype
 from evolve.fitness import evaluate
 from evolve.genotype import GENES, Genotype
@@ -27,7 +27,8 @@ PHENOTYPE = Phenotype(
 
 def small_config(task="detection", learning=LEARNING, **eye):
     genome = {name: replace(gene.default, open=gene.cluster == "neural") for name, gene in GENES.items()}
-    return RunConfig(task, eye=EyeConfig(optics=False, rays_per_receptor=1, **eye), genome=genome, learning=learning)
+    eye_config = EyeConfig(optics=False, rays_per_receptor=1, **eye)
+    return RunConfig(task, eye=eye_config, genome=genome, learning=learning, evaluation=EvaluationConfig(episodes=6))
 
 
 def small_run(path, seed=5):
