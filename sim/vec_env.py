@@ -17,8 +17,8 @@ from sim.fidelity import Fidelity
 from sim.observation import STANDING, Memory, action_space, observation_space
 from sim.picture import Onlooker, check_render_mode
 from sim.render import BatchedRenderer
+from sim.retinas import Retinas
 from sim.reward import per_world
-from sim.sight import Sight
 from sim.simulation import Simulation, Step
 from sim.state import WorldState
 from sim.world import build_world
@@ -39,8 +39,8 @@ class EyesVecEnv(VecEnv):
         self.render_mode = render_mode
         self._onlooker: Onlooker | None = None
         self._memory = Memory(memory)
-        self._sight = Sight(renderer, simulation.streams.noise_keys)
-        space = observation_space(self.eyes, renderer.eye.channels, memory, renderer.brightest, self._sight.spread)
+        self._retinas = Retinas(renderer, simulation.streams.noise_keys)
+        space = observation_space(self.eyes, renderer.eye.channels, memory, renderer.brightest, self._retinas.spread)
         super().__init__(simulation.n, space, action_space())
         self._commanded = self._actions = np.zeros((self.num_envs, 2), np.float32)
         self._returns, self._lengths = np.zeros(self.num_envs), np.zeros(self.num_envs, int)
@@ -53,14 +53,14 @@ class EyesVecEnv(VecEnv):
     def reset(self) -> dict[str, np.ndarray]:
         if self._seeds[0] is not None:
             self.simulation.seed(self._seeds[0])
-            self._sight.restart(self.simulation.streams.noise_keys)
+            self._retinas.restart(self.simulation.streams.noise_keys)
         self.simulation.reset()
         self._reset_seeds()
         self._reset_options()
         self._returns[:], self._lengths[:] = 0.0, 0
         self.reset_infos = self._infos_of(self.state, [{} for _ in range(self.num_envs)], np.zeros(self.num_envs, bool))
         everyone = np.ones(self.num_envs, bool)
-        return self._observation(self._sight.begin(self.state)(), everyone, ~everyone)
+        return self._observation(self._retinas.begin(self.state)(), everyone, ~everyone)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed all random streams at the next reset. World i draws from streams derived from (seed, i)."""
@@ -81,7 +81,7 @@ class EyesVecEnv(VecEnv):
         terminated, truncated, info."""
         self.step_async(actions)
         step = self.simulation.step(self._commanded)
-        looking = self._sight.begin(self.state)
+        looking = self._retinas.begin(self.state)
         reward = step.reward
         infos = self._infos(step, reward)
         observation = self._observation(looking(), np.zeros(self.num_envs, bool), step.contact)
@@ -91,10 +91,10 @@ class EyesVecEnv(VecEnv):
         step = self.simulation.step(self._commanded)
         done = step.done
         ended = np.flatnonzero(done)
-        last_look = self._sight.begin_some(step.state, ended) if len(ended) else None
+        last_look = self._retinas.begin_some(step.state, ended) if len(ended) else None
         if len(ended):
             self.simulation.restart(ended)
-        looking = self._sight.begin(self.state)
+        looking = self._retinas.begin(self.state)
         # While the eyes look: all that does not need what they see.
         reward = step.reward
         infos = self._infos(step, reward)

@@ -6,9 +6,9 @@ one to four eyes with 1 x 1 to 15 x 15 receptors behind a perfect lens, learn de
 held back, as a run would train them; the table compares their order on each rung with that on the last (Spearman's
 rank correlation, and its 90 % interval by bootstrap over animals).
 
-"6 episodes" is what a run sees that plays so few: each rung's fitness by its own six evaluation episodes. "48 episodes" measures each
-rung's policy longer and leaves out most of that luck; its last line compares the last rung's own two measurements, 6
-episodes and 48, which is as well as anything could foretell six episodes.
+"6 episodes" is what a run sees that plays so few: each rung's fitness by its own six evaluation episodes. "48
+episodes" measures each rung's policy longer and leaves out most of that luck; its last line compares the
+last rung's own two measurements, 6 episodes and 48, which is as well as anything could foretell six episodes.
 
 Ladders: what halving (or quartering) these animals as one generation would have cost in CPU seconds, against training
 all of them to the end; and which place, in the order of the last rung by 48 episodes, the animal has that it declares
@@ -108,7 +108,9 @@ def config(animal: Phenotype) -> RunConfig:
     rays = max(1, RAYS // (animal.resolution[0] * animal.resolution[1]))
     settings = (f"learning.total_steps={TOTAL}", f"learning.eval_interval={TOTAL // 2 ** (RUNGS - 1)}")
     optics = ("eye.optics=false", f"eye.rays_per_receptor={rays}")
-    return assemble("detection", assignments=[*settings, *optics, f"search.rungs={RUNGS}", f"evaluation.episodes={FEW}"])
+    return assemble(
+        "detection", assignments=[*settings, *optics, f"search.rungs={RUNGS}", f"evaluation.episodes={FEW}"]
+    )
 
 
 def climbed(number: int, animal: Phenotype) -> list[Row]:

@@ -37,7 +37,7 @@ import numpy as np
 import optics
 import sim
 from sim.picture import pose
-from sim.sight import Sight
+from sim.retinas import Retinas
 from sim.simulation import Simulation
 
 
@@ -125,14 +125,14 @@ class _Step:
     def __init__(self, case: Case, n_envs: int) -> None:
         self._worlds = sim.make_vec_env(case.task, with_pupil(case.eyes), n_envs)
         self._worlds.reset()
-        self._alone = Sight(self._worlds.renderer, self._worlds.simulation.streams.noise_keys)
+        self._alone = Retinas(self._worlds.renderer, self._worlds.simulation.streams.noise_keys)
         self._rng = np.random.default_rng(0)
         self._parts: list[Callable[[], Any]] = []
         self.wholes: list[float] = []
         self.shares: list[float] = []
         self._note(self._worlds.simulation._physics, "step", self._worlds.simulation._physics.step)
-        self._note(self._worlds._sight, "begin", lambda *asked: self._alone.begin(*asked)())
-        self._note(self._worlds._sight, "begin_some", lambda *asked: self._alone.begin_some(*asked)())
+        self._note(self._worlds._retinas, "begin", lambda *asked: self._alone.begin(*asked)())
+        self._note(self._worlds._retinas, "begin_some", lambda *asked: self._alone.begin_some(*asked)())
 
     def _note(self, owner: Any, name: str, alone: Callable[..., Any]) -> None:
         """Remember what the step asks of this method, for doing it again `alone`."""

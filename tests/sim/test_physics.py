@@ -1,11 +1,13 @@
 """The batched step against the servo's closed form, single MjData stepping, walls and breakdowns."""
 
+import copy
 import dataclasses
 
 import mujoco
 import numpy as np
 import pytest
 
+from sim import physics
 from sim.physics import SUBSTEPS, Physics
 from sim.simulation import Simulation
 from sim.world import SPEED_GAIN, TIME_CONSTANT, build_world
@@ -63,6 +65,28 @@ def test_gliding_is_what_mujoco_does(task):
         free += gliding.glide.touches_nothing(state.position, path, command).sum()
         simulation.step(rng.uniform(-1, 1, (32, 2)))
     assert free > 50  # or nothing was compared
+
+
+@pytest.mark.parametrize("task", ["detection", "navigation"])
+def test_what_physics_leaves_out_changes_no_bit(task, monkeypatch):
+    """Islands and, in small models, boxes of boxes: agents at walls and in corners move as in all of MuJoCo."""
+    world = build_world(task)
+    lean = Physics(world, 1, gliding=False)
+    assert lean._model.opt.disableflags != world.model.opt.disableflags
+    monkeypatch.setattr(physics, "_without_detours", copy.copy)
+    whole = Physics(world, 1, gliding=False)
+    assert whole._model.opt.disableflags == world.model.opt.disableflags
+    simulation = Simulation(world, 32, 0, "training", 1)
+    simulation.reset()
+    rng, touched = np.random.default_rng(0), 0
+    for _ in range(40):
+        state, command = simulation.state, rng.uniform(-10, 10, (32, 2))
+        ours, mujocos = lean.step(state, command), whole.step(state, command)
+        for name, array in vars(ours).items():
+            np.testing.assert_array_equal(array, getattr(mujocos, name), err_msg=name)
+        touched += int(ours.contact.sum())
+        simulation.step(np.concatenate([np.ones((32, 1)), rng.uniform(-1, 1, (32, 1))], axis=1))
+    assert touched > 50
 
 
 def test_an_agent_that_glides_through_a_wall_would_be_noticed(world):

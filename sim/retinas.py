@@ -1,4 +1,4 @@
-"""What all agents' eyes report, noise included; started early and waited for late, so that it runs beside the rest."""
+"""What all agents' retinas report, noise included: begun early, waited for late, beside other work."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sim.state import WorldState
 Pending = Callable[[], np.ndarray]  # waits for signals (env, eye, channel, height, width) float32
 
 
-class Sight:
+class Retinas:
     """Renderer and receptor noise of one batch of worlds.
 
     renderer  of all worlds

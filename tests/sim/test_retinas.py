@@ -1,0 +1,58 @@
+"""Looks that are begun early and waited for late are the looks they would have been one after the other."""
+
+import numpy as np
+import pytest
+
+import sim
+from sim.noise import FEW
+from sim.render import BatchedRenderer
+from sim.retinas import Retinas
+from sim.simulation import Simulation
+from sim.world import build_world
+
+EYES = sim.Eyes(n_eyes=2, resolution=(3, 5), fov_deg=60, placement_range_deg=60)
+N = 3 * FEW
+
+
+@pytest.fixture(scope="module")
+def before_and_after():
+    """A renderer of N worlds, and two different states of them."""
+    world = build_world("detection")
+    states = [Simulation(world, N, seed, "training", 1).reset() for seed in (0, 1)]
+    return BatchedRenderer(world, EYES, N, 4), *states
+
+
+def retinas(renderer):
+    return Retinas(renderer, np.arange(N, dtype=np.uint64))
+
+
+@pytest.mark.parametrize("worlds", [[4], [7, 2, 19], list(range(1, N, 2))], ids=["one", "a few", "many"])
+def test_some_and_then_all_at_once(before_and_after, worlds):
+    renderer, old, new = before_and_after
+    worlds = np.array(worlds)
+    patient, hasty = retinas(renderer), retinas(renderer)
+    expected = patient.begin_some(old, worlds)(), patient.begin(new)()
+    some = hasty.begin_some(old, worlds)
+    every = hasty.begin(new)
+    # Waited for in the other order, too.
+    seen = every(), some()
+    np.testing.assert_array_equal(seen[0], expected[1])
+    np.testing.assert_array_equal(seen[1], expected[0])
+    assert not np.array_equal(expected[0], expected[1][worlds])
+
+
+def test_some_see_what_they_see_among_all(before_and_after):
+    renderer, state, _ = before_and_after
+    worlds = np.array([5, 17])
+    among_all = retinas(renderer).begin(state)()[worlds]
+    np.testing.assert_array_equal(retinas(renderer).begin_some(state, worlds)(), among_all)
+
+
+def test_noise_goes_on_and_begins_anew(before_and_after):
+    renderer, state, _ = before_and_after
+    eyes = retinas(renderer)
+    first, second = eyes.begin(state)(), eyes.begin(state)()
+    spread = (second - first).std()
+    assert spread == pytest.approx(np.sqrt(2) * EYES.noise_sigma, rel=0.1)  # of 720 receptors: 3 % to chance
+    eyes.restart(np.arange(N, dtype=np.uint64))
+    np.testing.assert_array_equal(eyes.begin(state)(), first)
