@@ -11,7 +11,7 @@ from itertools import cycle, islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from evolve.config import RunConfig
+from evolve.config import ConfigError, RunConfig
 from evolve.development import Phenotype
 from evolve.worker import evaluate_candidate, prepare_device
 
@@ -50,15 +50,20 @@ def calibrate(config: RunConfig, animals: Mapping[str, Phenotype], workers: int)
 
     Raises:
         BackendError: Dr.Jit cannot work here.
-        AccuracyError: an animal's eyes cannot be computed.
+        ConfigError: an animal cannot be evaluated here: its eyes cannot be computed, say; names which and why.
     """
     context = multiprocessing.get_context("spawn")
     tried = list(islice(cycle(animals), max(workers, len(animals))))
+    paces: dict[str, list[Pace]] = {name: [] for name in animals}
     with ProcessPoolExecutor(workers, mp_context=context, initializer=prepare_device) as pool:
-        paces = list(pool.map(_short_life, [config] * len(tried), [animals[name] for name in tried], range(len(tried))))
-    return {
-        name: _slowest([pace for other, pace in zip(tried, paces, strict=True) if other == name]) for name in animals
-    }
+        lives = [pool.submit(_short_life, config, animals[name], seed) for seed, name in enumerate(tried)]
+        for name, life in zip(tried, lives, strict=True):
+            try:
+                paces[name].append(life.result())
+            except ValueError as error:
+                pool.shutdown(cancel_futures=True)
+                raise ConfigError(f"an animal like the {name} one cannot be evaluated here: {error}") from error
+    return {name: _slowest(found) for name, found in paces.items()}
 
 
 def _slowest(paces: list[Pace]) -> Pace:

@@ -4,11 +4,12 @@ import json
 from dataclasses import replace
 
 import pytest
-from small_run import small_config
+from small_run import PHENOTYPE, small_config
 
 import evolve.plan
 from evolve.calibration import Pace, calibrate
 from evolve.cli import main
+from evolve.config import ConfigError
 from evolve.config_source import assemble
 from evolve.development import develop
 from evolve.fitness import evaluate
@@ -34,6 +35,16 @@ def test_hours_count_rounds_of_workers_and_all_that_a_candidate_does(tmp_path, p
     assert plan.hours["start"] == pytest.approx(10 * 2 * candidate_s / 3600), "6 on 4 workers take two rounds"
     steady = Plan.of(replace(config, search=replace(config.search, steady_state=True)), tmp_path).measured()
     assert steady.hours["start"] == pytest.approx(15 * candidate_s / 3600), "60 on 4 workers, nobody waits"
+
+
+def test_animal_that_cannot_be_evaluated_is_named():
+    """A retina far behind a rough relief: light spreads farther than optics follows it."""
+    backend.require()
+    config = small_config()
+    rough = (0.53, 0.2, 0.7, 0.22, 0.59, 0.31, 0.53, 0.39, 0.25, 0.45, 0.67, 0.59, 0.88, 0.53, 0.24, 0.56)
+    blurred = replace(PHENOTYPE, fov_deg=13.8, relative_aperture=0.243, relief=rough, refractive_index=1.85)
+    with pytest.raises(ConfigError, match="an animal like the middle one cannot be evaluated here: tolerance"):
+        calibrate(config, {"middle": blurred}, 1)
 
 
 def test_disk_holds_policies_and_record_and_a_small_disk_is_noticed(tmp_path, paced, monkeypatch):
