@@ -20,7 +20,7 @@ OF_THE_BEST = ("best candidate", "fitness", "95 % interval", "success rate", "ac
 
 
 def summary(run: Run) -> dict[str, Any]:
-    """One run as plain values, all of which JSON has; those of the best candidate are None before one has succeeded, its
+    """One run as plain values, such as JSON has; those of the best candidate are None before one has succeeded, its
     interval also after a single episode."""
     best = run.best
     interval = None if best is None else bootstrap_interval(best.returns)

@@ -15,7 +15,8 @@ def compare(arguments: Namespace) -> int:
     """Print runs side by side."""
     runs = [Run.open(directory) for directory in arguments.directories]
     if arguments.json:
-        print(json.dumps({"runs": [summary(run) for run in runs], "settings": differing_settings(runs)}, indent=1, allow_nan=False))
+        found = {"runs": [summary(run) for run in runs], "settings": differing_settings(runs)}
+        print(json.dumps(found, indent=1, allow_nan=False))
     else:
         print("\n".join(lines(runs)))
     if arguments.html:

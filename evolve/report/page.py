@@ -58,8 +58,8 @@ def fitness_section(run: Run) -> str:
         f"<b>Fitness over generations.</b> {KEY.format('accent')} best so far and, pale, the 95 % bootstrap interval "
         f"of its mean return; {POPULATION}; a dot per candidate, "
         f'<span class="vermillion">×</span> failed. Fitness is the mean return of {run.config.evaluation.episodes} '
-        "evaluation episodes after training; that of the best of many owes part of its height to luck, which the interval "
-        "does not know."
+        "evaluation episodes after training; that of the best of many owes part of its height to luck, which the "
+        "interval does not know."
     )
     figures = figure(fitness_figure(rows, run.candidates), caption)
     caption = (
