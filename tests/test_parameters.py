@@ -47,7 +47,7 @@ FOUR_TYPES = ("eye.receptors=genes", "genome.receptor_types.start=4", *PERFECT)
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _device():
+def _device(short_episodes):
     backend.require()
 
 
@@ -132,7 +132,10 @@ class Case:
 # Steps too small to move a weight: but for the receptors' adapting, evaluations play the same, and soon none improves.
 STAGNANT = ("learning.learning_rate=1e-30", "learning.total_steps=256", "learning.eval_interval=32", *PERFECT)
 # Long enough, and fast enough, to come to a wall.
-TOUCHING = ("learning.first_speed=1", "learning.total_steps=1024", "learning.n_steps=32", *PERFECT)
+TOUCHING = (
+    *("learning.first_speed=1", "learning.total_steps=1024", "learning.n_steps=32", "learning.batch_size=128"),
+    *PERFECT,
+)
 FIELDS = {
     "task": Case("task=tracking", life),
     "seed": Case("seed=1", history),

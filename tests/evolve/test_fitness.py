@@ -12,9 +12,11 @@ from evolve.fitness import evaluate
 from evolve.learner import play
 from evolve.policy import load_policy
 
+pytestmark = pytest.mark.usefixtures("short_episodes")
+
 
 @pytest.fixture(scope="module")
-def outcome(tmp_path_factory):
+def outcome(tmp_path_factory, short_episodes):
     path = tmp_path_factory.mktemp("policy") / "0.safetensors"
     told = []
     return evaluate(PHENOTYPE, small_config(), 5, path, lambda *steps: told.append(steps)), path, told

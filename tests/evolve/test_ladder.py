@@ -130,7 +130,7 @@ def test_ladders_that_cannot_be_climbed_are_refused():
         assemble("detection", assignments=["search.promoted=1.0"])
 
 
-def test_a_training_in_pieces_is_one_training(tmp_path):
+def test_a_training_in_pieces_is_one_training(tmp_path, short_episodes):
     """Bit for bit: whether each rung takes up what the one below has stored, or all is trained in one process."""
     config = small_config()
 
@@ -151,7 +151,7 @@ def test_a_training_in_pieces_is_one_training(tmp_path):
     assert (end.steps, end.adam["steps"] > load_checkpoint(kept[1]).adam["steps"]) == (1024, True)
 
 
-def test_the_first_rung_is_a_short_training_and_the_next_goes_on_from_it(tmp_path):
+def test_the_first_rung_is_a_short_training_and_the_next_goes_on_from_it(tmp_path, short_episodes):
     config = small_config()
     short = replace(config, learning=replace(config.learning, total_steps=256))
     plain = evaluate(PHENOTYPE, short, 5, tmp_path / "plain")
