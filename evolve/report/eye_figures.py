@@ -68,7 +68,9 @@ def _pupil(eye: optics.Eye, phenotype: Phenotype) -> str:
     with drawing(*SIZE) as drawn:
         axes = drawn.subplots()
         extent = (-radius, radius, -radius, radius)
-        picture = axes.imshow(1e6 * heights, extent=extent, origin="lower", interpolation="none", vmin=low, vmax=high)
+        # A circle's rim is drawn as such; other shapes end at pixels.
+        seen = 1e6 * (heights if _is_round(pupil) else np.where(inside, heights, np.nan))
+        picture = axes.imshow(seen, extent=extent, origin="lower", interpolation="none", vmin=low, vmax=high)
         picture.set_clip_path(Circle((0, 0), radius, transform=axes.transData))
         _bar(axes, picture, "height [µm]")
         axes.grid(False)
@@ -85,6 +87,10 @@ def _pupil(eye: optics.Eye, phenotype: Phenotype) -> str:
     return figure(svg, caption)
 
 
+def _is_round(pupil: optics.Pupil | None) -> bool:
+    return pupil is not None and isinstance(pupil.aperture, optics.Circle)
+
+
 def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
     """Relief [m] over the pupil's square, (y, x), row 0 at y = -a; and which of it lies in the aperture."""
     types = precision("float64")
@@ -95,7 +101,7 @@ def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
     else:
         heights = pupil.height.height(types.Float64(x), types.Float64(y), types).numpy()
     shape = (PIXELS, PIXELS)
-    return heights.reshape(shape), (np.hypot(x, y) <= 1).reshape(shape)
+    return heights.reshape(shape), np.reshape(pupil.aperture.contains(x, y), shape)
 
 
 def _psf(light: Light) -> str:
@@ -159,7 +165,7 @@ def _cuts(light: Light) -> str:
             axes.semilogy(1e6 * psf.x[inside], cuts[band], color=colour, lw=1.2, label=label)
         axes.set(xlim=(-1e6 * half, 1e6 * half), ylim=(cuts.max() * 10.0**-DECADES, 2 * cuts.max()))
         axes.set(xlabel="x on the retina [µm]", ylabel="PSF [1/µm²]")
-        axes.legend(frameon=False, loc="upper right", handlelength=1.2, labelcolor=MUTED)
+        axes.legend(frameon=False, loc="best", handlelength=1.2, labelcolor=MUTED)
         _degrees(axes, light.eye, 1e6 * half)
         svg = inline(drawn, "psf-bands", "Cuts through the point spread function, one per spectral band.")
     return figure(svg, "<b>PSF per band</b>: cuts along x through the optical axis; dark lines are short wavelengths.")
@@ -185,19 +191,20 @@ def _mtf(light: Light) -> str:
         )
     green = int(np.argmin(np.abs(light.psf.wavelengths - 550e-9)))
     strehl = optics.strehl_ratio(light.psf)[green]
+    of_whom = "" if _is_round(eye.pupil) else " of a circle as wide"
     quality = optics.image_quality(light.white, nyquist, eye.throughput, eye.noise_sigma)[0]
     caption = (
         f"<b>Modulation transfer function</b> in white daylight, mean of all orientations ({KEY.format('accent')}), "
-        f"and its diffraction limit (dashed). Dotted: the receptors' Nyquist frequency, {number(nyquist * scale)} "
-        f"cycles per degree; contrast there {number(at_nyquist)}. Strehl ratio {number(strehl)} at "
-        f"{1e9 * light.psf.wavelengths[green]:.0f} nm; image quality {number(quality)} (in 0 to 1: contrast above the "
-        "noise, times throughput)."
+        f"and the diffraction limit{of_whom} (dashed). Dotted: the receptors' Nyquist frequency, "
+        f"{number(nyquist * scale)} cycles per degree; contrast there {number(at_nyquist)}. Strehl ratio "
+        f"{number(strehl)} at {1e9 * light.psf.wavelengths[green]:.0f} nm; image quality {number(quality)} (in 0 to 1: "
+        "contrast above the noise, times throughput)."
     )
     return figure(svg, caption)
 
 
 def diffraction_limit(light: Light, frequency: np.ndarray) -> np.ndarray:
-    """MTF of the same circular aperture without aberrations, in white daylight, (frequency,): the bands' limits
+    """MTF of a circular aperture as wide, without aberrations, in white daylight, (frequency,): the bands' limits
     (2/π)(arccos s - s √(1 - s²)), s = f / cutoff (Goodman, §6.3.3), weighted by their light."""
     weights = light.eye.spectral_bands.weights.mean(axis=0) * daylight(light.psf.wavelengths)
     s = np.clip(frequency / optics.mtf(light.psf).cutoff[:, None], 0, 1)

@@ -228,6 +228,9 @@
       slider.setAttribute("aria-valuetext", film.times[frame].toFixed(1) + " seconds");
       root.dataset.frame = frame;
       find(".time").textContent = `${film.times[frame].toFixed(1)} s of ${film.times[last].toFixed(1)} s`;
+      const turn = film.turn_deg[frame], side = turn < 0 ? "right" : "left";
+      find(".action").textContent =
+        `commands ${film.speed[frame].toFixed(1)} m/s and ${Math.abs(turn).toFixed(0)}\u00b0 to the ${side}`;
       for (const cell of root.querySelectorAll("[data-term]")) {
         const values = cell.dataset.term === "total" ? film.total : film.terms[cell.dataset.term];
         cell.textContent = values[frame].toFixed(2).replace("-", "\u2212");

@@ -12,6 +12,8 @@ from evolve.files import write_whole
 from evolve.report.markup import document, exact, json_script, number, text
 from evolve.report.picture import data_uri, display, film_sheet
 from evolve.report.stage import Stage
+from sim.simulation import MAX_TURN
+from sim.world import MAX_SPEED
 
 __all__ = ["player", "write_player"]
 
@@ -96,7 +98,7 @@ def _controls(episode: Episode) -> str:
         f'<div class="controls"><input type="range" min="0" max="{len(episode) - 1}" value="0" step="1" '
         'aria-label="Time in the episode"><button type="button" class="play" aria-pressed="false">Play</button>'
         '<label>Speed <select><option value="1">1×</option><option value="2" selected>2×</option>'
-        '<option value="4">4×</option></select></label><span class="time"></span></div>\n'
+        '<option value="4">4×</option></select></label><span class="time"></span><span class="action"></span></div>\n'
     )
 
 
@@ -118,7 +120,8 @@ def _score(episode: Episode) -> str:
 
 
 def _film(episode: Episode, stage: Stage) -> dict[str, Any]:
-    """What player.js reads. Times [s], positions [m], angles [rad]; everything over the frames that are kept."""
+    """What player.js reads. Times [s], positions [m], angles [rad], commands [m/s] and [°]; everything over the frames
+    that are kept."""
     kept = np.arange(0, len(episode), _stride(episode))
     terms = {name: np.cumsum(term, dtype=np.float64)[kept] for name, term in episode.reward_terms.items()}
     seen, columns = film_sheet(display(episode.signals[kept], stage.gain))
@@ -136,6 +139,8 @@ def _film(episode: Episode, stage: Stage) -> dict[str, Any]:
         },
         "position": _rounded(episode.position[kept]),
         "heading": _rounded(episode.heading[kept], 4),
+        "speed": _rounded(MAX_SPEED * (np.clip(episode.action[kept, 0], -1, 1) + 1) / 2),
+        "turn_deg": _rounded(np.degrees(MAX_TURN) * np.clip(episode.action[kept, 1], -1, 1)),
         "objects": _rounded(episode.objects[kept][..., :2]),
         "object_names": stage.object_names,
         "object_radius": stage.object_radius,

@@ -39,6 +39,12 @@ def test_height_map_is_the_pupils():
     assert inside.mean() == pytest.approx(np.pi / 4, abs=0.01)
 
 
+@pytest.mark.parametrize("aperture", [optics.Slit(0.4, 1.6), optics.Polygon.regular(3, 90.0), optics.Annulus(0.5)])
+def test_height_map_ends_where_the_pupil_does(aperture):
+    _, inside = relief_heights(optics.Pupil(30e-6, aperture=aperture))
+    assert 4 * inside.mean() == pytest.approx(aperture.area, rel=0.03)  # pixels of 1/80 of the radius at the edges
+
+
 def test_mtf_of_a_perfect_lens_is_the_diffraction_limit():
     """The PSF's window lacks up to 1 % of the light, which lifts the contrast by as much."""
     eye = optics.Eye(optics.Pupil(20e-6, thin_lens_focal_length=100e-6 / np.tan(np.radians(22.5))), (15, 15), 45.0)

@@ -18,6 +18,9 @@ def test_film_is_the_episode(run, episode, content):
     assert len(film["times"]) == len(episode) == 256
     assert film["times"][:3] == [0, 0.2, 0.4]
     np.testing.assert_allclose(film["position"], episode.position, atol=6e-4)
+    np.testing.assert_allclose(film["speed"], 5 * (episode.action[:, 0] + 1), atol=6e-4)
+    turned = np.degrees(np.diff(np.unwrap(episode.heading)))
+    np.testing.assert_allclose(film["turn_deg"][:-1], turned, atol=2e-2)
     np.testing.assert_allclose(film["objects"], episode.objects[..., :2], atol=6e-4)
     assert film["total"][-1] == pytest.approx(episode.reward.sum(), abs=1e-3)
     assert film["total"][0] == pytest.approx(episode.reward[0], abs=1e-3)
