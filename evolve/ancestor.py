@@ -14,18 +14,24 @@ from evolve.store import Run
 
 __all__ = ["starts_from"]
 
+LENGTHS = ("sensor_width", "relief_height")  # settings that genes of optics are multiplied with
+
 
 def starts_from(text: str) -> Source:
-    """Every gene's start as the animal RUN:ID has it (RUN alone: the run's best); RUN is a run directory.
+    """Every gene's start as the animal RUN:ID has it (RUN alone: the run's best); RUN is a run directory. Where it sees
+    through optics, also the lengths that its genes are measured in, or the same genes would be another lens.
 
     Raises:
         RunError: no such run, no such candidate, or none that succeeded.
     """
     path, identity = _parsed(text)
-    candidate = Run.open(path).candidate(identity)
+    run = Run.open(path)
+    candidate = run.candidate(identity)
     values = gene_values(candidate.phenotype)
     genome = {name: {"start": _exact(name, value)} for name, value in values.items() if not math.isnan(value)}
     tree: dict[str, Any] = {"genome": genome, "eye": {}}
+    if candidate.phenotype.relief is not None:
+        tree["eye"] |= {name: getattr(run.config.eye, name) for name in LENGTHS}
     if candidate.phenotype.lambda_max_nm is not None:
         tree["eye"]["receptors"] = INHERITED
     if candidate.phenotype.relief is not None and len(candidate.phenotype.relief) != 16:

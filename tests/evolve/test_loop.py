@@ -179,6 +179,7 @@ def test_animals_start_from_one_of_another_run(tmp_path, whole):
     ancestor = whole.candidate(7).phenotype
     config = assemble("detection", assignments=["search.population=2"], starts=starts)
     assert develop(Genotype(config.genome).start, config) == ancestor
+    assert config.eye == whole.config.eye
     assert starts_from(str(whole.path)).name == f"--from {whole.path}:{whole.best.id}"
     with pytest.raises(RunError, match="there is no candidate 99; 12 have been evaluated"):
         starts_from(f"{whole.path}:99")
@@ -188,3 +189,13 @@ def test_animals_start_from_one_of_another_run(tmp_path, whole):
         assemble("detection", assignments=narrow, starts=starts)
     wins = assemble("detection", assignments=[f"genome.fov_deg.start={fov / 2}"], starts=starts)
     assert wins.genome["fov_deg"].start == fov / 2
+
+
+@pytest.mark.parametrize("optics", ["true", "false"])
+def test_an_animals_lens_keeps_its_size_in_another_run(tmp_path, optics):
+    sizes = ("eye.relief_height=50e-6", "eye.sensor_width=300e-6", f"eye.optics={optics}", "search.population=2")
+    settings = (*sizes, "search.generations=1", "genome.optical.open=false", "learning.total_steps=4096")
+    ancestor, _ = carry(tmp_path / "run", assemble("detection", assignments=settings))
+    eye = assemble("detection", starts=starts_from(f"{ancestor.path}:0")).eye
+    lengths = (50e-6, 300e-6) if optics == "true" else (100e-6, 200e-6)
+    assert (eye.relief_height, eye.sensor_width) == lengths, "a perfect lens has no size to keep"
