@@ -1,8 +1,8 @@
-"""The mirror's geometry against MuJoCo's own ray casting, and its light against closed forms.
+"""The mirror's geometry against MuJoCo's own ray casting and renderer, and what it says of models and input.
 
 Tried and seen to fail, one at a time: camera mirrored (diag(1, 1, -1)), fov taken as horizontal, poses transposed,
-open cylinders, a capsule's caps at one end, ellipsoid's quaternion with its real part first, meshes not turned, light
-reversed, π forgotten, colours not linearised, sync that does nothing.
+open cylinders, a capsule's caps at one end, ellipsoid's quaternion with its real part first, meshes not turned, sync
+that does nothing.
 """
 
 import warnings
@@ -12,16 +12,13 @@ import numpy as np
 import pytest
 
 import sim
-from optics.spectrum import daylight
-from sim.color import decode_srgb
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import MirrorWarning
 
 from . import models
 from .drawn import draw
+from .lit import LIGHT, NM, WHITE, xml_of
 from .oracle import assert_agrees, camera_hits, first_hits
-
-NM = np.array([420.0, 505.0, 560.0, 631.0, 700.0])
 
 
 @pytest.mark.parametrize("textured", [False, True], ids=["exact", "tessellated"])
@@ -49,7 +46,7 @@ def test_scalar_variant_sees_the_same():
 
 
 def every_kind_in_the_light(seed):
-    spec = mujoco.MjSpec.from_string(_xml(LIGHT, '<geom type="plane" size="0 0 1" rgba="1 1 1 1"/>'))
+    spec = mujoco.MjSpec.from_string(xml_of(LIGHT, '<geom type="plane" size="0 0 1" rgba="1 1 1 1"/>'))
     models.add_camera(spec, [0, -4.0, 2.0], np.zeros(3))
     spec.worldbody.add_geom(type=models.GEOM.mjGEOM_SPHERE, size=[0.5, 0, 0], pos=[0, 0, 0.5], rgba=[0.9, 0.2, 0.1, 1])
     return spec.compile()
@@ -89,117 +86,6 @@ def test_sync_moves_geoms_camera_and_light():
     mirror.sync(data)
     after = assert_agrees(mirror, model, data, "camera", 120, 90)
     assert np.mean(before != after) > 0.05
-
-
-LIGHT = '<light name="sun" type="directional" dir="0 0 -1" diffuse="1 1 1"/>'
-
-
-def _xml(lights, geoms, headlight=False):
-    return f"""<mujoco><visual><headlight active="{int(headlight)}" ambient="0 0 0"/></visual>
-    <worldbody>{lights}{geoms}</worldbody></mujoco>"""
-
-
-def radiance(xml, origin=(0, 0, 5.0), target=(0, 0, 0), spp=4):
-    """Radiance at NM of what lies around `target`."""
-    mirror = sim.mirror(mujoco.MjModel.from_xml_string(xml))
-    view = Viewpoint.looking_at(np.array(origin), np.array(target), fovy_deg=1.0)
-    return mirror.render(view, 2, 2, spp=spp, wavelengths=NM * 1e-9).mean((1, 2))
-
-
-WHITE = '<geom type="plane" size="5 5 1" rgba="1 1 1 1"/>'
-
-
-def test_white_lambertian_facing_unit_light_has_the_radiance_of_daylight():
-    np.testing.assert_allclose(radiance(_xml(LIGHT, WHITE)), daylight(NM * 1e-9), rtol=1e-4)
-    assert daylight(np.array([560e-9])) == pytest.approx(1.0)
-
-
-def test_radiance_is_the_same_from_everywhere_and_falls_with_the_cosine():
-    np.testing.assert_allclose(radiance(_xml(LIGHT, WHITE), origin=(4.0, 1, 2)), daylight(NM * 1e-9), rtol=1e-4)
-    # Two lights add; Mitsuba draws one of them per sample: 16384 samples, standard error 1 %.
-    other = LIGHT.replace("sun", "moon").replace("0 0 -1", "0 0.6 -0.8").replace("1 1 1", "0.5 0.5 0.5")
-    slanted = LIGHT.replace("0 0 -1", "0.6 0 -0.8").replace("1 1 1", "0.5 0.5 0.5")
-    np.testing.assert_allclose(radiance(_xml(slanted, WHITE)), 0.4 * daylight(NM * 1e-9), rtol=1e-4)
-    np.testing.assert_allclose(radiance(_xml(slanted + other, WHITE), spp=4096), 0.8 * daylight(NM * 1e-9), rtol=0.02)
-
-
-def test_light_shines_along_its_direction():
-    """A wall that faces -x is lit by a light that travels towards +x, and not by one towards -x."""
-    wall = '<geom type="box" size="0.1 5 5" rgba="1 1 1 1"/>'
-    for sign in (1, -1):
-        light = LIGHT.replace("0 0 -1", f"{sign * 0.6} 0 -0.8")
-        seen = radiance(_xml(light, wall), origin=(-5.0, 0, 0))
-        np.testing.assert_allclose(seen, (0.6 if sign > 0 else 0.0) * daylight(NM * 1e-9), rtol=1e-4)
-
-
-def test_one_bounce_off_an_infinite_floor():
-    """A white wall under a light from above gets no direct light, and half of its hemisphere is floor of radiance 1:
-    its radiance is 1/2. (`direct` sees nothing, one bounce all of it.)"""
-    floor = '<geom type="plane" size="0 0 1" rgba="1 1 1 1"/>'
-    wall = '<geom type="box" size="0.1 50 50" pos="0.1 0 0" rgba="1 1 1 1"/>'
-    mirror = sim.mirror(mujoco.MjModel.from_xml_string(_xml(LIGHT, floor + wall)))
-    view = Viewpoint.looking_at(np.array([-3.0, 0, 1.0]), np.array([0, 0, 1.0]), 1.0)
-
-    def seen(integrator):
-        return mirror.render(view, 2, 2, integrator, spp=4096, wavelengths=[560e-9]).mean()
-
-    assert seen("direct") == 0
-    # 16384 samples of 0 or 1: standard error 0.004.
-    assert seen({"type": "path", "max_depth": 3}) == pytest.approx(0.5, abs=0.016)
-
-
-def test_shadows():
-    blocker = '<geom type="sphere" size="0.5" pos="0 0 2"/>'
-    assert np.all(radiance(_xml(LIGHT, WHITE + blocker), origin=(3.0, 0, 3)) == 0)
-
-
-def test_display_colors_are_linearised():
-    grey = WHITE.replace("1 1 1 1", "0.6 0.6 0.6 1")
-    np.testing.assert_allclose(radiance(_xml(LIGHT, grey)), decode_srgb(0.6) * daylight(NM * 1e-9), rtol=2e-3)
-    red = radiance(_xml(LIGHT, WHITE.replace("1 1 1 1", "0.8 0.1 0.1 1"))) / daylight(NM * 1e-9)
-    assert red[3] > 10 * red[1]
-
-
-def test_material_color_counts_where_the_geom_has_none():
-    """MuJoCo's rule: a geom's rgba other than its default overrides its material's."""
-    material = '<asset><material name="m" rgba="0.8 0.8 0.8 1"/></asset><worldbody>'
-    geom = '<geom type="plane" size="5 5 1" material="m"{}/>'
-    for rgba, value in (("", 0.8), (' rgba="0.3 0.3 0.3 1"', 0.3)):
-        xml = _xml(LIGHT, geom.format(rgba)).replace("<worldbody>", material)
-        np.testing.assert_allclose(radiance(xml), decode_srgb(value) * daylight(NM * 1e-9), rtol=2e-3)
-
-
-def test_colored_light():
-    """White under a light of linear RGB (1, 0.3, 0.3) looks like that light."""
-    from sim.exr import preview
-
-    red = LIGHT.replace("1 1 1", "1 0.3 0.3")
-    mirror = sim.mirror(mujoco.MjModel.from_xml_string(_xml(red, WHITE)))
-    nm = np.arange(365.0, 776.0, 10.0)
-    view = Viewpoint.looking_at(np.array([0, 0, 5.0]), np.zeros(3), 1.0)
-    seen = mirror.render(view, 1, 1, spp=1, wavelengths=nm * 1e-9)
-    np.testing.assert_allclose(preview(seen, nm)[0, 0], [1, 0.3, 0.3], atol=0.02)
-
-
-def test_headlight_shines_from_the_camera():
-    for origin in ((0, 0, 5.0), (0, 0, 2.0)):
-        seen = radiance(_xml("", WHITE, headlight=True), origin=origin)
-        np.testing.assert_allclose(seen, 0.4 * daylight(NM * 1e-9), rtol=1e-3)
-
-
-def test_point_light_obeys_the_inverse_square_law():
-    xml = _xml('<light type="point" pos="0 0 {}" diffuse="1 1 1" castshadow="false"/>', WHITE)
-    with pytest.warns(MirrorWarning, match="attenuation"):
-        near = radiance(xml.format(3), origin=(4.0, 0, 1))
-    # stat.center is the plane's centre, so that right below the light it is as bright as MuJoCo draws it.
-    np.testing.assert_allclose(near, daylight(NM * 1e-9), rtol=2e-3)
-
-
-def test_emissive_material_glows():
-    xml = _xml("", '<geom type="sphere" size="1" material="m"/>').replace(
-        "<worldbody>", '<asset><material name="m" rgba="1 1 1 1" emission="0.7"/></asset><worldbody>'
-    )
-    np.testing.assert_allclose(radiance(xml), 0.7 * daylight(NM * 1e-9), rtol=1e-4)
 
 
 def test_what_cannot_be_mirrored_is_named_once():
@@ -243,7 +129,7 @@ def test_what_cannot_be_mirrored_is_named_once():
 def test_a_model_that_can_be_mirrored_wholly_is_mirrored_without_a_word():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        sim.mirror(_xml(LIGHT, WHITE))
+        sim.mirror(xml_of(LIGHT, WHITE))
         sim.mirror(models.every_kind(0, textured=True, kinds=models.KINDS + models.SDF))
 
 
@@ -260,7 +146,7 @@ def test_invisible_geoms_and_other_bodies_are_left_out():
 
 
 def test_bad_input_is_named():
-    model = mujoco.MjModel.from_xml_string(_xml(LIGHT, WHITE))
+    model = mujoco.MjModel.from_xml_string(xml_of(LIGHT, WHITE))
     mirror = sim.mirror(model)
     with pytest.raises(ValueError, match="no camera 'eye_9'"):
         mirror.render("eye_9", 4, 4)
@@ -281,7 +167,7 @@ def test_the_callers_variant_stays_in_force():
 
     mi.set_variant("scalar_rgb")
     try:
-        sim.mirror(mujoco.MjModel.from_xml_string(_xml(LIGHT, WHITE)))
+        sim.mirror(mujoco.MjModel.from_xml_string(xml_of(LIGHT, WHITE)))
         assert mi.variant() == "scalar_rgb"
     finally:
         mi.set_variant("llvm_ad_spectral")
@@ -313,13 +199,13 @@ def test_a_camera_inside_bodies_looks_out_of_them():
     light = LIGHT.replace("0 0 -1", "0.6 0 -0.8")  # past the head
     view = Viewpoint.looking_at(np.zeros(3), np.array([1.0, 0, 0]), 5.0)
     for variant in ("llvm_ad_spectral", "scalar_spectral"):
-        mirror = sim.mirror(_xml(light, around + ball), variant=variant)
+        mirror = sim.mirror(xml_of(light, around + ball), variant=variant)
         assert (mirror.render_ids(view, 4, 4) == 2).all()
         np.testing.assert_allclose(mirror.render_depth(view, 4, 4), 3.5, atol=0.03)
-        alone = sim.mirror(_xml(light, ball), variant=variant).render(view, 4, 4, wavelengths=[560e-9])
+        alone = sim.mirror(xml_of(light, ball), variant=variant).render(view, 4, 4, wavelengths=[560e-9])
         assert alone.min() > 0.2
         np.testing.assert_allclose(mirror.render(view, 4, 4, wavelengths=[560e-9]), alone, rtol=1e-3)
-    assert (sim.mirror(_xml("", around + wall + ball)).render_ids(view, 4, 4) == 2).all()
+    assert (sim.mirror(xml_of("", around + wall + ball)).render_ids(view, 4, 4) == 2).all()
 
 
 def test_viewpoint_looks_where_it_is_told():
