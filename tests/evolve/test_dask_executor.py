@@ -197,7 +197,7 @@ def test_nobody_there_is_said_in_one_line(tmp_path):
 
 def test_scheduler_that_comes_back_is_asked_again(tmp_path):
     cluster = Cluster(tmp_path)
-    cluster.start()
+    cluster.start(workers=1)
     try:
         config = tiny("search.generations=2")
         run, found = Run.create(tmp_path / "run", config), []
@@ -208,7 +208,7 @@ def test_scheduler_that_comes_back_is_asked_again(tmp_path):
                 if len(found) == 2:
                     cluster.kill()
                     time.sleep(0.5)
-                    cluster.start()
+                    cluster.start(workers=1)
 
         with cluster.executor("slow") as executor:
             evolve(run, executor, Killer())

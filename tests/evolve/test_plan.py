@@ -105,7 +105,7 @@ def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, mon
     assert list(tmp_path.iterdir()) == []
 
 
-def test_pace_is_measured_with_the_real_thing(tmp_path):
+def test_pace_is_measured_with_the_real_thing(tmp_path, short_episodes):
     backend.require()
     config = small_config()
     animal = develop(Genotype(config.genome).start, config)
