@@ -107,11 +107,12 @@ class LearningConfig:
     """PPO, for each candidate."""
 
     total_steps: int = _setting(1_000_000, Interval(1, 10**10), "agent steps to train for")
-    n_envs: int = _setting(64, Interval(1, 65_536), "worlds simulated side by side")
-    n_steps: int = _setting(64, Interval(2, 10**6), "steps per world between updates")
+    n_envs: int = _setting(128, Interval(1, 65_536), "worlds simulated side by side")
+    n_steps: int = _setting(32, Interval(2, 10**6), "steps per world between updates")
     batch_size: int = _setting(1024, Interval(2, 10**7), "samples per gradient step")
-    n_epochs: int = _setting(4, Interval(1, 1000), "passes over the samples per update")
-    learning_rate: float = _setting(1e-3, Interval(0, 1, open_low=True), "Adam's step size")
+    n_epochs: int = _setting(10, Interval(1, 1000), "passes over the samples per update")
+    learning_rate: float = _setting(3e-3, Interval(0, 1, open_low=True), "Adam's step size at first")
+    decay_after: int = _setting(75_000, Interval(1, 10**10), "steps after which it falls, as one over the steps")
     gamma: float = _setting(0.9, Interval(0, 1), "discount per step")
     gae_lambda: float = _setting(0.9, Interval(0, 1), "share of what follows in an action's advantage, per step")
     value_weight: float = _setting(4.0, Interval(0, 1000), "weight of the critic's loss beside the actor's")

@@ -28,10 +28,17 @@ SCALES = ("laptop", "paper")  # of the presets that have scales; the first unles
 SETTINGS = (*TOP_LEVEL, *(f"{section}.{f.name}" for section, cls in SECTIONS.items() for f in fields(cls)))
 # A maze's walls say the same at every height, so navigators' eyes are one row of receptors unless told otherwise.
 # They begin slowly and may touch walls at first: else they learn to stand still before they have learnt to steer.
+# What contact costs changes that long, and so long there is much to learn.
 TASK_TREES: Mapping[str, Tree] = {
     "navigation": {
         "genome": {"resolution_height": {"open": False, "low": 1, "high": 1, "start": 1}},
-        "learning": {"first_speed": 0.25, "contact_ramp": 500_000, "gamma": 0.97, "n_epochs": 8},
+        "learning": {
+            "first_speed": 0.25,
+            "contact_ramp": 500_000,
+            "decay_after": 500_000,
+            "gamma": 0.97,
+            "n_epochs": 8,
+        },
     }
 }
 

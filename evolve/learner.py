@@ -16,6 +16,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
+from evolve.adam import Adam
 from evolve.checkpoint import Checkpoint
 from evolve.config import LearningConfig
 from evolve.policy import EyePolicy, TrainingDiverged, learnt, set_learnt
@@ -86,6 +87,11 @@ class AdaptingPPO(PPO):
     rollout_buffer: FrameRolloutBuffer
     policy: EyePolicy
     contact_ramp = 0  # steps
+    decay_after = 1  # steps
+
+    def _update_learning_rate(self, optimizers: Adam) -> None:
+        """Not by the part of a plan that is done, as SB3 does: a training goes the same way whatever is planned."""
+        optimizers.param_groups[0]["lr"] = self.learning_rate * min(1.0, self.decay_after / self.num_timesteps)
 
     def collect_rollouts(
         self, env: VecEnv, callback: BaseCallback, rollout_buffer: RolloutBuffer, n_rollout_steps: int
@@ -183,7 +189,7 @@ def learner(worlds: VecEnv, neurons: int, config: LearningConfig, seed: int, lay
         rollout_buffer_class=FrameRolloutBuffer,
         rollout_buffer_kwargs={"seed": seed},
     )
-    model.contact_ramp = config.contact_ramp
+    model.contact_ramp, model.decay_after = config.contact_ramp, config.decay_after
     model.set_logger(Logger(None, []))
     return model
 

@@ -2,6 +2,7 @@
 
 Every eye has weights of its own, and one encoder serves all its remembered frames: signals -> 16 -> 16 -> 16 per
 frame, then `memory` x 16 -> 16 over the frames. The eyes' features are joined with contact and previous action.
+Units are leaky rectifiers: tanh learnt detection from a third more samples, at ten times the cost per unit.
 Receptors adapt: the first layer sees signals less their running mean, in units of their spread, as learning has met
 them.
 """
@@ -33,7 +34,8 @@ ENCODER_WIDTHS = (16, 16, 16)  # hidden, hidden, code of one frame
 EYE_FEATURES = 16  # what the temporal layer makes of an eye's remembered codes
 FIRST_TURN = 0.5  # standard deviation of the first turns: with 1, a third of them are clipped
 DARK = 1e-6  # spread of signals that all are the same: keeps weights finite
-CONTRAST = 0.4  # what a signal one spread off its mean counts: small enough for tanh units to start out linear
+CONTRAST = 0.4  # what a signal one spread off its mean counts, where 675 move a unit together; 1 learnt no faster
+UNITS = nn.LeakyReLU  # of all hidden layers; leaky, so that none dies
 
 
 class TrainingDiverged(FloatingPointError):
@@ -125,12 +127,12 @@ class EyeFeatures(BaseFeaturesExtractor):
         super().__init__(observation_space, EYE_FEATURES * self.n_eyes + others)
         self.n_receptors = math.prod(retina)
         widths = (self.n_receptors, *ENCODER_WIDTHS)
-        layers: list[nn.Module] = [AdaptedLinear(self.n_eyes, *widths[:2]), nn.Tanh()]
+        layers: list[nn.Module] = [AdaptedLinear(self.n_eyes, *widths[:2]), UNITS()]
         for inputs, outputs in itertools.pairwise(widths[1:]):
-            layers += [PerEyeLinear(self.n_eyes, inputs, outputs), nn.Tanh()]
+            layers += [PerEyeLinear(self.n_eyes, inputs, outputs), UNITS()]
         self.encoder = nn.Sequential(*layers)
         self.temporal = nn.Sequential(
-            PerEyeLinear(self.n_eyes, ENCODER_WIDTHS[-1] * self.memory, EYE_FEATURES), nn.Tanh()
+            PerEyeLinear(self.n_eyes, ENCODER_WIDTHS[-1] * self.memory, EYE_FEATURES), UNITS()
         )
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
@@ -205,6 +207,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
         kwargs |= {
             "features_extractor_class": EyeFeatures,
             "net_arch": [neurons] * layers,
+            "activation_fn": UNITS,
             "optimizer_class": Adam,
         }
         super().__init__(observation_space, action_space, lr_schedule, **kwargs)
@@ -237,7 +240,7 @@ def save_policy(policy: EyePolicy, path: Path | str) -> None:
     """Write the policy's tensors as safetensors, its shape in the metadata; whole or not at all."""
     tensors = {name: tensor.detach().clone() for name, tensor in learnt(policy).items()}
     # One entry: safetensors writes several in random order, and the same policy must be the same bytes.
-    metadata = {"config": json.dumps(asdict(policy.config))}
+    metadata = {"config": json.dumps({**asdict(policy.config), "units": UNITS.__name__})}
     write_whole(Path(path), safetensors.torch.save(tensors, metadata))
 
 
@@ -253,6 +256,8 @@ def load_policy(path: Path | str) -> EyePolicy:
             metadata = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no mapping)
         stored = json.loads(metadata["config"])
+        if stored.get("units") != UNITS.__name__:
+            raise ValueError(f"its units are not {UNITS.__name__}, an earlier rhabdom wrote it")
         config = PolicyConfig(
             tuple(int(n) for n in stored["eyes"]), int(stored["neurons"]), int(stored.get("layers", 2))
         )

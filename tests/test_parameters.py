@@ -163,6 +163,7 @@ FIELDS = {
     "learning.batch_size": Case("learning.batch_size=32", life),
     "learning.n_epochs": Case("learning.n_epochs=3", life),
     "learning.learning_rate": Case("learning.learning_rate=1e-2", life),
+    "learning.decay_after": Case("learning.decay_after=50", life),
     "learning.gamma": Case("learning.gamma=0.5", life),
     "learning.gae_lambda": Case("learning.gae_lambda=0.5", life),
     "learning.value_weight": Case("learning.value_weight=0.5", life),

@@ -122,6 +122,23 @@ def test_learners_pay_their_share_of_contact(ramp, cost):
     assert np.median(-model.rollout_buffer.rewards) == pytest.approx(cost, rel=1e-6)
 
 
+@pytest.mark.parametrize("stretches", [(2048,), (512, 1536), (512,) * 4])
+def test_the_learning_rate_falls_with_steps_in_whatever_pieces(stretches):
+    """It stays for 1024 steps and then falls as one over the steps: 2/3 at 1536, half at 2048."""
+    config = LearningConfig(n_envs=16, n_steps=32, batch_size=128, learning_rate=4e-3, decay_after=1024)
+    model = learner(BrightSpot(16), 16, config, 0)
+    update, rates = model.train, []
+
+    def noted():
+        update()
+        rates.append(model.policy.optimizer.param_groups[0]["lr"])
+
+    model.train = noted
+    for steps in stretches:
+        model.learn(steps, reset_num_timesteps=False)
+    assert rates == pytest.approx([4e-3, 4e-3, 4e-3 * 2 / 3, 2e-3])
+
+
 class Favouring(BrightSpot):
     """Evaluation worlds that are kinder in one evaluation than in all others."""
 

@@ -40,7 +40,8 @@ def features_of(policy, observation):
 
 
 def layer(parameters, name, eye, x):
-    return np.tanh(parameters[f"{name}.weight"][eye] @ x + parameters[f"{name}.bias"][eye, :, 0])
+    drive = parameters[f"{name}.weight"][eye] @ x + parameters[f"{name}.bias"][eye, :, 0]
+    return np.where(drive > 0, drive, 0.01 * drive)
 
 
 def test_features_are_those_of_a_loop_over_eyes_and_frames(policy):
@@ -118,6 +119,17 @@ def test_a_stored_policy_acts_the_same(policy, tmp_path):
         stored.predict(observation, deterministic=True)[0], policy.predict(observation, deterministic=True)[0]
     )
     assert [path.name for path in tmp_path.iterdir()] == ["a.safetensors"]
+
+
+def test_a_policy_of_other_units_is_refused(policy, tmp_path):
+    """Earlier ones were of tanh units; the same weights would act otherwise."""
+    path = tmp_path / "a.safetensors"
+    save_policy(policy, path)
+    named = path.read_bytes()
+    path.write_bytes(named.replace(b"LeakyReLU", b"SharpTanh"))
+    assert path.read_bytes() != named
+    with pytest.raises(ValueError, match="units are not LeakyReLU"):
+        load_policy(path)
 
 
 class Hostile:

@@ -52,7 +52,7 @@ def test_samples_are_those_of_the_stacked_buffer(buffers):
     ours, theirs = buffers
     torch.manual_seed(0)
     features = build_policy_features(theirs.observation_space)
-    # float32 through four tanh layers; a frame from the wrong episode moves features by 0.01 and more
+    # float32 through four layers; a frame from the wrong episode moves features by 0.01 and more
     np.testing.assert_allclose(rows(ours.get(48), features), rows(theirs.get(48), features), atol=2e-6)
 
 
