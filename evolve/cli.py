@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TypeAlias
 
 from evolve.commands import INTERRUPTED
 
@@ -25,6 +25,9 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         print(f"{self.prog}: error: {message} (see {self.prog} --help)", file=sys.stderr)
         raise SystemExit(2)
+
+
+_Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -61,7 +64,20 @@ def _is_users(error: Exception) -> bool:
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="evolve", description="Evolve eyes that see through wave optics.")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", parser_class=_Parser)
+    _add_runs(commands)
+    _add_watching(commands)
+    _add_products(commands)
+    _command(commands, "validate", "checks.validate", "compare the optics with closed forms (needs a checkout)")
+    doctor = _command(commands, "doctor", "checks.doctor", "what is installed, and whether it works")
+    _command(commands, "tasks", "tables.tasks", "list the tasks")
+    genes = _command(commands, "genes", "tables.genes", "list the genes")
+    for command in (doctor, genes):
+        command.add_argument("--json", action="store_true", help="for machines")
+    return parser
 
+
+def _add_runs(commands: _Commands) -> None:
+    """Commands that carry a run on."""
     run = _command(commands, "run", "run.start", "begin a run: evolve eyes and brains for a task")
     run.add_argument(
         "task", metavar="TASK", nargs="?", help="see: evolve tasks; may be left out where the preset has one of its own"
@@ -93,6 +109,10 @@ def _parser() -> argparse.ArgumentParser:
         )
         command.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster: tcp://host:8786")
         command.add_argument("--tensorboard", action="store_true", help="write scalars into DIR/tensorboard")
+
+
+def _add_watching(commands: _Commands) -> None:
+    """Commands that read records."""
     status = _command(commands, "status", "status.status", "how a run stands", directory=True)
     status.add_argument("--json", action="store_true", help="for machines")
     status.add_argument("--watch", action="store_true", help="again at every change, as long as the run goes on")
@@ -100,6 +120,10 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories")
     compare.add_argument("--json", action="store_true", help="for machines")
     compare.add_argument("--html", type=Path, metavar="FILE", help="also write a page with their curves")
+
+
+def _add_products(commands: _Commands) -> None:
+    """Commands that make files of a run."""
     for name, meaning in (
         ("replay", "play the best agent once more, and say how it fared"),
         ("report", "write the HTML report"),
@@ -111,17 +135,10 @@ def _parser() -> argparse.ArgumentParser:
             product.add_argument("--seed", type=int, default=0, help="seed of the episode (default: 0)")
         if name == "replay":
             product.add_argument("--rrd", action="store_true", help="also write a recording for rerun")
-    _command(commands, "validate", "checks.validate", "compare the optics with closed forms (needs a checkout)")
-    doctor = _command(commands, "doctor", "checks.doctor", "what is installed, and whether it works")
-    doctor.add_argument("--json", action="store_true", help="for machines")
-    _command(commands, "tasks", "tables.tasks", "list the tasks")
-    genes = _command(commands, "genes", "tables.genes", "list the genes")
-    genes.add_argument("--json", action="store_true", help="for machines")
-    return parser
 
 
 def _command(
-    commands: argparse._SubParsersAction[_Parser], name: str, home: str, meaning: str, directory: bool = False
+    commands: _Commands, name: str, home: str, meaning: str, directory: bool = False
 ) -> argparse.ArgumentParser:
     """A command that lives in evolve.commands.<home>."""
     parser = commands.add_parser(name, help=meaning, description=f"{meaning[0].upper()}{meaning[1:]}.")
