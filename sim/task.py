@@ -151,7 +151,9 @@ def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: n
     substeps, end = path.shape[1], path[:, -1, None]
     found = np.full(objects_after.shape[:2], substeps)
     # Most objects are so far away that nobody can have come near.
-    moved = np.abs(path - end).max(axis=(1, 2))[:, None] + np.abs(objects_after - objects_before).max(axis=-1)
+    moved = np.abs(path - end).reshape(len(path), -1).max(axis=1)[:, None]
+    if objects_after is not objects_before:  # they move
+        moved = moved + np.abs(objects_after - objects_before).max(axis=-1)
     offset = objects_after[..., :2] - end
     reach = REACH + np.sqrt(2) * moved
     worlds, which = ((offset**2).sum(axis=-1) < reach**2).nonzero()
