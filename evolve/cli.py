@@ -46,8 +46,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         if not _is_users(error):
             raise
-        print(f"evolve: error: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"evolve: error: {_one_line(error)}", file=sys.stderr)
         return 2
+
+
+def _one_line(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return " ".join(str(error).split())
 
 
 def _is_users(error: Exception) -> bool:
@@ -132,9 +138,16 @@ def _add_products(commands: _Commands) -> None:
         product = _command(commands, name, f"products.{name}", meaning, directory=True)
         if name != "report":
             product.add_argument("--candidate", type=int, metavar="ID", help="which candidate (default: the best)")
-            product.add_argument("--seed", type=int, default=0, help="seed of the episode (default: 0)")
+            product.add_argument("--seed", type=_seed, default=0, help="seed of the episode (default: 0)")
         if name == "replay":
             product.add_argument("--rrd", action="store_true", help="also write a recording for rerun")
+
+
+def _seed(text: str) -> int:
+    """A seed as NumPy takes it."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 0 or more")
+    return int(text)
 
 
 def _command(

@@ -28,6 +28,7 @@ BAD = {
     "status of nothing": (("status", "/tmp"), "/tmp is no run: it holds no config.toml"),
     "report of nothing": (("report", "/absent"), "/absent is no run"),
     "export of nothing": (("export", "/absent"), "/absent is no run"),
+    "negative episode": (("replay", "/absent", "--seed", "-1"), "argument --seed: '-1': must be a whole number, 0 or"),
     "replay of nothing": (("replay", "/absent"), "/absent is no run"),
 }
 

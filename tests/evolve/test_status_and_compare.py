@@ -25,6 +25,12 @@ def test_status_tells_what_the_record_holds(call, finished):
     assert f"best: candidate {run.best.id}, fitness {run.best.fitness:.4g}" in text
 
 
+def test_page_that_cannot_be_written_is_named(call, finished):
+    code, _, err = call("compare", finished, "--html", "/proc/page.html")
+    assert code == 2
+    assert err == "evolve: error: /proc/page.html: No such file or directory\n"
+
+
 def test_watch_ends_with_the_run(call, finished):
     code, out, _ = call("status", finished, "--watch", "--json")
     assert code == 0
