@@ -69,8 +69,10 @@ def _climb(
             first = rung + 1
     for rung in range(first, stretch.rung + 1):
         learning = replace(config.learning, total_steps=stretch.budgets[rung])
+        # No ladder in a rung: a little budget, divided once more, may be too little for one.
+        life = replace(config, learning=learning, search=replace(config.search, rungs=1))
         entropy = [seed, rung] if rung else seed  # the first rung begins as a whole training does
-        training, episodes = _live(phenotype, replace(config, learning=learning), entropy, progress, begun)
+        training, episodes = _live(phenotype, life, entropy, progress, begun)
         begun = training.end
         save_checkpoint(begun, stretch.checkpoints[rung])
     return training, episodes

@@ -132,7 +132,9 @@ def test_ladders_that_cannot_be_climbed_are_refused():
 
 def test_a_training_in_pieces_is_one_training(tmp_path, short_episodes):
     """Bit for bit: whether each rung takes up what the one below has stored, or all is trained in one process."""
-    config = small_config()
+    plain = small_config()
+    whole_training = replace(plain.learning, total_steps=1024)
+    config = replace(plain, learning=whole_training, search=replace(plain.search, rungs=3))  # as a run has it
 
     def life(name, ends):
         kept = tuple(tmp_path / f"{name}-{rung}" for rung in range(len(ends)))
