@@ -40,19 +40,18 @@ class Retinas:
             self._normals.restart(keys)
 
     def begin(self, state: WorldState) -> Pending:
-        """Look at all worlds; to be waited for before the next look."""
+        """Look at all worlds; to be waited for before the next look at all."""
         everyone = np.arange(state.n)
         return self._noisy(self.renderer.begin(state), everyone, everyone)
 
     def begin_some(self, state: WorldState, worlds: np.ndarray) -> Pending:
-        """Look at these of the worlds alone; `begin` may follow before it is waited for."""
+        """Look at these of the worlds alone, perhaps beside a look at all; to be waited for after that one, and before
+        the next look at some."""
         if len(worlds) <= FEW < state.n:
             signals = self._few.begin(state.take(np.resize(worlds, FEW)))
             return self._noisy(signals, np.arange(len(worlds)), worlds)
-        seen = self._noisy(
-            self.renderer.begin(state), worlds, worlds
-        )()  # with what `begin` works with, so not beside it
-        return lambda: seen
+        # Kernels and buffers are those of `begin`: this cannot run beside it.
+        return lambda: self._noisy(self.renderer.begin(state), worlds, worlds)()
 
     def _noisy(self, signals: Pending, rows: np.ndarray, worlds: np.ndarray) -> Pending:
         """These rows of the signals, and on them the noise of these worlds."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim.observation import STANDING
-from sim.physics import Physics
+from sim.physics import Motion, Physics
 from sim.reward import MODES, reward_terms
 from sim.state import WorldState, concatenate, wrap_angle
 from sim.streams import Streams
@@ -22,12 +22,27 @@ NO_ACTION = "action is not finite"
 
 
 @dataclass(frozen=True)
+class Moved:
+    """Worlds that have moved by one action.
+
+    state   after it; where the physics broke down, the last good one
+    motion  of the agents · acted: the action was finite (n,) bool · broken: the physics broke down (n,) bool
+    """
+
+    state: WorldState
+    motion: Motion
+    acted: np.ndarray
+    broken: np.ndarray
+
+
+@dataclass(frozen=True)
 class Step:
     """One action of all worlds, before any world is started anew.
 
     state         after the action; where `failure` is set, the last good one
     reward_terms  name -> (n,)
     terminated, truncated, contact, success  (n,) bool; success: the goal was reached in this episode
+    respawned     worlds in which an object was put elsewhere
     failure       world that could not go on -> why: "unstable physics" or "action is not finite"
     """
 
@@ -37,6 +52,7 @@ class Step:
     truncated: np.ndarray
     contact: np.ndarray
     success: np.ndarray
+    respawned: np.ndarray
     failure: dict[int, str]
 
     @property
@@ -103,13 +119,21 @@ class Simulation:
 
     def step(self, actions: np.ndarray) -> Step:
         """Advance all worlds by one action; actions (n, 2) in [-1, 1]: forward speed, change of heading."""
+        return self.judge(self.move(actions))
+
+    def move(self, actions: np.ndarray) -> Moved:
+        """The first half of a step: everything moves."""
         before = self.state
         acted = np.isfinite(actions).all(axis=-1)
-        moved, velocity = self._steer(before, np.where(acted[:, None], actions, STANDING))
-        motion = self._physics.step(moved, velocity)
-        after = replace(moved, position=motion.path[:, -1].copy(), velocity=motion.velocity, steps=before.steps + 1)
+        steered, velocity = self._steer(before, np.where(acted[:, None], actions, STANDING))
+        motion = self._physics.step(steered, velocity)
+        after = replace(steered, position=motion.path[:, -1].copy(), velocity=motion.velocity, steps=before.steps + 1)
         broken = motion.unstable | ~after.finite
-        good = acted & ~broken
+        return Moved(after.repaired() if broken.any() else after, motion, acted, broken)
+
+    def judge(self, moved: Moved) -> Step:
+        """The second half: what it led to. Objects that were reached may be elsewhere afterwards."""
+        before, after, motion, good = self.state, moved.state, moved.motion, moved.acted & ~moved.broken
         outcome = self.task.judge(before, after, motion.path, ends=self.mode == "training")
         goal, adversary = outcome.goal & good, outcome.adversary & good
         after = replace(
@@ -117,8 +141,8 @@ class Simulation:
             goals_reached=before.goals_reached + goal,
             adversaries_reached=before.adversaries_reached + adversary,
         )
-        final = respawned(self.task, after, outcome.respawn & good[:, None], self.streams.placement)
-        self._state = final = final.repaired() if broken.any() else final
+        elsewhere = outcome.respawn & good[:, None]
+        self._state = final = respawned(self.task, after, elsewhere, self.streams.placement)
         terminated = (outcome.terminated & good) | ~good
         return Step(
             state=final,
@@ -129,7 +153,8 @@ class Simulation:
             truncated=(final.steps >= EPISODE_STEPS) & ~terminated,
             contact=motion.contact,
             success=final.goals_reached > 0,
-            failure={int(i): UNSTABLE if acted[i] else NO_ACTION for i in np.flatnonzero(~good)},
+            respawned=np.flatnonzero(elsewhere.any(axis=1)),
+            failure={int(i): UNSTABLE if moved.acted[i] else NO_ACTION for i in np.flatnonzero(~good)},
         )
 
     def _steer(self, state: WorldState, actions: np.ndarray) -> tuple[WorldState, np.ndarray]:

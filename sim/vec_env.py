@@ -17,7 +17,7 @@ from sim.fidelity import Fidelity
 from sim.observation import STANDING, Memory, action_space, observation_space
 from sim.picture import Onlooker, check_render_mode
 from sim.render import BatchedRenderer
-from sim.retinas import Retinas
+from sim.retinas import Pending, Retinas
 from sim.reward import per_world
 from sim.simulation import Simulation, Step
 from sim.state import WorldState
@@ -80,29 +80,37 @@ class EyesVecEnv(VecEnv):
         """One action without starting ended worlds anew, as a single environment wants it: observation, reward,
         terminated, truncated, info."""
         self.step_async(actions)
-        step = self.simulation.step(self._commanded)
-        looking = self._retinas.begin(self.state)
+        step, looking = self._advance()
         reward = step.reward
         infos = self._infos(step, reward)
-        observation = self._observation(looking(), np.zeros(self.num_envs, bool), step.contact)
+        observation = self._observation(self._seen(looking, step), np.zeros(self.num_envs, bool), step.contact)
         return observation, reward, step.terminated, step.truncated, infos
 
     def step_wait(self) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        step = self.simulation.step(self._commanded)
-        done = step.done
-        ended = np.flatnonzero(done)
-        last_look = self._retinas.begin_some(step.state, ended) if len(ended) else None
-        if len(ended):
-            self.simulation.restart(ended)
-        looking = self._retinas.begin(self.state)
-        # While the eyes look: all that does not need what they see.
-        reward = step.reward
+        step, looking = self._advance()
+        reward, done = step.reward, step.done
         infos = self._infos(step, reward)
-        if last_look:
-            self._add_terminal_observations(infos, step, ended, last_look())
+        seen = self._seen(looking, step)
+        ended = np.flatnonzero(done)
+        if len(ended):
+            self._add_terminal_observations(infos, step, ended, seen[ended])
             self._returns[ended], self._lengths[ended] = 0.0, 0
-        observation = self._observation(looking(), done, step.contact & ~done)
+            seen[ended] = self._retinas.begin_some(self.simulation.restart(ended), ended)()
+        observation = self._observation(seen, done, step.contact & ~done)
         return observation, reward.astype(np.float32), done, infos
+
+    def _advance(self) -> tuple[Step, Pending]:
+        """Move, and look while it is judged what that led to."""
+        moved = self.simulation.move(self._commanded)
+        looking = self._retinas.begin(moved.state)
+        return self.simulation.judge(moved), looking
+
+    def _seen(self, looking: Pending, step: Step) -> np.ndarray:
+        """What is there to see after the step, objects that were put elsewhere included."""
+        seen = looking()
+        if len(step.respawned):
+            seen[step.respawned] = self._retinas.begin_some(step.state, step.respawned)()
+        return seen
 
     def close(self) -> None:
         self.simulation.close()

@@ -93,16 +93,16 @@ def test_observations_are_those_of_the_state_they_come_with():
 def test_terminal_observation_shows_the_final_state(monkeypatch):
     """Few and many endings at once (small and whole renderer) give the same pictures."""
     venv = make(FEW + 2, eyes=QUIET, memory=3)
-    whole = venv.renderer
+    whole = venv.renderer.resized(venv.num_envs)  # the environment's own is busy just then
     seen = {}
-    step = venv.simulation.step
+    judge = venv.simulation.judge
 
-    def watched(a):
-        result = step(a)
+    def watched(moved):
+        result = judge(moved)
         seen["signals"], seen["done"] = whole.signals(result.state), result.done
         return result
 
-    monkeypatch.setattr(venv.simulation, "step", watched)
+    monkeypatch.setattr(venv.simulation, "judge", watched)
     before = venv.reset()["eyes"]
     ends = 0
     for i in range(60):
@@ -114,6 +114,21 @@ def test_terminal_observation_shows_the_final_state(monkeypatch):
             ends += 1
         before = after["eyes"]
     assert ends
+
+
+@pytest.mark.parametrize("mode", ["training", "evaluation"])
+def test_eyes_see_worlds_as_they_are_after_fresh_starts_and_respawns(mode):
+    """Most of an observation is begun before rewards are worked out; what they change must be in it all the same."""
+    venv = make(FEW + 2, eyes=QUIET, mode=mode)
+    whole = venv.renderer.resized(venv.num_envs)
+    venv.reset()
+    changes = 0
+    for i in range(60):
+        objects = venv.state.objects.copy()
+        seen = venv.step(seeking(venv, i))[0]["eyes"][:, -1]
+        np.testing.assert_array_equal(seen, whole.signals(venv.state))
+        changes += int((objects != venv.state.objects).any(axis=(1, 2)).sum())
+    assert changes
 
 
 def test_memory_holds_newest_last_and_starts_with_the_first_frame():
