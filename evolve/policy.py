@@ -257,7 +257,7 @@ def load_policy(path: Path | str) -> EyePolicy:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no mapping)
         stored = json.loads(metadata["config"])
         if stored.get("units") != UNITS.__name__:
-            raise ValueError(f"its units are not {UNITS.__name__}, an earlier rhabdom wrote it")
+            raise ValueError(f"its units are not {UNITS.__name__}, as those of this version's policies are")
         config = PolicyConfig(
             tuple(int(n) for n in stored["eyes"]), int(stored["neurons"]), int(stored.get("layers", 2))
         )
