@@ -41,19 +41,18 @@ class Retinas:
 
     def begin(self, state: WorldState) -> Pending:
         """Look at all worlds; to be waited for before the next look at all."""
-        everyone = np.arange(state.n)
-        return self._noisy(self.renderer.begin(state), everyone, everyone)
+        return self._noisy(self.renderer.begin(state), slice(None), np.arange(state.n))
 
     def begin_some(self, state: WorldState, worlds: np.ndarray) -> Pending:
         """Look at these of the worlds alone, perhaps beside a look at all; to be waited for after that one, and before
         the next look at some."""
         if len(worlds) <= FEW < state.n:
             signals = self._few.begin(state.take(np.resize(worlds, FEW)))
-            return self._noisy(signals, np.arange(len(worlds)), worlds)
+            return self._noisy(signals, slice(len(worlds)), worlds)
         # Kernels and buffers are those of `begin`: this cannot run beside it.
         return lambda: self._noisy(self.renderer.begin(state), worlds, worlds)()
 
-    def _noisy(self, signals: Pending, rows: np.ndarray, worlds: np.ndarray) -> Pending:
+    def _noisy(self, signals: Pending, rows: np.ndarray | slice, worlds: np.ndarray) -> Pending:
         """These rows of the signals, and on them the noise of these worlds."""
         normals = self._normals.begin(worlds) if self._normals else None
 
