@@ -34,8 +34,8 @@ TASK_TREES: Mapping[str, Tree] = {
         "genome": {"resolution_height": {"open": False, "low": 1, "high": 1, "start": 1}},
         "learning": {
             "first_speed": 0.25,
-            "contact_ramp": 500_000,
-            "decay_after": 500_000,
+            "contact_ramp": 200_000,
+            "decay_after": 200_000,
             "gamma": 0.97,
             "n_epochs": 8,
         },
