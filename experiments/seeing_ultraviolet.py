@@ -55,7 +55,7 @@ def shortest(row: Row) -> float:
 
 
 def longest(row: Row) -> float:
-    """Peak [nm] of the other type."""
+    """Peak [nm] of the type that sees least of it."""
     return max(peaks(row), default=NO_NUMBER)
 
 
@@ -79,8 +79,8 @@ def page(store: Store) -> Page:
         ),
         answer=store.answer,
         method=(
-            "Two types of receptor begin at 600 and 520 nm; nothing but their peaks evolves. Left: what a receptor's "
-            "signals of goal and adversary differ by in daylight, computed for every peak, and where each seed's "
+            "Three types of receptor begin at 600, 520 and 460 nm; nothing but their peaks evolves. Left: what a "
+            "receptor's signals of goal and adversary differ by in daylight, computed for every peak, and where each seed's "
             f"candidates of the last {LAST} generations have theirs. Pigments of long peaks have a second, weak band "
             "in the ultraviolet (Govardovskii et al. 2000), so that even the first eyes are not quite blind to it. "
             "Lines are means over the candidates of a generation, one per seed; the table compares the first "
@@ -95,7 +95,7 @@ def page(store: Store) -> Page:
             Figure(
                 NAME,
                 lambda path: draw(store.rows, path),
-                "Violet: the type with the shorter peak; orange: the other. All seeds are shown.",
+                "Violet: the type with the shortest peak; orange: the one with the longest. All seeds are shown.",
             )
         ],
         tables=[table(store.rows)],

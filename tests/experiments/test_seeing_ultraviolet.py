@@ -36,11 +36,11 @@ def test_the_best_type_counts():
     assert contrast(replace(ROW, peaks_nm="600.0 520.0")) < contrast(ROW) / 10
 
 
-def test_nothing_but_two_peaks_evolves():
+def test_nothing_but_three_peaks_evolves():
     config = assemble(preset="ultraviolet")
     genotype = Genotype(config.genome)
     start = develop(genotype.start, config)
-    assert start.lambda_max_nm == pytest.approx((600.0, 520.0))
+    assert start.lambda_max_nm == pytest.approx((600.0, 520.0, 460.0))
     for end in (np.zeros_like(genotype.start), np.ones_like(genotype.start)):
         other = develop(end, config)
         assert replace(other, lambda_max_nm=start.lambda_max_nm) == start
