@@ -81,9 +81,9 @@ def page(store: Store) -> Page:
         method=(
             "Three types of receptor begin at 600, 520 and 460 nm; nothing but their peaks evolves. Left: what a "
             "receptor's signals of goal and adversary differ by in daylight, computed for every peak, and where each "
-            f"seed's candidates of the last {LAST} generations have theirs. Pigments of long peaks have a second, weak band "
-            "in the ultraviolet (Govardovskii et al. 2000), so that even the first eyes are not quite blind to it. "
-            "Lines are means over the candidates of a generation, one per seed; the table compares the first "
+            f"seed's candidates of the last {LAST} generations have theirs. Pigments of long peaks have a second, "
+            "weak band in the ultraviolet (Govardovskii et al. 2000), so that even the first eyes are not quite blind "
+            "to it. Lines are means over the candidates of a generation, one per seed; the table compares the first "
             f"generation's with the last {LAST} generations', over all seeds, with 95 % intervals by a bootstrap over "
             "seeds and candidates."
         ),
