@@ -110,13 +110,16 @@ class Run:
         """Write a candidate down for good.
 
         Raises:
-            RunError: the candidate is there already, or cannot be written; what was there before still is.
+            RunError: the candidate is there already, somebody else has changed the record, or it cannot be written;
+                what was there before still is.
         """
         if (candidate.id, candidate.rung) in self._lines:
             raise RunError(f"{self.path}: candidate {candidate.id} has been evaluated already")
         line = candidate.to_line().encode()
         try:
             with (self.path / CANDIDATES).open("ab") as file:
+                if file.tell() != self._whole_bytes:  # the directory was deleted, say, and another run begun in it
+                    raise RunError(f"{self.path / CANDIDATES}: is no longer as this process left it; nothing is added")
                 file.write(line)
                 file.flush()
                 os.fsync(file.fileno())

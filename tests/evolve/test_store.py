@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import resource
 import subprocess
 import sys
 
@@ -69,6 +70,19 @@ def test_candidate_is_written_once(run):
     run.append(candidate(0))
     with pytest.raises(RunError, match="candidate 0 has been evaluated already"):
         run.append(candidate(0, 9.0))
+
+
+@pytest.mark.parametrize("begun_anew", [True, False], ids=["begun anew", "deleted"])
+def test_a_run_that_is_somebody_elses_by_now_gets_no_more_lines(run, begun_anew):
+    """Its directory was deleted under its process, and perhaps another run begun in the same place."""
+    run.append(candidate(0))
+    record = run.path / "candidates.jsonl"
+    record.unlink()
+    if begun_anew:
+        record.write_text(candidate(0).to_line() + candidate(1).to_line())
+    with pytest.raises(RunError, match="no longer as this process left it"):
+        run.append(candidate(2))
+    assert len(record.read_text().splitlines()) == 2 * begun_anew
 
 
 @pytest.mark.parametrize("kept", [1, 40, -2, -1])
@@ -165,14 +179,27 @@ def test_damaged_config_is_named(run):
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
-def test_full_disk_is_named_and_loses_nothing(run):
-    run.append(candidate(0))
-    kept = (run.path / "candidates.jsonl").read_bytes()
-    (run.path / "candidates.jsonl").rename(run.path / "aside")
+def test_full_disk_is_named(run):
+    (run.path / "candidates.jsonl").unlink()
     (run.path / "candidates.jsonl").symlink_to("/dev/full")
     with pytest.raises(RunError, match=r"candidates\.jsonl: cannot be written: No space left"):
-        run.append(candidate(1))
-    assert (run.path / "aside").read_bytes() == kept
+        run.append(candidate(0))
+    assert run.candidates == (), "what is not on disk is not on record"
+
+
+def test_a_record_that_may_not_grow_loses_nothing(run):
+    """A limit of the file's size stands for a disk that is full from here on."""
+    run.append(candidate(0))
+    record = run.path / "candidates.jsonl"
+    kept = record.read_bytes()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(kept), hard))
+    try:
+        with pytest.raises(RunError, match=r"candidates\.jsonl: cannot be written: File too large"):
+            run.append(candidate(1))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert record.read_bytes() == kept
     assert [c.id for c in run.candidates] == [0], "what is not on disk is not on record"
 
 
