@@ -28,7 +28,7 @@ SCALES = ("laptop", "paper")  # of the presets that have scales; the first unles
 SETTINGS = (*TOP_LEVEL, *(f"{section}.{f.name}" for section, cls in SECTIONS.items() for f in fields(cls)))
 # A maze's walls say the same at every height, so navigators' eyes are one row of receptors unless told otherwise.
 # They begin slowly and may touch walls at first: else they learn to stand still before they have learnt to steer.
-# What contact costs changes that long, and so long there is much to learn.
+# Until contact has its whole price what is to be learnt changes, so the learning rate falls only from then on.
 TASK_TREES: Mapping[str, Tree] = {
     "navigation": {
         "genome": {"resolution_height": {"open": False, "low": 1, "high": 1, "start": 1}},

@@ -6,13 +6,13 @@ import numpy as np
 
 from sim.placement import SEPARATION
 from sim.state import WorldState, wrap_angle
-from sim.streams import Motion
+from sim.streams import Chance
 
 SPEED = 0.5  # [m/s]
 TURN = 0.4  # standard deviation of the change of heading per action [rad]
 
 
-def wander(state: WorldState, chance: Motion, bounds: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+def wander(state: WorldState, chance: Chance, bounds: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """Object positions (n, k, 3) and headings (n, k) one action later.
 
     Every object walks at SPEED with a heading that drifts at random. A step that would leave `bounds`

@@ -15,7 +15,7 @@ import numpy as np
 from sim.motion import wander
 from sim.placement import REACH, free_spot, place
 from sim.state import WorldState
-from sim.streams import Motion
+from sim.streams import Chance
 from sim.world import TASKS, World
 
 
@@ -44,7 +44,7 @@ class Task(Protocol):
     def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """Start of an episode in one world: agent (2,) and objects (k, 2)."""
 
-    def move(self, state: WorldState, chance: Motion, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    def move(self, state: WorldState, chance: Chance, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         """Objects (n, k, 3) and their headings (n, k) one action later."""
 
     def judge(self, before: WorldState, after: WorldState, path: np.ndarray, ends: bool) -> Outcome:
@@ -77,7 +77,7 @@ class FindGoal:
     def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         return place(rng, self.world.agent_spawn, self.world.object_spawn, len(self.world.objects))
 
-    def move(self, state: WorldState, chance: Motion, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    def move(self, state: WorldState, chance: Chance, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         if not self.moving:
             return state.objects, state.object_heading
         return wander(state, chance, self._bounds, seconds)
@@ -115,7 +115,7 @@ class LeaveMaze:
     def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         return self.world.agent_spawn[rng.integers(len(self.world.agent_spawn))], np.empty((0, 2))
 
-    def move(self, state: WorldState, chance: Motion, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    def move(self, state: WorldState, chance: Chance, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         return state.objects, state.object_heading
 
     def judge(self, before: WorldState, after: WorldState, path: np.ndarray, ends: bool) -> Outcome:

@@ -16,7 +16,7 @@ from evolve.config import ConfigError
 from evolve.development import develop
 from evolve.evaluation import Evaluation
 from evolve.genotype import Genotype
-from evolve.lock import LockedError, RunLock, holder
+from evolve.lock import LockedError
 from evolve.store import Run, RunError, next_directory
 from evolve.versions import present, record_start, recorded
 
@@ -201,41 +201,6 @@ def test_a_record_that_may_not_grow_loses_nothing(run):
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert record.read_bytes() == kept
     assert [c.id for c in run.candidates] == [0], "what is not on disk is not on record"
-
-
-HOLD = """
-import sys, time
-from evolve.lock import RunLock
-from pathlib import Path
-with RunLock(Path(sys.argv[1])):
-    print("held", flush=True)
-    time.sleep(60)
-"""
-
-
-def test_second_process_is_refused_by_name_and_the_lock_dies_with_its_process(run):
-    child = subprocess.Popen([sys.executable, "-c", HOLD, run.path], stdout=subprocess.PIPE)
-    try:
-        assert child.stdout.readline() == b"held\n"
-        assert holder(run.path).startswith(str(child.pid))
-        with pytest.raises(LockedError, match=f"in use by process {child.pid}"), run.lock():
-            pass
-        child.kill()
-        child.wait()
-        assert holder(run.path) is None
-        with run.lock():
-            assert holder(run.path).startswith(str(os.getpid()))
-        assert holder(run.path) is None
-    finally:
-        child.kill()
-        child.wait()
-        child.stdout.close()
-
-
-def test_lock_alone_does_not_make_a_directory_full(tmp_path):
-    with RunLock(tmp_path):
-        pass
-    Run.create(tmp_path, CONFIG)
 
 
 def test_versions_are_recorded_at_each_start(run):
