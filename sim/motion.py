@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from sim.placement import SEPARATION
@@ -24,16 +26,26 @@ def wander(state: WorldState, chance: Chance, bounds: np.ndarray, seconds: float
     x, y = state.objects[..., 0], state.objects[..., 1]
     to_x, to_y = x + SPEED * seconds * np.cos(heading), y + SPEED * seconds * np.sin(heading)
     free = (to_x >= bounds[0]) & (to_y >= bounds[1]) & (to_x <= bounds[2]) & (to_y <= bounds[3])
-    nearest = np.minimum(_between(to_x, to_y, x, y), _between(to_x, to_y, to_x, to_y)).min(axis=-1)
-    free &= nearest >= SEPARATION**2
+    free &= _nearest(to_x, to_y, x, y) >= SEPARATION**2
     objects = state.objects.copy()
     objects[..., 0], objects[..., 1] = np.where(free, to_x, x), np.where(free, to_y, y)
     return objects, np.where(free, heading, np.pi * turn)
 
 
-def _between(x: np.ndarray, y: np.ndarray, others_x: np.ndarray, others_y: np.ndarray) -> np.ndarray:
-    """Squared distances from each object to the others [m²], (n, k, k); infinite to itself."""
-    squared: np.ndarray = (x[:, :, None] - others_x[:, None]) ** 2 + (y[:, :, None] - others_y[:, None]) ** 2
-    itself = np.arange(x.shape[1])
-    squared[:, itself, itself] = np.inf
-    return squared
+def _nearest(to_x: np.ndarray, to_y: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Squared distance from where each object is about to step to the nearest place where another one is, or is about
+    to step [m²], (n, k)."""
+    # Worlds come last, side by side, as there are many of them: NumPy's inner loop is over that axis.
+    place_x, place_y = (np.ascontiguousarray(np.concatenate(at, axis=1).T) for at in ([x, to_x], [y, to_y]))
+    k = x.shape[1]
+    squared = (place_x[k:, None] - place_x) ** 2
+    squared += (place_y[k:, None] - place_y) ** 2
+    squared += _but_itself(k)
+    nearest: np.ndarray = squared.min(axis=1).T
+    return nearest
+
+
+@cache
+def _but_itself(k: int) -> np.ndarray:
+    """Infinite for each of k objects' own two places, (k, 2k, 1)."""
+    return np.tile(np.diag(np.full(k, np.inf)), 2)[..., None]

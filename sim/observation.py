@@ -49,6 +49,9 @@ class Memory:
 
         Returns (env, memory, ...), the caller's own.
         """
+        if self.frames == 1:
+            self._past = [frame]
+            return frame[:, None].copy()
         if not self._past:
             self._past = [frame.copy() for _ in range(self.frames)]
         self._past = [*self._past[1:], frame]

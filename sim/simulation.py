@@ -134,26 +134,25 @@ class Simulation:
     def judge(self, moved: Moved) -> Step:
         """The second half: what it led to. Objects that were reached may be elsewhere afterwards."""
         before, after, motion, good = self.state, moved.state, moved.motion, moved.acted & ~moved.broken
-        outcome = self.task.judge(before, after, motion.path, ends=self.mode == "training")
-        goal, adversary = outcome.goal & good, outcome.adversary & good
-        after = replace(
-            after,
-            goals_reached=before.goals_reached + goal,
-            adversaries_reached=before.adversaries_reached + adversary,
-        )
-        elsewhere = outcome.respawn & good[:, None]
-        self._state = final = respawned(self.task, after, elsewhere, self.streams.placement)
-        terminated = (outcome.terminated & good) | ~good
+        outcome = self.task.judge(before, after, motion.path, ends=self.mode == "training").within(good)
+        if outcome.event.any():
+            after = replace(
+                after,
+                goals_reached=before.goals_reached + outcome.goal,
+                adversaries_reached=before.adversaries_reached + outcome.adversary,
+            )
+        self._state = final = respawned(self.task, after, outcome.respawn, self.streams.placement)
+        terminated = outcome.terminated | ~good
         return Step(
             state=final,
             reward_terms=reward_terms(
-                MODES[self.mode], np.where(good, outcome.progress, 0.0), goal, adversary, motion.contact
+                MODES[self.mode], outcome.progress, outcome.goal, outcome.adversary, motion.contact
             ),
             terminated=terminated,
             truncated=(final.steps >= EPISODE_STEPS) & ~terminated,
             contact=motion.contact,
             success=final.goals_reached > 0,
-            respawned=np.flatnonzero(elsewhere.any(axis=1)),
+            respawned=np.flatnonzero(outcome.respawn.any(axis=1)),
             failure={int(i): UNSTABLE if moved.acted[i] else NO_ACTION for i in np.flatnonzero(~good)},
         )
 

@@ -40,6 +40,6 @@ class Chance:
         if not len(self._drawn):
             shape = (AHEAD, movers)
             of_worlds = [(rng.standard_normal(shape), rng.uniform(-1, 1, shape)) for rng in self._generators]
-            self._drawn = np.transpose(of_worlds, (2, 1, 0, 3))
+            self._drawn = np.ascontiguousarray(np.transpose(of_worlds, (2, 1, 0, 3)))
         (normal, uniform), self._drawn = self._drawn[0], self._drawn[1:]
         return normal, uniform

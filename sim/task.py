@@ -33,6 +33,23 @@ class Outcome:
     respawn: np.ndarray
     terminated: np.ndarray
 
+    @property
+    def event(self) -> np.ndarray:
+        """Something was reached, (n,) bool."""
+        return self.goal | self.adversary
+
+    def within(self, worlds: np.ndarray) -> Outcome:
+        """The same in these worlds, (n,) bool; in the others nothing came of it."""
+        if worlds.all():
+            return self
+        return Outcome(
+            progress=np.where(worlds, self.progress, 0.0),
+            goal=self.goal & worlds,
+            adversary=self.adversary & worlds,
+            respawn=self.respawn & worlds[:, None],
+            terminated=self.terminated & worlds,
+        )
+
 
 class Task(Protocol):
     """The rules of a game on a World; pure functions of states, all worlds at once."""
@@ -64,9 +81,12 @@ class FindGoal:
     moving: bool
 
     @cached_property
-    def _goals(self) -> np.ndarray:
-        """Which objects are goals, (k,) bool."""
-        return np.array([name.startswith("goal") for name in self.world.objects])
+    def _goals(self) -> int:
+        """How many of the objects, the first ones, are goals. Raises ValueError where others are between them."""
+        are_goals = [name.startswith("goal") for name in self.world.objects]
+        if sorted(are_goals, reverse=True) != are_goals:
+            raise ValueError(f"objects = {self.world.objects}: goals must come first")
+        return sum(are_goals)
 
     @cached_property
     def _bounds(self) -> np.ndarray:
@@ -83,22 +103,21 @@ class FindGoal:
         return wander(state, chance, self._bounds, seconds)
 
     def judge(self, before: WorldState, after: WorldState, path: np.ndarray, ends: bool) -> Outcome:
-        goals = self._goals
-        first = first_reached(path, before.objects, after.objects)
-        never = path.shape[1]
-        goal_at = first[:, goals].min(axis=1)
-        adversary_at = first[:, ~goals].min(axis=1)
+        goals, never = self._goals, path.shape[1]
+        squared = squared_distances(after)
+        first = first_reached(path, before.objects, after.objects, squared)
+        goal_at, adversary_at = first[:, :goals].min(axis=1), first[:, goals:].min(axis=1)
         goal, adversary = goal_at < never, adversary_at < never
         if ends:
             goal, adversary = goal & (goal_at <= adversary_at), adversary & (adversary_at < goal_at)
         event = goal | adversary
-        respawn = np.zeros_like(first, bool) if ends else first < never
+        was, is_now = (np.sqrt(d[:, :goals].min(axis=1)) for d in (squared_distances(before), squared))
         return Outcome(
-            progress=_distance(before, goals) - _distance(after, goals),
+            progress=was - is_now,
             goal=goal,
             adversary=adversary,
-            respawn=respawn,
-            terminated=event if ends else np.zeros_like(event),
+            respawn=np.zeros(first.shape, bool) if ends else first < never,
+            terminated=event if ends else np.zeros(len(event), bool),
         )
 
 
@@ -143,20 +162,30 @@ def task_of(world: World) -> Task:
     raise ValueError(f"task = {world.task!r}, must be one of {', '.join(map(repr, TASKS))}")
 
 
-def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: np.ndarray) -> np.ndarray:
+def squared_distances(state: WorldState) -> np.ndarray:
+    """From the agent's centre to every object's, on the ground [m²], (n, k)."""
+    x = state.objects[..., 0] - state.position[:, :1]
+    y = state.objects[..., 1] - state.position[:, 1:]
+    squared: np.ndarray = x * x + y * y
+    return squared
+
+
+def first_reached(
+    path: np.ndarray, objects_before: np.ndarray, objects_after: np.ndarray, squared_after: np.ndarray
+) -> np.ndarray:
     """First substep at which the agent is within REACH of each object, (n, k); the number of substeps if never.
 
-    path (n, substep, 2): the agent at the *end* of each substep; objects move evenly from before to after.
+    path (n, substep, 2): the agent at the *end* of each substep; objects move evenly from before to after, and their
+    squared distances (n, k) [m²] from the agent are those after the last.
     """
-    substeps, end = path.shape[1], path[:, -1, None]
-    found = np.full(objects_after.shape[:2], substeps)
-    # Most objects are so far away that nobody can have come near.
-    moved = np.abs(path - end).reshape(len(path), -1).max(axis=1)[:, None]
-    if objects_after is not objects_before:  # they move
-        moved = moved + np.abs(objects_after - objects_before).max(axis=-1)
-    offset = objects_after[..., :2] - end
-    reach = REACH + np.sqrt(2) * moved
-    worlds, which = ((offset**2).sum(axis=-1) < reach**2).nonzero()
+    substeps = path.shape[1]
+    found = np.full(squared_after.shape, substeps)
+    # Most objects are so far away that nobody can have come near: in no world anything has moved more than this.
+    # (fmax passes over a world whose numbers broke down.)
+    moved = np.fmax.reduce(np.abs(path - path[:, -1:]), axis=None)
+    if objects_after is not objects_before:
+        moved += np.fmax.reduce(np.abs(objects_after - objects_before), axis=None)
+    worlds, which = (squared_after < (REACH + np.sqrt(2) * moved) ** 2).nonzero()
     if len(worlds):
         t = (np.arange(substeps) + 1.0)[:, None] / substeps
         before, after = (objects[worlds, which, None, :2] for objects in (objects_before, objects_after))
@@ -180,10 +209,3 @@ def respawned(task: Task, state: WorldState, which: np.ndarray, rngs: list[np.ra
             raise ValueError("object_spawn: no free spot left to respawn an object; it needs more cells")
         objects[world, index, :2] = spot
     return replace(state, objects=objects)
-
-
-def _distance(state: WorldState, goals: np.ndarray) -> np.ndarray:
-    """From the agent to the nearest goal [m], (n,)."""
-    offset = state.objects[:, goals, :2] - state.position[:, None]
-    distance: np.ndarray = np.sqrt((offset**2).sum(axis=-1).min(axis=1))
-    return distance

@@ -132,11 +132,24 @@ def test_actions_steer(field):
     np.testing.assert_allclose(step.state.position, before.position, atol=1e-9)  # -1: stop
 
 
+def _first_reached(path: np.ndarray, before: float, after: np.ndarray) -> list[list[int]]:
+    """Of agents that end where their paths do, in worlds of one object each, on the x-axis."""
+    objects = [np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=-1)[:, None] for x in (before + 0 * after, after)]
+    squared = ((objects[1][..., :2] - path[:, -1:]) ** 2).sum(axis=-1)
+    return first_reached(path, *objects, squared).tolist()
+
+
 def test_first_reached_follows_moving_objects():
     path = np.zeros((1, 10, 2))
-    near = first_reached(path, np.array([[[2.0, 0, 0]]]), np.array([[[0.0, 0, 0]]]))
-    assert near.tolist() == [[5]]  # 2 - 0.2 s < 1 from the sixth substep on
-    assert first_reached(path, np.array([[[2.0, 0, 0]]]), np.array([[[1.5, 0, 0]]])).tolist() == [[10]]
+    assert _first_reached(path, 2.0, np.array([0.0])) == [[5]]  # 2 - 0.2 s < 1 from the sixth substep on
+    assert _first_reached(path, 2.0, np.array([1.5])) == [[10]]
+
+
+def test_a_broken_world_hides_no_event_of_its_neighbours():
+    path = np.zeros((2, 10, 2))
+    path[0] = np.nan
+    path[1, :, 0] = np.linspace(0, 2, 10)  # by the object's place, and a metre on
+    assert _first_reached(path, 0.5, np.array([np.nan, 0.5]))[1] == [0]
 
 
 def test_starts_are_apart_and_varied(field):
