@@ -7,16 +7,17 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
-import safetensors
 from numpy.typing import NDArray
 
 import optics
 from evolve.analysis import acuity_cpd, polychromatic, succeeded
 from evolve.candidate import Candidate
 from evolve.files import write_whole
+from evolve.policy import PolicyConfig, build_policy, learnt
 from evolve.store import Run, RunError
 from evolve.versions import recorded
 from evolve.vision import vision
@@ -24,7 +25,7 @@ from experiments.best_pupil import contrast_of, measures
 from experiments.page import Page, parser
 from experiments.store import Origin, read_rows, write_rows
 
-__all__ = ["LAST", "Interval", "Row", "Store", "last_mean", "main", "of_generation", "rows_of"]
+__all__ = ["LAST", "Interval", "Row", "Store", "last_mean", "main", "of_generation", "parameters", "rows_of"]
 
 Floats = NDArray[np.float64]
 LAST = 3  # generations whose mean is reported
@@ -88,6 +89,8 @@ def _row(run: Run, group: str, candidate: Candidate, champion: bool) -> Row:
     openings = {use.opens_at for use in config.genome.values() if use.open}
     seen = _seen(run, candidate) if champion and animal.relative_aperture is not None else {}
     has_optics = animal.relative_aperture is not None
+    channels = animal.eyes(config.eye).eye().channels
+    shape = (animal.memory_frames, animal.n_eyes, channels, *animal.resolution)
     return Row(
         group=group,
         seed=config.seed,
@@ -106,7 +109,7 @@ def _row(run: Run, group: str, candidate: Candidate, champion: bool) -> Row:
         cpd=acuity_cpd(animal),
         memory_frames=animal.memory_frames,
         neurons=animal.neurons,
-        parameters=_parameters(run.policy_path(candidate.id)),
+        parameters=parameters(PolicyConfig(shape, animal.neurons, animal.layers)),
         relative_aperture=animal.relative_aperture if animal.relative_aperture is not None else NO_NUMBER,
         refractive_index=animal.refractive_index if animal.refractive_index is not None else NO_NUMBER,
         relief=" ".join(f"{height:.3g}" for height in animal.relief or ()) if has_optics else "",
@@ -133,12 +136,10 @@ def _seen(run: Run, candidate: Candidate) -> dict[str, float]:
     }
 
 
-def _parameters(policy: Path) -> int:
-    """Numbers in a policy's file; 0 where training left none."""
-    if not policy.exists():
-        return 0
-    with safetensors.safe_open(str(policy), framework="np") as file:
-        return sum(math.prod(file.get_slice(name).get_shape()) for name in file.keys())  # noqa: SIM118 (no mapping)
+@cache
+def parameters(shape: PolicyConfig) -> int:
+    """Numbers in a policy of this shape: what training would leave, also where its file is elsewhere."""
+    return sum(tensor.numel() for tensor in learnt(build_policy(shape)).values())
 
 
 # --- statistics

@@ -5,16 +5,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import safetensors.numpy
 
 from evolve.candidate import Candidate
 from evolve.config_source import assemble
 from evolve.development import develop
 from evolve.evaluation import Evaluation
 from evolve.genotype import Genotype
+from evolve.policy import PolicyConfig, build_policy, save_policy
 from evolve.report.eye_figures import relief_heights
 from evolve.store import Run
 from experiments import bending_light, brains_and_acuity, goals_shape_eyes
-from experiments.evolved import Row, Store, last_mean, main, rows_of
+from experiments.evolved import Row, Store, last_mean, main, parameters, rows_of
 from experiments.store import Origin, write_rows
 from optics import Pupil, backend
 
@@ -44,9 +46,25 @@ def test_candidates_become_rows(tmp_path):
         *((0, 0, 0, 1.0), (0, 1, 1, -math.inf), (1, 0, 0, 3.0), (1, 1, 0, 2.0))
     ]
     first = rows[0]
-    assert (first.n_eyes, first.height, first.width, first.episodes, first.parameters) == (1, 1, 1, 4, 0)
+    assert (first.n_eyes, first.height, first.width, first.episodes) == (1, 1, 1, 4)
     assert first.cpd == pytest.approx(1 / 90)
     assert math.isnan(first.relative_aperture)
+
+
+def test_parameters_are_those_of_a_stored_policy(tmp_path):
+    shape = PolicyConfig((3, 2, 3, 4, 5), neurons=16, layers=3)
+    save_policy(build_policy(shape), tmp_path / "policy.safetensors")
+    stored = safetensors.numpy.load_file(tmp_path / "policy.safetensors")
+    assert parameters(shape) == sum(tensor.size for tensor in stored.values())
+
+
+def test_candidates_with_more_receptors_have_more_parameters(tmp_path):
+    wider = (*SMALL, "genome.resolution_width.start=9")
+    small, large = (
+        rows_of(run_of(tmp_path / name, "bifurcation-detection", settings, (1.0,)), "detection")[0].parameters
+        for name, settings in (("small", SMALL), ("large", wider))
+    )
+    assert 0 < small < large
 
 
 def test_the_best_of_each_generation_is_looked_through(tmp_path):
