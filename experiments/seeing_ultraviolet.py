@@ -95,7 +95,8 @@ def page(store: Store) -> Page:
             Figure(
                 NAME,
                 lambda path: draw(store.rows, path),
-                "Violet: the type with the shortest peak; orange: the one with the longest. All seeds are shown.",
+                "Violet: the type with the shortest peak; orange: the one with the longest. All seeds are shown. "
+                "Shaded: where goal and adversaries reflect differently; dotted: chance, one goal among three objects.",
             )
         ],
         tables=[table(store.rows)],
