@@ -5,12 +5,14 @@ python -m experiments.seeing_ultraviolet [--runs foraging=DIR ...] [--answer TEX
 
 from __future__ import annotations
 
+import itertools
 import sys
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+import scipy.stats
 
 import optics
 from experiments import evolved
@@ -22,6 +24,7 @@ __all__ = ["contrast", "difference", "page"]
 
 NAME = "seeing_ultraviolet"
 BANDS = 16
+RANGES = (330, 365, 400, 435, 470, 650)  # of the shortest peak [nm]
 SHORTEST, LONGEST = "#6A3D9A", "#D55E00"
 FITNESS = "#0072B2"
 
@@ -99,7 +102,11 @@ def page(store: Store) -> Page:
                 "Shaded: where goal and adversaries reflect differently; dotted: chance, one goal among three objects.",
             )
         ],
-        tables=[table(store.rows)],
+        tables=[
+            table(store.rows),
+            f"By shortest peak, all candidates (rank correlation with fitness {rank_correlation(store.rows):.2f}):",
+            table_by_peak(store.rows),
+        ],
         origin=store.origin,
     )
 
@@ -110,6 +117,23 @@ def table(rows: Sequence[Row]) -> str:
     header = ["mean", "first generation", f"last {LAST} generations"]
     lines = [[name, str(last_mean(first, value)), str(last_mean(rows, value))] for name, value in QUANTITIES.items()]
     return markdown_table(header, lines)
+
+
+def rank_correlation(rows: Sequence[Row]) -> float:
+    """Spearman's, of shortest peak and fitness."""
+    done = [row for row in rows if not row.failed]
+    return float(scipy.stats.spearmanr([shortest(row) for row in done], [row.fitness for row in done]).statistic)
+
+
+def table_by_peak(rows: Sequence[Row]) -> str:
+    """A row per range of the shortest peak."""
+    lines = []
+    for low, high in itertools.pairwise(RANGES):
+        mine = [row for row in rows if not row.failed and low <= shortest(row) < high]
+        if mine:
+            means = (np.mean([value(row) for row in mine]) for value in (lambda r: r.success_rate, lambda r: r.fitness))
+            lines.append([f"{low} to {high} nm", str(len(mine)), *(f"{mean:.3g}" for mean in means)])
+    return markdown_table(["shortest peak", "candidates", "goal first", "fitness"], lines)
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:

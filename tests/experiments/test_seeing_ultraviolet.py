@@ -49,7 +49,15 @@ def test_nothing_but_three_peaks_evolves():
 
 def test_page_of_stored_runs(tmp_path):
     rows = [
-        replace(ROW, seed=seed, generation=g, index=i, peaks_nm=f"600.0 {520 - 30 * g}.0", success_rate=0.3 + 0.1 * g)
+        replace(
+            ROW,
+            seed=seed,
+            generation=g,
+            index=i,
+            peaks_nm=f"600.0 {520 - 30 * g}.0",
+            success_rate=0.3 + 0.1 * g,
+            fitness=g,
+        )
         for seed in (0, 1)
         for g in range(5)
         for i in range(3)
@@ -60,4 +68,6 @@ def test_page_of_stored_runs(tmp_path):
     text = (tmp_path / "seeing_ultraviolet.md").read_text()
     assert "They do." in text
     assert "| shortest peak [nm] | 520 [520, 520] | 430 [4" in text
+    assert "(rank correlation with fitness -1.00)" in text
+    assert "| 400 to 435 nm | 12 | 0.65 | 3.5 |" in text  # the last two generations of both seeds
     assert (tmp_path / "figures" / "seeing_ultraviolet.png").stat().st_size > 10_000
