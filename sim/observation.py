@@ -47,11 +47,11 @@ class Memory:
     def remember(self, frame: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         """Add a frame (env, ...); `fresh` (env,) bool: worlds that have just started.
 
-        Returns (env, memory, ...), the caller's own.
+        Returns (env, memory, ...), the caller's own, as `frame` is from now on.
         """
         if self.frames == 1:
             self._past = [frame]
-            return frame[:, None].copy()
+            return frame[:, None]
         if not self._past:
             self._past = [frame.copy() for _ in range(self.frames)]
         self._past = [*self._past[1:], frame]

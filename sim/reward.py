@@ -34,13 +34,3 @@ def reward_terms(
         "adversary": weights.adversary * adversary + 0.0,
         "contact": weights.contact * contact + 0.0,
     }
-
-
-def per_world(terms: dict[str, np.ndarray]) -> list[dict[str, float]]:
-    """The terms of each world by itself."""
-    columns = (terms[name].tolist() for name in TERMS)
-    # Written out: this is done for every world in every step, and takes a third of the time that way.
-    return [
-        {"progress": progress, "goal": goal, "adversary": adversary, "contact": contact}
-        for progress, goal, adversary, contact in zip(*columns, strict=True)
-    ]

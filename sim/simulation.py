@@ -19,6 +19,7 @@ MAX_TURN = np.pi / 4  # [rad] change of heading per action
 
 UNSTABLE = "unstable physics"
 NO_ACTION = "action is not finite"
+NOWHERE = np.empty(0, int)
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,7 @@ class Simulation:
             truncated=(final.steps >= EPISODE_STEPS) & ~terminated,
             contact=motion.contact,
             success=final.goals_reached > 0,
-            respawned=np.flatnonzero(outcome.respawn.any(axis=1)),
+            respawned=np.unique(outcome.respawn.nonzero()[0]) if outcome.respawn.any() else NOWHERE,
             failure={int(i): UNSTABLE if moved.acted[i] else NO_ACTION for i in np.flatnonzero(~good)},
         )
 

@@ -14,11 +14,11 @@ from optics.tabulated import Spectrum
 from sim.agent import Eyes
 from sim.eye_images import side_by_side
 from sim.fidelity import Fidelity
+from sim.infos import first_infos, infos_of
 from sim.observation import STANDING, Memory, action_space, observation_space
 from sim.picture import Onlooker, check_render_mode
 from sim.render import BatchedRenderer
 from sim.retinas import Pending, Retinas
-from sim.reward import per_world
 from sim.simulation import Simulation, Step
 from sim.state import WorldState
 from sim.world import build_world
@@ -58,7 +58,7 @@ class EyesVecEnv(VecEnv):
         self._reset_seeds()
         self._reset_options()
         self._returns[:], self._lengths[:] = 0.0, 0
-        self.reset_infos = self._infos_of(self.state, [{} for _ in range(self.num_envs)], np.zeros(self.num_envs, bool))
+        self.reset_infos = first_infos(self.state)
         everyone = np.ones(self.num_envs, bool)
         return self._observation(self._retinas.begin(self.state)(), everyone, ~everyone)
 
@@ -157,7 +157,7 @@ class EyesVecEnv(VecEnv):
     # --- info
 
     def _infos(self, step: Step, reward: np.ndarray) -> list[dict[str, Any]]:
-        infos = self._infos_of(step.state, per_world(step.reward_terms), step.success)
+        infos = infos_of(step)
         self._returns += reward
         self._lengths += 1
         for world in np.flatnonzero(step.done):
@@ -166,14 +166,6 @@ class EyesVecEnv(VecEnv):
         for index, reason in step.failure.items():
             infos[index]["failure"] = reason
         return infos
-
-    def _infos_of(self, state: WorldState, terms: list[dict[str, float]], success: np.ndarray) -> list[dict[str, Any]]:
-        return [
-            {"reward_terms": of_world, "is_success": reached, "position": (x, y), "heading": heading}
-            for of_world, reached, (x, y), heading in zip(
-                terms, success.tolist(), state.position.tolist(), state.heading.tolist(), strict=True
-            )
-        ]
 
     # --- the rest of the VecEnv contract: there is one environment behind all indices
 
