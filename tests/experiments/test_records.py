@@ -1,0 +1,30 @@
+"""Records of runs that are kept in the repository: what pages say can be made from them again, and they can go on."""
+
+from pathlib import Path
+
+import pytest
+
+from evolve.store import Run
+from experiments.evolved import Row, rows_of
+from experiments.store import read_rows, write_rows
+
+RESULTS = Path(__file__).parents[2] / "docs/results"
+RECORDS = sorted((RESULTS / "records").iterdir())
+PAGES = {"seeing_ultraviolet": {"foraging": ("ultraviolet-0", "ultraviolet-1")}}
+
+
+@pytest.mark.parametrize("record", RECORDS, ids=lambda path: path.name)
+def test_record_is_a_run(record):
+    run = Run.open(record)
+    assert run.notice is None
+    assert 0 < len(run.candidates) <= run.config.candidates
+    assert {file.name for file in record.iterdir()} == {"candidates.jsonl", "config.toml", "versions.json"}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_pages_hold_what_is_on_record(page, tmp_path):
+    runs = [(group, name) for group, names in PAGES[page].items() for name in names]
+    rows = [row for group, name in runs for row in rows_of(Run.open(RESULTS / "records" / name), group)]
+    write_rows(rows, tmp_path / "rows.csv")
+    assert (tmp_path / "rows.csv").read_bytes() == (RESULTS / "data" / f"{page}.csv").read_bytes()
+    assert read_rows(Row, tmp_path / "rows.csv")
