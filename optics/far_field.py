@@ -13,7 +13,7 @@ from optics.chebyshev import chebyshev_points, lagrange
 from optics.field import Field
 from optics.fourier import dft2, fast_length, predicted_seconds
 from optics.grid import Grid
-from optics.precision import Precision, opaque, precision
+from optics.precision import Precision, opaque, precision, with_room
 from optics.problem import Problem, PupilEdge
 from optics.radial import TAPS, lagrange_weights
 
@@ -142,7 +142,7 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
         for b, along in enumerate(np.tan(nodes)):
             part = u * _slow_kernel(float(across), float(along), beam, how.pupil, types)
             part = dft2(part, how.period, how.directions.shape, -1, how.directions.dx)
-            weight = types.Float(np.ascontiguousarray(along_x[a] * along_x[b].T, dtype=types.dtype).ravel())
+            weight = types.Float(with_room((along_x[a] * along_x[b].T).astype(types.dtype)))
             total_re, total_im = total_re + weight * part.re, total_im + weight * part.im
             dr.eval(total_re, total_im)
     return _onto_window(total_re * total_re + total_im * total_im, beam, problem, how, types)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from optics.grid import Grid
-from optics.precision import Precision, opaque
+from optics.precision import Precision, opaque, with_room
 
 __all__ = ["Field"]
 
@@ -35,13 +35,8 @@ class Field:
 
     @classmethod
     def from_numpy(cls, u: np.ndarray, dx: float, types: Precision) -> Field:
-        flat = np.ascontiguousarray(u, dtype=types.complex_dtype).ravel()
-        return cls(
-            types.Float(np.ascontiguousarray(flat.real)),
-            types.Float(np.ascontiguousarray(flat.imag)),
-            Grid(u.shape, dx),
-            types,
-        )
+        u = np.asarray(u, dtype=types.complex_dtype)
+        return cls(types.Float(with_room(u.real)), types.Float(with_room(u.imag)), Grid(u.shape, dx), types)
 
     def __mul__(self, other: Field) -> Field:
         re = self.re * other.re - self.im * other.im

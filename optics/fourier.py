@@ -19,7 +19,7 @@ import numpy as np
 
 from optics.field import Field
 from optics.grid import Grid
-from optics.precision import Precision, opaque
+from optics.precision import Precision, opaque, with_room
 from optics.tracked import is_tracked
 
 __all__ = [
@@ -186,7 +186,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
         u.real, u.imag = re.numpy().reshape(from_), im.numpy().reshape(from_)
         for axis in (1, 0):
             u = _fft_axis(u, period, to[axis], turn, axis)
-        return types.Float(np.ascontiguousarray(u.real).ravel()), types.Float(np.ascontiguousarray(u.imag).ravel())
+        return types.Float(with_room(u.real)), types.Float(with_room(u.imag))
 
     class FourierSum(dr.CustomOp):
         """Its adjoint is the sum with the other sign, from the output's samples to the input's."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from optics.field import Field
 from optics.grid import Grid
-from optics.precision import Precision, opaque
+from optics.precision import Precision, opaque, with_room
 from optics.soft_edge import kaiser_beta
 from optics.table import Table
 
@@ -167,7 +167,7 @@ class Passage:
         import drjit as dr
 
         grid = Grid((len(fy), len(fx)), 1.0)
-        x, y = (types.Float64(a.ravel()) for a in np.meshgrid(fx, fy))
+        x, y = (types.Float64(with_room(a)) for a in np.meshgrid(fx, fy))
         s2 = (x * x + y * y) * opaque(types, self.wavelength**2)
         z = opaque(types, self.z / self.wavelength)
         if self.paraxial:

@@ -11,7 +11,7 @@ import numpy as np
 from optics.aperture import Aperture
 from optics.beam import Beam
 from optics.direct_sum import cached_nodes, node_count
-from optics.precision import Precision, opaque, precision
+from optics.precision import Precision, opaque, precision, with_room
 from optics.problem import Problem
 from optics.rays import brightness, mismatch
 from optics.tracked import is_tracked
@@ -89,7 +89,7 @@ class PinholeSampling:
         image = np.zeros(window.shape, dtype=types.dtype)
         if 0 <= row < window.shape[0] and 0 <= column < window.shape[1] and bool(propagates[0]):
             image[row, column] = beam.pupil.area / window.dx**2
-        return types.Float(image.ravel())
+        return types.Float(with_room(image))
 
     def plane(self, problem: Problem) -> float:
         """Nothing rounds."""

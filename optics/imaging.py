@@ -10,7 +10,7 @@ import numpy as np
 from optics.field import Field
 from optics.fourier import dft2, fast_length
 from optics.grid import Grid
-from optics.precision import Precision
+from optics.precision import Precision, with_room
 
 __all__ = ["blur", "centred", "receptor_average"]
 
@@ -64,7 +64,7 @@ def _tensor(kernel: Any, types: Precision) -> Any:
 
 
 def _flat(array: np.ndarray, types: Precision) -> Any:
-    return types.Float(np.ascontiguousarray(array).ravel().astype(types.complex_dtype(0).real.dtype))
+    return types.Float(with_room(np.asarray(array, types.complex_dtype(0).real.dtype)))
 
 
 def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, ...]) -> tuple[int, int]:

@@ -12,7 +12,7 @@ from optics.beam import Beam
 from optics.chebyshev import chebyshev_points, lagrange
 from optics.field import Field
 from optics.grid import Grid
-from optics.precision import Precision, opaque, precision
+from optics.precision import Precision, opaque, precision, with_room
 from optics.problem import Problem, PupilEdge
 
 __all__ = ["LowRankSampling", "low_rank"]
@@ -184,8 +184,8 @@ def _fourier(
     waves = np.tile(np.outer(at, xi) / (-problem.wavelength * how.scale), rank)
     weight = np.repeat(lagrange(at - middle, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
     wheel = weight * np.exp(2j * np.pi * waves)
-    re, im = (np.ascontiguousarray(part, dtype=types.dtype) for part in (wheel.real, wheel.imag))
-    return types.Tensor(re), types.Tensor(im)
+    re, im = (with_room(part.astype(types.dtype)) for part in (wheel.real, wheel.imag))
+    return types.Tensor(re, wheel.shape), types.Tensor(im, wheel.shape)
 
 
 def _product(re: Any, im: Any, other_re: Any, other_im: Any, transposed: bool) -> tuple[Any, Any]:

@@ -10,7 +10,9 @@ import numpy as np
 
 from optics.tracked import is_tracked
 
-__all__ = ["Precision", "opaque", "precision"]
+__all__ = ["Precision", "opaque", "precision", "with_room"]
+
+ROOM = 64  # elements: more than any processor takes at once
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,19 @@ def precision(dtype: str = "float32") -> Precision:
     return Precision(
         dtype, types.Float64, types.TensorXf64, types.Float64, types.TensorXf64, types.UInt32, np.complex128
     )
+
+
+def with_room(values: np.ndarray) -> np.ndarray:
+    """The same numbers, flat, in memory that may be read some way past their end.
+
+    Dr.Jit works on NumPy's memory itself, without a copy, and its kernels take whole packets of numbers, sixteen with
+    AVX-512: those past the end go nowhere, but reading them ends the process where the page after it is not there,
+    as happens to arrays of some megabytes (seen with Dr.Jit 1.5 and 2087 x 2087 numbers).
+    """
+    room = np.empty(values.size + ROOM, values.dtype)
+    flat = room[: values.size]
+    flat.reshape(values.shape)[...] = values
+    return flat
 
 
 def opaque(types: Precision, value: Any) -> Any:

@@ -17,7 +17,7 @@ from optics.field import Field
 from optics.fourier import dft2
 from optics.grid import Grid
 from optics.point_spread import PSFResult
-from optics.precision import opaque, precision
+from optics.precision import opaque, precision, with_room
 from optics.tracked import at_border, number
 
 __all__ = ["MTF", "encircled_energy", "image_quality", "mtf", "strehl_ratio"]
@@ -177,4 +177,4 @@ def _flat(tensor: Any) -> Any:
     """Row by row, Dr.Jit or NumPy."""
     import drjit as dr
 
-    return np.ascontiguousarray(tensor).ravel() if isinstance(tensor, np.ndarray) else dr.ravel(tensor)
+    return with_room(tensor) if isinstance(tensor, np.ndarray) else dr.ravel(tensor)

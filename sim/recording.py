@@ -9,6 +9,8 @@ from contextlib import contextmanager
 import numpy as np
 
 ALIGNMENT = 64  # [bytes]
+# [bytes] that a kernel takes at once, at most: it may read past an array's end (`optics.precision.with_room`)
+PACKET = 128
 
 
 @contextmanager
@@ -27,6 +29,6 @@ def garbage_kept() -> Iterator[None]:
 def aligned(n: int, dtype: type) -> np.ndarray:
     """n zeros that start on 64 bytes: Dr.Jit records a frozen function anew for every alignment of its inputs."""
     size = np.dtype(dtype).itemsize
-    raw = np.zeros(n * size + ALIGNMENT, np.uint8)
+    raw = np.zeros(n * size + ALIGNMENT + PACKET, np.uint8)
     first = -raw.ctypes.data % ALIGNMENT
     return raw[first : first + n * size].view(dtype)

@@ -1,0 +1,14 @@
+"""Memory that is handed to Dr.Jit."""
+
+import numpy as np
+
+from optics.precision import with_room
+
+
+def test_memory_goes_on_after_the_last_number():
+    values = np.arange(24.0).reshape(4, 6)[:, ::2]
+    flat = with_room(values)
+    assert flat.tolist() == values.ravel().tolist()
+    start, end = np.lib.array_utils.byte_bounds(flat.base)
+    assert start == flat.ctypes.data
+    assert end - (start + flat.nbytes) >= 16 * flat.itemsize  # a packet of AVX-512
