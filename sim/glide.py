@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -27,12 +28,14 @@ class Glide:
 
     response       of path [m] and velocity [m/s] after each substep to a speed of 1 m/s and a command of 1, per
                    axis: (path | velocity, substep, speed | command, 2)
-    lower, upper   what could be touched, as upright boxes (n, 2) [m]
+    obstacles      ids of the geoms that could be touched (n,)
+    lower, upper   upright boxes around them (n, 2) [m]
     reach          how near the agent's centre may come to them and still touch nothing [m]
     strongest      command beyond which the servo saturates
     """
 
     response: np.ndarray
+    obstacles: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
     reach: float
@@ -40,22 +43,39 @@ class Glide:
 
     def __call__(self, velocity: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Path from where the agents are (n, substep, 2) [m], and their velocity at its end (n, 2) [m/s]."""
-        forces = np.stack([velocity, command], axis=1)
         # Summed by hand: a product of matrices rounds differently with the number of worlds.
-        path, speed = (
-            response[:, 0] * forces[:, None, 0] + response[:, 1] * forces[:, None, 1]
-            for response in (self.response[0], self.response[1, -1:])
-        )
-        return path, speed[:, 0]
+        (paths, speeds), at_end = self.response, slice(-1, None)
+        path = paths[:, 0] * velocity[:, None] + paths[:, 1] * command[:, None]
+        speed = speeds[at_end, 0] * velocity + speeds[at_end, 1] * command
+        return path, speed
 
-    def touches_nothing(self, position: np.ndarray, path: np.ndarray, command: np.ndarray) -> np.ndarray:
-        """Whether the agents, on `path` from `position` (n, 2) [m], surely stay out of reach of everything, (n,)."""
-        places = position[:, None] + path
-        low = np.minimum(places.min(axis=1), position)[:, None] - self.reach
-        high = np.maximum(places.max(axis=1), position)[:, None] + self.reach
-        met = ((low < self.upper) & (high > self.lower)).all(axis=-1).any(axis=1)
-        free: np.ndarray = ~met & (np.abs(command) <= self.strongest).all(axis=-1)
-        return free
+    @cached_property
+    def _within(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Between which x, and which y, a centre is within reach of each box [m]."""
+        return (*(self.lower - self.reach).T.copy(), *(self.upper + self.reach).T.copy())
+
+    def met(self, position: np.ndarray, path: np.ndarray) -> np.ndarray:
+        """What agents on `path` from `position` (n, 2) [m] come within reach of, (n, obstacle) bool."""
+        low = position + np.minimum(np.minimum.reduce(path, axis=1), 0.0)
+        high = position + np.maximum(np.maximum.reduce(path, axis=1), 0.0)
+        x_from, y_from, x_to, y_to = self._within
+        # An axis at a time: NumPy's inner loop is over the boxes then.
+        met: np.ndarray = low[:, :1] < x_to
+        met &= high[:, :1] > x_from
+        met &= low[:, 1:] < y_to
+        met &= high[:, 1:] > y_from
+        return met
+
+    def around(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """Random places in and about the boxes, out to where an agent touches them, (n, 2) [m]."""
+        one = rng.integers(len(self.lower), size=n)
+        places: np.ndarray = rng.uniform(self.lower[one] - self.reach, self.upper[one] + self.reach)
+        return places
+
+    def obeys(self, command: np.ndarray) -> np.ndarray:
+        """Whether the servos do not saturate, (n,) bool."""
+        obeys: np.ndarray = (np.abs(command) <= self.strongest).all(axis=-1)
+        return obeys
 
 
 def glide_of(model: mujoco.MjModel, agent: int, run: Run, strongest: float) -> Glide | None:
@@ -70,17 +90,18 @@ def glide_of(model: mujoco.MjModel, agent: int, run: Run, strongest: float) -> G
     response = np.stack([np.stack([r[kind][0] for r in responses], axis=1) for kind in (0, 1)])
     geoms = np.flatnonzero(model.geom_bodyid == agent)
     reach = float((np.linalg.norm(model.geom_pos[geoms], axis=1) + model.geom_rbound[geoms]).max())
-    margin = model.geom_margin[geoms].max() + model.geom_gap[geoms].max() + obstacles[2]
-    glide = Glide(response, obstacles[0], obstacles[1], reach + float(margin), strongest)
+    ids, lower, upper, their_margin = obstacles
+    margin = model.geom_margin[geoms].max() + model.geom_gap[geoms].max() + their_margin
+    glide = Glide(response, ids, lower, upper, reach + float(margin), strongest)
     actual = run(*trial)
     path, velocity = glide(*trial[:2])
     linear = np.abs(path - actual[0]).max() < ROUNDING and np.abs(velocity - actual[1][:, -1]).max() < ROUNDING
     return glide if linear else None
 
 
-def _obstacles(model: mujoco.MjModel, agent: int) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """Upright boxes around all that the agent can touch, lower and upper corners (n, 2) [m], and their largest margin
-    [m]; None where one of them moves or has no end."""
+def _obstacles(model: mujoco.MjModel, agent: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:
+    """Ids of all geoms that the agent can touch, lower and upper corners (n, 2) [m] of upright boxes around them, and
+    their largest margin [m]; None where one of them moves or has no end."""
     mine = model.geom_bodyid == agent
     meets = np.zeros(model.ngeom, bool)
     for geom in np.flatnonzero(mine):
@@ -97,4 +118,4 @@ def _obstacles(model: mujoco.MjModel, agent: int) -> tuple[np.ndarray, np.ndarra
     center = data.geom_xpos[others] + np.einsum("nij,nj->ni", frames, model.geom_aabb[others, :3])
     half = np.einsum("nij,nj->ni", np.abs(frames), model.geom_aabb[others, 3:])
     margin = float((model.geom_margin[others] + model.geom_gap[others]).max(initial=0.0))
-    return (center - half)[:, :2], (center + half)[:, :2], margin
+    return others, (center - half)[:, :2], (center + half)[:, :2], margin

@@ -2,24 +2,28 @@
 
 The agent is a heavy body on two slide joints driven by velocity actuators; its heading is set, not simulated.
 Objects are mocap bodies that collide with nothing, so that physics need not know where they are. Agents that surely
-touch nothing during the action glide (`sim.glide`); the others' worlds are MuJoCo's.
+touch nothing during the action glide (`sim.glide`); the others are MuJoCo's, among the few geoms that they could touch
+(`sim.vicinity`).
 """
 
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
-import mujoco.rollout
 import numpy as np
 
 from sim.glide import glide_of
+from sim.rollouts import Rollouts
 from sim.state import WorldState
+from sim.vicinity import Vicinity, vicinity_of
 from sim.world import MAX_SPEED, World
 
 SUBSTEPS = 10  # of the model's timestep per action
 UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s]: no actuator can do that
+TRIALS = 64  # agents by which a model of a part is held against the whole
 FEW_GEOMS = 200  # so few are sooner gone through one by one than by MuJoCo's tree of boxes
 
 
@@ -37,12 +41,30 @@ class Motion:
     contact: np.ndarray
     unstable: np.ndarray
 
+    def put(self, worlds: np.ndarray, motion: Motion) -> None:
+        """Set the motion of these worlds."""
+        for name, array in vars(self).items():
+            array[worlds] = getattr(motion, name)
+
+
+@dataclass(frozen=True)
+class _Agents:
+    """Where agents are [m], (n, 2), their headings [rad], (n,), and velocities [m/s], (n, 2)."""
+
+    position: np.ndarray
+    heading: np.ndarray
+    velocity: np.ndarray
+
+    def take(self, some: np.ndarray) -> _Agents:
+        return _Agents(self.position[some], self.heading[some], self.velocity[some])
+
 
 class Physics:
     """Batched physics of one world's model.
 
-    threads  of MuJoCo's batched step
-    gliding  whether agents out of reach of everything move in closed form (`.glide`: how, None where they cannot)
+    threads  of MuJoCo's batched step, see `sim.rollouts`
+    gliding  whether agents out of reach of everything move in closed form, and those near something among that alone
+             (`.glide`, `.vicinity`: how, None where they cannot); otherwise everything is MuJoCo's, in the whole world
 
     Raises ValueError for a model without the agent's joints, actuators and touch sensor, and for objects that
     could collide.
@@ -51,39 +73,73 @@ class Physics:
     def __init__(self, world: World, threads: int, gliding: bool = True) -> None:
         model = _without_detours(world.model)
         self._model = model
-        self._data = [mujoco.MjData(model) for _ in range(max(threads, 1))]
-        self._rollout = mujoco.rollout.Rollout(nthread=threads if threads > 1 else 0)
+        self._rollouts = Rollouts(model, threads)
         self._columns = _Columns.of(model)
         self._actuators = [_actuator(model, joint) for joint in ("agent_x", "agent_y")]
         self._touch = _touch_columns(model)
         _check_objects(model, world.objects)
         self._start = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
-        mujoco.mj_getState(model, self._data[0], self._start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        mujoco.mj_getState(model, mujoco.MjData(model), self._start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         self.seconds = SUBSTEPS * model.opt.timestep
         agent = int(model.jnt_bodyid[_joint(model, "agent_x")])
         self.glide = glide_of(model, agent, self._untouched, MAX_SPEED) if gliding else None
+        self.vicinity = vicinity_of(model, world.alone, self.glide)
+        self._rollouts_near = Rollouts(self.vicinity.alone, threads) if self.vicinity else None
+        if self.vicinity and not self._agrees(self.vicinity):
+            self.vicinity = None
 
     def step(self, state: WorldState, velocity: np.ndarray) -> Motion:
         """One action: SUBSTEPS with the commanded velocity [m/s] (n, 2) held."""
+        agents = _Agents(state.position, state.heading, state.velocity)
         if self.glide is None:
-            return self._simulate(state, velocity)
+            return self._simulate(agents, velocity)
         path, speed = self.glide(state.velocity, velocity)
-        free = self.glide.touches_nothing(state.position, path, velocity)
+        met = self.glide.met(state.position, path)
+        free = ~met.any(axis=1) & self.glide.obeys(velocity)
         free &= (np.abs(state.velocity) < UNSTABLE_SPEED).all(axis=-1)  # false for NaN: MuJoCo says what comes of it
         motion = Motion(state.position[:, None] + path, speed, np.zeros(state.n, bool), np.zeros(state.n, bool))
         near = np.flatnonzero(~free)
         if len(near):
-            simulated = self._simulate(state.take(near), velocity[near])
-            for name, array in vars(motion).items():
-                array[near] = getattr(simulated, name)
+            motion.put(near, self._near(agents.take(near), velocity[near], met[near]))
         return motion
 
-    def _simulate(self, state: WorldState, velocity: np.ndarray) -> Motion:
-        initial = self._initial(state.n)
-        initial[:, self._columns.position] = state.position - self._columns.origin
-        initial[:, self._columns.heading] = state.heading
-        initial[:, self._columns.velocity] = state.velocity
-        return self._motion(state, *self._rollout.rollout(self._model, self._data, initial, self._control(velocity)))
+    def _near(self, agents: _Agents, velocity: np.ndarray, met: np.ndarray) -> Motion:
+        """Of agents that may touch something, each among what it may meet: where something turns it aside to where it
+        could meet more, and where it breaks down, it is done again in the whole world."""
+        if self.vicinity is None:
+            return self._simulate(agents, velocity)
+        few = self.vicinity.few(met)
+        motion = self._simulate(agents, velocity, self.vicinity.models(few))
+        strayed = self.vicinity.strayed(agents.position, motion.path - agents.position[:, None], few)
+        again = np.flatnonzero(strayed | motion.unstable)
+        if len(again):
+            motion.put(again, self._simulate(agents.take(again), velocity[again]))
+        return motion
+
+    def _simulate(
+        self, agents: _Agents, velocity: np.ndarray, models: Sequence[mujoco.MjModel] | None = None
+    ) -> Motion:
+        """MuJoCo's step, in the whole world or in each agent's own model."""
+        initial = self._initial(len(velocity))
+        initial[:, self._columns.position] = agents.position - self._columns.origin
+        initial[:, self._columns.heading] = agents.heading
+        initial[:, self._columns.velocity] = agents.velocity
+        if models is None or self._rollouts_near is None:
+            rolled = self._rollouts([self._model] * len(velocity), initial, self._control(velocity))
+        else:
+            rolled = self._rollouts_near(models, initial, self._control(velocity))
+        return self._motion(agents.position, *rolled)
+
+    def _agrees(self, vicinity: Vicinity) -> bool:
+        """Whether agents about the obstacles do bit for bit as in the whole world: not where its model was altered
+        after it had been compiled."""
+        rng = np.random.default_rng(0)
+        places = vicinity.glide.around(rng, TRIALS)
+        velocity, command = rng.uniform(-MAX_SPEED, MAX_SPEED, (2, TRIALS, 2))
+        agents = _Agents(places, rng.uniform(-np.pi, np.pi, TRIALS), velocity)
+        near = self._near(agents, command, vicinity.glide.met(places, vicinity.glide(velocity, command)[0]))
+        whole = self._simulate(agents, command)
+        return all(np.array_equal(array, getattr(whole, name)) for name, array in vars(near).items())
 
     def _initial(self, n: int) -> np.ndarray:
         return np.repeat(self._start[None], n, axis=0)
@@ -102,26 +158,27 @@ class Physics:
         initial = self._initial(len(speed))
         initial[:, self._columns.position] += displacement
         initial[:, self._columns.velocity] = speed
-        data = [mujoco.MjData(model)]
-        states, _ = mujoco.rollout.Rollout(nthread=0).rollout(model, data, initial, self._control(command))
+        states, _ = Rollouts(model, 1)([model] * len(speed), initial, self._control(command))
         path = states[:, :, self._columns.position] - initial[:, None, self._columns.position]
         return path, states[:, :, self._columns.velocity]
 
     def close(self) -> None:
         """Stop the thread pool."""
-        self._rollout.close()
+        for rollouts in (self._rollouts, self._rollouts_near):
+            if rollouts:
+                rollouts.close()
 
-    def _motion(self, state: WorldState, states: np.ndarray, sensors: np.ndarray) -> Motion:
+    def _motion(self, position: np.ndarray, states: np.ndarray, sensors: np.ndarray) -> Motion:
         path = states[:, :, self._columns.position] + self._columns.origin
-        velocity = states[:, -1, self._columns.velocity]
+        velocity = states[:, -1, self._columns.velocity].copy()
         # MuJoCo resets a world that broke down, and its clock with it.
         due = self._start[0] + self.seconds
         unstable = ~np.isfinite(states[:, -1]).all(axis=-1)  # an earlier state that is not sets the clock back
         unstable |= np.abs(states[:, -1, 0] - due) > self._model.opt.timestep / 2
         unstable |= ~(np.abs(velocity) < UNSTABLE_SPEED).all(axis=-1)
-        contact = np.asarray((sensors[:, :, self._touch] > 0).any(axis=(1, 2)))
+        contact = np.asarray((sensors[:, :, self._touch] > 0).reshape(len(states), -1).any(axis=1))
         if unstable.any():
-            path[unstable] = np.nan_to_num(state.position)[unstable, None]
+            path[unstable] = np.nan_to_num(position)[unstable, None]
             velocity = np.where(unstable[:, None], 0.0, velocity)
             contact = contact & ~unstable
         return Motion(path, velocity, contact, unstable)
@@ -131,9 +188,9 @@ class Physics:
 class _Columns:
     """Where the agent is in MuJoCo's full physics state, and where its slide joints are zero [m]."""
 
-    position: list[int]
+    position: slice | list[int]
     heading: int
-    velocity: list[int]
+    velocity: slice | list[int]
     origin: np.ndarray
 
     @classmethod
@@ -143,9 +200,9 @@ class _Columns:
         joints = [_joint(model, name) for name in ("agent_x", "agent_y", "agent_heading")]
         body = model.jnt_bodyid[joints[0]]
         return cls(
-            position=[qpos + int(model.jnt_qposadr[j]) for j in joints[:2]],
+            position=_columns([qpos + int(model.jnt_qposadr[j]) for j in joints[:2]]),
             heading=qpos + int(model.jnt_qposadr[joints[2]]),
-            velocity=[qvel + int(model.jnt_dofadr[j]) for j in joints[:2]],
+            velocity=_columns([qvel + int(model.jnt_dofadr[j]) for j in joints[:2]]),
             origin=model.body_pos[body, :2] - model.qpos0[[int(model.jnt_qposadr[j]) for j in joints[:2]]],
         )
 
@@ -177,11 +234,17 @@ def _actuator(model: mujoco.MjModel, joint_name: str) -> int:
     return int(driving[0])
 
 
-def _touch_columns(model: mujoco.MjModel) -> list[int]:
+def _columns(wanted: list[int]) -> slice | list[int]:
+    """Columns of an array; where they are side by side, without a copy."""
+    side_by_side = wanted == list(range(wanted[0], wanted[0] + len(wanted)))
+    return slice(wanted[0], wanted[-1] + 1) if side_by_side else wanted
+
+
+def _touch_columns(model: mujoco.MjModel) -> slice | list[int]:
     touch = np.flatnonzero(model.sensor_type == mujoco.mjtSensor.mjSENS_TOUCH)
     if not len(touch):
         raise ValueError("the model has no touch sensor on the agent")
-    return [int(model.sensor_adr[i]) for i in touch]
+    return _columns([int(model.sensor_adr[i]) for i in touch])
 
 
 def _check_objects(model: mujoco.MjModel, names: tuple[str, ...]) -> None:

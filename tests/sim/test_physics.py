@@ -9,7 +9,9 @@ import pytest
 
 from sim import physics
 from sim.physics import SUBSTEPS, Physics
+from sim.rollouts import POOLED
 from sim.simulation import Simulation
+from sim.vicinity import Vicinity
 from sim.world import SPEED_GAIN, TIME_CONSTANT, build_world
 
 
@@ -62,7 +64,7 @@ def test_gliding_is_what_mujoco_does(task):
         np.testing.assert_allclose(ours.velocity, mujocos.velocity, rtol=0, atol=1e-11)
         np.testing.assert_array_equal(ours.contact, mujocos.contact)
         path, _ = gliding.glide(state.velocity, command)
-        free += gliding.glide.touches_nothing(state.position, path, command).sum()
+        free += (~gliding.glide.met(state.position, path).any(axis=1)).sum()
         simulation.step(rng.uniform(-1, 1, (32, 2)))
     assert free > 50  # or nothing was compared
 
@@ -89,6 +91,65 @@ def test_what_physics_leaves_out_changes_no_bit(task, monkeypatch):
     assert touched > 50
 
 
+def begun_at_walls(world, n):
+    """Worlds whose agents have walked into walls and corners for a while."""
+    simulation = Simulation(world, n, 0, "training", 1)
+    simulation.reset()
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        simulation.step(np.concatenate([np.ones((n, 1)), rng.uniform(-1, 1, (n, 1))], axis=1))
+    return simulation.state, rng.uniform(-10, 10, (n, 2))
+
+
+def assert_same_bits(ours, theirs):
+    for name, array in vars(ours).items():
+        np.testing.assert_array_equal(array, getattr(theirs, name), err_msg=name)
+
+
+@pytest.mark.parametrize("task", ["detection", "foraging", "navigation", "tracking"])
+def test_agents_among_a_few_geoms_do_what_they_do_among_all(task):
+    world = build_world(task)
+    state, command = begun_at_walls(world, 150)
+    few, all_of_them = Physics(world, 1), Physics(world, 1)
+    all_of_them.vicinity = None
+    ours, theirs = few.step(state, command), all_of_them.step(state, command)
+    assert_same_bits(ours, theirs)
+    assert ours.contact.sum() > 20
+    assert len(few.vicinity._models) > 4  # different walls, and corners
+
+
+@pytest.mark.parametrize("noticed", [True, False])
+def test_agents_that_stray_to_what_their_models_lack_are_done_again(monkeypatch, noticed):
+    """With room for no geom at all, every agent at a wall strays into it; unnoticed, they would go through."""
+    world = build_world("navigation")
+    state, command = begun_at_walls(world, 64)
+    physics_without_room = Physics(world, 1)
+    physics_without_room.vicinity.room = 0
+    if not noticed:
+        monkeypatch.setattr(Vicinity, "strayed", lambda _, position, path, few: np.zeros(len(few), bool))
+    ours, theirs = physics_without_room.step(state, command), Physics(world, 1, gliding=False).step(state, command)
+    assert (np.abs(ours.path - theirs.path).max() < 1e-12) == noticed
+    assert np.array_equal(ours.contact, theirs.contact) == noticed
+
+
+def test_threads_change_nothing(world):
+    """As many agents as are shared among threads, and more."""
+    state, command = begun_at_walls(world, POOLED + 70)
+    assert_same_bits(*(Physics(world, threads, gliding=False).step(state, command) for threads in (1, 2)))
+
+
+def test_mujocos_clock_runs_on_after_physics(world):
+    """It is stopped during a rollout, whose data count their steps without timing them, and for nobody else."""
+    ours = Physics(world, 1, gliding=False)
+    ours.step(begun(world, 1), np.ones((1, 2)))
+    step = mujoco.mjtTimer.mjTIMER_STEP
+    assert ours._rollouts._data[0].timer[step].number >= SUBSTEPS
+    assert ours._rollouts._data[0].timer[step].duration == 0
+    data = mujoco.MjData(world.model)
+    mujoco.mj_step(world.model, data)
+    assert data.timer[step].duration > 0
+
+
 def test_an_agent_that_glides_through_a_wall_would_be_noticed(world):
     """Blind to the walls, the same glide departs from MuJoCo: the test above can fail."""
     physics = Physics(world, 1)
@@ -103,11 +164,13 @@ def test_an_agent_that_glides_through_a_wall_would_be_noticed(world):
     ("field", "glides"), [("dof_damping", True), ("dof_frictionloss", False), ("jnt_stiffness", False)]
 )
 def test_models_glide_as_far_as_they_are_linear(field, glides):
-    """A spring's pull depends on the place, dry friction on the direction: such agents are left to MuJoCo."""
+    """A spring's pull depends on the place, dry friction on the direction: such agents are left to MuJoCo. And models
+    of a part, compiled before this one was altered, do not stand for it."""
     world = build_world("detection")
     getattr(world.model, field)[0] = 0.3
     world.model.qpos_spring[:] = world.model.qpos0  # at rest where the agent starts, and nowhere else
     assert (Physics(world, 1).glide is not None) == glides
+    assert Physics(world, 1).vicinity is None
     state = dataclasses.replace(begun(world, 4), position=np.array([[3.0, 1.0]] * 4))
     command = np.random.default_rng(0).uniform(-10, 10, (4, 2))
     ours, mujocos = (Physics(world, 1, gliding).step(state, command) for gliding in (True, False))
