@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 REACH = 1.0  # [m] from the agent's centre to an object's: closer counts as reached
@@ -19,14 +21,14 @@ def place(
     """
     for _ in range(TRIES):
         agent = agent_spawn[rng.integers(len(agent_spawn))]
-        objects = np.empty((0, 2))
+        objects: list[np.ndarray] = []
         while len(objects) < n_objects:
             spot = free_spot(rng, agent, objects, object_spawn)
             if spot is None:
                 break
-            objects = np.concatenate([objects, spot[None]])
+            objects.append(spot)
         else:
-            return agent, objects
+            return agent, np.array(objects).reshape(-1, 2)
     raise ValueError(
         f"object_spawn: no way found to place {n_objects} objects {SEPARATION} m apart and {CLEARANCE} m from "
         f"the agent on {len(object_spawn)} cells"
@@ -34,11 +36,18 @@ def place(
 
 
 def free_spot(
-    rng: np.random.Generator, agent: np.ndarray, others: np.ndarray, object_spawn: np.ndarray
+    rng: np.random.Generator, agent: np.ndarray, others: Sequence[np.ndarray] | np.ndarray, object_spawn: np.ndarray
 ) -> np.ndarray | None:
-    """A cell's centre (2,) clear of the agent and of the other objects (k, 2); None where there is none."""
-    free = np.hypot(object_spawn[:, 0] - agent[0], object_spawn[:, 1] - agent[1]) >= CLEARANCE
-    for x, y in others:
-        free &= np.hypot(object_spawn[:, 0] - x, object_spawn[:, 1] - y) >= SEPARATION
+    """A cell's centre (2,) clear of the agent and of the other objects, each (2,); None where there is none."""
+    free = _squared_distances(object_spawn, agent) >= CLEARANCE**2
+    for other in others:
+        free &= _squared_distances(object_spawn, other) >= SEPARATION**2
     spots = np.flatnonzero(free)
     return object_spawn[spots[rng.integers(len(spots))]] if len(spots) else None
+
+
+def _squared_distances(spots: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """From each of the spots (n, 2) to a place (2,) [m²]."""
+    x, y = spots[:, 0] - place[0], spots[:, 1] - place[1]
+    squared: np.ndarray = x * x + y * y
+    return squared

@@ -9,7 +9,7 @@ import numpy as np
 from sim.observation import STANDING
 from sim.physics import Motion, Physics
 from sim.reward import MODES, reward_terms
-from sim.state import WorldState, concatenate, wrap_angle
+from sim.state import WorldState, wrap_angle
 from sim.streams import Streams
 from sim.task import respawned, task_of
 from sim.world import MAX_SPEED, World
@@ -126,7 +126,7 @@ class Simulation:
         """The first half of a step: everything moves."""
         before = self.state
         acted = np.isfinite(actions).all(axis=-1)
-        steered, velocity = self._steer(before, np.where(acted[:, None], actions, STANDING))
+        steered, velocity = self._steer(before, actions if acted.all() else np.where(acted[:, None], actions, STANDING))
         motion = self._physics.step(steered, velocity)
         after = replace(steered, position=motion.path[:, -1].copy(), velocity=motion.velocity, steps=before.steps + 1)
         broken = motion.unstable | ~after.finite
@@ -159,27 +159,32 @@ class Simulation:
 
     def _steer(self, state: WorldState, actions: np.ndarray) -> tuple[WorldState, np.ndarray]:
         """Turn the agents, move the objects; the state so far and the commanded velocities [m/s] (n, 2)."""
-        actions = np.clip(np.asarray(actions, np.float64), -1.0, 1.0)
-        heading = wrap_angle(state.heading + MAX_TURN * actions[:, 1])
-        forward = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+        speed, turn = np.asarray(actions, np.float64).clip(-1.0, 1.0).T
+        heading = wrap_angle(state.heading + MAX_TURN * turn)
+        speed = MAX_SPEED * (speed + 1.0) / 2.0
+        velocity = np.empty((state.n, 2))
+        velocity[:, 0], velocity[:, 1] = np.cos(heading) * speed, np.sin(heading) * speed
         objects, object_heading = self.task.move(state, self.streams.motion, self._physics.seconds)
-        velocity = forward * (MAX_SPEED * (actions[:, :1] + 1.0) / 2.0)
         return replace(state, heading=heading, objects=objects, object_heading=object_heading), velocity
 
     def _begin(self, worlds: np.ndarray) -> WorldState:
-        return concatenate([self._begin_one(self.streams.placement[i]) for i in worlds])
-
-    def _begin_one(self, rng: np.random.Generator) -> WorldState:
-        position, objects = self.task.begin(rng)
-        k = len(self.world.objects)
+        n, k = len(worlds), len(self.world.objects)
+        position, heading = np.empty((n, 2)), np.empty(n)
+        objects, object_heading = np.empty((n, k, 3)), np.empty((n, k))
+        objects[:, :, 2] = self._heights
+        for row, world in enumerate(worlds):
+            rng = self.streams.placement[world]
+            position[row], objects[row, :, :2] = self.task.begin(rng)
+            heading[row] = rng.uniform(-np.pi, np.pi)
+            object_heading[row] = rng.uniform(-np.pi, np.pi, k)
         return WorldState(
-            position=position[None].astype(float),
-            heading=rng.uniform(-np.pi, np.pi, 1),
-            velocity=np.zeros((1, 2)),
-            objects=np.concatenate([objects, self._heights[:, None]], axis=1)[None],
-            object_heading=rng.uniform(-np.pi, np.pi, (1, k)),
-            start=position[None].astype(float),
-            steps=np.zeros(1, int),
-            goals_reached=np.zeros(1, int),
-            adversaries_reached=np.zeros(1, int),
+            position=position,
+            heading=heading,
+            velocity=np.zeros((n, 2)),
+            objects=objects,
+            object_heading=object_heading,
+            start=position.copy(),
+            steps=np.zeros(n, int),
+            goals_reached=np.zeros(n, int),
+            adversaries_reached=np.zeros(n, int),
         )

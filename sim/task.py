@@ -6,6 +6,7 @@ event reward for reaching the goal or an adversary, and a penalty per action in 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -17,6 +18,8 @@ from sim.placement import REACH, free_spot, place
 from sim.state import WorldState
 from sim.streams import Chance
 from sim.world import TASKS, World
+
+SQRT_2 = math.sqrt(2.0)
 
 
 @dataclass(frozen=True)
@@ -105,19 +108,21 @@ class FindGoal:
     def judge(self, before: WorldState, after: WorldState, path: np.ndarray, ends: bool) -> Outcome:
         goals, never = self._goals, path.shape[1]
         squared = squared_distances(after)
+        was, is_now = (np.sqrt(np.minimum.reduce(d[:, :goals], axis=1)) for d in (squared_distances(before), squared))
         first = first_reached(path, before.objects, after.objects, squared)
+        nothing = np.zeros(len(path), bool)
+        if (first == never).all():
+            return Outcome(was - is_now, nothing, nothing, np.zeros(first.shape, bool), nothing)
         goal_at, adversary_at = first[:, :goals].min(axis=1), first[:, goals:].min(axis=1)
         goal, adversary = goal_at < never, adversary_at < never
         if ends:
             goal, adversary = goal & (goal_at <= adversary_at), adversary & (adversary_at < goal_at)
-        event = goal | adversary
-        was, is_now = (np.sqrt(d[:, :goals].min(axis=1)) for d in (squared_distances(before), squared))
         return Outcome(
             progress=was - is_now,
             goal=goal,
             adversary=adversary,
             respawn=np.zeros(first.shape, bool) if ends else first < never,
-            terminated=event if ends else np.zeros(len(event), bool),
+            terminated=goal | adversary if ends else nothing,
         )
 
 
@@ -141,13 +146,15 @@ class LeaveMaze:
         region = self.world.goal_region
         if region is None:
             raise ValueError(f"world {self.world.task!r} has no goal_region")
-        inside = np.logical_and(path >= region[:2], path <= region[2:]).all(axis=-1)
-        goal = np.any(inside, axis=1)
-        away = [np.linalg.norm(s.position - before.start, axis=-1) for s in (before, after)]
+        was, is_now = (np.linalg.norm(s.position - before.start, axis=-1) for s in (before, after))
+        inside = path[..., 0] >= region[0]
+        for side in (path[..., 0] <= region[2], path[..., 1] >= region[1], path[..., 1] <= region[3]):
+            inside &= side
+        goal = inside.any(axis=1)
         return Outcome(
-            progress=away[1] - away[0],
+            progress=is_now - was,
             goal=goal,
-            adversary=np.zeros_like(goal),
+            adversary=np.zeros(before.n, bool),
             respawn=np.zeros((before.n, 0), bool),
             terminated=goal,
         )
@@ -183,14 +190,19 @@ def first_reached(
     # Most objects are so far away that nobody can have come near: in no world anything has moved more than this.
     # (fmax passes over a world whose numbers broke down.)
     moved = np.fmax.reduce(np.abs(path - path[:, -1:]), axis=None)
-    if objects_after is not objects_before:
+    standing = objects_after is objects_before
+    if not standing:
         moved += np.fmax.reduce(np.abs(objects_after - objects_before), axis=None)
-    worlds, which = (squared_after < (REACH + np.sqrt(2) * moved) ** 2).nonzero()
+    worlds, which = (squared_after < (REACH + SQRT_2 * moved) ** 2).nonzero()
     if len(worlds):
-        t = (np.arange(substeps) + 1.0)[:, None] / substeps
-        before, after = (objects[worlds, which, None, :2] for objects in (objects_before, objects_after))
-        near = ((path[worlds] - (before + t * (after - before))) ** 2).sum(axis=-1) < REACH**2
-        found[worlds, which] = np.where(near.any(axis=1), near.argmax(axis=1), substeps)
+        place = objects_after[worlds, which, None, :2]
+        if not standing:
+            t = (np.arange(substeps) + 1.0)[:, None] / substeps
+            before = objects_before[worlds, which, None, :2]
+            place = before + t * (place - before)
+        near = ((path[worlds] - place) ** 2).sum(axis=-1) < REACH**2
+        if near.any():
+            found[worlds, which] = np.where(near.any(axis=1), near.argmax(axis=1), substeps)
     return found
 
 

@@ -23,6 +23,8 @@ from sim.simulation import Simulation, Step
 from sim.state import WorldState
 from sim.world import build_world
 
+_STANDING = np.array(STANDING, np.float32)
+
 
 class EyesVecEnv(VecEnv):
     """Many agents with eyes, each in its own world.
@@ -72,7 +74,7 @@ class EyesVecEnv(VecEnv):
         if actions.shape != (self.num_envs, 2):
             raise ValueError(f"actions have shape {actions.shape}, must be ({self.num_envs}, 2)")
         finite = actions if np.isfinite(actions).all() else np.nan_to_num(actions)
-        self._commanded, self._actions = actions, np.clip(finite, -1, 1)
+        self._commanded, self._actions = actions, finite.clip(-1, 1)
 
     def step_once(
         self, actions: np.ndarray
@@ -140,7 +142,7 @@ class EyesVecEnv(VecEnv):
         return {
             "eyes": self._memory.remember(seen, fresh),
             "contact": contact.astype(np.float32)[:, None],
-            "previous_action": np.where(fresh[:, None], np.array(STANDING, np.float32), self._actions),
+            "previous_action": np.where(fresh[:, None], _STANDING, self._actions),
         }
 
     def _add_terminal_observations(

@@ -7,8 +7,8 @@ Medians over repeated calls after warm-up, in agent-steps per second (one step o
     render_mitsuba the same where Mitsuba traces the rays, and not the closed form that a world of walls has
     render_optics  the same behind a pupil: receptive fields, weights, bands
     step           the whole VecEnv step behind that pupil: physics, rewards, rendering, optics, noise, infos
-    overhead       how much longer a step takes than its physics and its rendering, optics and noise by themselves, done
-                   again from the same states right after it: at most OVERHEAD
+    overhead       how much longer steps take than their physics and their rendering, optics and noise by themselves,
+                   done again from the same states right after them, BLOCK steps at a time: at most OVERHEAD
     mujoco         mujoco.Renderer drawing the same eyes of one world, one after the other (RGB, no optics, no shadows)
     mujoco_shadows the same with shadows, which the batched renderer has; in software they are what it mostly does
     mi_render      the mirror's Mitsuba scene of one world, posed and rendered eye by eye with as many samples
@@ -61,6 +61,9 @@ BARS = {
     "detection": {"render_optics": 18.0, "step": 14.0},
 }
 OVERHEAD = 0.15
+# A loop of steps beside a loop of their parts, each with the caches that it leaves itself, so short that the machine is
+# the same for both.
+BLOCK = 8
 WARM_UP = 3  # calls
 
 
@@ -114,13 +117,16 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
         "chosen": chosen,
         "agent_steps_per_second": rates,
         "ratio_to_mujoco": {name: rates[name] / base for name in names} if base else None,  # type: ignore[operator]
-        "overhead": statistics.median(step.shares[WARM_UP:]),
+        "overhead": statistics.median(step.shares[1:]),
     }
 
 
 class _Step:
-    """One step of all worlds, behind the pupil, with random actions; and by themselves, right after it and from the
-    same states, its parts: physics, and looks (rendering, optics and noise)."""
+    """One step of all worlds, behind the pupil, with random actions; and by themselves, after every BLOCK steps and
+    from the same states, their parts: physics, and looks (rendering, optics and noise).
+
+    wholes  durations of the steps [s] · shares: of every block, what the steps took beyond their parts
+    """
 
     def __init__(self, case: Case, n_envs: int) -> None:
         self._worlds = sim.make_vec_env(case.task, with_pupil(case.eyes), n_envs)
@@ -145,12 +151,12 @@ class _Step:
         setattr(owner, name, noted)
 
     def __call__(self) -> None:
-        self._parts.clear()
         actions = self._rng.uniform(-1, 1, (self._worlds.num_envs, 2))
-        whole = _duration(lambda: self._worlds.step(actions))
-        parts = sum(_duration(part) for part in self._parts)
-        self.wholes.append(whole)
-        self.shares.append(whole / parts - 1)
+        self.wholes.append(_duration(lambda: self._worlds.step(actions)))
+        if len(self.wholes) % BLOCK == 0:
+            parts = _duration(lambda: [part() for part in self._parts])
+            self.shares.append(sum(self.wholes[-BLOCK:]) / parts - 1)
+            self._parts.clear()
 
 
 def _duration(call: Callable[[], Any]) -> float:
