@@ -27,13 +27,20 @@ class Moved:
     """Worlds that have moved by one action.
 
     state   after it; where the physics broke down, the last good one
-    motion  of the agents · acted: the action was finite (n,) bool · broken: the physics broke down (n,) bool
+    motion  of the agents
+    failed  worlds that could not go on, most often none: what the action or the physics was
     """
 
     state: WorldState
     motion: Motion
-    acted: np.ndarray
-    broken: np.ndarray
+    failed: dict[int, str]
+
+    @property
+    def well(self) -> np.ndarray:
+        """Worlds that could go on, (n,) bool."""
+        well = np.ones(self.state.n, bool)
+        well[list(self.failed)] = False
+        return well
 
 
 @dataclass(frozen=True)
@@ -126,16 +133,24 @@ class Simulation:
         """The first half of a step: everything moves."""
         before = self.state
         acted = np.isfinite(actions).all(axis=-1)
-        steered, velocity = self._steer(before, actions if acted.all() else np.where(acted[:, None], actions, STANDING))
+        everyone = acted.all()
+        steered, velocity = self._steer(before, actions if everyone else np.where(acted[:, None], actions, STANDING))
         motion = self._physics.step(steered, velocity)
         after = replace(steered, position=motion.path[:, -1].copy(), velocity=motion.velocity, steps=before.steps + 1)
         broken = motion.unstable | ~after.finite
-        return Moved(after.repaired() if broken.any() else after, motion, acted, broken)
+        failed = dict.fromkeys(np.flatnonzero(broken).tolist(), UNSTABLE) if broken.any() else {}
+        if not everyone:
+            failed |= dict.fromkeys(np.flatnonzero(~acted).tolist(), NO_ACTION)
+        return Moved(after.repaired() if broken.any() else after, motion, failed)
 
     def judge(self, moved: Moved) -> Step:
         """The second half: what it led to. Objects that were reached may be elsewhere afterwards."""
-        before, after, motion, good = self.state, moved.state, moved.motion, moved.acted & ~moved.broken
-        outcome = self.task.judge(before, after, motion.path, ends=self.mode == "training").within(good)
+        before, after, motion = self.state, moved.state, moved.motion
+        outcome = self.task.judge(before, after, motion.path, ends=self.mode == "training")
+        terminated = outcome.terminated
+        if moved.failed:
+            outcome = outcome.within(moved.well)
+            terminated = outcome.terminated | ~moved.well
         if outcome.event.any():
             after = replace(
                 after,
@@ -143,7 +158,6 @@ class Simulation:
                 adversaries_reached=before.adversaries_reached + outcome.adversary,
             )
         self._state = final = respawned(self.task, after, outcome.respawn, self.streams.placement)
-        terminated = outcome.terminated | ~good
         return Step(
             state=final,
             reward_terms=reward_terms(
@@ -154,7 +168,7 @@ class Simulation:
             contact=motion.contact,
             success=final.goals_reached > 0,
             respawned=np.unique(outcome.respawn.nonzero()[0]) if outcome.respawn.any() else NOWHERE,
-            failure={int(i): UNSTABLE if moved.acted[i] else NO_ACTION for i in np.flatnonzero(~good)},
+            failure=moved.failed,
         )
 
     def _steer(self, state: WorldState, actions: np.ndarray) -> tuple[WorldState, np.ndarray]:

@@ -43,8 +43,6 @@ class Outcome:
 
     def within(self, worlds: np.ndarray) -> Outcome:
         """The same in these worlds, (n,) bool; in the others nothing came of it."""
-        if worlds.all():
-            return self
         return Outcome(
             progress=np.where(worlds, self.progress, 0.0),
             goal=self.goal & worlds,

@@ -7,8 +7,9 @@ Medians over repeated calls after warm-up, in agent-steps per second (one step o
     render_mitsuba the same where Mitsuba traces the rays, and not the closed form that a world of walls has
     render_optics  the same behind a pupil: receptive fields, weights, bands
     step           the whole VecEnv step behind that pupil: physics, rewards, rendering, optics, noise, infos
-    overhead       how much longer steps take than their physics and their rendering, optics and noise by themselves,
-                   done again from the same states right after them, BLOCK steps at a time: at most OVERHEAD
+    overhead       how much longer steps take than their physics (of agents, and of objects that move) and their
+                   rendering, optics and noise by themselves, done again from the same states right after them,
+                   BLOCK steps at a time: at most OVERHEAD
     mujoco         mujoco.Renderer drawing the same eyes of one world, one after the other (RGB, no optics, no shadows)
     mujoco_shadows the same with shadows, which the batched renderer has; in software they are what it mostly does
     mi_render      the mirror's Mitsuba scene of one world, posed and rendered eye by eye with as many samples
@@ -26,6 +27,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo reads it when first imported
@@ -39,6 +41,7 @@ import sim
 from sim.picture import pose
 from sim.retinas import Retinas
 from sim.simulation import Simulation
+from sim.streams import Streams
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,7 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
 
 class _Step:
     """One step of all worlds, behind the pupil, with random actions; and by themselves, after every BLOCK steps and
-    from the same states, their parts: physics, and looks (rendering, optics and noise).
+    from the same states, their parts: physics of agents and of objects, and looks (rendering, optics and noise).
 
     wholes  durations of the steps [s] · shares: of every block, what the steps took beyond their parts
     """
@@ -136,7 +139,11 @@ class _Step:
         self._parts: list[Callable[[], Any]] = []
         self.wholes: list[float] = []
         self.shares: list[float] = []
-        self._note(self._worlds.simulation._physics, "step", self._worlds.simulation._physics.step)
+        simulation = self._worlds.simulation
+        task, chance = simulation.task, Streams(1, n_envs).motion
+        simulation.task = SimpleNamespace(world=task.world, begin=task.begin, judge=task.judge, move=task.move)
+        self._note(simulation.task, "move", lambda state, _, seconds: task.move(state, chance, seconds))
+        self._note(simulation._physics, "step", simulation._physics.step)
         self._note(self._worlds._retinas, "begin", lambda *asked: self._alone.begin(*asked)())
         self._note(self._worlds._retinas, "begin_some", lambda *asked: self._alone.begin_some(*asked)())
 
