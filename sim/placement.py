@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 REACH = 1.0  # [m] from the agent's centre to an object's: closer counts as reached
@@ -21,14 +19,15 @@ def place(
     """
     for _ in range(TRIES):
         agent = agent_spawn[rng.integers(len(agent_spawn))]
-        objects: list[np.ndarray] = []
-        while len(objects) < n_objects:
-            spot = free_spot(rng, agent, objects, object_spawn)
-            if spot is None:
+        free, objects = _apart(object_spawn, agent, CLEARANCE), np.empty((n_objects, 2))
+        for i in range(n_objects):
+            spots = np.flatnonzero(free)
+            if not len(spots):
                 break
-            objects.append(spot)
+            objects[i] = object_spawn[spots[rng.integers(len(spots))]]
+            free &= _apart(object_spawn, objects[i], SEPARATION)
         else:
-            return agent, np.array(objects).reshape(-1, 2)
+            return agent, objects
     raise ValueError(
         f"object_spawn: no way found to place {n_objects} objects {SEPARATION} m apart and {CLEARANCE} m from "
         f"the agent on {len(object_spawn)} cells"
@@ -36,18 +35,18 @@ def place(
 
 
 def free_spot(
-    rng: np.random.Generator, agent: np.ndarray, others: Sequence[np.ndarray] | np.ndarray, object_spawn: np.ndarray
+    rng: np.random.Generator, agent: np.ndarray, others: np.ndarray, object_spawn: np.ndarray
 ) -> np.ndarray | None:
-    """A cell's centre (2,) clear of the agent and of the other objects, each (2,); None where there is none."""
-    free = _squared_distances(object_spawn, agent) >= CLEARANCE**2
+    """A cell's centre (2,) clear of the agent and of the other objects (k, 2); None where there is none."""
+    free = _apart(object_spawn, agent, CLEARANCE)
     for other in others:
-        free &= _squared_distances(object_spawn, other) >= SEPARATION**2
+        free &= _apart(object_spawn, other, SEPARATION)
     spots = np.flatnonzero(free)
     return object_spawn[spots[rng.integers(len(spots))]] if len(spots) else None
 
 
-def _squared_distances(spots: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """From each of the spots (n, 2) to a place (2,) [m²]."""
+def _apart(spots: np.ndarray, place: np.ndarray, distance: float) -> np.ndarray:
+    """Which spots (n, 2) are at least `distance` [m] from a place (2,), (n,) bool."""
     x, y = spots[:, 0] - place[0], spots[:, 1] - place[1]
-    squared: np.ndarray = x * x + y * y
-    return squared
+    apart: np.ndarray = x * x + y * y >= distance**2
+    return apart
