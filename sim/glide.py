@@ -66,12 +66,6 @@ class Glide:
         met &= high[:, 1:] > y_from
         return met
 
-    def around(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """Random places in and about the boxes, out to where an agent touches them, (n, 2) [m]."""
-        one = rng.integers(len(self.lower), size=n)
-        places: np.ndarray = rng.uniform(self.lower[one] - self.reach, self.upper[one] + self.reach)
-        return places
-
     def obeys(self, command: np.ndarray) -> np.ndarray:
         """Whether the servos do not saturate, (n,) bool."""
         obeys: np.ndarray = (np.abs(command) <= self.strongest).all(axis=-1)

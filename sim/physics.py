@@ -9,7 +9,6 @@ touch nothing during the action glide (`sim.glide`); the others are MuJoCo's, am
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -18,12 +17,11 @@ import numpy as np
 from sim.glide import glide_of
 from sim.rollouts import Rollouts
 from sim.state import WorldState
-from sim.vicinity import Vicinity, vicinity_of
+from sim.vicinity import vicinity_of
 from sim.world import MAX_SPEED, World
 
 SUBSTEPS = 10  # of the model's timestep per action
 UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s]: no actuator can do that
-TRIALS = 64  # agents by which a model of a part is held against the whole
 FEW_GEOMS = 200  # so few are sooner gone through one by one than by MuJoCo's tree of boxes
 
 
@@ -42,7 +40,7 @@ class Motion:
     unstable: np.ndarray
 
     def put(self, worlds: np.ndarray, motion: Motion) -> None:
-        """Set the motion of these worlds."""
+        """Set the motion of these worlds, in place: only while the whole is being put together."""
         for name, array in vars(self).items():
             array[worlds] = getattr(motion, name)
 
@@ -83,10 +81,7 @@ class Physics:
         self.seconds = SUBSTEPS * model.opt.timestep
         agent = int(model.jnt_bodyid[_joint(model, "agent_x")])
         self.glide = glide_of(model, agent, self._untouched, MAX_SPEED) if gliding else None
-        self.vicinity = vicinity_of(model, world.alone, self.glide)
-        self._rollouts_near = Rollouts(self.vicinity.alone, threads) if self.vicinity else None
-        if self.vicinity and not self._agrees(self.vicinity):
-            self.vicinity = None
+        self.vicinity = vicinity_of(world, model, self.glide, threads)
 
     def step(self, state: WorldState, velocity: np.ndarray) -> Motion:
         """One action: SUBSTEPS with the commanded velocity [m/s] (n, 2) held."""
@@ -96,7 +91,9 @@ class Physics:
         path, speed = self.glide(state.velocity, velocity)
         met = self.glide.met(state.position, path)
         free = ~met.any(axis=1) & self.glide.obeys(velocity)
-        free &= (np.abs(state.velocity) < UNSTABLE_SPEED).all(axis=-1)  # false for NaN: MuJoCo says what comes of it
+        free &= (np.abs(state.velocity) < UNSTABLE_SPEED).all(
+            axis=-1
+        )  # false for NaN: MuJoCo tells what it makes of it
         motion = Motion(state.position[:, None] + path, speed, np.zeros(state.n, bool), np.zeros(state.n, bool))
         near = np.flatnonzero(~free)
         if len(near):
@@ -104,42 +101,30 @@ class Physics:
         return motion
 
     def _near(self, agents: _Agents, velocity: np.ndarray, met: np.ndarray) -> Motion:
-        """Of agents that may touch something, each among what it may meet: where something turns it aside to where it
-        could meet more, and where it breaks down, it is done again in the whole world."""
+        """Of agents that may touch something, each among what it may meet. Where that is too much, where something
+        turns it aside to where it could meet more, and where it breaks down, it is done again in the whole world."""
         if self.vicinity is None:
             return self._simulate(agents, velocity)
         few = self.vicinity.few(met)
-        motion = self._simulate(agents, velocity, self.vicinity.models(few))
+        motion = self._motion(agents.position, *self.vicinity.roll(few, *self._start_of(agents, velocity)))
         strayed = self.vicinity.strayed(agents.position, motion.path - agents.position[:, None], few)
         again = np.flatnonzero(strayed | motion.unstable)
         if len(again):
             motion.put(again, self._simulate(agents.take(again), velocity[again]))
         return motion
 
-    def _simulate(
-        self, agents: _Agents, velocity: np.ndarray, models: Sequence[mujoco.MjModel] | None = None
-    ) -> Motion:
-        """MuJoCo's step, in the whole world or in each agent's own model."""
+    def _simulate(self, agents: _Agents, velocity: np.ndarray) -> Motion:
+        """MuJoCo's step, in the whole world."""
+        models = [self._model] * len(velocity)
+        return self._motion(agents.position, *self._rollouts(models, *self._start_of(agents, velocity)))
+
+    def _start_of(self, agents: _Agents, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """MuJoCo's states (n, ...), and controls (n, substep, nu) that hold a commanded velocity [m/s] (n, 2)."""
         initial = self._initial(len(velocity))
         initial[:, self._columns.position] = agents.position - self._columns.origin
         initial[:, self._columns.heading] = agents.heading
         initial[:, self._columns.velocity] = agents.velocity
-        if models is None or self._rollouts_near is None:
-            rolled = self._rollouts([self._model] * len(velocity), initial, self._control(velocity))
-        else:
-            rolled = self._rollouts_near(models, initial, self._control(velocity))
-        return self._motion(agents.position, *rolled)
-
-    def _agrees(self, vicinity: Vicinity) -> bool:
-        """Whether agents about the obstacles do bit for bit as in the whole world: not where its model was altered
-        after it had been compiled."""
-        rng = np.random.default_rng(0)
-        places = vicinity.glide.around(rng, TRIALS)
-        velocity, command = rng.uniform(-MAX_SPEED, MAX_SPEED, (2, TRIALS, 2))
-        agents = _Agents(places, rng.uniform(-np.pi, np.pi, TRIALS), velocity)
-        near = self._near(agents, command, vicinity.glide.met(places, vicinity.glide(velocity, command)[0]))
-        whole = self._simulate(agents, command)
-        return all(np.array_equal(array, getattr(whole, name)) for name, array in vars(near).items())
+        return initial, self._control(velocity)
 
     def _initial(self, n: int) -> np.ndarray:
         return np.repeat(self._start[None], n, axis=0)
@@ -164,9 +149,9 @@ class Physics:
 
     def close(self) -> None:
         """Stop the thread pool."""
-        for rollouts in (self._rollouts, self._rollouts_near):
-            if rollouts:
-                rollouts.close()
+        self._rollouts.close()
+        if self.vicinity:
+            self.vicinity.close()
 
     def _motion(self, position: np.ndarray, states: np.ndarray, sensors: np.ndarray) -> Motion:
         path = states[:, :, self._columns.position] + self._columns.origin

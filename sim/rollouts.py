@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-from collections.abc import Iterator, Sequence
+import threading
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -27,9 +28,10 @@ class Rollouts:
     def __init__(self, like: mujoco.MjModel, threads: int) -> None:
         self._state_size = mujoco.mj_stateSize(like, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         self._sensors = like.nsensordata
-        self._data = [mujoco.MjData(like) for _ in range(max(threads, 1))]
+        self._like, self._threads = like, threads
+        self._data = [mujoco.MjData(like)]
         self._alone = mujoco.rollout.Rollout(nthread=0)
-        self._pool = mujoco.rollout.Rollout(nthread=threads) if threads > 1 else None
+        self._pool: mujoco.rollout.Rollout | None = None  # not before it is needed
 
     def __call__(
         self, models: Sequence[mujoco.MjModel], initial: np.ndarray, control: np.ndarray
@@ -37,16 +39,21 @@ class Rollouts:
         """States (n, step, ...) and sensors (n, step, ...) after each step from `initial` (n, ...) under `control`
         (n, step, nu); one model per world."""
         n, steps = control.shape[:2]
-        pooled = self._pool is not None and n >= POOLED
+        rollout = self._pooled() if self._threads > 1 and n >= POOLED else self._alone
+        data = self._data[: max(rollout.nthread, 1)]
         states, sensors = np.empty((n, steps, self._state_size)), np.empty((n, steps, self._sensors))
-        rollout = self._pool if self._pool and pooled else self._alone
-        data = self._data if pooled else self._data[:1]
-        with _clock_stopped():
+        with _clock_stopped:
             # Checking what is known to be right would take a third of the time of a small batch.
             rollout.rollout(
                 models, data, initial, control, skip_checks=True, nstep=steps, state=states, sensordata=sensors
             )
         return states, sensors
+
+    def _pooled(self) -> mujoco.rollout.Rollout:
+        if self._pool is None:
+            self._pool = mujoco.rollout.Rollout(nthread=self._threads)
+            self._data += [mujoco.MjData(self._like) for _ in range(self._threads - len(self._data))]
+        return self._pool
 
     def close(self) -> None:
         """Stop the pool's threads."""
@@ -55,16 +62,27 @@ class Rollouts:
         self._pool = None
 
 
-@contextlib.contextmanager
-def _clock_stopped() -> Iterator[None]:
-    """MuJoCo without the clock that it reads a score of times per step for MjData.timer: a fifth of so small a step."""
-    clock = _clock()
-    was = clock.value
-    clock.value = None
-    try:
-        yield
-    finally:
-        clock.value = was
+class _ClockStopped:
+    """MuJoCo without the clock that it reads a score of times per step for MjData.timer: a fifth of so small a step.
+
+    The clock is the process's: it stands still while any rollout is at work, and goes on when the last one is done.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._at_work = threading.Lock(), 0
+        self._was: int | None = None
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._at_work:
+                self._was, _clock().value = _clock().value, None
+            self._at_work += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._at_work -= 1
+            if not self._at_work:
+                _clock().value = self._was
 
 
 @cache
@@ -75,3 +93,6 @@ def _clock() -> ctypes.c_void_p:
         with contextlib.suppress(OSError, ValueError):
             return ctypes.c_void_p.in_dll(ctypes.CDLL(str(library)), "mjcb_time")
     return ctypes.c_void_p()
+
+
+_clock_stopped = _ClockStopped()

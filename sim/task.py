@@ -111,7 +111,7 @@ class FindGoal:
         nothing = np.zeros(len(path), bool)
         if (first == never).all():
             return Outcome(was - is_now, nothing, nothing, np.zeros(first.shape, bool), nothing)
-        goal_at, adversary_at = first[:, :goals].min(axis=1), first[:, goals:].min(axis=1)
+        goal_at, adversary_at = (of.min(axis=1, initial=never) for of in (first[:, :goals], first[:, goals:]))
         goal, adversary = goal_at < never, adversary_at < never
         if ends:
             goal, adversary = goal & (goal_at <= adversary_at), adversary & (adversary_at < goal_at)

@@ -16,6 +16,7 @@ import numpy as np
 from optics.tabulated import Spectrum
 from sim import materials
 from sim.agent import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
+from sim.alone import AgentAlone
 from sim.layout import WALL_CONAFFINITY
 from sim.scene.spectra import resolve
 from sim.tasks import detection, foraging, navigation, tracking
@@ -33,8 +34,6 @@ TIME_CONSTANT = 0.35  # [s] lag of the agent's speed behind the commanded one
 SPEED_GAIN = 0.99  # speed reached per speed commanded
 MAX_SPEED = 10.0  # [m/s] commanded
 
-ROOM = 4  # geoms about an agent that physics may see alone: the corner of two walls, and one or two more in reach
-
 # The agent can move MAX_SPEED * TIMESTEP = 0.2 m in one substep. Its whiskers feel a wall that near, so that the
 # skin, and the eyes in it, never pass through a wall. See `_add_agent` for the contact's stiffness.
 WHISKER_LENGTH = MAX_SPEED * TIMESTEP  # [m]
@@ -51,7 +50,7 @@ class World:
     agent_spawn   (n, 2) cell centres [m];  object_spawn (m, 2) cell centres [m]
     goal_region   navigation: (x_min, y_min, x_max, y_max) [m]
     spectra       measured spectra of materials and lights, by name: what the renderers use instead of their colours
-    alone         the model's agent by itself, as `agent_alone` makes it; without, physics takes the whole model always
+    alone         the model's agent by itself; without, agents that may touch something are stepped in the whole model
     """
 
     task: str
@@ -61,7 +60,7 @@ class World:
     object_spawn: np.ndarray
     goal_region: np.ndarray | None
     spectra: Mapping[str, Spectrum] = field(default_factory=dict)
-    alone: mujoco.MjModel | None = None
+    alone: AgentAlone | None = None
 
 
 def build_world(
@@ -104,26 +103,8 @@ def build_world(
         object_spawn=layout.object_spawn,
         goal_region=layout.goal_region,
         spectra=resolve(model, {**layout.spectra, **(spectra or {})}),
-        alone=agent_alone(spec),
+        alone=AgentAlone.of(spec, model),
     )
-
-
-def agent_alone(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """The agent of a world, among ROOM boxes that touch nothing: no objects, walls, lights, cameras or textures, for
-    physics of what is near (`sim.vicinity`)."""
-    alone = spec.copy()
-    for body in list(alone.bodies):
-        if body.name not in ("world", "agent"):
-            alone.delete(body)
-    for element in [*alone.worldbody.geoms, *alone.lights, *alone.cameras]:
-        alone.delete(element)
-    for geom in alone.geoms:
-        geom.material = ""
-    for element in [*alone.materials, *alone.textures]:
-        alone.delete(element)
-    for _ in range(ROOM):
-        alone.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[1, 1, 1], contype=0, conaffinity=0)
-    return alone.compile()
 
 
 def _empty_world() -> mujoco.MjSpec:
