@@ -10,28 +10,35 @@ CLEARANCE = REACH + 0.5  # [m] between the agent's start and an object
 TRIES = 100
 
 
-def place(
-    rng: np.random.Generator, agent_spawn: np.ndarray, object_spawn: np.ndarray, n_objects: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """An agent position (2,) and object positions (k, 2), drawn from the cells' centres.
+class Places:
+    """Where episodes may start: cells' centres of agents (a, 2) and of objects (m, 2) [m]."""
 
-    Raises ValueError when the cells cannot hold them SEPARATION and CLEARANCE apart.
-    """
-    for _ in range(TRIES):
-        agent = agent_spawn[rng.integers(len(agent_spawn))]
-        free, objects = _apart(object_spawn, agent, CLEARANCE), np.empty((n_objects, 2))
-        for i in range(n_objects):
-            spots = np.flatnonzero(free)
-            if not len(spots):
-                break
-            objects[i] = object_spawn[spots[rng.integers(len(spots))]]
-            free &= _apart(object_spawn, objects[i], SEPARATION)
-        else:
-            return agent, objects
-    raise ValueError(
-        f"object_spawn: no way found to place {n_objects} objects {SEPARATION} m apart and {CLEARANCE} m from "
-        f"the agent on {len(object_spawn)} cells"
-    )
+    def __init__(self, agents: np.ndarray, objects: np.ndarray) -> None:
+        self._agents, self._objects = agents, objects
+        # Looked up rather than worked out: some episode starts in every step of a batch.
+        self._clear_of_agent = np.array([_apart(objects, place, CLEARANCE) for place in agents])
+        self._apart = np.array([_apart(objects, place, SEPARATION) for place in objects])
+
+    def draw(self, rng: np.random.Generator, n_objects: int) -> tuple[np.ndarray, np.ndarray]:
+        """An agent's position (2,) and those of objects (k, 2).
+
+        Raises ValueError when the cells cannot hold them SEPARATION and CLEARANCE apart.
+        """
+        for _ in range(TRIES):
+            agent, chosen = rng.integers(len(self._agents)), []
+            free = self._clear_of_agent[agent]
+            for _ in range(n_objects):
+                spots = np.flatnonzero(free)
+                if not len(spots):
+                    break
+                chosen.append(spots[rng.integers(len(spots))])
+                free = free & self._apart[chosen[-1]]
+            else:
+                return self._agents[agent], self._objects[chosen]
+        raise ValueError(
+            f"object_spawn: no way found to place {n_objects} objects {SEPARATION} m apart and {CLEARANCE} m from "
+            f"the agent on {len(self._objects)} cells"
+        )
 
 
 def free_spot(

@@ -132,16 +132,20 @@ class Simulation:
     def move(self, actions: np.ndarray) -> Moved:
         """The first half of a step: everything moves."""
         before = self.state
-        acted = np.isfinite(actions).all(axis=-1)
-        everyone = acted.all()
-        steered, velocity = self._steer(before, actions if everyone else np.where(acted[:, None], actions, STANDING))
+        finite = np.isfinite(actions)
+        acted = None if finite.all() else finite.all(axis=-1)
+        steered, velocity = self._steer(
+            before, actions if acted is None else np.where(acted[:, None], actions, STANDING)
+        )
         motion = self._physics.step(steered, velocity)
         after = replace(steered, position=motion.path[:, -1].copy(), velocity=motion.velocity, steps=before.steps + 1)
+        failed: dict[int, str] = {}
         broken = motion.unstable | ~after.finite
-        failed = dict.fromkeys(np.flatnonzero(broken).tolist(), UNSTABLE) if broken.any() else {}
-        if not everyone:
+        if broken.any():
+            after, failed = after.repaired(), dict.fromkeys(np.flatnonzero(broken).tolist(), UNSTABLE)
+        if acted is not None:
             failed |= dict.fromkeys(np.flatnonzero(~acted).tolist(), NO_ACTION)
-        return Moved(after.repaired() if broken.any() else after, motion, failed)
+        return Moved(after, motion, failed)
 
     def judge(self, moved: Moved) -> Step:
         """The second half: what it led to. Objects that were reached may be elsewhere afterwards."""
@@ -151,13 +155,16 @@ class Simulation:
         if moved.failed:
             outcome = outcome.within(moved.well)
             terminated = outcome.terminated | ~moved.well
+        elsewhere = NOWHERE
         if outcome.event.any():
             after = replace(
                 after,
                 goals_reached=before.goals_reached + outcome.goal,
                 adversaries_reached=before.adversaries_reached + outcome.adversary,
             )
-        self._state = final = respawned(self.task, after, outcome.respawn, self.streams.placement)
+            after = respawned(self.task, after, outcome.respawn, self.streams.placement)
+            elsewhere = np.unique(outcome.respawn.nonzero()[0])
+        self._state = final = after
         return Step(
             state=final,
             reward_terms=reward_terms(
@@ -167,7 +174,7 @@ class Simulation:
             truncated=(final.steps >= EPISODE_STEPS) & ~terminated,
             contact=motion.contact,
             success=final.goals_reached > 0,
-            respawned=np.unique(outcome.respawn.nonzero()[0]) if outcome.respawn.any() else NOWHERE,
+            respawned=elsewhere,
             failure=moved.failed,
         )
 

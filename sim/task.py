@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from sim.motion import wander
-from sim.placement import REACH, free_spot, place
+from sim.placement import REACH, Places, free_spot
 from sim.state import WorldState
 from sim.streams import Chance
 from sim.world import TASKS, World
@@ -90,13 +90,17 @@ class FindGoal:
         return sum(are_goals)
 
     @cached_property
+    def _places(self) -> Places:
+        return Places(self.world.agent_spawn, self.world.object_spawn)
+
+    @cached_property
     def _bounds(self) -> np.ndarray:
         """Of where objects move: x_min, y_min, x_max, y_max [m]."""
         spots = self.world.object_spawn
         return np.concatenate([spots.min(axis=0), spots.max(axis=0)])
 
     def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        return place(rng, self.world.agent_spawn, self.world.object_spawn, len(self.world.objects))
+        return self._places.draw(rng, len(self.world.objects))
 
     def move(self, state: WorldState, chance: Chance, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         if not self.moving:
