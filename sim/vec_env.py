@@ -92,14 +92,22 @@ class EyesVecEnv(VecEnv):
         step, looking = self._advance()
         reward, done = step.reward, step.done
         infos = self._infos(step, reward)
-        seen = self._seen(looking, step)
         ended = np.flatnonzero(done)
+        # First looks of new episodes run beside the last looks of all, but not beside those at objects put elsewhere.
+        beginning = None if len(step.respawned) else self._begin_anew(ended)
+        seen = self._seen(looking, step)
         if len(ended):
             self._add_terminal_observations(infos, step, ended, seen[ended])
-            self._returns[ended], self._lengths[ended] = 0.0, 0
-            seen[ended] = self._retinas.begin_some(self.simulation.restart(ended), ended)()
+            seen[ended] = (beginning or self._begin_anew(ended))()
         observation = self._observation(seen, done, step.contact & ~done)
         return observation, reward.astype(np.float32), done, infos
+
+    def _begin_anew(self, ended: np.ndarray) -> Pending:
+        """Start the episodes of these worlds anew, and look at them."""
+        if not len(ended):
+            return lambda: np.empty(0)
+        self._returns[ended], self._lengths[ended] = 0.0, 0
+        return self._retinas.begin_some(self.simulation.restart(ended), ended)
 
     def _advance(self) -> tuple[Step, Pending]:
         """Move, and look while it is judged what that led to."""

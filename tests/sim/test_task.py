@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sim.placement import CLEARANCE, REACH, SEPARATION, place
+from sim.placement import CLEARANCE, REACH, SEPARATION, Places
 from sim.reward import EVALUATION, TRAINING
 from sim.simulation import EPISODE_STEPS, MAX_TURN, Simulation
 from sim.task import first_reached, task_of
@@ -154,7 +154,8 @@ def test_a_broken_world_hides_no_event_of_its_neighbours():
 
 def test_starts_are_apart_and_varied(field):
     rng = np.random.default_rng(0)
-    starts = [place(rng, field.agent_spawn, field.object_spawn, 3) for _ in range(200)]
+    places = Places(field.agent_spawn, field.object_spawn)
+    starts = [places.draw(rng, 3) for _ in range(200)]
     for agent, objects in starts:
         gaps = np.linalg.norm(objects[:, None] - objects[None], axis=-1)[np.triu_indices(3, 1)]
         assert gaps.min() >= SEPARATION
@@ -166,7 +167,7 @@ def test_starts_are_apart_and_varied(field):
 
 def test_too_small_a_field_is_refused(field):
     with pytest.raises(ValueError, match="object_spawn"):
-        place(np.random.default_rng(0), field.agent_spawn, field.object_spawn[:1], 3)
+        Places(field.agent_spawn, field.object_spawn[:1]).draw(np.random.default_rng(0), 3)
 
 
 def test_tracked_objects_wander_inside_and_apart():
