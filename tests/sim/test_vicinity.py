@@ -1,0 +1,180 @@
+"""Physics among few geoms, in threads and without MuJoCo's clock: what it may not change."""
+
+import dataclasses
+import threading
+
+import mujoco
+import numpy as np
+import pytest
+
+from sim import rollouts
+from sim.alone import AgentAlone
+from sim.physics import SUBSTEPS, Physics
+from sim.rollouts import POOLED
+from sim.simulation import Simulation
+from sim.vicinity import Vicinity
+from sim.world import _add_agent, _empty_world, build_world
+
+
+@pytest.fixture(scope="module")
+def world():
+    return build_world("detection")
+
+
+def begun(world, n, seed=0):
+    return Simulation(world, n, seed, "training", 1).reset()
+
+
+def begun_at_walls(world, n):
+    """Worlds whose agents have walked into walls and corners for a while."""
+    simulation = Simulation(world, n, 0, "training", 1)
+    simulation.reset()
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        simulation.step(np.concatenate([np.ones((n, 1)), rng.uniform(-1, 1, (n, 1))], axis=1))
+    return simulation.state, rng.uniform(-10, 10, (n, 2))
+
+
+def assert_same_bits(ours, theirs):
+    for name, array in vars(ours).items():
+        np.testing.assert_array_equal(array, getattr(theirs, name), err_msg=name)
+
+
+@pytest.fixture
+def redone(monkeypatch):
+    """How many agents were stepped in the whole world, call by call."""
+    counts = []
+    simulate = Physics._simulate
+
+    def noted(self, agents, velocity):
+        counts.append(len(velocity))
+        return simulate(self, agents, velocity)
+
+    monkeypatch.setattr(Physics, "_simulate", noted)
+    return counts
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("task", ["detection", "foraging", "navigation", "tracking"])
+def test_agents_among_a_few_geoms_do_what_they_do_among_all(task, threads, redone):
+    """Bit for bit, and hardly anyone is done again; so many agents that threads share them."""
+    world = build_world(task)
+    state, command = begun_at_walls(world, 2 * POOLED)
+    few, all_of_them = Physics(world, threads), Physics(world, 1)
+    all_of_them.vicinity = None
+    redone.clear()
+    ours = few.step(state, command)
+    assert sum(redone) < 5
+    assert (few.vicinity._rollouts._pool is None) == (threads == 1)
+    assert_same_bits(ours, all_of_them.step(state, command))
+    assert ours.contact.sum() > 100
+    assert len(few.vicinity._models) > 4  # different walls, and corners
+
+
+def test_agents_among_too_many_geoms_are_stepped_in_the_whole_world(redone):
+    world = build_world("navigation")
+    state, command = begun_at_walls(world, 64)
+    cramped = Physics(world, 1)
+    cramped.vicinity._slots = cramped.vicinity._slots[:1]
+    redone.clear()
+    ours = cramped.step(state, command)
+    assert 0 < sum(redone) < 64  # those in corners
+    assert_same_bits(ours, Physics(world, 1).step(state, command))
+
+
+@pytest.mark.parametrize("noticed", [True, False])
+def test_agents_that_stray_to_what_their_models_lack_are_done_again(monkeypatch, noticed):
+    """With room for no geom at all, every agent at a wall strays into it; unnoticed, they would go through."""
+    world = build_world("navigation")
+    state, command = begun_at_walls(world, 64)
+    without_room = Physics(world, 1)
+    without_room.vicinity._slots = without_room.vicinity._slots[:0]
+    if not noticed:
+        monkeypatch.setattr(Vicinity, "strayed", lambda _, position, path, few: np.zeros(len(few), bool))
+    ours, theirs = without_room.step(state, command), Physics(world, 1, gliding=False).step(state, command)
+    assert (np.abs(ours.path - theirs.path).max() < 1e-12) == noticed
+    assert np.array_equal(ours.contact, theirs.contact) == noticed
+
+
+def test_an_agent_that_breaks_down_at_a_wall_is_what_the_whole_world_makes_of_it():
+    world = build_world("navigation")
+    state, command = begun_at_walls(world, 64)
+    touching = np.flatnonzero(Physics(world, 1).step(state, command).contact)
+    velocity = state.velocity.copy()
+    velocity[touching[::2]] = [[1e9, -1e9]]
+    state = dataclasses.replace(state, velocity=velocity)
+    ours, theirs = (Physics(world, 1, gliding).step(state, command) for gliding in (True, False))
+    assert theirs.unstable.sum() == len(touching[::2])
+    np.testing.assert_array_equal(ours.unstable, theirs.unstable)
+    np.testing.assert_allclose(ours.path, theirs.path, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("change", ["opt.iterations", "opt.timestep", "geom_conaffinity", "geom_friction", "body_mass"])
+def test_a_model_that_was_altered_has_no_parts(change):
+    """Another number anywhere, and agents at walls are stepped in the whole of it."""
+    world = build_world("navigation")
+    assert Physics(world, 1).vicinity is not None
+    if change.startswith("opt."):
+        was = getattr(world.model.opt, change[4:])
+        setattr(world.model.opt, change[4:], type(was)(was / 2))
+    else:
+        getattr(world.model, change)[1] += 1
+    assert Physics(world, 1).vicinity is None
+
+
+def test_a_world_with_nothing_to_touch_is_glided_through():
+    """Boundless, but a world."""
+    field, spec = build_world("detection"), _empty_world()
+    _add_agent(spec, np.zeros(2), None)
+    model = spec.compile()
+    world = dataclasses.replace(field, model=model, objects=(), alone=AgentAlone.of(spec, model))
+    state = begun(field, 4)
+    motion = Physics(world, 1).step(state, np.full((4, 2), 3.0))
+    assert not motion.contact.any()
+    np.testing.assert_array_less(state.position, motion.path[:, -1])
+
+
+def test_threads_change_nothing(world):
+    state, command = begun_at_walls(world, POOLED)
+    one, two = (Physics(world, threads, gliding=False) for threads in (1, 2))
+    assert_same_bits(one.step(state, command), two.step(state, command))
+    assert two._rollouts._pool is not None
+
+
+def test_fewer_worlds_than_are_worth_it_start_no_threads(world):
+    state, command = begun_at_walls(world, POOLED - 1)
+    physics = Physics(world, 2, gliding=False)
+    physics.step(state, command)
+    assert physics._rollouts._pool is None
+
+
+def test_mujocos_clock_outlives_physics_in_two_threads(world):
+    """Each saves and restores it; a race would leave the process without."""
+    state, command = begun(world, 64), np.zeros((64, 2))
+    stepping = [
+        threading.Thread(target=step_often, args=(Physics(world, 1, gliding=False), state, command)) for _ in "12"
+    ]
+    before = rollouts._clock().value
+    for thread in stepping:
+        thread.start()
+    for thread in stepping:
+        thread.join()
+    assert before is not None
+    assert rollouts._clock().value == before
+
+
+def step_often(physics, state, command):
+    for _ in range(60):
+        physics.step(state, command)
+
+
+def test_mujocos_clock_runs_on_after_physics(world):
+    """It is stopped during a rollout, whose data count their steps without timing them, and for nobody else."""
+    ours = Physics(world, 1, gliding=False)
+    ours.step(begun(world, 1), np.ones((1, 2)))
+    step = mujoco.mjtTimer.mjTIMER_STEP
+    assert ours._rollouts._data[0].timer[step].number >= SUBSTEPS
+    assert ours._rollouts._data[0].timer[step].duration == 0
+    data = mujoco.MjData(world.model)
+    mujoco.mj_step(world.model, data)
+    assert data.timer[step].duration > 0
