@@ -44,9 +44,9 @@ class Glide:
     def __call__(self, velocity: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Path from where the agents are (n, substep, 2) [m], and their velocity at its end (n, 2) [m/s]."""
         # Summed by hand: a product of matrices rounds differently with the number of worlds.
-        (paths, speeds), at_end = self.response, slice(-1, None)
+        paths, speeds = self.response
         path = paths[:, 0] * velocity[:, None] + paths[:, 1] * command[:, None]
-        speed = speeds[at_end, 0] * velocity + speeds[at_end, 1] * command
+        speed = speeds[-1, 0] * velocity + speeds[-1, 1] * command
         return path, speed
 
     @cached_property

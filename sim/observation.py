@@ -67,9 +67,9 @@ class Memory:
 
     def preview(self, frame: np.ndarray, worlds: np.ndarray) -> np.ndarray:
         """What these worlds' memory would hold with this frame (len(worlds), ...) added; nothing is remembered."""
-        return (
-            np.stack([*(past[worlds] for past in self._past[1:]), frame], axis=1) if self.frames > 1 else frame[:, None]
-        )
+        if self.frames == 1:
+            return frame[:, None]
+        return np.stack([*(past[worlds] for past in self._past[1:]), frame], axis=1)
 
 
 STANDING = (-1.0, 0.0)  # the "previous action" of an agent that has not moved yet: no speed, no turn

@@ -91,9 +91,8 @@ class Physics:
         path, speed = self.glide(state.velocity, velocity)
         met = self.glide.met(state.position, path)
         free = ~met.any(axis=1) & self.glide.obeys(velocity)
-        free &= (np.abs(state.velocity) < UNSTABLE_SPEED).all(
-            axis=-1
-        )  # false for NaN: MuJoCo tells what it makes of it
+        # False for NaN, too: MuJoCo tells what it makes of that.
+        free &= (np.abs(state.velocity) < UNSTABLE_SPEED).all(axis=-1)
         motion = Motion(state.position[:, None] + path, speed, np.zeros(state.n, bool), np.zeros(state.n, bool))
         near = np.flatnonzero(~free)
         if len(near):

@@ -94,7 +94,7 @@ class EyesVecEnv(VecEnv):
         infos = self._infos(step, reward)
         ended = np.flatnonzero(done)
         # First looks of new episodes run beside the last looks of all, but not beside those at objects put elsewhere.
-        beginning = None if len(step.respawned) else self._begin_anew(ended)
+        beginning = self._begin_anew(ended) if len(ended) and not len(step.respawned) else None
         seen = self._seen(looking, step)
         if len(ended):
             self._add_terminal_observations(infos, step, ended, seen[ended])
@@ -104,8 +104,6 @@ class EyesVecEnv(VecEnv):
 
     def _begin_anew(self, ended: np.ndarray) -> Pending:
         """Start the episodes of these worlds anew, and look at them."""
-        if not len(ended):
-            return lambda: np.empty(0)
         self._returns[ended], self._lengths[ended] = 0.0, 0
         return self._retinas.begin_some(self.simulation.restart(ended), ended)
 

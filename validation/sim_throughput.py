@@ -108,7 +108,7 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
         chosen[name] = f"{renderer.tracer.name}, {renderer.fidelity.rays_per_receptor:g} rays per receptor"
         rates[name] = n_envs / seconds(lambda renderer=renderer: renderer.signals(moved()), budget)  # type: ignore[misc]
     step = _Step(case, n_envs)
-    for _ in range(SETTLED):
+    for _ in range(SETTLED + BLOCK):  # a block to count, however little time there is
         step()
     seconds(step, 2 * budget)
     rates["step"] = n_envs / statistics.median(step.wholes[SETTLED:])
