@@ -13,7 +13,7 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 
-# So many worlds are worth waking a pool of threads: on two cores 64 worlds took no less time on two threads than on one.
+# So many worlds are taken to be worth waking a pool of threads: on two cores 64 took no less time on two than on one.
 POOLED = 128
 
 
