@@ -46,15 +46,15 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class _Agents:
+class Agents:
     """Where agents are [m], (n, 2), their headings [rad], (n,), and velocities [m/s], (n, 2)."""
 
     position: np.ndarray
     heading: np.ndarray
     velocity: np.ndarray
 
-    def take(self, some: np.ndarray) -> _Agents:
-        return _Agents(self.position[some], self.heading[some], self.velocity[some])
+    def take(self, some: np.ndarray) -> Agents:
+        return Agents(self.position[some], self.heading[some], self.velocity[some])
 
 
 class Physics:
@@ -83,23 +83,23 @@ class Physics:
         self.glide = glide_of(model, agent, self._untouched, MAX_SPEED) if gliding else None
         self.vicinity = vicinity_of(world, model, self.glide, threads)
 
-    def step(self, state: WorldState, velocity: np.ndarray) -> Motion:
+    def step(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
         """One action: SUBSTEPS with the commanded velocity [m/s] (n, 2) held."""
-        agents = _Agents(state.position, state.heading, state.velocity)
         if self.glide is None:
             return self._simulate(agents, velocity)
-        path, speed = self.glide(state.velocity, velocity)
-        met = self.glide.met(state.position, path)
+        path, speed = self.glide(agents.velocity, velocity)
+        met = self.glide.met(agents.position, path)
         free = ~met.any(axis=1) & self.glide.obeys(velocity)
         # False for NaN, too: MuJoCo tells what it makes of that.
-        free &= (np.abs(state.velocity) < UNSTABLE_SPEED).all(axis=-1)
-        motion = Motion(state.position[:, None] + path, speed, np.zeros(state.n, bool), np.zeros(state.n, bool))
+        free &= (np.abs(agents.velocity) < UNSTABLE_SPEED).all(axis=-1)
+        n = len(velocity)
+        motion = Motion(agents.position[:, None] + path, speed, np.zeros(n, bool), np.zeros(n, bool))
         near = np.flatnonzero(~free)
         if len(near):
             motion.put(near, self._near(agents.take(near), velocity[near], met[near]))
         return motion
 
-    def _near(self, agents: _Agents, velocity: np.ndarray, met: np.ndarray) -> Motion:
+    def _near(self, agents: Agents | WorldState, velocity: np.ndarray, met: np.ndarray) -> Motion:
         """Of agents that may touch something, each among what it may meet. Where that is too much, where something
         turns it aside to where it could meet more, and where it breaks down, it is done again in the whole world."""
         if self.vicinity is None:
@@ -112,12 +112,12 @@ class Physics:
             motion.put(again, self._simulate(agents.take(again), velocity[again]))
         return motion
 
-    def _simulate(self, agents: _Agents, velocity: np.ndarray) -> Motion:
+    def _simulate(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
         """MuJoCo's step, in the whole world."""
         models = [self._model] * len(velocity)
         return self._motion(agents.position, *self._rollouts(models, *self._start_of(agents, velocity)))
 
-    def _start_of(self, agents: _Agents, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _start_of(self, agents: Agents | WorldState, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """MuJoCo's states (n, ...), and controls (n, substep, nu) that hold a commanded velocity [m/s] (n, 2)."""
         initial = self._initial(len(velocity))
         initial[:, self._columns.position] = agents.position - self._columns.origin

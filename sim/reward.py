@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,11 @@ class RewardWeights:
     adversary: float
     contact: float
 
+    @cached_property
+    def column(self) -> np.ndarray:
+        """The weights in the order of TERMS, (term, 1)."""
+        return np.array([[getattr(self, name)] for name in TERMS])
+
 
 TRAINING = RewardWeights(progress=0.25, goal=1.0, adversary=-1.0, contact=-1.0)
 EVALUATION = RewardWeights(progress=1.5, goal=10.0, adversary=-10.0, contact=-2.0)
@@ -26,11 +32,10 @@ MODES = {"training": TRAINING, "evaluation": EVALUATION}
 
 def reward_terms(
     weights: RewardWeights, progress: np.ndarray, goal: np.ndarray, adversary: np.ndarray, contact: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Each term of the reward, (n,): progress [m] in the task's sense, and which events happened."""
-    return {
-        "progress": weights.progress * progress,
-        "goal": weights.goal * goal + 0.0,  # never -0.0
-        "adversary": weights.adversary * adversary + 0.0,
-        "contact": weights.contact * contact + 0.0,
-    }
+) -> np.ndarray:
+    """The terms of the reward in the order of TERMS, (term, n), of progress [m] in the task's sense and of which events
+    happened."""
+    terms = np.array([progress, goal, adversary, contact])
+    terms *= weights.column
+    terms += 0.0  # never -0.0
+    return terms

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim.observation import STANDING
-from sim.physics import Motion, Physics
-from sim.reward import MODES, reward_terms
+from sim.physics import Agents, Motion, Physics
+from sim.reward import MODES, TERMS, reward_terms
 from sim.state import WorldState, wrap_angle
 from sim.streams import Streams
 from sim.task import respawned, task_of
@@ -26,11 +26,13 @@ NOWHERE = np.empty(0, int)
 class Moved:
     """Worlds that have moved by one action.
 
-    state   after it; where the physics broke down, the last good one
-    motion  of the agents
-    failed  worlds that could not go on, most often none: what the action or the physics was
+    actions  as they were taken, (n, 2): within [-1, 1], and STANDING where they were not finite
+    state    after it; where the physics broke down, the last good one
+    motion   of the agents
+    failed   worlds that could not go on, most often none: what the action or the physics was
     """
 
+    actions: np.ndarray
     state: WorldState
     motion: Motion
     failed: dict[int, str]
@@ -48,14 +50,14 @@ class Step:
     """One action of all worlds, before any world is started anew.
 
     state         after the action; where `failure` is set, the last good one
-    reward_terms  name -> (n,)
+    terms         of the reward, in the order of TERMS (term, n)
     terminated, truncated, contact, success  (n,) bool; success: the goal was reached in this episode
     respawned     worlds in which an object was put elsewhere
     failure       world that could not go on -> why: "unstable physics" or "action is not finite"
     """
 
     state: WorldState
-    reward_terms: dict[str, np.ndarray]
+    terms: np.ndarray
     terminated: np.ndarray
     truncated: np.ndarray
     contact: np.ndarray
@@ -66,8 +68,12 @@ class Step:
     @property
     def reward(self) -> np.ndarray:
         """Sum of the terms, (n,)."""
-        first, *others = self.reward_terms.values()
-        return sum(others, start=first)
+        return self.terms.sum(axis=0)
+
+    @property
+    def reward_terms(self) -> dict[str, np.ndarray]:
+        """Each term (n,) by its name."""
+        return dict(zip(TERMS, self.terms, strict=True))
 
     @property
     def done(self) -> np.ndarray:
@@ -132,20 +138,24 @@ class Simulation:
     def move(self, actions: np.ndarray) -> Moved:
         """The first half of a step: everything moves."""
         before = self.state
-        finite = np.isfinite(actions)
-        acted = None if finite.all() else finite.all(axis=-1)
-        steered, velocity = self._steer(
-            before, actions if acted is None else np.where(acted[:, None], actions, STANDING)
+        taken, idle = _taken(actions)
+        heading, velocity = _steered(before.heading, taken)
+        motion = self._physics.step(Agents(before.position, heading, before.velocity), velocity)
+        objects, object_heading = self.task.move(before, self.streams.motion, self._physics.seconds)
+        after = replace(
+            before,
+            position=motion.path[:, -1].copy(),
+            heading=heading,
+            velocity=motion.velocity,
+            objects=objects,
+            object_heading=object_heading,
+            steps=before.steps + 1,
         )
-        motion = self._physics.step(steered, velocity)
-        after = replace(steered, position=motion.path[:, -1].copy(), velocity=motion.velocity, steps=before.steps + 1)
         failed: dict[int, str] = {}
         broken = motion.unstable | ~after.finite
         if broken.any():
             after, failed = after.repaired(), dict.fromkeys(np.flatnonzero(broken).tolist(), UNSTABLE)
-        if acted is not None:
-            failed |= dict.fromkeys(np.flatnonzero(~acted).tolist(), NO_ACTION)
-        return Moved(after, motion, failed)
+        return Moved(taken, after, motion, failed | dict.fromkeys(idle, NO_ACTION))
 
     def judge(self, moved: Moved) -> Step:
         """The second half: what it led to. Objects that were reached may be elsewhere afterwards."""
@@ -167,9 +177,7 @@ class Simulation:
         self._state = final = after
         return Step(
             state=final,
-            reward_terms=reward_terms(
-                MODES[self.mode], outcome.progress, outcome.goal, outcome.adversary, motion.contact
-            ),
+            terms=reward_terms(MODES[self.mode], outcome.progress, outcome.goal, outcome.adversary, motion.contact),
             terminated=terminated,
             truncated=(final.steps >= EPISODE_STEPS) & ~terminated,
             contact=motion.contact,
@@ -177,16 +185,6 @@ class Simulation:
             respawned=elsewhere,
             failure=moved.failed,
         )
-
-    def _steer(self, state: WorldState, actions: np.ndarray) -> tuple[WorldState, np.ndarray]:
-        """Turn the agents, move the objects; the state so far and the commanded velocities [m/s] (n, 2)."""
-        speed, turn = np.asarray(actions, np.float64).clip(-1.0, 1.0).T
-        heading = wrap_angle(state.heading + MAX_TURN * turn)
-        speed = MAX_SPEED * (speed + 1.0) / 2.0
-        velocity = np.empty((state.n, 2))
-        velocity[:, 0], velocity[:, 1] = np.cos(heading) * speed, np.sin(heading) * speed
-        objects, object_heading = self.task.move(state, self.streams.motion, self._physics.seconds)
-        return replace(state, heading=heading, objects=objects, object_heading=object_heading), velocity
 
     def _begin(self, worlds: np.ndarray) -> WorldState:
         n, k = len(worlds), len(self.world.objects)
@@ -209,3 +207,24 @@ class Simulation:
             goals_reached=np.zeros(n, int),
             adversaries_reached=np.zeros(n, int),
         )
+
+
+def _taken(actions: np.ndarray) -> tuple[np.ndarray, list[int]]:
+    """Actions as they are taken, and the worlds whose agents stand because theirs were not finite."""
+    finite = np.isfinite(actions)
+    idle: list[int] = []
+    if not finite.all():
+        idle = np.flatnonzero(~finite.all(axis=-1)).tolist()
+        actions = actions.copy()
+        actions[idle] = STANDING
+    return np.minimum(np.maximum(actions, -1.0), 1.0), idle
+
+
+def _steered(heading: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Headings [rad] (n,) after turning, and commanded velocities [m/s] (n, 2)."""
+    speed, turn = actions.astype(np.float64).T
+    heading = wrap_angle(heading + MAX_TURN * turn)
+    speed = MAX_SPEED * (speed + 1.0) / 2.0
+    velocity = np.empty((len(heading), 2))
+    velocity[:, 0], velocity[:, 1] = np.cos(heading) * speed, np.sin(heading) * speed
+    return heading, velocity

@@ -6,7 +6,6 @@ event reward for reaching the goal or an adversary, and a penalty per action in 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -18,8 +17,6 @@ from sim.placement import REACH, Places, free_spot
 from sim.state import WorldState
 from sim.streams import Chance
 from sim.world import TASKS, World
-
-SQRT_2 = math.sqrt(2.0)
 
 
 @dataclass(frozen=True)
@@ -109,9 +106,8 @@ class FindGoal:
 
     def judge(self, before: WorldState, after: WorldState, path: np.ndarray, ends: bool) -> Outcome:
         goals, never = self._goals, path.shape[1]
-        squared = squared_distances(after)
-        was, is_now = (np.sqrt(np.minimum.reduce(d[:, :goals], axis=1)) for d in (squared_distances(before), squared))
-        first = first_reached(path, before.objects, after.objects, squared)
+        was, is_now = (_distance_to_goal(state, goals) for state in (before, after))
+        first = first_reached(path, before.objects, after.objects)
         nothing = np.zeros(len(path), bool)
         if (first == never).all():
             return Outcome(was - is_now, nothing, nothing, np.zeros(first.shape, bool), nothing)
@@ -171,41 +167,38 @@ def task_of(world: World) -> Task:
     raise ValueError(f"task = {world.task!r}, must be one of {', '.join(map(repr, TASKS))}")
 
 
-def squared_distances(state: WorldState) -> np.ndarray:
-    """From the agent's centre to every object's, on the ground [m²], (n, k)."""
-    x = state.objects[..., 0] - state.position[:, :1]
-    y = state.objects[..., 1] - state.position[:, 1:]
-    squared: np.ndarray = x * x + y * y
-    return squared
+def _distance_to_goal(state: WorldState, goals: int) -> np.ndarray:
+    """From the agent's centre to the nearest goal's, on the ground [m], (n,); the first objects are goals."""
+    x = state.objects[:, :goals, 0] - state.position[:, :1]
+    y = state.objects[:, :goals, 1] - state.position[:, 1:]
+    nearest: np.ndarray = np.sqrt(np.minimum.reduce(x * x + y * y, axis=1))
+    return nearest
 
 
-def first_reached(
-    path: np.ndarray, objects_before: np.ndarray, objects_after: np.ndarray, squared_after: np.ndarray
-) -> np.ndarray:
+def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: np.ndarray) -> np.ndarray:
     """First substep at which the agent is within REACH of each object, (n, k); the number of substeps if never.
 
-    path (n, substep, 2): the agent at the *end* of each substep; objects move evenly from before to after, and their
-    squared distances (n, k) [m²] from the agent are those after the last.
+    path (n, substep, 2): the agent at the *end* of each substep; objects (n, k, 3) move evenly from before to after.
     """
     substeps = path.shape[1]
-    found = np.full(squared_after.shape, substeps)
-    # Most objects are so far away that nobody can have come near: in no world anything has moved more than this.
-    # (fmax passes over a world whose numbers broke down.)
-    moved = np.fmax.reduce(np.abs(path - path[:, -1:]), axis=None)
-    standing = objects_after is objects_before
-    if not standing:
-        moved += np.fmax.reduce(np.abs(objects_after - objects_before), axis=None)
-    worlds, which = (squared_after < (REACH + SQRT_2 * moved) ** 2).nonzero()
-    if len(worlds):
-        place = objects_after[worlds, which, None, :2]
-        if not standing:
-            t = (np.arange(substeps) + 1.0)[:, None] / substeps
-            before = objects_before[worlds, which, None, :2]
-            place = before + t * (place - before)
-        near = ((path[worlds] - place) ** 2).sum(axis=-1) < REACH**2
-        if near.any():
-            found[worlds, which] = np.where(near.any(axis=1), near.argmax(axis=1), substeps)
-    return found
+    # Worlds come last, side by side, as there are many of them: NumPy's inner loop is over that axis.
+    agent = path.T.copy()[:, :, None]  # (x | y, substep, 1, n)
+    place = _on_the_ground(objects_after)
+    if objects_after is not objects_before:
+        before = _on_the_ground(objects_before)
+        t = (np.arange(substeps) + 1.0)[:, None, None] / substeps
+        place = before + t * (place - before)
+    apart = agent - place
+    apart *= apart
+    near = apart[0] + apart[1] < REACH**2
+    if not near.any():
+        return np.full(objects_after.shape[:2], substeps)
+    return np.where(near.any(axis=0), near.argmax(axis=0), substeps).T
+
+
+def _on_the_ground(objects: np.ndarray) -> np.ndarray:
+    """Objects (n, k, 3) as (x | y, 1, k, n)."""
+    return objects.T[:2].copy()[:, None]
 
 
 def respawned(task: Task, state: WorldState, which: np.ndarray, rngs: list[np.random.Generator]) -> WorldState:

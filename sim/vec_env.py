@@ -73,8 +73,7 @@ class EyesVecEnv(VecEnv):
         actions = np.asarray(actions, np.float32)
         if actions.shape != (self.num_envs, 2):
             raise ValueError(f"actions have shape {actions.shape}, must be ({self.num_envs}, 2)")
-        finite = actions if np.isfinite(actions).all() else np.nan_to_num(actions)
-        self._commanded, self._actions = actions, finite.clip(-1, 1)
+        self._commanded = actions
 
     def step_once(
         self, actions: np.ndarray
@@ -84,15 +83,15 @@ class EyesVecEnv(VecEnv):
         self.step_async(actions)
         step, looking = self._advance()
         reward = step.reward
-        infos = self._infos(step, reward)
+        infos = self._infos(step, reward, np.flatnonzero(step.done))
         observation = self._observation(self._seen(looking, step), np.zeros(self.num_envs, bool), step.contact)
         return observation, reward, step.terminated, step.truncated, infos
 
     def step_wait(self) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, list[dict[str, Any]]]:
         step, looking = self._advance()
         reward, done = step.reward, step.done
-        infos = self._infos(step, reward)
         ended = np.flatnonzero(done)
+        infos = self._infos(step, reward, ended)
         # First looks of new episodes run beside the last looks of all, but not beside those at objects put elsewhere.
         beginning = self._begin_anew(ended) if len(ended) and not len(step.respawned) else None
         seen = self._seen(looking, step)
@@ -111,6 +110,7 @@ class EyesVecEnv(VecEnv):
         """Move, and look while it is judged what that led to."""
         moved = self.simulation.move(self._commanded)
         looking = self._retinas.begin(moved.state)
+        self._actions = moved.actions
         return self.simulation.judge(moved), looking
 
     def _seen(self, looking: Pending, step: Step) -> np.ndarray:
@@ -164,11 +164,11 @@ class EyesVecEnv(VecEnv):
 
     # --- info
 
-    def _infos(self, step: Step, reward: np.ndarray) -> list[dict[str, Any]]:
+    def _infos(self, step: Step, reward: np.ndarray, ended: np.ndarray) -> list[dict[str, Any]]:
         infos = infos_of(step)
         self._returns += reward
         self._lengths += 1
-        for world in np.flatnonzero(step.done):
+        for world in ended:
             infos[world]["TimeLimit.truncated"] = bool(step.truncated[world])
             infos[world]["episode"] = {"r": float(self._returns[world]), "l": int(self._lengths[world])}
         for index, reason in step.failure.items():

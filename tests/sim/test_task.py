@@ -133,10 +133,9 @@ def test_actions_steer(field):
 
 
 def _first_reached(path: np.ndarray, before: float, after: np.ndarray) -> list[list[int]]:
-    """Of agents that end where their paths do, in worlds of one object each, on the x-axis."""
+    """In worlds of one object each, on the x-axis."""
     objects = [np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=-1)[:, None] for x in (before + 0 * after, after)]
-    squared = ((objects[1][..., :2] - path[:, -1:]) ** 2).sum(axis=-1)
-    return first_reached(path, *objects, squared).tolist()
+    return first_reached(path, *objects).tolist()
 
 
 def test_first_reached_follows_moving_objects():
