@@ -54,6 +54,20 @@ def test_training_ends_at_goal_and_adversary(field):
     assert step.reward_terms["adversary"].tolist() == [0, -1, -1]
 
 
+def test_a_world_of_goals_alone(field):
+    """No adversary: the nearest goal counts, and reaching one ends the episode as usual."""
+    goals = dataclasses.replace(field, objects=("goal",))
+    simulation = Simulation(goals, 2, 0, "training", 1)
+    state = facing(simulation, np.array([0, 0]), 2.5)
+    away = dataclasses.replace(state, heading=np.array([0.0, np.pi]), velocity=state.velocity * [[1], [-1]])
+    simulation._state = away
+    step = simulation.step(np.tile(AHEAD, (2, 1)))
+    assert step.reward_terms["goal"].tolist() == [1, 0]
+    assert step.reward_terms["adversary"].tolist() == [0, 0]
+    assert step.terminated.tolist() == [True, False]
+    assert step.reward_terms["progress"][1] < 0
+
+
 def test_passing_by_within_reach_counts_though_the_action_ends_beyond(field):
     """2 m per action: at its end the agent is 1.05 m behind the goal, in between it went through it."""
     simulation = Simulation(field, 1, 0, "training", 1)
