@@ -72,6 +72,9 @@ class EyeConfig:
     relief_points: int = _setting(
         4, RELIEF_POINTS, "genes of the relief along one side; 4: a bicubic patch, more: a cubic spline through as many"
     )
+    relief_symmetric: bool = _setting(
+        False, None, "reliefs look the same mirrored and turned by a quarter; an eighth of their genes says how"
+    )
     rays_per_receptor: float | str = _setting(
         AUTO, Interval(0, 4096, open_low=True), "rays traced per receptor and frame; auto: as few as its noise allows"
     )
@@ -81,6 +84,11 @@ class EyeConfig:
     receptor_width: float = _setting(
         1e-6, Interval(0, 1e-2, open_low=True), "least width of a receptor [m]; receptors do not overlap"
     )
+
+    @property
+    def genes(self) -> Mapping[str, Gene]:
+        """Every gene that animals with such eyes have, by name."""
+        return gene_table(self.relief_points, self.relief_symmetric)
 
 
 @dataclass(frozen=True)
@@ -170,7 +178,7 @@ class RunConfig:
             raise ConfigError(
                 f"eye.receptors = {self.eye.receptors!r}: must be one of {', '.join(known)}", "eye.receptors"
             )
-        for name, gene in gene_table(self.eye.relief_points).items():
+        for name, gene in self.eye.genes.items():
             _check_gene_use(gene, self.genome[name])
         self._check_clusters()
         self._check_phases()
@@ -187,7 +195,7 @@ class RunConfig:
 
     def _check_clusters(self) -> None:
         """Something must be open, and nothing that the run leaves out."""
-        genes = [gene for name, gene in gene_table(self.eye.relief_points).items() if self.genome[name].open]
+        genes = [gene for name, gene in self.eye.genes.items() if self.genome[name].open]
         opened = {
             cluster: [f"genome.{gene.name}.open" for gene in genes if gene.cluster == cluster] for cluster in CLUSTERS
         }

@@ -14,6 +14,7 @@ from evolve.anatomy import fitted
 from evolve.config import INHERITED, EyeConfig, RunConfig
 from evolve.genes import APERTURE_SHAPES, LAMBDA_MAX
 from evolve.genotype import Genotype
+from evolve.relief import doe_own_names
 
 if TYPE_CHECKING:
     import optics
@@ -96,8 +97,8 @@ class Phenotype:
 def develop(genome: NDArray[np.float64], config: RunConfig) -> Phenotype:
     """Phenotype of a genome under a run's config; every genome of the right length has one, and its eyes fit."""
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
-    side, seen_through = config.eye.relief_points, config.eye.optics
-    relief = tuple(values[f"doe_{i}{j}"] for i in range(side) for j in range(side))
+    seen_through = config.eye.optics
+    relief = tuple(values[name] for name in doe_own_names(config.eye.relief_points, config.eye.relief_symmetric))
     peaks = tuple(values[name] for name in LAMBDA_MAX)[: int(values["receptor_types"])]
     return Phenotype(
         n_eyes=int(values["n_eyes"]),

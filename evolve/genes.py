@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from evolve.interval import Interval
+from evolve.relief import doe_own_names
 
 __all__ = [
     "ALL_GENES",
@@ -91,9 +92,12 @@ class Gene:
 
 
 @lru_cache
-def gene_table(relief_points: int = 4) -> Mapping[str, Gene]:
-    """Every gene by name, in the order in which they stand in a genome; the relief has relief_points² of them."""
+def gene_table(relief_points: int = 4, relief_symmetric: bool = False) -> Mapping[str, Gene]:
+    """Every gene by name, in the order in which they stand in a genome; the relief has relief_points² of them, or those
+    of an eighth of it."""
+    relief = set(doe_own_names(relief_points, relief_symmetric))
     genes = [*_body(), *_optics(relief_points), *_brain(), *_spectra()]
+    genes = [gene for gene in genes if gene.name in relief or not gene.name.startswith("doe_")]
     return {gene.name: gene for gene in genes}
 
 

@@ -15,7 +15,7 @@ from evolve.config import RunConfig
 from evolve.development import Phenotype, develop
 from evolve.evaluation import Evaluation
 from evolve.executors import cores
-from evolve.genes import CLUSTERS, LAMBDA_MAX, gene_table
+from evolve.genes import CLUSTERS, LAMBDA_MAX
 from evolve.genotype import Genotype
 from evolve.ladder import budgets, evaluations, sizes, stretches
 from evolve.ladder import steps as total_steps
@@ -149,7 +149,7 @@ class Plan:
 
 def idle_genes(config: RunConfig) -> list[str]:
     """Open genes that cannot change anything as the others are held, one line each."""
-    uses, table = config.genome, gene_table(config.eye.relief_points)
+    uses, table = config.genome, config.eye.genes
     notes = []
     if uses["placement_range_deg"].open and not uses["n_eyes"].open and uses["n_eyes"].start == 1:
         notes.append("genome.placement_range_deg is open but changes nothing: genome.n_eyes is held at 1")

@@ -1,4 +1,4 @@
-"""A relief's genes, N x N of them, as the same surface with more genes: what a start given for few means for many."""
+"""A relief's genes: which there are, and what a start given for few of them means for many."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from math import isqrt
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["doe_names", "refined"]
+__all__ = ["doe_names", "doe_own_names", "refined"]
 
 Floats = NDArray[np.float64]
 PATCH = (
@@ -18,6 +18,15 @@ PATCH = (
 def doe_names(points: int) -> list[str]:
     """Names of the genes of a relief with points x points of them, row-major (y, x)."""
     return [f"doe_{i}{j}" for i in range(points) for j in range(points)]
+
+
+def doe_own_names(points: int, symmetric: bool) -> list[str]:
+    """For each gene in `doe_names`, the one that its height is. A symmetric relief looks the same mirrored and turned
+    by a quarter, as an eighth of it says: its genes are those of their own name."""
+    if not symmetric:
+        return doe_names(points)
+    to_rim = np.minimum(np.arange(points), np.arange(points)[::-1])
+    return [f"doe_{min(i, j)}{max(i, j)}" for i in to_rim for j in to_rim]
 
 
 def refined(relief: Floats, points: int) -> Floats:

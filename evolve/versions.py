@@ -46,6 +46,12 @@ def recorded(run: Path) -> dict[str, str]:
     return starts[0]["versions"] if starts else {}
 
 
+def commits(run: Path) -> list[str]:
+    """Of rhabdom, with which a run was begun and continued, in order and without repetitions; those that are known."""
+    known = [start["versions"].get("commit") for start in _starts(run)]
+    return list(dict.fromkeys(commit for commit in known if commit))
+
+
 def record_start(run: Path, candidates: int, origin: str | None = None) -> None:
     """Write down that a run goes on from `candidates` evaluated ones with the present versions, and `origin`, from
     whose animal it started."""

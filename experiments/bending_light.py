@@ -15,7 +15,9 @@ import numpy as np
 import optics
 from evolve.report.eye_figures import relief_heights
 from experiments import evolved
-from experiments.evolved import LAST, Row, Store, last_mean, of_generation
+from experiments.candidates import Row
+from experiments.evolved import Store
+from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 
 __all__ = ["page"]

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments import evolved
-from experiments.evolved import Interval, Row, Store
+from experiments.candidates import Row
+from experiments.evolved import Store
+from experiments.means import Interval
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 
 __all__ = ["PowerLaw", "error", "fitted", "page"]

@@ -16,7 +16,9 @@ import scipy.stats
 
 import optics
 from experiments import evolved
-from experiments.evolved import LAST, NO_NUMBER, Row, Store, last_mean, of_generation
+from experiments.candidates import NO_NUMBER, Row
+from experiments.evolved import Store
+from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from sim.tasks.foraging import ULTRAVIOLET, petal
 

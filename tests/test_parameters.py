@@ -148,6 +148,7 @@ FIELDS = {
     "eye.relief_height": Case("eye.relief_height=80e-6", point_image, ()),
     "eye.rays_per_receptor": Case("eye.rays_per_receptor=2", life),
     "eye.relief_points": Case("eye.relief_points=5", history, ()),
+    "eye.relief_symmetric": Case("eye.relief_symmetric=true", history, ()),
     "eye.head_radius": Case("eye.head_radius=100e-6", sight),
     "eye.receptor_width": Case("eye.receptor_width=100e-6", sight),
     "search.optimizer": Case("search.optimizer=mutation", history),

@@ -9,7 +9,7 @@ from evolve.candidate import Candidate
 from evolve.config import TASKS
 from evolve.episode import Episode
 from evolve.genealogy import descent
-from evolve.genes import CLUSTERS, Gene, gene_table
+from evolve.genes import CLUSTERS, Gene
 from evolve.report import tables
 from evolve.report.eye_figures import eye_figures
 from evolve.report.figures import (
@@ -89,7 +89,7 @@ def genes_section(run: Run) -> str:
         f"<p>{KEY.format('accent')} value in the best candidate so far, {POPULATION}. "
         "The vertical axes span the range that evolution may search.</p>\n"
     ]
-    shown, table = gene_values(run.candidates[0].phenotype), gene_table(run.config.eye.relief_points).values()
+    shown, table = gene_values(run.candidates[0].phenotype), run.config.eye.genes.values()
     for cluster in CLUSTERS:
         genes = [g for g in table if g.cluster == cluster and run.config.genome[g.name].open and g.name in shown]
         figures = "".join(_gene(run, gene) for gene in genes if not gene.name.startswith("doe_"))

@@ -1,5 +1,6 @@
 """Configuration: sources, precedence, and one clear line for everything that is wrong."""
 
+import numpy as np
 import pytest
 
 from evolve.config import TASKS, ConfigError
@@ -227,3 +228,38 @@ def test_relief_may_have_more_points_and_keeps_the_presets_surface():
     # A spline through a bicubic polynomial is that polynomial, up to rounding.
     for points in (5, 9):
         assert heights[points] == pytest.approx(heights[4], rel=1e-9)
+
+
+@pytest.mark.parametrize(("points", "count"), [(4, 3), (5, 6), (6, 6), (9, 15)])
+def test_symmetric_reliefs_look_the_same_mirrored_and_turned(points, count):
+    from evolve.development import develop
+    from evolve.genotype import Genotype
+
+    asked = ["eye.relief_symmetric=true", f"eye.relief_points={points}"]
+    config = assemble("detection", assignments=asked)
+    genes = [gene.name for gene in Genotype(config.genome).open_genes if gene.name.startswith("doe_")]
+    assert len(genes) == count
+    animal = develop(np.random.default_rng(0).random(Genotype(config.genome).dimension), config)
+    relief = np.reshape(animal.relief, (points, points))
+    np.testing.assert_array_equal(relief, relief.T)
+    np.testing.assert_array_equal(relief, relief[::-1])
+    assert len(set(animal.relief)) == count
+
+
+def test_symmetric_reliefs_have_no_genes_that_would_be_ignored():
+    with pytest.raises(ConfigError, match=r"a symmetric relief has other genes \(doe_00, doe_01, doe_11\)"):
+        assemble("detection", assignments=["eye.relief_symmetric=true", "genome.doe_02.start=0.3"])
+
+
+def test_a_symmetric_animal_begins_a_run_of_symmetric_reliefs():
+    """All sixteen heights of an animal are named; where they say one thing eightfold, they are three genes' starts."""
+    from evolve.config_lines import Source
+
+    heights = {f"doe_{i}{j}": {"start": 0.2 + 0.1 * min(i, 3 - i) * min(j, 3 - j)} for i in range(4) for j in range(4)}
+    eye = {"relief_symmetric": True}
+    config = assemble("detection", starts=Source("--from a:1", {"genome": heights, "eye": eye}))
+    assert [config.genome[f"doe_{place}"].start for place in ("00", "01", "11")] == pytest.approx([0.2, 0.2, 0.3])
+    assert "doe_32" not in config.genome
+    heights["doe_32"] = {"start": 0.9}
+    with pytest.raises(ConfigError, match="a symmetric relief has other genes"):
+        assemble("detection", starts=Source("--from a:1", {"genome": heights, "eye": eye}))

@@ -1,0 +1,146 @@
+"""What runs of evolution came to: a row per candidate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import optics
+from evolve.analysis import acuity_cpd, polychromatic, succeeded
+from evolve.candidate import Candidate
+from evolve.config import RunConfig
+from evolve.development import Phenotype
+from evolve.policy import PolicyConfig, build_policy, learnt
+from evolve.store import Run
+from evolve.vision import vision
+from experiments.best_pupil import contrast_of, measures
+
+__all__ = ["NO_NUMBER", "Row", "anatomy", "complete", "parameters", "rows_of"]
+
+NO_NUMBER = math.nan
+
+
+@dataclass(frozen=True)
+class Row:
+    """A candidate of a run. Optical measures are those of the best of each generation; elsewhere they are NaN.
+
+    group        what the run stands for: a task, or a variant of an experiment
+    phase        how many times genes have been opened, 0 in the first generation
+    episodes     played after training; fitness and success rate are their means
+    parameters   of its trained policy, critic included
+    above_noise  contrast above the noise; see experiments.best_pupil
+    relief       heights in [0, 1], row by row, of an eye with optics
+    peaks_nm     of the pigments, of an eye that inherits them
+    """
+
+    group: str
+    seed: int
+    generation: int
+    phase: int
+    index: int
+    failed: int
+    fitness: float
+    success_rate: float
+    episodes: int
+    n_eyes: int
+    placement_range_deg: float
+    fov_deg: float
+    height: int
+    width: int
+    cpd: float
+    memory_frames: int
+    neurons: int
+    parameters: int
+    relative_aperture: float = NO_NUMBER
+    refractive_index: float = NO_NUMBER
+    image_quality: float = NO_NUMBER
+    above_noise: float = NO_NUMBER
+    strehl: float = NO_NUMBER
+    psnr_db: float = NO_NUMBER
+    ssim: float = NO_NUMBER
+    relief: str = ""
+    peaks_nm: str = ""
+
+
+def rows_of(run: Run, group: str) -> list[Row]:
+    """A run's candidates, in order of their ids; those of a generation that is not complete are left out, unless
+    candidates come one by one and generations mean nothing."""
+    chosen = range(run.config.search.generations) if run.config.search.steady_state else complete(run)
+    generations = {generation: run.generation(generation) for generation in chosen}
+    champions = set()
+    for candidates in generations.values():
+        done = [c for c in candidates if succeeded(c)]
+        champions |= {max(done, key=lambda c: c.fitness).id} if done else set()
+    return [_row(run, group, c, c.id in champions) for c in run.candidates if c.generation in generations]
+
+
+def complete(run: Run) -> list[int]:
+    """Generations of which all candidates are on record."""
+    search = run.config.search
+    return [g for g in range(search.generations) if len(run.generation(g)) == search.population]
+
+
+def _row(run: Run, group: str, candidate: Candidate, champion: bool) -> Row:
+    animal, config = candidate.phenotype, run.config
+    openings = {use.opens_at for use in config.genome.values() if use.open}
+    channels = animal.eyes(config.eye).eye().channels
+    shape = (animal.memory_frames, animal.n_eyes, channels, *animal.resolution)
+    return Row(
+        group=group,
+        seed=config.seed,
+        generation=candidate.generation,
+        phase=sum(0 < at <= candidate.generation for at in openings),
+        index=candidate.index,
+        failed=int(not succeeded(candidate)),
+        fitness=candidate.fitness,
+        success_rate=candidate.success_rate,
+        episodes=len(candidate.returns),
+        parameters=parameters(PolicyConfig(shape, animal.neurons, animal.layers)),
+        **anatomy(animal),
+        **(_seen(config, animal) if champion and animal.relative_aperture is not None else {}),
+    )
+
+
+def anatomy(animal: Phenotype) -> dict[str, Any]:
+    """Those fields of a row that are the animal's own."""
+    has_optics = animal.relative_aperture is not None
+    return {
+        "n_eyes": animal.n_eyes,
+        "placement_range_deg": animal.placement_range_deg,
+        "fov_deg": animal.fov_deg,
+        "height": animal.resolution[0],
+        "width": animal.resolution[1],
+        "cpd": acuity_cpd(animal),
+        "memory_frames": animal.memory_frames,
+        "neurons": animal.neurons,
+        "relative_aperture": animal.relative_aperture if animal.relative_aperture is not None else NO_NUMBER,
+        "refractive_index": animal.refractive_index if animal.refractive_index is not None else NO_NUMBER,
+        "relief": " ".join(f"{height:.3g}" for height in animal.relief or ()) if has_optics else "",
+        "peaks_nm": " ".join(f"{peak:.1f}" for peak in animal.lambda_max_nm or ()),
+    }
+
+
+def _seen(config: RunConfig, animal: Phenotype) -> dict[str, Any]:
+    """Measures of an eye's optics; {} where they cannot be computed."""
+    eye = animal.eyes(config.eye).eye()
+    try:
+        white = polychromatic(eye, eye.psf())
+        above = measures(contrast_of(eye), float(eye.throughput), max(eye.noise_sigma, 1e-9))[1]
+    except optics.AccuracyError:
+        return {}
+    looked = vision(animal, config)
+    return {
+        "image_quality": looked.image_quality,
+        "above_noise": above,
+        "strehl": float(optics.strehl_ratio(white)[0]),
+        "psnr_db": looked.psnr_db,
+        "ssim": looked.ssim,
+    }
+
+
+@cache
+def parameters(shape: PolicyConfig) -> int:
+    """Numbers in a policy of this shape: what training would leave, also where its file is elsewhere."""
+    return sum(tensor.numel() for tensor in learnt(build_policy(shape)).values())
