@@ -14,30 +14,46 @@ import numpy as np
 
 import optics
 from evolve.report.eye_figures import relief_heights
-from experiments import evolved
+from experiments import best_pupil, evolved
 from experiments.candidates import Row
-from experiments.evolved import Store
+from experiments.drift import SEEDS, of_the_end, shade
+from experiments.evolved import Store, conduct_table, luck_table
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
+from experiments.store import read_rows
 
 __all__ = ["page"]
 
 NAME = "bending_light"
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#B8568F", "#777777")
+MEASURES = ("contrast", "stripes")
+COLORS = {
+    "blue": "#0072B2",
+    "orange": "#D55E00",
+    "green": "#009E73",
+    "purple": "#B8568F",
+    "yellow": "#B59E00",
+    "black": "#222222",
+    "brown": "#8C564B",
+    "grey": "#999999",
+}
 QUANTITIES: dict[str, Callable[[Row], float]] = {
     "relative aperture a": lambda row: row.relative_aperture,
     "refractive index": lambda row: row.refractive_index,
+    "contrast above the noise": lambda row: row.above_noise,
+    "what its glass adds to it": lambda row: row.above_noise - row.above_noise_of_hole,
     "Strehl ratio": lambda row: row.strehl,
     "image quality": lambda row: row.image_quality,
-    "contrast above the noise": lambda row: row.above_noise,
     "PSNR [dB]": lambda row: row.psnr_db,
     "SSIM": lambda row: row.ssim,
     "fitness": lambda row: row.fitness,
+    "success rate": lambda row: row.success_rate,
 }
 
 
 def page(store: Store) -> Page:
-    """The page of stored runs."""
+    """The page of stored runs. Raises ValueError with more groups than there are colours."""
+    if len(store.groups) > len(COLORS):
+        raise ValueError(f"{len(store.groups)} groups of runs, must be at most {len(COLORS)}: one colour each")
     return Page(
         name=NAME,
         title="Eyes learn to bend light",
@@ -48,59 +64,112 @@ def page(store: Store) -> Page:
         ),
         answer=store.answer,
         method=(
-            "Aperture, index and fitness are means over a generation's candidates, the other measures those of its "
-            "best; a line per seed, all seeds are shown; dotted: relief and index join. PSNR and SSIM compare with a "
-            "perfect lens, brightness made equal. Tables have means of the phases' last "
-            f"{LAST} generations with 95 % intervals, by a bootstrap over seeds and candidates."
+            "Aperture, index, fitness and success are means over a generation's candidates, the other measures those "
+            "of its fittest, optics that cannot be computed left out; a line per seed, all seeds are shown; dotted: "
+            f"relief and index join. Tables have means of the phases' last {LAST} generations with 95 % intervals, by "
+            "a bootstrap over seeds and candidates; with few seeds they are too narrow, and hardly more than the range "
+            f"of the seeds. By chance: the median and the range of 95 % of {SEEDS} searches that were told random "
+            "numbers as fitness. What glass adds is the contrast above the noise less that behind a hole as wide; "
+            "Strehl ratios compare with a lens as wide, and a hole that closes has a better one too. PSNR and SSIM "
+            "compare with a perfect lens, without noise, brightness made equal."
         ),
         command=(
-            "evolve run --preset lens --seed 0    # and 1, 2\n"
-            "evolve run --preset lens --set genome.refractive_index.open=false --set genome.refractive_index.start=1 "
-            "--set genome.doe.open=false\n"
-            "evolve run --preset lens --set eye.noise_sigma=0.003\n"
-            "python -m experiments.bending_light --runs lens=DIR index1=DIR bright=DIR"
+            "evolve run --preset lens --seed 0    # and 1\n"
+            "evolve run --preset lens --set genome.refractive_index.open=false --set genome.refractive_index.start=1\n"
+            "evolve run --preset lens --set eye.noise_sigma=0.0003    # and 0.003\n"
+            "python -m experiments.bending_light --runs lens=DIR lens=DIR index1=DIR bright=DIR dark=DIR"
         ),
         figures=[
-            Figure(NAME, lambda path: draw(store, path), f"Generation by generation: {_legend(store)}."),
+            Figure(
+                NAME,
+                lambda path: draw(store, path),
+                f"Generation by generation: {_legend(store)}. Shaded: by chance. Dashed: the best hole by stripes.",
+            ),
             Figure(
                 f"{NAME}_reliefs",
                 lambda path: draw_reliefs(store, path),
-                "Reliefs of the fittest and of the least fit of each seed's last generations, over the pupil; heights "
-                "in units of the gene.",
+                "Reliefs of the fittest and of the least fit of each seed's last generations, over the pupil: how much "
+                "longer than at its lowest place the way through the glass is [µm].",
             ),
         ],
-        tables=[part for phase in (0, 1) for part in (f"End of phase {'I' * (phase + 1)}:", table(store, phase))],
+        tables=[
+            *(part for phase in (0, 1) for part in (f"End of phase {'I' * (phase + 1)}:", table(store, phase))),
+            "Phase I beside what is best for a hole:",
+            prediction(store),
+            luck_table(store, QUANTITIES),
+            conduct_table(store),
+        ],
         origin=store.origin,
     )
 
 
 def _legend(store: Store) -> str:
-    names = ("blue", "orange", "green", "purple", "grey")
-    return ", ".join(f"{group} {names[min(i, 4)]}" for i, group in enumerate(store.groups))
+    return ", ".join(f"{group} {color}" for group, color in zip(store.groups, COLORS, strict=False))
+
+
+def colors(store: Store) -> dict[str, str]:
+    """Of each group."""
+    return dict(zip(store.groups, COLORS.values(), strict=False))
+
+
+def joining(store: Store) -> int | None:
+    """The first generation of phase II: that of the groups that have one; None where none has."""
+    return min((row.generation for row in store.rows if row.phase > 0), default=None)
+
+
+def of_phase(store: Store, group: str, phase: int) -> list[Row]:
+    """Rows of a group up to the end of phase I, or from there on. A group whose genes are all open from the beginning
+    is compared at the same generations."""
+    start = joining(store)
+    rows = store.group(group)
+    if start is None:
+        return rows if phase == 0 else []
+    return [row for row in rows if (row.generation >= start) == bool(phase)]
 
 
 def table(store: Store, phase: int) -> str:
-    """A row per quantity, a column per variant."""
+    """A row per quantity, two columns per variant."""
+    header = ["", *(f"{group}{what}" for group in store.groups for what in ("", ", by chance"))]
     lines = []
     for name, value in QUANTITIES.items():
-        found = [last_mean([r for r in store.group(g) if r.phase == phase], value) for g in store.groups]
-        lines.append([name, *("-" if f is None else str(f) for f in found)])
-    return markdown_table(["", *store.groups], lines)
+        line = [name]
+        for group in store.groups:
+            rows = of_phase(store, group, phase)
+            found = last_mean(rows, value)
+            chance = of_the_end(store.chance(group, name), joining(store) if phase == 0 else None)
+            line += ["-" if found is None else str(found), "" if chance is None or found is None else str(chance)]
+        lines.append(line)
+    return markdown_table(header, lines)
+
+
+def prediction(store: Store) -> str:
+    """Where pupils that evolve alone end, beside where holes are best by each measure."""
+    holes = read_rows(best_pupil.Row, best_pupil.STORED)
+    lines = []
+    for group in store.groups:
+        sigma = next(one.noise_sigma for one in store.conduct if one.group == group)
+        computed = any(math.isclose(row.noise_sigma, sigma) for row in holes)
+        found = last_mean(of_phase(store, group, 0), QUANTITIES["relative aperture a"])
+        best = [best_pupil.best(holes, "hole", sigma, m) if computed else math.nan for m in MEASURES]
+        lines.append([group, f"{sigma:g}", "-" if found is None else str(found), *(f"{a:.2f}" for a in best)])
+    return markdown_table(["", "noise σ", "a at the end of phase I", *(f"best by {m}" for m in MEASURES)], lines)
 
 
 def draw(store: Store, path: Path) -> None:
     """A panel per quantity, a line per seed."""
-    figure, axes = new_figure(11, 5.2, columns=4, rows=2, sharex=True)
+    figure, axes = new_figure(13, 5.2, columns=5, rows=2, sharex=True)
     for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=True):
-        for i, group in enumerate(store.groups):
+        for group, color in colors(store).items():
             rows = store.group(group)
+            shade(place, store.chance(group, name), color)
             for seed in sorted({row.seed for row in rows}):
                 mine = [row for row in rows if row.seed == seed]
-                place.plot(*of_generation(mine, value), color=COLORS[min(i, 4)], lw=1.2)
-            later = [row.generation for row in rows if row.phase > 0]
-            if later:
-                place.axvline(min(later) - 0.5, color="#777777", ls=":", lw=1)
+                place.plot(*of_generation(mine, value), color=color, lw=1.2)
+        if (start := joining(store)) is not None:
+            place.axvline(start - 0.5, color="#777777", ls=":", lw=1)
         place.set_title(name, fontsize=10)
+    holes = read_rows(best_pupil.Row, best_pupil.STORED)
+    axes[0, 0].axhline(best_pupil.best(holes, "hole", holes[0].noise_sigma, "stripes"), color="#777777", ls="--", lw=1)
     for place in axes[1]:
         place.set_xlabel("generation")
     save(figure, path)
@@ -123,27 +192,35 @@ def relief_of(row: Row) -> optics.BSplineRelief | np.ndarray:
 
 
 def draw_reliefs(store: Store, path: Path) -> None:
-    """Height maps, two per seed."""
+    """Height maps, two per seed, all on one scale."""
     runs = [(g, s) for g in store.groups for s in sorted({row.seed for row in store.group(g)})]
     figure, axes = new_figure(max(4.0, 1.7 * len(runs)), 3.8, columns=len(runs), rows=2)
-    for column, (group, seed) in enumerate(runs):
-        chosen = extremes([row for row in store.group(group) if row.seed == seed])
-        for place in axes[:, column]:
-            place.set_axis_off()
-        for place, row, what in zip(axes[:, column], chosen, ("fittest", "least fit"), strict=False):
-            heights, inside = relief_heights(optics.Pupil(1.0, relief_of(row)))
-            shown = place.imshow(np.where(inside, heights, np.nan), origin="lower")
-            figure.colorbar(shown, ax=place, shrink=0.7)
-            place.set_title(
-                f"{group}, seed {seed}\n{what}: a = {row.relative_aperture:.2f}, n = {row.refractive_index:.2f}",
-                fontsize=7,
-            )
+    chosen = {run: extremes([row for row in store.group(run[0]) if row.seed == run[1]]) for run in runs}
+    maps = {(run, i): longer(row, store) for run, rows in chosen.items() for i, row in enumerate(rows)}
+    most = max((float(np.nanmax(one)) for one in maps.values()), default=1.0) or 1.0
+    for place in axes.flat:
+        place.set_axis_off()
+    for column, run in enumerate(runs):
+        for i, (row, what) in enumerate(zip(chosen[run], ("fittest", "least fit"), strict=False)):
+            shown = axes[i, column].imshow(maps[run, i], origin="lower", vmin=0, vmax=most)
+            title = f"{run[0]}, seed {run[1]}\n{what}: a = {row.relative_aperture:.2f}, n = {row.refractive_index:.2f}"
+            axes[i, column].set_title(title, fontsize=7)
+    if maps:
+        figure.colorbar(shown, ax=axes, shrink=0.7)
     save(figure, path)
+
+
+def longer(row: Row, store: Store) -> np.ndarray:
+    """Optical path through the relief less the least, over the pupil's square [µm]; NaN outside the pupil."""
+    unit = next((one.relief_height for one in store.conduct if one.group == row.group), 0.0)
+    heights, inside = relief_heights(optics.Pupil(1.0, relief_of(row)))
+    path = 1e6 * unit * (row.refractive_index - 1) * heights
+    return np.where(inside, path - path[inside].min(), np.nan)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Collect runs if asked, and make the page."""
-    return evolved.main(NAME, __doc__ or "", page, arguments)
+    return evolved.main(NAME, __doc__ or "", page, arguments, QUANTITIES)
 
 
 if __name__ == "__main__":

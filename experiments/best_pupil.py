@@ -18,19 +18,21 @@ from numpy.typing import NDArray
 import optics
 from evolve.analysis import polychromatic
 from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
-from experiments.store import Origin, read_rows, write_rows
+from experiments.store import DATA, Origin, read_rows, write_rows
 from sim import materials
 
 __all__ = ["Row", "best", "computed", "measures"]
 
 Floats = NDArray[np.float64]
+MEASURES = ("contrast", "stripes", "bits", "image_quality")
 PUPILS = ("hole", "lens")
 APERTURES = tuple(np.geomspace(0.04, 1.0, 29).tolist())
-NOISES = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05)
-MEASURES = ("image_quality", "contrast", "bits")
+STORED = Path(__file__).parents[1] / DATA / "best_pupil.csv"
+NOISES = (0.0003, 0.001, 0.003, 0.005, 0.01, 0.02, 0.05)
 RESOLUTION, FOV_DEG = 15, 45.0
 SCENE = (materials.WHITE - materials.BLACK) / 2  # standard deviation of the signal of black and white stripes
 GREEN = 550e-9
+ZERO = 0.25  # an MTF that dips below it has one there: averaged over directions, its dips do not reach 0
 COLORS = {"hole": "#D55E00", "lens": "#0072B2"}
 
 
@@ -44,6 +46,7 @@ class Row:
     image_quality: float
     contrast: float
     bits: float
+    stripes: float
 
 
 def eye(pupil: str, aperture: float) -> optics.Eye:
@@ -72,6 +75,15 @@ def measures(contrasts: Floats, throughput: float, noise_sigma: float) -> tuple[
     return throughput * above, above, bits
 
 
+def stripes(contrasts: Floats, throughput: float) -> float:
+    """T MTF at half the receptors' Nyquist frequency: what stripes two receptors wide leave in the signals, whatever
+    the noise; 0 beyond the MTF's first zero, where they are seen reversed or not at all."""
+    falls, rises = np.diff(contrasts)[:-1] < 0, np.diff(contrasts)[1:] >= 0
+    zeros = np.flatnonzero(falls & rises & (contrasts[1:-1] < ZERO)) + 1
+    middle = (contrasts.size - 1) // 2
+    return 0.0 if zeros.size and zeros[0] < middle else throughput * float(contrasts[middle])
+
+
 def contrast_of(seen: optics.Eye) -> Floats:
     """MTF in white daylight at 257 frequencies up to the retina's Nyquist frequency."""
     white = polychromatic(seen, seen.psf())
@@ -86,7 +98,8 @@ def computed(apertures: Sequence[float] = APERTURES, noises: Sequence[float] = N
         for aperture in apertures:
             seen = eye(pupil, aperture)
             contrasts, light = contrast_of(seen), float(seen.throughput)
-            rows += [Row(pupil, aperture, sigma, *measures(contrasts, light, sigma)) for sigma in noises]
+            seen_stripes = stripes(contrasts, light)
+            rows += [Row(pupil, aperture, s, *measures(contrasts, light, s), seen_stripes) for s in noises]
     return rows
 
 
@@ -113,11 +126,8 @@ def page(rows: Sequence[Row], origin: Origin) -> Page:
     """The page of the stored numbers."""
     noises = sorted({row.noise_sigma for row in rows})
     open_best = [best(rows, "hole", sigma, "contrast") for sigma in noises]
-    cells = [
-        [f"{s:g}", *(_shown(best(rows, p, s, m)) for p in PUPILS for m in ("contrast", "bits", "image_quality"))]
-        for s in noises
-    ]
-    header = ["noise σ", *(f"{p}: {m}" for p in PUPILS for m in ("contrast", "bits", "image quality"))]
+    cells = [[f"{s:g}", *(_shown(best(rows, p, s, m)) for p in PUPILS for m in MEASURES)] for s in noises]
+    header = ["noise σ", *(f"{p}: {m.replace('_', ' ')}" for p in PUPILS for m in MEASURES)]
     return Page(
         name="best_pupil",
         title="The best pupil: sharpness against light",
@@ -129,17 +139,19 @@ def page(rows: Sequence[Row], origin: Origin) -> Page:
             f"It depends on what reads the retina. By contrast above the noise a hole is best at a = "
             f"{_shown(open_best[0])} where σ = {noises[0]:g} and at {open_best[-1]:.2f} where σ = {noises[-1]:g}; at "
             f"the default σ = 0.01 at {_shown(best(rows, 'hole', 0.01, 'contrast'))}. With little noise that is near "
-            f"Rayleigh's sharpest pinhole, a = {rayleigh():.2f}; noise opens it. But a hole that opens takes hardly "
-            "any signal away: contrast falls, light grows faster. A brain that could undo the blur would open the "
-            "pupil wide, by bits in all cases; and so would one that follows image quality as `optics.image_quality` "
-            "has it, contrast times throughput. If evolution's pupils close, it is because the brains that it gets "
-            "cannot do that. With a lens in focus the widest pupil is best by every measure."
+            f"Rayleigh's sharpest pinhole, a = {rayleigh():.2f}; noise opens it. Stripes of one width leave most in "
+            f"the signals where they are neither dark nor blurred, a = {_shown(best(rows, 'hole', 0.01, 'stripes'))} "
+            "for those two receptors wide, whatever the noise. By bits, in which structures that are seen reversed "
+            "count as well as others, and by image quality as `optics.image_quality` has it, contrast times "
+            "throughput, the widest hole that was tried is best at every noise: what a brain is worth that undoes the "
+            "blur. With a lens in focus the widest pupil is best by every measure."
         ),
         method=(
             f"Eyes 200 µm wide, {FOV_DEG:g}°, {RESOLUTION} x {RESOLUTION} receptors, in white daylight; hole and ideal "
             "lens; exact wave optics. σ is a receptor's noise in units of what white gives at a = 1. With f in units "
             "of the receptors' Nyquist frequency and T = a²: *contrast* is C = ∫ max(MTF - σ/T, 0) df; *image quality* "
-            "is T C; *bits* per receptor are what noise leaves of a scene of black and white stripes "
+            "is T C; *stripes* are T MTF at half that frequency, up to the MTF's first zero; *bits* per receptor are "
+            "what noise leaves of a scene of black and white stripes "
             f"(reflectances {materials.BLACK:g} and {materials.WHITE:g}) of all frequencies alike, "
             "(π/2) ∫ ½ log2(1 + (c T MTF / σ)²) f df with c half their difference (Snyder, Laughlin and Stavenga "
             f"1977). {len({row.relative_aperture for row in rows})} apertures, optima by parabolas."

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from experiments import evolved
 from experiments.candidates import Row
-from experiments.evolved import Store
+from experiments.evolved import Store, conduct_table
 from experiments.means import Interval
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 
@@ -41,7 +41,9 @@ class PowerLaw:
 
 def error(row: Row) -> float:
     """Share of episodes in which the goal did not come first, (k + 1/2) / (n + 1), so that no error has no logarithm
-    (Jeffreys' mean)."""
+    (Jeffreys' mean). In a maze, whose goal nobody reaches: the share of a full return that was missed."""
+    if math.isfinite(row.full_return):
+        return 1 - row.fitness / row.full_return
     return ((1 - row.success_rate) * row.episodes + 0.5) / (row.episodes + 1)
 
 
@@ -51,11 +53,14 @@ def size(row: Row) -> float:
 
 
 def fitted(rows: Sequence[Row], seed: int = 0) -> PowerLaw:
-    """Least squares in logarithms, with a bootstrap over candidates; raises ValueError with fewer than three sizes."""
+    """Least squares in logarithms, with a bootstrap over candidates; raises ValueError with fewer than three sizes, and
+    where all errors are the same."""
     x = np.log([size(row) / 1e4 for row in rows])
     y = np.log([error(row) for row in rows])
     if np.unique(x).size < 3:
         raise ValueError("a power law needs candidates of at least three sizes")
+    if np.ptp(y) < 1e-9:
+        raise ValueError("errors that are all the same have no power law")
     slope, offset = np.polyfit(x, y, 1)
     chance = np.random.default_rng(seed)
     slopes = []
@@ -85,18 +90,20 @@ def page(store: Store) -> Page:
         answer=store.answer,
         method=(
             "Candidates are spread evenly over receptors, memory and neurons, each trained once from its own seed. "
-            "Error: the share of evaluation episodes in which the goal did not come first. Power laws by least "
+            "Error: the share of evaluation episodes in which the goal did not come first; in navigation, where within "
+            "such budgets it is never reached, the share that is missing of what a straight way to it without any "
+            "contact would return. Power laws by least "
             "squares in logarithms; 95 % intervals by a bootstrap over candidates. Parameters are all of a policy's, "
             "critic included. The best of an acuity is the mean of its best quarter, which bounds what brains add."
         ),
         command=(
             "evolve run --preset scaling\n"
             "evolve run tracking --preset scaling\n"
-            "evolve run navigation --preset scaling --set learning.total_steps=600_000\n"
+            "evolve run navigation --preset scaling\n"
             "python -m experiments.brains_and_acuity --runs detection=DIR navigation=DIR tracking=DIR"
         ),
         figures=[Figure(NAME, lambda path: draw(store, path), "Each dot is a candidate, darker for finer acuity.")],
-        tables=[exponents(store), ceilings(store)],
+        tables=[exponents(store), ceilings(store), conduct_table(store)],
         origin=store.origin,
     )
 
@@ -106,10 +113,18 @@ def exponents(store: Store) -> str:
     lines = []
     for group in store.groups:
         rows = trained(store, group)
-        law = fitted(rows)
-        published = f"{PUBLISHED[group]:g}" if group in PUBLISHED else "-"
-        lines.append([group, str(len(rows)), str(law.exponent), published, f"{law.explained:.2f}"])
+        law, published = _law(rows), f"{PUBLISHED[group]:g}" if group in PUBLISHED else "-"
+        exponent, explained = ("-", "-") if law is None else (str(law.exponent), f"{law.explained:.2f}")
+        lines.append([group, str(len(rows)), exponent, published, explained])
     return markdown_table(["task", "candidates", "exponent", "published", "variance explained"], lines)
+
+
+def _law(rows: Sequence[Row]) -> PowerLaw | None:
+    """The fitted power law; None where there is none."""
+    try:
+        return fitted(rows)
+    except ValueError:
+        return None
 
 
 def ceilings(store: Store) -> str:
@@ -135,10 +150,10 @@ def draw(store: Store, path: Path) -> None:
         ranks = np.argsort(np.argsort([row.cpd for row in rows])) / max(len(rows) - 1, 1)
         for row, rank in zip(rows, ranks, strict=True):
             place.loglog(size(row), error(row), "o", color=color, alpha=0.2 + 0.75 * rank, ms=5, mec="none")
-        law = fitted(rows)
-        ends = np.array([min(map(size, rows)), max(map(size, rows))])
-        place.loglog(ends, law.scale * (ends / 1e4) ** -law.exponent.mean, color="#222222", lw=1.2)
-        place.set_title(f"{group}: exponent {law.exponent}", fontsize=10)
+        if (law := _law(rows)) is not None:
+            ends = np.array([min(map(size, rows)), max(map(size, rows))])
+            place.loglog(ends, law.scale * (ends / 1e4) ** -law.exponent.mean, color="#222222", lw=1.2)
+        place.set_title(f"{group}: exponent {'-' if law is None else law.exponent}", fontsize=10)
         place.set_xlabel("acuity x parameters x memory")
     axes[0, 0].set_ylabel("error")
     save(figure, path)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
+
+import numpy as np
 
 import optics
 from evolve.analysis import acuity_cpd, polychromatic, succeeded
@@ -16,6 +18,8 @@ from evolve.policy import PolicyConfig, build_policy, learnt
 from evolve.store import Run
 from evolve.vision import vision
 from experiments.best_pupil import contrast_of, measures
+from sim.reward import EVALUATION
+from sim.world import build_world
 
 __all__ = ["NO_NUMBER", "Row", "anatomy", "complete", "parameters", "rows_of"]
 
@@ -30,7 +34,8 @@ class Row:
     phase        how many times genes have been opened, 0 in the first generation
     episodes     played after training; fitness and success rate are their means
     parameters   of its trained policy, critic included
-    above_noise  contrast above the noise; see experiments.best_pupil
+    full_return  of an episode straight to the goal without any contact; NaN where there is always another goal
+    above_noise  contrast above the noise; see experiments.best_pupil. of_hole: of the same pupil without its relief
     relief       heights in [0, 1], row by row, of an eye with optics
     peaks_nm     of the pigments, of an eye that inherits them
     """
@@ -57,11 +62,13 @@ class Row:
     refractive_index: float = NO_NUMBER
     image_quality: float = NO_NUMBER
     above_noise: float = NO_NUMBER
+    above_noise_of_hole: float = NO_NUMBER
     strehl: float = NO_NUMBER
     psnr_db: float = NO_NUMBER
     ssim: float = NO_NUMBER
     relief: str = ""
     peaks_nm: str = ""
+    full_return: float = NO_NUMBER
 
 
 def rows_of(run: Run, group: str) -> list[Row]:
@@ -98,9 +105,23 @@ def _row(run: Run, group: str, candidate: Candidate, champion: bool) -> Row:
         success_rate=candidate.success_rate,
         episodes=len(candidate.returns),
         parameters=parameters(PolicyConfig(shape, animal.neurons, animal.layers)),
+        full_return=full_return(config.task),
         **anatomy(animal),
         **(_seen(config, animal) if champion and animal.relative_aperture is not None else {}),
     )
+
+
+@cache
+def full_return(task: str) -> float:
+    """Fitness of who goes from start to goal in a straight line, on average over the starts; NaN where a goal that was
+    reached is followed by another one."""
+    world = build_world(task)
+    if world.goal_region is None:
+        return NO_NUMBER
+    low, high = np.reshape(world.goal_region, (2, 2))
+    nearest = np.clip(world.agent_spawn, low, high)
+    distance = float(np.linalg.norm(nearest - world.agent_spawn, axis=1).mean())
+    return EVALUATION.progress * distance + EVALUATION.goal
 
 
 def anatomy(animal: Phenotype) -> dict[str, Any]:
@@ -127,13 +148,17 @@ def _seen(config: RunConfig, animal: Phenotype) -> dict[str, Any]:
     eye = animal.eyes(config.eye).eye()
     try:
         white = polychromatic(eye, eye.psf())
-        above = measures(contrast_of(eye), float(eye.throughput), max(eye.noise_sigma, 1e-9))[1]
+        hole = replace(eye, pupil=optics.Pupil(eye.pupil.aperture_radius, aperture=eye.pupil.aperture))
+        above, above_of_hole = (
+            measures(contrast_of(one), float(one.throughput), max(one.noise_sigma, 1e-9))[1] for one in (eye, hole)
+        )
     except optics.AccuracyError:
         return {}
     looked = vision(animal, config)
     return {
         "image_quality": looked.image_quality,
         "above_noise": above,
+        "above_noise_of_hole": above_of_hole,
         "strehl": float(optics.strehl_ratio(white)[0]),
         "psnr_db": looked.psnr_db,
         "ssim": looked.ssim,

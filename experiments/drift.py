@@ -30,7 +30,7 @@ FIRST_SEED = 10_000  # none that anybody takes for a run
 @dataclass(frozen=True)
 class Drift:
     """Mean of a quantity over the candidates of a generation, or of the last ones (END): median over searches, and
-    the range of 95 % of them."""
+    the range of 95 % of them; of the END, what every search came to."""
 
     group: str
     quantity: str
@@ -38,11 +38,19 @@ class Drift:
     low: float
     median: float
     high: float
+    ends: str = ""
 
     @property
     def held(self) -> bool:
         """Nothing moves it: its gene is closed."""
         return self.low == self.high
+
+    def as_far(self, value: float) -> float:
+        """Share of searches that came at least as far from the middle, on whichever side (two-sided, the one that is
+        asked about counted as one of them: Davison and Hinkley 1997, §4.2)."""
+        ends = np.array(self.ends.split(), float)
+        fewer = min((ends <= value).sum(), (ends >= value).sum())
+        return min(1.0, 2 * (float(fewer) + 1) / (ends.size + 1))
 
     def __str__(self) -> str:
         return f"held at {self.median:.3g}" if self.held else f"{self.median:.3g} [{self.low:.3g}, {self.high:.3g}]"
@@ -57,13 +65,16 @@ def drifted(config: RunConfig, group: str, quantities: Mapping[str, Callable[[Ro
         mine = means[:, place]
         if np.isfinite(mine).any(axis=0).all():
             rows += [_drift(group, name, generation, mine[:, generation]) for generation in range(mine.shape[1])]
-            rows.append(_drift(group, name, END, np.nanmean(mine[:, -LAST:], axis=1)))
+            late = mine[:, -LAST:]
+            ends = np.nanmean(late[np.isfinite(late).any(axis=1)], axis=1)
+            rows.append(replace(_drift(group, name, END, ends), ends=" ".join(f"{end:.4g}" for end in ends)))
     return rows
 
 
-def of_the_end(drift: list[Drift]) -> Drift | None:
-    """That of the last generations together; None where there is none."""
-    return next((one for one in drift if one.generation == END), None)
+def of_the_end(drift: list[Drift], before: int | None = None) -> Drift | None:
+    """That of the last generations together, or of the last one before a generation; None where there is none."""
+    wanted = END if before is None else before - 1
+    return next((one for one in drift if one.generation == wanted), None)
 
 
 def shade(axes: Any, drift: list[Drift], color: str) -> None:

@@ -12,11 +12,12 @@ from evolve.files import write_whole
 from evolve.store import Run, RunError
 from evolve.versions import commits, recorded
 from experiments.candidates import Row, complete, rows_of
-from experiments.drift import Drift, drifted
+from experiments.drift import Drift, drifted, of_the_end
+from experiments.means import last_mean
 from experiments.page import Page, markdown_table, parser
 from experiments.store import Origin, read_rows, write_rows
 
-__all__ = ["Conduct", "Quantities", "Store", "conduct_table", "main"]
+__all__ = ["Conduct", "Quantities", "Store", "conduct_table", "luck_table", "main"]
 
 Quantities = Mapping[str, Callable[[Row], float]]  # of which it is asked what chance alone makes
 NOT_JUDGED = "Not judged yet."
@@ -28,6 +29,7 @@ class Conduct:
 
     generations, planned  complete ones, and how many there were to be
     commits               of rhabdom, with which it was begun and continued, first digits
+    noise_sigma           of its receptors · relief_height [m]: what a relief gene of 1 means
     """
 
     group: str
@@ -37,13 +39,16 @@ class Conduct:
     planned: int
     core_hours: float
     commits: str
+    noise_sigma: float
+    relief_height: float
 
     @classmethod
     def of(cls, run: Run, group: str) -> Conduct:
         done, hours = complete(run), sum(candidate.seconds for candidate in run.candidates) / 3600
         by = ", ".join(commit[:7] for commit in commits(run.path))
-        planned = run.config.search.generations
-        return cls(group, run.config.seed, len(run.candidates), len(done), planned, hours, by)
+        config, eye = run.config, run.config.eye
+        counts = (len(run.candidates), len(done), config.search.generations)
+        return cls(group, config.seed, *counts, hours, by, eye.noise_sigma, eye.relief_height)
 
 
 @dataclass(frozen=True)
@@ -82,6 +87,24 @@ def conduct_table(store: Store) -> str:
         for one in store.conduct
     ]
     return markdown_table(header, lines)
+
+
+def luck_table(store: Store, quantities: Quantities) -> str:
+    """A row per run: the share of searches by luck alone that came as far."""
+    names = [n for n in quantities if any(end and not end.held for end in (_end(store, g, n) for g in store.groups))]
+    lines = []
+    for one in store.conduct:
+        rows = [row for row in store.group(one.group) if row.seed == one.seed]
+        line = [f"{one.group}, seed {one.seed}"]
+        for name in names:
+            found, end = last_mean(rows, quantities[name]), _end(store, one.group, name)
+            line.append("-" if found is None or end is None or end.held else f"{end.as_far(found.mean):.2g}")
+        lines.append(line)
+    return markdown_table(["share of searches by chance that came as far", *names], lines)
+
+
+def _end(store: Store, group: str, quantity: str) -> Drift | None:
+    return of_the_end(store.chance(group, quantity))
 
 
 def main(

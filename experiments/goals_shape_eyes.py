@@ -12,7 +12,7 @@ from pathlib import Path
 from experiments import evolved
 from experiments.candidates import Row
 from experiments.drift import SEEDS, of_the_end, shade
-from experiments.evolved import Store, conduct_table
+from experiments.evolved import Store, conduct_table, luck_table
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 
@@ -66,7 +66,7 @@ def page(store: Store) -> Page:
                 NAME, lambda path: draw(store, path), f"Generation by generation: {_legend(store)}. Shaded: by chance."
             ),
         ],
-        tables=[table(store), "Every seed:", seeds_table(store), conduct_table(store)],
+        tables=[table(store), "Every seed:", seeds_table(store), luck_table(store, QUANTITIES), conduct_table(store)],
         origin=store.origin,
     )
 

@@ -17,7 +17,8 @@ import scipy.stats
 import optics
 from experiments import evolved
 from experiments.candidates import NO_NUMBER, Row
-from experiments.evolved import Store
+from experiments.drift import SEEDS, of_the_end, shade
+from experiments.evolved import Store, conduct_table, luck_table
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from sim.tasks.foraging import ULTRAVIOLET, petal
@@ -90,7 +91,8 @@ def page(store: Store) -> Page:
             "weak band in the ultraviolet (Govardovskii et al. 2000), so that even the first eyes are not quite blind "
             "to it. Lines are means over the candidates of a generation, one per seed; the table compares the first "
             f"generation's with the last {LAST} generations', over all seeds, with 95 % intervals by a bootstrap over "
-            "seeds and candidates."
+            "seeds and candidates; with two seeds they are too narrow, and hardly more than the range of the seeds. By "
+            f"chance: the median and the range of 95 % of {SEEDS} searches that were told random numbers as fitness."
         ),
         command=(
             "evolve run --preset ultraviolet --seed 0    # and others\n"
@@ -99,25 +101,31 @@ def page(store: Store) -> Page:
         figures=[
             Figure(
                 NAME,
-                lambda path: draw(store.rows, path),
+                lambda path: draw(store, path),
                 "Violet: the type with the shortest peak; orange: the one with the longest. All seeds are shown. "
-                "Shaded: where goal and adversaries reflect differently; dotted: chance, one goal among three objects.",
+                "Band: where goal and adversaries reflect differently; shaded: where luck leads the types; dotted: "
+                "one goal among three objects.",
             )
         ],
         tables=[
-            table(store.rows),
+            table(store),
             f"By shortest peak, all candidates (rank correlation with fitness {rank_correlation(store.rows):.2f}):",
             table_by_peak(store.rows),
+            luck_table(store, QUANTITIES),
+            conduct_table(store),
         ],
         origin=store.origin,
     )
 
 
-def table(rows: Sequence[Row]) -> str:
-    """First generation and last ones."""
-    first = [row for row in rows if row.generation == 0]
-    header = ["mean", "first generation", f"last {LAST} generations"]
-    lines = [[name, str(last_mean(first, value)), str(last_mean(rows, value))] for name, value in QUANTITIES.items()]
+def table(store: Store) -> str:
+    """First generation and last ones, and what chance would have made of these."""
+    first = [row for row in store.rows if row.generation == 0]
+    header = ["mean", "first generation", f"last {LAST} generations", "by chance"]
+    lines = []
+    for name, value in QUANTITIES.items():
+        chance = of_the_end(store.chance(store.groups[0], name))
+        lines.append([name, str(last_mean(first, value)), str(last_mean(store.rows, value)), str(chance or "")])
     return markdown_table(header, lines)
 
 
@@ -138,13 +146,16 @@ def table_by_peak(rows: Sequence[Row]) -> str:
     return markdown_table(["shortest peak", "candidates", "goal first", "fitness"], lines)
 
 
-def draw(rows: Sequence[Row], path: Path) -> None:
+def draw(store: Store, path: Path) -> None:
     """What can be seen where, where the pigments went, and what it was good for."""
+    rows = store.rows
     figure, axes = new_figure(11, 3.4, columns=3)
     seen, moved, worth = axes[0]
     nm = np.linspace(330, 650, 65)
     seen.semilogy(nm, [difference(float(peak)) for peak in nm], color="#222222", lw=1.2)
     seen.set(xlabel="peak of the pigment [nm]", title="difference of goal and adversary")
+    for name, color in zip(QUANTITIES, (SHORTEST, LONGEST), strict=False):
+        shade(moved, store.chance(store.groups[0], name), color)
     for seed in sorted({row.seed for row in rows}):
         mine = [row for row in rows if row.seed == seed]
         last = [row for row in mine if row.generation > max(r.generation for r in mine) - LAST]
@@ -162,7 +173,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Collect runs if asked, and make the page."""
-    return evolved.main(NAME, __doc__ or "", page, arguments)
+    return evolved.main(NAME, __doc__ or "", page, arguments, QUANTITIES)
 
 
 if __name__ == "__main__":

@@ -81,13 +81,14 @@ def test_lens_opens_the_pupil_first_and_then_what_bends_light(scale):
     assert first == 0
     assert open_in(config, second - 1) == {"relative_aperture"}
     joined = open_in(config, second) - {"relative_aperture"}
-    assert joined == {"refractive_index", *(f"doe_{i}{j}" for i in range(4) for j in range(4))}
+    assert joined == {"refractive_index", *(name for name in config.genome if name.startswith("doe_"))}
+    assert len(joined) == 1 + (3 if scale == "laptop" else 16), "on a laptop reliefs are symmetric"
     assert second < config.search.generations / 2, "the harder phase has more time"
 
 
-@pytest.mark.parametrize(("index", "aperture"), [(1.5, 0.27), (2.0, 0.38)])
+@pytest.mark.parametrize(("index", "aperture"), [(1.5, 0.38), (2.0, 0.54)])
 def test_a_lens_in_focus_is_within_reach_of_the_lens_presets_genes(index, aperture):
-    """Up to the apertures that the preset names, and hardly beyond: control points span 16 R² / (4 f (n - 1))."""
+    """Also behind wider pupils than the best hole, and hardly beyond these: control points span 16 R² / (4 f (n - 1))."""
     config = assemble(preset="lens")
     eye = animal(config).eyes(config.eye).eye()
     focal_length = eye.sensor_distance
@@ -131,7 +132,7 @@ def test_scales_that_do_not_exist_are_refused():
 
 
 def test_contradiction_with_a_scale_names_it():
-    with pytest.raises(ConfigError, match="opens_at = 5: must be below") as caught:
+    with pytest.raises(ConfigError, match="opens_at = 8: must be below") as caught:
         assemble(preset="lens", assignments=["search.generations=4"])
     assert str(caught.value).endswith("(preset lens on laptop scale; --set search.generations=4)")
 

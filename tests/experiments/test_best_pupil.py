@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.best_pupil import SCENE, Row, best, computed, measures, page, rayleigh
+from experiments.best_pupil import RESOLUTION, SCENE, Row, best, computed, measures, page, rayleigh
 from experiments.store import Origin, read_rows
 from optics import backend
 
@@ -28,7 +28,7 @@ def test_contrast_below_the_noise_counts_for_nothing():
 
 def test_optimum_is_that_of_the_parabola():
     apertures = np.geomspace(0.05, 0.5, 8)
-    rows = [Row("hole", a, 0.01, 0.0, 1 - np.log(a / 0.21) ** 2, a) for a in apertures]
+    rows = [Row("hole", a, 0.01, 0.0, 1 - np.log(a / 0.21) ** 2, a, 0.0) for a in apertures]
     assert best(rows, "hole", 0.01, "contrast") == pytest.approx(0.21)
     assert best(rows, "hole", 0.01, "bits") == 0.5, "at the end of what was tried"
 
@@ -40,6 +40,20 @@ def test_with_little_noise_the_best_hole_is_rayleighs_pinhole():
     rows = computed(tuple(np.geomspace(0.07, 0.2, 6)), (0.001,))
     assert best(rows, "hole", 0.001, "contrast") == pytest.approx(rayleigh(), rel=0.15)
     assert best(rows, "lens", 0.001, "contrast") == pytest.approx(0.2), "a lens gains by every opening"
+
+
+def test_stripes_are_seen_best_where_a_disk_of_blur_takes_least():
+    """Behind a hole light falls on a disk as wide as the hole: T MTF = a² 2 J1(x) / x with x = π a L f is greatest at
+    J0's first zero. Of a hole of three Fresnel zones the disk is brighter in its middle, hence 8 %; contrast above the
+    noise peaks at half that width or at twice it."""
+    backend.require()
+    rows = computed(tuple(np.geomspace(0.1, 0.9, 23)), (0.01,))
+    frequency = RESOLUTION / 4  # half of Nyquist's, per width of the retina
+    assert best(rows, "hole", 0.01, "stripes") == pytest.approx(2.405 / (np.pi * frequency), rel=0.08)
+    beyond = [row.stripes for row in rows if row.pupil == "hole" and row.relative_aperture > 4.2 / (np.pi * frequency)]
+    assert beyond
+    assert max(beyond) == 0.0, "reversed"
+    assert best(rows, "lens", 0.01, "stripes") == pytest.approx(0.9)
 
 
 def test_page_is_what_its_store_says():

@@ -16,7 +16,10 @@ from evolve.policy import PolicyConfig, build_policy, save_policy
 from evolve.report.eye_figures import relief_heights
 from evolve.store import Run
 from experiments import bending_light, brains_and_acuity, goals_shape_eyes
-from experiments.evolved import Row, Store, last_mean, main, parameters, rows_of
+from experiments.candidates import Row, full_return, parameters, rows_of
+from experiments.drift import END, drifted
+from experiments.evolved import Conduct, Store, main
+from experiments.means import last_mean
 from experiments.store import Origin, write_rows
 from optics import Pupil, backend
 
@@ -61,7 +64,7 @@ def test_parameters_are_those_of_a_stored_policy(tmp_path):
 def test_candidates_with_more_receptors_have_more_parameters(tmp_path):
     wider = (*SMALL, "genome.resolution_width.start=9")
     small, large = (
-        rows_of(run_of(tmp_path / name, "bifurcation-detection", settings, (1.0,)), "detection")[0].parameters
+        rows_of(run_of(tmp_path / name, "bifurcation-detection", settings, (1.0, 1.0)), "detection")[0].parameters
         for name, settings in (("small", SMALL), ("large", wider))
     )
     assert 0 < small < large
@@ -75,6 +78,7 @@ def test_the_best_of_each_generation_is_looked_through(tmp_path):
     assert [row.phase for row in rows] == [0, 0, 1, 1]
     best = rows[1]
     assert 0 < best.image_quality < best.above_noise < 1
+    assert best.above_noise == pytest.approx(best.above_noise_of_hole, rel=0.05), "a relief that is nearly flat"
     assert len(best.relief.split()) == 16
 
 
@@ -110,6 +114,80 @@ def test_power_law_is_found():
         brains_and_acuity.fitted([with_error(0.3, 1000)] * 5)
 
 
+def test_errors_that_do_not_vary_have_no_power_law():
+    rows = [with_error(0.9, size) for size in (1000, 5000, 20_000)]
+    with pytest.raises(ValueError, match="all the same"):
+        brains_and_acuity.fitted(rows)
+    store = Store([replace(row, group="navigation") for row in rows], [], [], Origin.here(1.0), "")
+    assert "| navigation | 3 | - | 0.69 | - |" in brains_and_acuity.exponents(store)
+
+
+def test_in_a_maze_what_is_missing_of_a_full_return_is_the_error():
+    """Straight ways of 63 to 67 m at 1.5 per metre, and 10 for the goal."""
+    full = full_return("navigation")
+    assert 1.5 * 63 + 10 < full < 1.5 * 67 + 10
+    assert math.isnan(full_return("detection"))
+    row = replace(ROW, full_return=full, fitness=0.25 * full, success_rate=0.0)
+    assert brains_and_acuity.error(row) == pytest.approx(0.75)
+
+
+def test_unfinished_generations_do_not_count(tmp_path):
+    rows = rows_of(run_of(tmp_path / "run", "bifurcation-detection", SMALL, (1.0, 2.0, 30.0)), "detection")
+    assert [row.generation for row in rows] == [0, 0]
+    steady = (*SMALL, "search.steady_state=true")
+    rows = rows_of(run_of(tmp_path / "steady", "bifurcation-detection", steady, (1.0, 2.0, 30.0)), "detection")
+    assert len(rows) == 3, "one by one, candidates are of no generation"
+
+
+def test_chance_moves_genes_that_are_open_and_no_others():
+    config = assemble("navigation", "bifurcation-navigation", assignments=("search.generations=4",))
+    quantities = {"fov": lambda row: row.fov_deg, "up": lambda row: row.height, "fitness": lambda row: row.fitness}
+    drift = drifted(config, "navigation", quantities)
+    assert {one.quantity for one in drift} == {"fov", "up"}, "nobody lived"
+    fov = [one for one in drift if one.quantity == "fov"]
+    assert [one.generation for one in fov] == [0, 1, 2, 3, END]
+    assert all(one.low < one.median < one.high for one in fov)
+    assert fov[0].high - fov[0].low < fov[3].high - fov[3].low, "searches part"
+    assert fov[0].low < 45 < fov[0].high, "from the same start"
+    held = [one for one in drift if one.quantity == "up"]
+    assert all(one.held for one in held)
+    assert str(held[-1]) == "held at 1"
+
+
+def test_runs_of_one_group_differ_in_their_seeds_alone(tmp_path, capsys):
+    for name, settings in (("a", ()), ("b", ("seed=1", "workers=2")), ("c", ("eye.noise_sigma=0.02",))):
+        run_of(tmp_path / name, "bifurcation-detection", (*SMALL, *settings), (1.0, 2.0))
+    collect = ["--docs", str(tmp_path / "docs"), "--runs", f"detection={tmp_path / 'a'}"]
+    assert goals_shape_eyes.main([*collect, f"detection={tmp_path / 'b'}"]) == 0
+    text = (tmp_path / "docs/goals_shape_eyes.md").read_text()
+    assert "| detection, seed 1 | 2 | 1 of 2 | 0.0 |" in text
+    assert goals_shape_eyes.main([*collect, f"detection={tmp_path / 'c'}"]) == 2
+    assert "has other settings than the last run of group 'detection'" in capsys.readouterr().err
+
+
+def test_an_answer_does_not_outlive_its_numbers(tmp_path):
+    run_of(tmp_path / "a", "bifurcation-detection", SMALL, (1.0, 2.0))
+    run_of(tmp_path / "b", "bifurcation-detection", SMALL, (1.0, 3.0))
+    page = ["--docs", str(tmp_path / "docs")]
+    assert goals_shape_eyes.main([*page, "--runs", f"detection={tmp_path / 'a'}", "--answer", "Yes."]) == 0
+    assert goals_shape_eyes.main([*page, "--runs", f"detection={tmp_path / 'a'}"]) == 0
+    assert "**Answer.** Yes." in (tmp_path / "docs/goals_shape_eyes.md").read_text()
+    assert goals_shape_eyes.main([*page, "--runs", f"detection={tmp_path / 'b'}"]) == 0
+    assert "**Answer.** Not judged yet." in (tmp_path / "docs/goals_shape_eyes.md").read_text()
+
+
+def test_variants_are_compared_at_the_same_generations(tmp_path):
+    """A control without a second phase has no first one that lasts as long as both."""
+    rows = [
+        replace(ROW, group=group, generation=g, phase=int(group == "lens" and g >= 4), relative_aperture=1 - 0.1 * g)
+        for group in ("lens", "index1") for g in range(8)
+    ]  # fmt: skip
+    store = Store(rows, [], [], Origin.here(1.0), "")
+    for phase, mean in ((0, 0.8), (1, 0.4)):
+        line = next(x for x in bending_light.table(store, phase).splitlines() if x.startswith("| relative aperture"))
+        assert [float(cell.split()[0]) for cell in line.split("|")[2:6:2]] == pytest.approx([mean, mean])
+
+
 def test_no_error_still_has_a_logarithm():
     assert brains_and_acuity.error(replace(ROW, success_rate=1.0, episodes=4)) == pytest.approx(0.1)
 
@@ -129,7 +207,14 @@ def test_reliefs_of_any_number_of_genes_are_drawn(tmp_path, side):
     assert (np.diff(heights, axis=0) > 0).all()
     assert heights.mean() == pytest.approx(0.5)
     failed = [replace(ROW, failed=1, relief="0.5 " * 16, seed=1)]
-    store = Store([replace(ROW, relief=" ".join(map(str, rows))), *failed], Origin.here(1.0), "")
+    conduct = [Conduct("a", 0, 1, 1, 1, 1.0, "", 0.01, 1e-4)]
+    store = Store(
+        [replace(ROW, relief=" ".join(map(str, rows)), refractive_index=1.5), *failed],
+        conduct,
+        [],
+        Origin.here(1.0),
+        "",
+    )
     bending_light.draw_reliefs(store, tmp_path / "reliefs.png")
 
 
@@ -146,6 +231,9 @@ def test_pages_come_from_their_stores(experiment, tmp_path, capsys):
     ]  # fmt: skip
     stem = tmp_path / "data" / experiment.NAME
     write_rows(rows, stem.with_suffix(".csv"))
+    groups = [(group, seed) for group in ("navigation", "detection") for seed in (3, 4)]
+    runs = [Conduct(*run, 12, 4, 4, 1.0, "abc", 0.01, 1e-4) for run in groups]
+    write_rows(runs, stem.with_name(f"{stem.name}_runs.csv"))
     Origin.here(1.0).write(stem.with_suffix(".json"))
     assert experiment.main(["--docs", str(tmp_path), "--answer", "Partly, because nobody learnt."]) == 0
     assert experiment.main(["--docs", str(tmp_path)]) == 0, "the answer is kept"

@@ -5,12 +5,18 @@ from pathlib import Path
 import pytest
 
 from evolve.store import Run
-from experiments.evolved import Row, rows_of
+from experiments.candidates import Row, rows_of
 from experiments.store import read_rows, write_rows
 
 RESULTS = Path(__file__).parents[2] / "docs/results"
 RECORDS = sorted((RESULTS / "records").iterdir())
-PAGES = {"seeing_ultraviolet": {"foraging": ("ultraviolet-0", "ultraviolet-1")}}
+PAGES = {
+    "goals_shape_eyes": {
+        "navigation": ("navigation-0", "navigation-1"),
+        "detection": ("detection-0", "detection-1"),
+    },
+    "seeing_ultraviolet": {"foraging": ("ultraviolet-0", "ultraviolet-1")},
+}
 
 
 @pytest.mark.parametrize("record", RECORDS, ids=lambda path: path.name)

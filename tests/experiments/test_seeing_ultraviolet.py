@@ -10,7 +10,7 @@ from evolve.config_source import assemble
 from evolve.development import develop
 from evolve.genotype import Genotype
 from experiments import seeing_ultraviolet
-from experiments.evolved import Row
+from experiments.candidates import Row
 from experiments.seeing_ultraviolet import contrast, difference, peaks
 from experiments.store import Origin, write_rows
 from optics.pigment import pigment_absorptance
