@@ -18,7 +18,7 @@ from evolve.genotype import Genotype
 from evolve.plan import idle_genes
 from evolve.search import Search
 
-EXPERIMENTS = ("bifurcation-detection", "bifurcation-navigation", "lens", "scaling", "ultraviolet")
+EXPERIMENTS = ("bifurcation-detection", "bifurcation-navigation", "lens", "pupil", "scaling", "ultraviolet")
 PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
 
 
@@ -99,6 +99,14 @@ def test_a_lens_in_focus_is_within_reach_of_the_lens_presets_genes(index, apertu
         return np.ptp(points) / config.eye.relief_height
 
     assert span(aperture) <= 1 < span(aperture + 0.015)
+
+
+def test_pupil_is_the_preset_lens_without_a_lens():
+    pupil, lens = assemble(preset="pupil"), assemble(preset="lens")
+    assert open_in(pupil, 0) == {"relative_aperture"}
+    assert replace(animal(pupil), relative_aperture=0.9, refractive_index=1.5) == animal(lens)
+    assert replace(pupil.eye, relief_symmetric=True) == lens.eye
+    assert pupil.learning == lens.learning
 
 
 def test_scaling_spreads_candidates_evenly():
