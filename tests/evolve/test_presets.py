@@ -127,7 +127,7 @@ def test_dry_run_predicts_hours(preset, scale, monkeypatch, capsys, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "--preset", preset, "--scale", scale, "--dry-run", "--json", "--workers", "2"]) == 0
     plan = json.loads(capsys.readouterr().out)
-    assert plan["hours"]["start"] > 1
+    assert plan["hours"]["start"] > 0.5
     assert plan["notes"] == []
     assert plan["directory"].startswith(f"runs/{plan['task']}-{preset.split('-')[0]}-")
 

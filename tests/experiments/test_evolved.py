@@ -15,7 +15,7 @@ from evolve.genotype import Genotype
 from evolve.policy import PolicyConfig, build_policy, save_policy
 from evolve.report.eye_figures import relief_heights
 from evolve.store import Run
-from experiments import bending_light, brains_and_acuity, goals_shape_eyes
+from experiments import bending_light, brains_and_acuity, goals_shape_eyes, learning_through_holes
 from experiments.candidates import Row, full_return, parameters, rows_of
 from experiments.drift import END, drifted
 from experiments.evolved import Conduct, Store, main
@@ -112,6 +112,33 @@ def test_power_law_is_found():
     assert law.explained == pytest.approx(1.0)
     with pytest.raises(ValueError, match="three sizes"):
         brains_and_acuity.fitted([with_error(0.3, 1000)] * 5)
+
+
+def through_holes(peak, noise, group="0.001"):
+    """Animals whose success falls off on both sides of a width, but for luck."""
+    chance = np.random.default_rng(1)
+    widths = np.exp(np.linspace(np.log(0.05), np.log(0.65), 40))
+    success = 0.3 + 0.5 * np.exp(-0.5 * (np.log(widths / peak) / 0.4) ** 2) + noise * chance.normal(size=40)
+    pairs = zip(widths, success, strict=True)
+    return [replace(ROW, group=group, relative_aperture=a, success_rate=float(np.clip(s, 0, 1))) for a, s in pairs]
+
+
+@pytest.mark.parametrize("peak", [0.12, 0.25])
+def test_the_best_width_is_found_with_an_interval_that_holds_it(peak):
+    found = learning_through_holes.best_width(through_holes(peak, 0.1))
+    assert found.low <= peak <= found.high
+    assert found.mean == pytest.approx(peak, rel=0.25)
+    sure = learning_through_holes.best_width(through_holes(peak, 0.0))
+    assert sure.mean == pytest.approx(peak, rel=0.05)
+    assert sure.high - sure.low < found.high - found.low
+
+
+def test_widths_are_held_against_what_is_predicted_for_their_noise():
+    rows = [*through_holes(0.2, 0.0), *through_holes(0.2, 0.0, "0.01")]
+    conduct = [Conduct(group, 0, 40, 5, 5, 1.0, "", float(group), 1e-4) for group in ("0.001", "0.01")]
+    bright, dark = learning_through_holes.table(Store(rows, conduct, [], Origin.here(1.0), "")).splitlines()[2:]
+    assert [cell.strip() for cell in bright.split("|")[4:6]] == ["0.11", "0.21"]
+    assert [cell.strip() for cell in dark.split("|")[4:6]] == ["0.21", "0.21"]
 
 
 def test_errors_that_do_not_vary_have_no_power_law():
@@ -218,7 +245,7 @@ def test_reliefs_of_any_number_of_genes_are_drawn(tmp_path, side):
     bending_light.draw_reliefs(store, tmp_path / "reliefs.png")
 
 
-@pytest.mark.parametrize("experiment", [goals_shape_eyes, bending_light, brains_and_acuity])
+@pytest.mark.parametrize("experiment", [goals_shape_eyes, bending_light, brains_and_acuity, learning_through_holes])
 def test_pages_come_from_their_stores(experiment, tmp_path, capsys):
     chance = np.random.default_rng(0)
     rows = [

@@ -1,0 +1,151 @@
+"""Learning through holes: how wide a pupil do animals learn best behind, and does light move it as optics predicts?
+
+python -m experiments.learning_through_holes [--runs NOISE=DIR ...] [--answer TEXT] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments import best_pupil, evolved
+from experiments.candidates import Row
+from experiments.evolved import Store, conduct_table
+from experiments.means import Interval
+from experiments.page import Figure, Page, markdown_table, new_figure, save
+from experiments.store import read_rows
+
+__all__ = ["best_width", "page", "smoothed"]
+
+NAME = "learning_through_holes"
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#B8568F", "#B59E00")
+MEASURES = ("contrast", "stripes")
+BANDWIDTH = 0.2  # of the smooth curve, in log a: a fifth of the width
+WIDTHS = np.geomspace(0.05, 0.65, 105)
+RESAMPLES = 2000
+BINS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65)
+CHANCE = 1 / 3
+Floats = NDArray[np.float64]
+
+
+def page(store: Store) -> Page:
+    """The page of stored runs. Raises ValueError with more groups than there are colours."""
+    if len(store.groups) > len(COLORS):
+        raise ValueError(f"{len(store.groups)} groups of runs, must be at most {len(COLORS)}: one colour each")
+    return Page(
+        name=NAME,
+        title="Learning through holes",
+        question=(
+            "How wide a hole do animals learn best behind, and does more light narrow it, as contrast above the noise "
+            "predicts, or not, as the signal of stripes does ([the best pupil](best_pupil.md))?"
+        ),
+        answer=store.answer,
+        method=(
+            "Two eyes of 15 x 15 receptors, 45° wide; every animal is trained once from its own seed, behind an open "
+            "hole of its own width. Lines: a mean of the animals with weights that fall with the distance in log a "
+            f"(Gaussian, {BANDWIDTH:g}); the best width is where that line peaks, with a 95 % interval by a bootstrap "
+            "over animals. Dotted: the goal comes first of three objects by luck."
+        ),
+        command=(
+            "evolve run --preset pupil\n"
+            "evolve run --preset pupil --set eye.noise_sigma=0.003    # and others\n"
+            f"python -m experiments.{NAME} --runs 0.001=DIR 0.003=DIR"
+        ),
+        figures=[Figure(NAME, lambda path: draw(store, path), f"Dots are animals; σ: {_legend(store)}.")],
+        tables=[
+            "Best relative aperture a:",
+            table(store),
+            "Goal first, by width:",
+            by_width(store),
+            conduct_table(store),
+        ],
+        origin=store.origin,
+    )
+
+
+def _legend(store: Store) -> str:
+    names = ("blue", "orange", "green", "purple", "yellow")
+    return ", ".join(f"{group} {name}" for group, name in zip(store.groups, names, strict=False))
+
+
+def _samples(rows: Sequence[Row]) -> tuple[Floats, Floats]:
+    """Log widths and success rates of those that did not fail."""
+    done = [row for row in rows if not row.failed]
+    return np.log([row.relative_aperture for row in done]), np.array([row.success_rate for row in done])
+
+
+def smoothed(place: Floats, value: Floats) -> Floats:
+    """Kernel mean (Nadaraya 1964, Watson 1964) of values at log widths `place`, at WIDTHS."""
+    weight = np.exp(-0.5 * ((np.log(WIDTHS)[:, None] - place) / BANDWIDTH) ** 2)
+    found: Floats = weight @ value / weight.sum(axis=1)
+    return found
+
+
+def best_width(rows: Sequence[Row], seed: int = 0) -> Interval:
+    """Where the smooth curve of success peaks, with a bootstrap over animals."""
+    place, value = _samples(rows)
+    chance = np.random.default_rng(seed)
+    peaks = []
+    for _ in range(RESAMPLES):
+        chosen = chance.integers(len(place), size=len(place))
+        peaks.append(WIDTHS[smoothed(place[chosen], value[chosen]).argmax()])
+    low, high = np.quantile(peaks, [0.025, 0.975])
+    return Interval(float(WIDTHS[smoothed(place, value).argmax()]), float(low), float(high))
+
+
+def table(store: Store) -> str:
+    """A row per noise: what animals tell, and what optics predicts."""
+    holes = read_rows(best_pupil.Row, best_pupil.STORED)
+    lines = []
+    for group in store.groups:
+        sigma = next(one.noise_sigma for one in store.conduct if one.group == group)
+        known = any(math.isclose(row.noise_sigma, sigma) for row in holes)
+        predicted = [f"{best_pupil.best(holes, 'hole', sigma, m):.2f}" if known else "-" for m in MEASURES]
+        rows = store.group(group)
+        lines.append([f"{sigma:g}", str(len(_samples(rows)[0])), str(best_width(rows)), *predicted])
+    return markdown_table(["noise σ", "animals", "learnt best at", *(f"best by {m}" for m in MEASURES)], lines)
+
+
+def by_width(store: Store) -> str:
+    """A row per range of widths, a column per noise: mean success and its standard error."""
+    lines = []
+    for low, high in itertools.pairwise(BINS):
+        line = [f"{low:g} to {high:g}"]
+        for group in store.groups:
+            rows = store.group(group)
+            mine = np.array([r.success_rate for r in rows if low <= r.relative_aperture < high and not r.failed])
+            error = mine.std(ddof=1) / math.sqrt(mine.size) if mine.size > 1 else math.nan
+            line.append(f"{mine.mean():.2f} ± {error:.2f} ({mine.size})" if mine.size else "-")
+        lines.append(line)
+    return markdown_table(["a", *(f"σ = {group}" for group in store.groups)], lines)
+
+
+def draw(store: Store, path: Path) -> None:
+    """Success over the pupil's width."""
+    figure, axes = new_figure(6.4, 4.0)
+    place = axes[0, 0]
+    for group, color in zip(store.groups, COLORS, strict=False):
+        at, value = _samples(store.group(group))
+        place.semilogx(np.exp(at), value, "o", color=color, ms=4, alpha=0.5, mec="none")
+        place.semilogx(WIDTHS, smoothed(at, value), color=color, lw=1.5)
+    place.axhline(CHANCE, color="#999999", lw=0.8, ls=":")
+    ticks = [0.05, 0.1, 0.2, 0.3, 0.5]
+    place.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    place.minorticks_off()
+    place.set(xlabel="relative aperture a", ylabel="goal reached before any adversary", ylim=(0, 1))
+    save(figure, path)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Collect runs if asked, and make the page."""
+    return evolved.main(NAME, __doc__ or "", page, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
