@@ -12,12 +12,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from evolve.config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig, check_gene_value, check_value
+from evolve.config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
 from evolve.config_lines import Source
 from evolve.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, GeneConfig, group_members
-from evolve.relief import doe_names, doe_own_names, refined
+from evolve.relief_starts import no_such_gene, with_relief
+from evolve.settings import check_gene_value, check_value
 
 __all__ = ["SCALES", "assemble", "from_toml", "nearest", "parse_assignment", "preset_names", "to_toml"]
 
@@ -250,12 +249,12 @@ def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
     eye = EyeConfig(**_merged(trees).get("eye", {}))
     table = eye.genes
     for source in layers:
-        for name in _with_relief(source.tree, eye).get("genome", {}):
+        for name in with_relief(source.tree, eye).get("genome", {}):
             if name in ALL_GENES and name not in table:
                 raise ConfigError(
-                    _no_such_gene(name, eye), f"genome.{name}", "eye.relief_points", "eye.relief_symmetric"
+                    no_such_gene(name, eye), f"genome.{name}", "eye.relief_points", "eye.relief_symmetric"
                 )
-    tree = _merged([_with_relief(tree, eye) for tree in trees])
+    tree = _merged([with_relief(tree, eye) for tree in trees])
     sections = {name: cls(**tree.get(name, {})) for name, cls in SECTIONS.items()}
     genes = tree.get("genome", {})
     genome = {}
@@ -265,32 +264,3 @@ def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
         genome[name] = replace(gene.default, **{**({"open": False} if off else {}), **genes.get(name, {})})
     top = {name: tree[name] for name in TOP_LEVEL if name in tree}
     return RunConfig(**top, **sections, genome=genome)
-
-
-def _with_relief(tree: Tree, eye: EyeConfig) -> Tree:
-    """`tree`, whose starts for a relief of 4 x 4 genes, if it spells them out, become the same surface's for more, and
-    if they say one thing eightfold, an eighth of them where reliefs are symmetric."""
-    genes, points = tree.get("genome", {}), eye.relief_points
-    names, own = doe_names(points), doe_own_names(points, eye.relief_symmetric)
-    given = [genes[name]["start"] for name in doe_names(4) if "start" in genes.get(name, {})]
-    if points > 4 and len(given) == 16 and "start" not in genes.get("doe_44", {}):
-        finer = refined(np.array(given), points)
-        starts = {name: {**genes.get(name, {}), "start": float(u)} for name, u in zip(names, finer, strict=True)}
-        genes = {**genes, **starts}
-    if all("start" in genes.get(name, {}) for name in names):
-        heights, wanted = ([genes[name]["start"] for name in which] for which in (names, own))
-        if np.allclose(heights, wanted, rtol=0, atol=1e-9):
-            genes = {name: use for name, use in genes.items() if name not in names or name in own}
-    return {**tree, "genome": genes} if genes else tree
-
-
-def _no_such_gene(name: str, eye: EyeConfig) -> str:
-    """Why these eyes have no such relief gene."""
-    points = eye.relief_points
-    if eye.relief_symmetric and name in doe_names(points):
-        return f"genome.{name}: a symmetric relief has other genes ({', '.join(_relief_genes(eye))})"
-    return f"genome.{name}: the relief has {points} x {points} genes; set eye.relief_points for more"
-
-
-def _relief_genes(eye: EyeConfig) -> list[str]:
-    return [name for name in eye.genes if name.startswith("doe_")]

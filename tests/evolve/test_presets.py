@@ -88,7 +88,7 @@ def test_lens_opens_the_pupil_first_and_then_what_bends_light(scale):
 
 @pytest.mark.parametrize(("index", "aperture"), [(1.5, 0.38), (2.0, 0.54)])
 def test_a_lens_in_focus_is_within_reach_of_the_lens_presets_genes(index, aperture):
-    """Also behind wider pupils than the best hole, and hardly beyond these: control points span 16 R² / (4 f (n - 1))."""
+    """Behind wider pupils than the best hole, too, but hardly wider ones: control points span 16 R² / (4 f (n - 1))."""
     config = assemble(preset="lens")
     eye = animal(config).eyes(config.eye).eye()
     focal_length = eye.sensor_distance
