@@ -45,7 +45,7 @@ class Memory:
         self._past: list[np.ndarray] = []
 
     def remember(self, frame: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        """Add a frame (env, ...); `fresh` (env,) bool: worlds that have just started.
+        """Add a frame (env, ...); `fresh`: numbers of the worlds that have just started.
 
         Returns (env, memory, ...), the caller's own, as `frame` is from now on.
         """
@@ -55,7 +55,7 @@ class Memory:
         if not self._past:
             self._past = [frame.copy() for _ in range(self.frames)]
         self._past = [*self._past[1:], frame]
-        if fresh.any():
+        if len(fresh):
             for past in self._past[:-1]:
                 past[fresh] = frame[fresh]
         return np.stack(self._past, axis=1)

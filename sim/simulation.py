@@ -152,8 +152,8 @@ class Simulation:
             steps=before.steps + 1,
         )
         failed: dict[int, str] = {}
-        broken = motion.unstable | ~after.finite
-        if broken.any():
+        if motion.unstable.any() or not after.all_finite:
+            broken = motion.unstable | ~after.finite
             after, failed = after.repaired(), dict.fromkeys(np.flatnonzero(broken).tolist(), UNSTABLE)
         return Moved(taken, after, motion, failed | dict.fromkeys(idle, NO_ACTION))
 

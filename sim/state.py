@@ -39,13 +39,15 @@ class WorldState:
         return len(self.position)
 
     @property
+    def all_finite(self) -> bool:
+        """Whether every number in every world surely is one: False, too, where their squares add up to infinity."""
+        # NaN and infinity survive any sum, and one test of a sum costs less than one of every term.
+        numbers = (self.heading, self.position, self.velocity, self.objects, self.object_heading)
+        return math.isfinite(sum(np.vdot(array, array) for array in numbers))
+
+    @property
     def finite(self) -> np.ndarray:
         """Worlds in which every number is one, (n,) bool."""
-        # NaN and infinity survive any sum, and one test of a sum costs less than one of every term: of all worlds, and
-        # only where that fails, of each.
-        numbers = (self.heading, self.position, self.velocity, self.objects, self.object_heading)
-        if math.isfinite(sum(np.vdot(array, array) for array in numbers)):
-            return np.ones(self.n, bool)
         total = self.heading + self.position.sum(axis=1) + self.velocity.sum(axis=1)
         total += self.objects.sum(axis=(1, 2)) + self.object_heading.sum(axis=1)
         finite: np.ndarray = np.isfinite(total)

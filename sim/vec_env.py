@@ -19,7 +19,7 @@ from sim.observation import STANDING, Memory, action_space, observation_space
 from sim.picture import Onlooker, check_render_mode
 from sim.render import BatchedRenderer
 from sim.retinas import Pending, Retinas
-from sim.simulation import Simulation, Step
+from sim.simulation import NOWHERE, Simulation, Step
 from sim.state import WorldState
 from sim.world import build_world
 
@@ -61,8 +61,8 @@ class EyesVecEnv(VecEnv):
         self._reset_options()
         self._returns[:], self._lengths[:] = 0.0, 0
         self.reset_infos = first_infos(self.state)
-        everyone = np.ones(self.num_envs, bool)
-        return self._observation(self._retinas.begin(self.state)(), everyone, ~everyone)
+        untouched = np.zeros(self.num_envs, bool)
+        return self._observation(self._retinas.begin(self.state)(), np.arange(self.num_envs), untouched)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed all random streams at the next reset. World i draws from streams derived from (seed, i)."""
@@ -84,7 +84,7 @@ class EyesVecEnv(VecEnv):
         step, looking = self._advance()
         reward = step.reward
         infos = self._infos(step, reward, np.flatnonzero(step.done))
-        observation = self._observation(self._seen(looking, step), np.zeros(self.num_envs, bool), step.contact)
+        observation = self._observation(self._seen(looking, step), NOWHERE, step.contact)
         return observation, reward, step.terminated, step.truncated, infos
 
     def step_wait(self) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, list[dict[str, Any]]]:
@@ -98,7 +98,7 @@ class EyesVecEnv(VecEnv):
         if len(ended):
             self._add_terminal_observations(infos, step, ended, seen[ended])
             seen[ended] = (beginning or self._begin_anew(ended))()
-        observation = self._observation(seen, done, step.contact & ~done)
+        observation = self._observation(seen, ended, step.contact)
         return observation, reward.astype(np.float32), done, infos
 
     def _begin_anew(self, ended: np.ndarray) -> Pending:
@@ -145,11 +145,11 @@ class EyesVecEnv(VecEnv):
     # --- observations
 
     def _observation(self, seen: np.ndarray, fresh: np.ndarray, contact: np.ndarray) -> dict[str, np.ndarray]:
-        return {
-            "eyes": self._memory.remember(seen, fresh),
-            "contact": contact.astype(np.float32)[:, None],
-            "previous_action": np.where(fresh[:, None], _STANDING, self._actions),
-        }
+        """What is seen, felt and remembered; worlds that have just begun (`fresh`, their numbers) have only seen."""
+        felt, action = contact.astype(np.float32)[:, None], self._actions.copy()
+        if len(fresh):
+            felt[fresh], action[fresh] = 0.0, _STANDING
+        return {"eyes": self._memory.remember(seen, fresh), "contact": felt, "previous_action": action}
 
     def _add_terminal_observations(
         self, infos: list[dict[str, Any]], step: Step, ended: np.ndarray, seen: np.ndarray

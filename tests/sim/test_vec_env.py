@@ -133,15 +133,14 @@ def test_eyes_see_worlds_as_they_are_after_fresh_starts_and_respawns(mode):
 
 def test_memory_holds_newest_last_and_starts_with_the_first_frame():
     memory = Memory(3)
-    fresh = np.array([True, True])
-    going = ~fresh
+    fresh, going = np.array([0, 1]), np.array([], int)
 
     def frame(value):
         return np.full((2, 1), value, np.float32)
 
     assert memory.remember(frame(1), fresh)[:, :, 0].tolist() == [[1, 1, 1]] * 2
     assert memory.remember(frame(2), going)[:, :, 0].tolist() == [[1, 1, 2]] * 2
-    kept = memory.remember(frame(3), np.array([False, True]))
+    kept = memory.remember(frame(3), np.array([1]))
     assert kept[:, :, 0].tolist() == [[1, 2, 3], [3, 3, 3]]
     assert memory.preview(frame(9)[:1], np.array([0]))[:, :, 0].tolist() == [[2, 3, 9]]
     memory.remember(frame(4), fresh)
