@@ -1,10 +1,14 @@
 """Records of runs that are kept in the repository: what pages say can be made from them again, and they can go on."""
 
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from evolve.store import Run
+from evolve.config_source import to_toml
+from evolve.loop import evolve
+from evolve.store import Run, RunError
 from experiments.candidates import Row, rows_of
 from experiments.store import read_rows, write_rows
 
@@ -25,6 +29,36 @@ def test_record_is_a_run(record):
     assert run.notice is None
     assert 0 < len(run.candidates) <= run.config.candidates
     assert {file.name for file in record.iterdir()} == {"candidates.jsonl", "config.toml", "versions.json"}
+
+
+class NobodyThere(Exception):
+    pass
+
+
+class Nobody:
+    """An executor that has nobody to evaluate anything, watched by nobody."""
+
+    training = evaluated = None
+
+    def run(self, jobs, progress=None):
+        if jobs:
+            raise NobodyThere
+        return iter(())
+
+
+@pytest.mark.parametrize("record", RECORDS, ids=lambda path: path.name)
+def test_search_still_proposes_what_is_on_record(record, tmp_path):
+    """So that a record goes on where it ends: the loop asks for the first animal that is missing, and for no other."""
+    run = Run.open(shutil.copytree(record, tmp_path / "run"))
+    if run.finished:
+        evolve(run, Nobody(), Nobody())
+    else:
+        with pytest.raises(NobodyThere):
+            evolve(run, Nobody(), Nobody())
+    altered = replace(run.config, search=replace(run.config.search, sigma=0.9 * run.config.search.sigma))
+    (run.path / "config.toml").write_text(to_toml(altered))
+    with pytest.raises(RunError):
+        evolve(Run.open(run.path), Nobody(), Nobody())
 
 
 @pytest.mark.parametrize("page", PAGES)
