@@ -117,6 +117,12 @@ def joining(store: Store) -> int | None:
     return min((row.generation for row in store.rows if row.phase > 0), default=None)
 
 
+def _end_of_first(store: Store) -> int:
+    """The generation after phase I, or after what there is of it."""
+    start = joining(store)
+    return 1 + max(row.generation for row in store.rows) if start is None else start
+
+
 def of_phase(store: Store, group: str, phase: int) -> list[Row]:
     """Rows of a group up to the end of phase I, or from there on. A group whose genes are all open from the beginning
     is compared at the same generations."""
@@ -136,7 +142,7 @@ def table(store: Store, phase: int) -> str:
         for group in store.groups:
             rows = of_phase(store, group, phase)
             found = last_mean(rows, value)
-            chance = of_the_end(store.chance(group, name), joining(store) if phase == 0 else None)
+            chance = of_the_end(store.chance(group, name), _end_of_first(store) if phase == 0 else None)
             line += ["-" if found is None else str(found), "" if chance is None or found is None else str(chance)]
         lines.append(line)
     return markdown_table(header, lines)
