@@ -135,9 +135,10 @@ def _quantiles(values: Floats) -> tuple[float, float, float]:
     return float(low), float(median), float(high)
 
 
-def gene_values(phenotype: Phenotype) -> dict[str, float]:
+def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str, float]:
     """Value of every gene that shows in the phenotype, under the genes' names; optical ones only with optics on,
-    spectral ones where receptors are inherited: NaN for the peaks of types that the animal has not."""
+    spectral ones where receptors are inherited: NaN for the peaks of types that the animal has not. With `eye`, of the
+    genes alone that a run with such eyes has: of a symmetric relief an eighth."""
     values = {
         "n_eyes": float(phenotype.n_eyes),
         "placement_range_deg": phenotype.placement_range_deg,
@@ -162,7 +163,7 @@ def gene_values(phenotype: Phenotype) -> dict[str, float]:
             **dict.fromkeys(LAMBDA_MAX, math.nan),
             **dict(zip(LAMBDA_MAX, phenotype.lambda_max_nm, strict=False)),
         }
-    return values
+    return values if eye is None else {name: value for name, value in values.items() if name in eye.genes}
 
 
 def acuity_cpd(phenotype: Phenotype) -> float:

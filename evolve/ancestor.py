@@ -36,8 +36,8 @@ def starts_from(text: str) -> Source:
         tree["eye"]["receptors"] = INHERITED
     if candidate.phenotype.relief is not None and len(candidate.phenotype.relief) != 16:
         tree["eye"]["relief_points"] = math.isqrt(len(candidate.phenotype.relief))
-    if candidate.phenotype.relief is not None and run.config.eye.relief_symmetric:
-        tree["eye"]["relief_symmetric"] = True
+    if candidate.phenotype.relief is not None:
+        tree["eye"]["relief_symmetric"] = run.config.eye.relief_symmetric
     return Source(f"--from {path}:{candidate.id}", tree)
 
 

@@ -7,7 +7,7 @@ from math import isqrt
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["doe_names", "doe_own_names", "refined"]
+__all__ = ["PATCH", "doe_names", "doe_own_names", "refined"]
 
 Floats = NDArray[np.float64]
 PATCH = (

@@ -53,7 +53,10 @@ class Scalars:
         its learning over steps."""
         if candidate.failure is None:
             values = {"fitness": candidate.fitness, "success_rate": candidate.success_rate}
-            genes = {**gene_values(candidate.phenotype), "acuity_cpd": acuity_cpd(candidate.phenotype)}
+            genes = {
+                **gene_values(candidate.phenotype, self._run.config.eye),
+                "acuity_cpd": acuity_cpd(candidate.phenotype),
+            }
             values |= {f"genes/{name}": value for name, value in genes.items() if math.isfinite(value)}
             self._add("candidates", values, candidate.id)
             for steps, value in candidate.curve:

@@ -16,8 +16,8 @@ import optics
 from evolve.report.eye_figures import relief_heights
 from experiments import best_pupil, evolved
 from experiments.candidates import Row
-from experiments.drift import SEEDS, of_the_end, shade
-from experiments.evolved import Store, conduct_table, luck_table
+from experiments.drift import SEEDS, shade
+from experiments.evolved import Store, conduct_table, luck, luck_table
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.store import read_rows
@@ -96,7 +96,11 @@ def page(store: Store) -> Page:
             *(part for phase in (0, 1) for part in (f"End of phase {'I' * (phase + 1)}:", table(store, phase))),
             "Phase I beside what is best for a hole:",
             prediction(store),
-            luck_table(store, QUANTITIES),
+            *(
+                part
+                for phase in (0, 1)
+                for part in (f"Phase {'I' * (phase + 1)}:", luck_table(store, QUANTITIES, phase))
+            ),
             conduct_table(store),
         ],
         origin=store.origin,
@@ -115,12 +119,6 @@ def colors(store: Store) -> dict[str, str]:
 def joining(store: Store) -> int | None:
     """The first generation of phase II: that of the groups that have one; None where none has."""
     return min((row.generation for row in store.rows if row.phase > 0), default=None)
-
-
-def _end_of_first(store: Store) -> int:
-    """The generation after phase I, or after what there is of it."""
-    start = joining(store)
-    return 1 + max(row.generation for row in store.rows) if start is None else start
 
 
 def of_phase(store: Store, group: str, phase: int) -> list[Row]:
@@ -142,7 +140,7 @@ def table(store: Store, phase: int) -> str:
         for group in store.groups:
             rows = of_phase(store, group, phase)
             found = last_mean(rows, value)
-            chance = of_the_end(store.chance(group, name), _end_of_first(store) if phase == 0 else None)
+            chance = luck(store, group, name, rows)
             line += ["-" if found is None else str(found), "" if chance is None or found is None else str(chance)]
         lines.append(line)
     return markdown_table(header, lines)

@@ -20,17 +20,16 @@ from evolve.search import Search
 from experiments.candidates import NO_NUMBER, Row, anatomy
 from experiments.means import LAST
 
-__all__ = ["END", "SEEDS", "Drift", "drifted", "of_the_end", "shade"]
+__all__ = ["SEEDS", "Drift", "drifted", "of_the_end", "shade"]
 
 SEEDS = 200
-END = -1  # the "generation" that stands for the mean of the last LAST
 FIRST_SEED = 10_000  # none that anybody takes for a run
 
 
 @dataclass(frozen=True)
 class Drift:
-    """Mean of a quantity over the candidates of a generation, or of the last ones (END): median over searches, and
-    the range of 95 % of them; of the END, what every search came to."""
+    """Mean of a quantity over the candidates of a generation: median over searches, and the range of 95 % of them. At
+    the end of a phase another row, of its last LAST generations together, with what every search came to (`ends`)."""
 
     group: str
     quantity: str
@@ -45,9 +44,9 @@ class Drift:
         """Nothing moves it: its gene is closed."""
         return self.low == self.high
 
-    def as_far(self, value: float) -> float:
-        """Share of searches that came at least as far from the middle, on whichever side (two-sided, the one that is
-        asked about counted as one of them: Davison and Hinkley 1997, §4.2)."""
+    def p(self, value: float) -> float:
+        """Two-sided p of a value, were it drawn like these: the one that is asked about counts as one of them (Davison
+        and Hinkley 1997, §4.2), so that it is 2 / (searches + 1) at the least."""
         ends = np.array(self.ends.split(), float)
         fewer = min((ends <= value).sum(), (ends >= value).sum())
         return min(1.0, 2 * (float(fewer) + 1) / (ends.size + 1))
@@ -56,30 +55,34 @@ class Drift:
         return f"held at {self.median:.3g}" if self.held else f"{self.median:.3g} [{self.low:.3g}, {self.high:.3g}]"
 
 
-def drifted(config: RunConfig, group: str, quantities: Mapping[str, Callable[[Row], float]]) -> list[Drift]:
-    """Of SEEDS searches with these settings; quantities that are no numbers without a life are left out."""
-    searches = [_means(replace(config, seed=FIRST_SEED + i), quantities) for i in range(SEEDS)]
+def drifted(
+    config: RunConfig, group: str, quantities: Mapping[str, Callable[[Row], float]], generations: int
+) -> list[Drift]:
+    """Of SEEDS searches with these settings and so many generations; quantities that are no numbers without a life are
+    left out."""
+    searches = [_means(replace(config, seed=FIRST_SEED + i), quantities, generations) for i in range(SEEDS)]
     means = np.array(searches)  # (search, quantity, generation)
+    starts = sorted({use.opens_at for use in config.genome.values() if use.open and use.opens_at < generations})
     rows = []
     for place, name in enumerate(quantities):
         mine = means[:, place]
         if np.isfinite(mine).any(axis=0).all():
-            rows += [_drift(group, name, generation, mine[:, generation]) for generation in range(mine.shape[1])]
-            late = mine[:, -LAST:]
-            ends = np.nanmean(late[np.isfinite(late).any(axis=1)], axis=1)
-            rows.append(replace(_drift(group, name, END, ends), ends=" ".join(f"{end:.4g}" for end in ends)))
+            rows += [_drift(group, name, generation, mine[:, generation]) for generation in range(generations)]
+            for start, end in zip(starts, [*starts[1:], generations], strict=True):
+                late = mine[:, max(start, end - LAST) : end]
+                ends = np.nanmean(late[np.isfinite(late).any(axis=1)], axis=1)
+                rows.append(replace(_drift(group, name, end - 1, ends), ends=" ".join(f"{one:.4g}" for one in ends)))
     return rows
 
 
-def of_the_end(drift: list[Drift], before: int | None = None) -> Drift | None:
-    """That of the last generations together, or of the last one before a generation; None where there is none."""
-    wanted = END if before is None else before - 1
-    return next((one for one in drift if one.generation == wanted), None)
+def of_the_end(drift: list[Drift], generation: int) -> Drift | None:
+    """That of the phase that ends with a generation; None where none does."""
+    return next((one for one in drift if one.ends and one.generation == generation), None)
 
 
 def shade(axes: Any, drift: list[Drift], color: str) -> None:
     """Shade what chance alone makes, over generations; nothing where a gene is held."""
-    rows = [one for one in drift if one.generation != END and not one.held]
+    rows = [one for one in drift if not one.ends and not one.held]
     if rows:
         x, low, high = ([getattr(one, name) for one in rows] for name in ("generation", "low", "high"))
         axes.fill_between(x, low, high, color=color, alpha=0.1, lw=0)
@@ -90,11 +93,11 @@ def _drift(group: str, quantity: str, generation: int, means: NDArray[np.float64
     return Drift(group, quantity, generation, low, median, high)
 
 
-def _means(config: RunConfig, quantities: Mapping[str, Callable[[Row], float]]) -> list[list[float]]:
-    """Of each quantity, for every generation of one search."""
+def _means(config: RunConfig, quantities: Mapping[str, Callable[[Row], float]], generations: int) -> list[list[float]]:
+    """Of each quantity, for the first generations of one search."""
     search, chance = Search(config), np.random.default_rng(config.seed)
     means: list[list[float]] = [[] for _ in quantities]
-    for generation in range(config.search.generations):
+    for generation in range(generations):
         proposals = search.propose_generation()
         rows = [_row(develop(proposal.vector, config), generation) for proposal in proposals]
         search.tell([(proposal.id, chance.normal()) for proposal in proposals])

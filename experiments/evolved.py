@@ -12,12 +12,12 @@ from evolve.files import write_whole
 from evolve.store import Run, RunError
 from evolve.versions import commits, recorded
 from experiments.candidates import Row, complete, rows_of
-from experiments.drift import Drift, drifted, of_the_end
+from experiments.drift import SEEDS, Drift, drifted, of_the_end
 from experiments.means import last_mean
 from experiments.page import Page, markdown_table, parser
 from experiments.store import Origin, read_rows, write_rows
 
-__all__ = ["Conduct", "Quantities", "Store", "conduct_table", "luck_table", "main"]
+__all__ = ["Conduct", "Quantities", "Store", "conduct_table", "luck", "luck_table", "main", "stored"]
 
 Quantities = Mapping[str, Callable[[Row], float]]  # of which it is asked what chance alone makes
 NOT_JUDGED = "Not judged yet."
@@ -28,7 +28,7 @@ class Conduct:
     """How a run was conducted.
 
     generations, planned  complete ones, and how many there were to be
-    commits               of rhabdom, with which it was begun and continued, first digits
+    commits               of rhabdom, with which it was begun and continued, first digits; +: with changes
     noise_sigma           of its receptors · relief_height [m]: what a relief gene of 1 means
     """
 
@@ -45,7 +45,7 @@ class Conduct:
     @classmethod
     def of(cls, run: Run, group: str) -> Conduct:
         done, hours = complete(run), sum(candidate.seconds for candidate in run.candidates) / 3600
-        by = ", ".join(commit[:7] for commit in commits(run.path))
+        by = ", ".join(commit[:7] + "+" * commit.endswith("+") for commit in commits(run.path))
         config, eye = run.config, run.config.eye
         counts = (len(run.candidates), len(done), config.search.generations)
         return cls(group, config.seed, *counts, hours, by, eye.noise_sigma, eye.relief_height)
@@ -89,22 +89,23 @@ def conduct_table(store: Store) -> str:
     return markdown_table(header, lines)
 
 
-def luck_table(store: Store, quantities: Quantities) -> str:
-    """A row per run: the share of searches by luck alone that came as far."""
-    names = [n for n in quantities if any(end and not end.held for end in (_end(store, g, n) for g in store.groups))]
+def luck_table(store: Store, quantities: Quantities, phase: int | None = None) -> str:
+    """A row per run: the p of what it came to, against searches by luck alone; of the end of a phase, or of the run."""
+    names = [n for n in quantities if any(not one.held for g in store.groups for one in store.chance(g, n))]
     lines = []
     for one in store.conduct:
-        rows = [row for row in store.group(one.group) if row.seed == one.seed]
+        rows = [r for r in store.group(one.group) if r.seed == one.seed and phase in (None, r.phase)]
         line = [f"{one.group}, seed {one.seed}"]
         for name in names:
-            found, end = last_mean(rows, quantities[name]), _end(store, one.group, name)
-            line.append("-" if found is None or end is None or end.held else f"{end.as_far(found.mean):.2g}")
+            found, end = last_mean(rows, quantities[name]), luck(store, one.group, name, rows)
+            line.append("-" if found is None or end is None or end.held else f"{end.p(found.mean):.2g}")
         lines.append(line)
-    return markdown_table(["share of searches by chance that came as far", *names], lines)
+    return markdown_table([f"p by chance (two-sided, {2 / (SEEDS + 1):.2g} at the least)", *names], lines)
 
 
-def _end(store: Store, group: str, quantity: str) -> Drift | None:
-    return of_the_end(store.chance(group, quantity))
+def luck(store: Store, group: str, quantity: str, rows: Sequence[Row]) -> Drift | None:
+    """What chance alone makes of a quantity by the last generation of these rows; None where no phase ends there."""
+    return of_the_end(store.chance(group, quantity), max((row.generation for row in rows), default=-1))
 
 
 def main(
@@ -122,7 +123,7 @@ def main(
     stem = chosen.docs / "data" / name
     try:
         _collect(chosen, stem, quantities or {})
-        page(_stored(stem)).publish(chosen.docs)
+        page(stored(stem)).publish(chosen.docs)
     except (RunError, ValueError, OSError) as error:
         print(f"{name}: error: {error}", file=sys.stderr)
         return 2
@@ -144,8 +145,9 @@ def _collect(chosen: Namespace, stem: Path, quantities: Quantities) -> None:
         conduct = [Conduct.of(run, group) for group, run in runs]
         write_rows(conduct, _beside(stem, "runs"))
         if quantities:
-            configs = {group: run.config for group, run in runs}
-            found = [row for group, config in configs.items() for row in drifted(config, group, quantities)]
+            furthest = {one.group: max(o.generations for o in conduct if o.group == one.group) for one in conduct}
+            configs = {group: run.config for group, run in runs if furthest[group] > 0}
+            found = [row for g, config in configs.items() for row in drifted(config, g, quantities, furthest[g])]
             write_rows(found, _beside(stem, "drift"))
         here = Origin.here(sum(one.core_hours for one in conduct))
         replace(here, versions=recorded(runs[0][1].path) or here.versions).write(stem.with_suffix(".json"))
@@ -170,7 +172,8 @@ def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8") if path.exists() else ""
 
 
-def _stored(stem: Path) -> Store:
+def stored(stem: Path) -> Store:
+    """What is stored under this name (path without an ending). Raises ValueError where there are no rows."""
     rows = read_rows(Row, stem.with_suffix(".csv"))
     if not rows:
         raise ValueError(f"{stem.with_suffix('.csv')} holds no runs; collect some with --runs GROUP=DIR ...")

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from experiments import evolved
 from experiments.candidates import Row
-from experiments.drift import SEEDS, of_the_end, shade
-from experiments.evolved import Store, conduct_table, luck_table
+from experiments.drift import SEEDS, shade
+from experiments.evolved import Store, conduct_table, luck, luck_table
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 
@@ -84,7 +84,7 @@ def table(store: Store) -> str:
     for place, (name, value) in enumerate(QUANTITIES.items()):
         line = [name]
         for g in store.groups:
-            chance = of_the_end(store.chance(g, name))
+            chance = luck(store, g, name, store.group(g))
             line += [_shown(store.group(g), value), str(chance or ""), PUBLISHED[g][place] if g in PUBLISHED else ""]
         lines.append(line)
     return markdown_table(header, lines)

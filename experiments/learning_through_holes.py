@@ -29,6 +29,7 @@ MEASURES = ("contrast", "stripes")
 BANDWIDTH = 0.2  # of the smooth curve, in log a: a fifth of the width
 WIDTHS = np.geomspace(0.05, 0.65, 105)
 RESAMPLES = 2000
+SURE = 0.05  # p below which a best width is one
 BINS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65)
 CHANCE = 1 / 3
 Floats = NDArray[np.float64]
@@ -48,9 +49,11 @@ def page(store: Store) -> Page:
         answer=store.answer,
         method=(
             "Two eyes of 15 x 15 receptors, 45° wide; every animal is trained once from its own seed, behind an open "
-            "hole of its own width. Lines: a mean of the animals with weights that fall with the distance in log a "
-            f"(Gaussian, {BANDWIDTH:g}); the best width is where that line peaks, with a 95 % interval by a bootstrap "
-            "over animals. Dotted: the goal comes first of three objects by luck."
+            "hole of its own width. Curves: local lines with weights that fall with the distance in log a (Gaussian, "
+            f"{BANDWIDTH:g}); the best width is where the curve peaks, with a 95 % interval by a bootstrap over "
+            "animals, cut at the widths that were tried. p: of a curve that explains as much where success has nothing "
+            f"to do with the width, by {RESAMPLES} permutations; above {SURE:g} no best width is given. Dotted: the "
+            "goal comes first of three objects by luck."
         ),
         command=(
             "evolve run --preset pupil\n"
@@ -80,23 +83,33 @@ def _samples(rows: Sequence[Row]) -> tuple[Floats, Floats]:
     return np.log([row.relative_aperture for row in done]), np.array([row.success_rate for row in done])
 
 
-def smoothed(place: Floats, value: Floats) -> Floats:
-    """Kernel mean (Nadaraya 1964, Watson 1964) of values at log widths `place`, at WIDTHS."""
-    weight = np.exp(-0.5 * ((np.log(WIDTHS)[:, None] - place) / BANDWIDTH) ** 2)
+def smoothed(place: Floats, value: Floats, at: Floats) -> Floats:
+    """Local lines (Fan 1992) through values at log widths `place`, at others: a kernel's mean alone leans to where
+    there are more animals."""
+    away = place - at[:, None]
+    weight = np.exp(-0.5 * (away / BANDWIDTH) ** 2)
+    first, second = (weight * away).sum(axis=1, keepdims=True), (weight * away**2).sum(axis=1, keepdims=True)
+    weight = weight * (second - away * first)
     found: Floats = weight @ value / weight.sum(axis=1)
     return found
 
 
-def best_width(rows: Sequence[Row], seed: int = 0) -> Interval:
-    """Where the smooth curve of success peaks, with a bootstrap over animals."""
+def best_width(rows: Sequence[Row], seed: int = 0) -> tuple[Interval, float]:
+    """Where the smooth curve of success peaks, with a bootstrap over animals; and the p of a curve that explains as
+    much, were success the same behind all widths (permutations). Raises ValueError for less than three animals."""
     place, value = _samples(rows)
-    chance = np.random.default_rng(seed)
-    peaks = []
+    if len(place) < 3:
+        raise ValueError("a best width needs three animals at least")
+    chance, at, peaks, as_much = np.random.default_rng(seed), np.log(WIDTHS), [], 1
+    explained = smoothed(place, value, place).var()
     for _ in range(RESAMPLES):
         chosen = chance.integers(len(place), size=len(place))
-        peaks.append(WIDTHS[smoothed(place[chosen], value[chosen]).argmax()])
+        if np.unique(place[chosen]).size > 1:
+            peaks.append(WIDTHS[smoothed(place[chosen], value[chosen], at).argmax()])
+        as_much += bool(smoothed(place, chance.permutation(value), place).var() >= explained)
     low, high = np.quantile(peaks, [0.025, 0.975])
-    return Interval(float(WIDTHS[smoothed(place, value).argmax()]), float(low), float(high))
+    best = float(WIDTHS[smoothed(place, value, at).argmax()])
+    return Interval(best, float(low), float(high)), as_much / (RESAMPLES + 1)
 
 
 def table(store: Store) -> str:
@@ -107,9 +120,10 @@ def table(store: Store) -> str:
         sigma = next(one.noise_sigma for one in store.conduct if one.group == group)
         known = any(math.isclose(row.noise_sigma, sigma) for row in holes)
         predicted = [f"{best_pupil.best(holes, 'hole', sigma, m):.2f}" if known else "-" for m in MEASURES]
-        rows = store.group(group)
-        lines.append([f"{sigma:g}", str(len(_samples(rows)[0])), str(best_width(rows)), *predicted])
-    return markdown_table(["noise σ", "animals", "learnt best at", *(f"best by {m}" for m in MEASURES)], lines)
+        found, p = best_width(store.group(group))
+        shown = str(found) if p < SURE else "nowhere better"
+        lines.append([f"{sigma:g}", str(len(_samples(store.group(group))[0])), shown, f"{p:.2g}", *predicted])
+    return markdown_table(["noise σ", "animals", "learnt best at", "p", *(f"best by {m}" for m in MEASURES)], lines)
 
 
 def by_width(store: Store) -> str:
@@ -133,7 +147,7 @@ def draw(store: Store, path: Path) -> None:
     for group, color in zip(store.groups, COLORS, strict=False):
         at, value = _samples(store.group(group))
         place.semilogx(np.exp(at), value, "o", color=color, ms=4, alpha=0.5, mec="none")
-        place.semilogx(WIDTHS, smoothed(at, value), color=color, lw=1.5)
+        place.semilogx(WIDTHS, smoothed(at, value, np.log(WIDTHS)), color=color, lw=1.5)
     place.axhline(CHANCE, color="#999999", lw=0.8, ls=":")
     ticks = [0.05, 0.1, 0.2, 0.3, 0.5]
     place.set_xticks(ticks, [f"{tick:g}" for tick in ticks])

@@ -17,8 +17,8 @@ import scipy.stats
 import optics
 from experiments import evolved
 from experiments.candidates import NO_NUMBER, Row
-from experiments.drift import SEEDS, of_the_end, shade
-from experiments.evolved import Store, conduct_table, luck_table
+from experiments.drift import SEEDS, shade
+from experiments.evolved import Store, conduct_table, luck, luck_table
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from sim.tasks.foraging import ULTRAVIOLET, petal
@@ -124,7 +124,7 @@ def table(store: Store) -> str:
     header = ["mean", "first generation", f"last {LAST} generations", "by chance"]
     lines = []
     for name, value in QUANTITIES.items():
-        chance = of_the_end(store.chance(store.groups[0], name))
+        chance = luck(store, store.groups[0], name, store.rows)
         lines.append([name, str(last_mean(first, value)), str(last_mean(store.rows, value)), str(chance or "")])
     return markdown_table(header, lines)
 

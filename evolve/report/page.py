@@ -125,9 +125,10 @@ def _acuity(run: Run) -> str:
 
 def _relief(run: Run, genes: list[Gene]) -> str:
     paths = {g.name: trajectory(run.candidates, lambda p, name=g.name: gene_values(p)[name]) for g in genes}  # type: ignore[misc]
+    left_out = "Frozen genes" + (", and what mirrors others," if run.config.eye.relief_symmetric else "")
     caption = (
         f"<b>{genes[0].name} … {genes[-1].name}</b>: the relief, each panel where its gene lies over the pupil "
-        "(x to the right, y up). Frozen genes are left out."
+        f"(x to the right, y up). {left_out} are left out."
     )
     return f'<div class="wide">{figure(relief_figure(paths), caption)}</div>\n'
 

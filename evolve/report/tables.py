@@ -51,7 +51,7 @@ def _best_tiles(best: Candidate) -> list[tuple[str, str, str]]:
 
 def best_genes(run: Run, best: Candidate) -> str:
     """Every gene of the best candidate beside where it started."""
-    values = gene_values(best.phenotype)
+    values = gene_values(best.phenotype, run.config.eye)
     relief = sorted({name[:-1] for name in values if name.startswith("doe_")})
     groups = [[name] for name in values if not name.startswith("doe_")]
     groups += [[name for name in values if name.startswith(row)] for row in relief]

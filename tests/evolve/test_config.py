@@ -260,6 +260,22 @@ def test_a_symmetric_animal_begins_a_run_of_symmetric_reliefs():
     config = assemble("detection", starts=Source("--from a:1", {"genome": heights, "eye": eye}))
     assert [config.genome[f"doe_{place}"].start for place in ("00", "01", "11")] == pytest.approx([0.2, 0.2, 0.3])
     assert "doe_32" not in config.genome
+    heights["doe_32"]["open"] = False
+    with pytest.raises(ConfigError, match="doe_32: a symmetric relief has other genes"):
+        assemble("detection", starts=Source("--from a:1", {"genome": heights, "eye": eye}))
     heights["doe_32"] = {"start": 0.9}
     with pytest.raises(ConfigError, match="a symmetric relief has other genes"):
         assemble("detection", starts=Source("--from a:1", {"genome": heights, "eye": eye}))
+
+
+def test_heights_of_more_points_become_no_other_number_of_them():
+    from evolve.config_lines import Source
+    from evolve.relief import doe_names
+
+    heights = {name: {"start": 0.3} for name in doe_names(6)}
+    with pytest.raises(ConfigError, match="heights of 6 x 6 points cannot become so many; must be 6"):
+        assemble(
+            "detection",
+            assignments=["eye.relief_points=9"],
+            starts=Source("--from a:1", {"genome": heights, "eye": {"relief_points": 6}}),
+        )

@@ -1,5 +1,6 @@
 """Records of runs that are kept in the repository: what pages say can be made from them again, and they can go on."""
 
+import importlib
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from evolve.config_source import to_toml
 from evolve.loop import evolve
 from evolve.store import Run, RunError
 from experiments.candidates import Row, rows_of
+from experiments.evolved import stored
 from experiments.store import read_rows, write_rows
 
 RESULTS = Path(__file__).parents[2] / "docs/results"
@@ -19,6 +21,7 @@ PAGES = {
         "navigation": ("navigation-0", "navigation-1"),
         "detection": ("detection-0", "detection-1"),
     },
+    "learning_through_holes": {"0.001": ("pupil-001",)},
     "seeing_ultraviolet": {"foraging": ("ultraviolet-0", "ultraviolet-1")},
 }
 
@@ -68,3 +71,9 @@ def test_pages_hold_what_is_on_record(page, tmp_path):
     write_rows(rows, tmp_path / "rows.csv")
     assert (tmp_path / "rows.csv").read_bytes() == (RESULTS / "data" / f"{page}.csv").read_bytes()
     assert read_rows(Row, tmp_path / "rows.csv")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_pages_say_what_their_stores_say(page):
+    experiment = importlib.import_module(f"experiments.{page}")
+    assert experiment.page(stored(RESULTS / "data" / page)).markdown == (RESULTS / f"{page}.md").read_text()

@@ -160,3 +160,15 @@ def test_reliefs_of_more_genes_and_receptors_of_genes_are_reported(tmp_path):
     text = Page(genes_section(run)).texts["all"]
     assert "doe_00 … doe_44: the relief" in text
     assert "lambda_max_0_nm:" in text
+
+
+def test_symmetric_reliefs_are_reported_by_the_genes_that_they_have(tmp_path):
+    config = assemble("detection", assignments=("eye.relief_symmetric=true", "search.population=2"))
+    run = Run.create(tmp_path / "symmetric", config)
+    genome = Genotype(config.genome).start
+    outcome = Evaluation(1.0, (0.5, 1.5), 0.5)
+    run.append(Candidate.of((0, 0, 0), tuple(genome.tolist()), develop(genome, config), 1, outcome))
+    genes = {row[0]: row[2] for row in Page(best_genes(run, run.best)).rows["genes-of-the-best"][1:]}
+    assert [name for name in genes if name.startswith("doe_")] == ["doe_00 … doe_01", "doe_11"]
+    text = Page(genes_section(run)).texts["all"]
+    assert "Frozen genes, and what mirrors others, are left out." in text
