@@ -148,14 +148,13 @@ def table(store: Store, phase: int) -> str:
 
 def prediction(store: Store) -> str:
     """Where pupils that evolve alone end, beside where holes are best by each measure."""
-    holes = read_rows(best_pupil.Row, best_pupil.STORED)
     lines = []
     for group in store.groups:
-        sigma = next(one.noise_sigma for one in store.conduct if one.group == group)
-        computed = any(math.isclose(row.noise_sigma, sigma) for row in holes)
+        sigma = store.noise_sigma(group)
         found = last_mean(of_phase(store, group, 0), QUANTITIES["relative aperture a"])
-        best = [best_pupil.best(holes, "hole", sigma, m) if computed else math.nan for m in MEASURES]
-        lines.append([group, f"{sigma:g}", "-" if found is None else str(found), *(f"{a:.2f}" for a in best)])
+        lines.append(
+            [group, f"{sigma:g}", "-" if found is None else str(found), *best_pupil.predicted(sigma, MEASURES)]
+        )
     return markdown_table(["", "noise σ", "a at the end of phase I", *(f"best by {m}" for m in MEASURES)], lines)
 
 

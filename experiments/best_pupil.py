@@ -116,6 +116,13 @@ def best(rows: Iterable[Row], pupil: str, noise_sigma: float, measure: str) -> f
     return float(np.exp(place[top] + shift * (place[1] - place[0])))
 
 
+def predicted(noise_sigma: float, measures: Sequence[str]) -> list[str]:
+    """The stored best hole by each measure, as pages show it; "-" where this noise was not computed."""
+    rows = read_rows(Row, STORED)
+    known = any(math.isclose(row.noise_sigma, noise_sigma) for row in rows)
+    return [_shown(best(rows, "hole", noise_sigma, measure)) if known else "-" for measure in measures]
+
+
 def rayleigh() -> float:
     """Relative aperture of the sharpest pinhole for a distant point, diameter 1.9 √(λf) (Rayleigh 1891)."""
     plain = optics.Eye(fov_deg=FOV_DEG)

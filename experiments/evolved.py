@@ -71,6 +71,10 @@ class Store:
         """Names of the groups, in the order in which they were given."""
         return list(dict.fromkeys(row.group for row in self.rows))
 
+    def noise_sigma(self, group: str) -> float:
+        """Of the receptors in a group's runs."""
+        return next(one.noise_sigma for one in self.conduct if one.group == group)
+
     def chance(self, group: str, quantity: str) -> list[Drift]:
         """What chance alone makes of a quantity, by generation; [] where it was not asked."""
         return [one for one in self.drift if (one.group, one.quantity) == (group, quantity)]

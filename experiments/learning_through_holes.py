@@ -19,7 +19,6 @@ from experiments.candidates import Row
 from experiments.evolved import Store, conduct_table
 from experiments.means import Interval
 from experiments.page import Figure, Page, markdown_table, new_figure, save
-from experiments.store import read_rows
 
 __all__ = ["best_width", "page", "smoothed"]
 
@@ -27,11 +26,12 @@ NAME = "learning_through_holes"
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#B8568F", "#B59E00")
 MEASURES = ("contrast", "stripes")
 BANDWIDTH = 0.2  # of the smooth curve, in log a: a fifth of the width
-WIDTHS = np.geomspace(0.05, 0.65, 105)
+STEPS = 105  # of a curve
 RESAMPLES = 2000
 SURE = 0.05  # p below which a best width is one
 BINS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65)
 CHANCE = 1 / 3
+CAPTION = "Dots are animals. Upright lines: the best hole by contrast (dotted) and by stripes (dashed). σ: "
 Floats = NDArray[np.float64]
 
 
@@ -60,7 +60,7 @@ def page(store: Store) -> Page:
             "evolve run --preset pupil --set eye.noise_sigma=0.003    # and others\n"
             f"python -m experiments.{NAME} --runs 0.001=DIR 0.003=DIR"
         ),
-        figures=[Figure(NAME, lambda path: draw(store, path), f"Dots are animals; σ: {_legend(store)}.")],
+        figures=[Figure(NAME, lambda path: draw(store, path), CAPTION + _legend(store) + ".")],
         tables=[
             "Best relative aperture a:",
             table(store),
@@ -100,26 +100,28 @@ def best_width(rows: Sequence[Row], seed: int = 0) -> tuple[Interval, float]:
     place, value = _samples(rows)
     if len(place) < 3:
         raise ValueError("a best width needs three animals at least")
-    chance, at, peaks, as_much = np.random.default_rng(seed), np.log(WIDTHS), [], 1
+    chance, at, peaks, as_much = np.random.default_rng(seed), _tried(place), [], 1
     explained = smoothed(place, value, place).var()
     for _ in range(RESAMPLES):
         chosen = chance.integers(len(place), size=len(place))
         if np.unique(place[chosen]).size > 1:
-            peaks.append(WIDTHS[smoothed(place[chosen], value[chosen], at).argmax()])
+            peaks.append(at[smoothed(place[chosen], value[chosen], at).argmax()])
         as_much += bool(smoothed(place, chance.permutation(value), place).var() >= explained)
-    low, high = np.quantile(peaks, [0.025, 0.975])
-    best = float(WIDTHS[smoothed(place, value, at).argmax()])
-    return Interval(best, float(low), float(high)), as_much / (RESAMPLES + 1)
+    best, low, high = np.exp([at[smoothed(place, value, at).argmax()], *np.quantile(peaks, [0.025, 0.975])])
+    return Interval(float(best), float(low), float(high)), as_much / (RESAMPLES + 1)
+
+
+def _tried(place: Floats) -> Floats:
+    """Log widths between the least and the greatest that was tried."""
+    return np.linspace(place.min(), place.max(), STEPS)
 
 
 def table(store: Store) -> str:
     """A row per noise: what animals tell, and what optics predicts."""
-    holes = read_rows(best_pupil.Row, best_pupil.STORED)
     lines = []
     for group in store.groups:
-        sigma = next(one.noise_sigma for one in store.conduct if one.group == group)
-        known = any(math.isclose(row.noise_sigma, sigma) for row in holes)
-        predicted = [f"{best_pupil.best(holes, 'hole', sigma, m):.2f}" if known else "-" for m in MEASURES]
+        sigma = store.noise_sigma(group)
+        predicted = best_pupil.predicted(sigma, MEASURES)
         found, p = best_width(store.group(group))
         shown = str(found) if p < SURE else "nowhere better"
         lines.append([f"{sigma:g}", str(len(_samples(store.group(group))[0])), shown, f"{p:.2g}", *predicted])
@@ -147,7 +149,11 @@ def draw(store: Store, path: Path) -> None:
     for group, color in zip(store.groups, COLORS, strict=False):
         at, value = _samples(store.group(group))
         place.semilogx(np.exp(at), value, "o", color=color, ms=4, alpha=0.5, mec="none")
-        place.semilogx(WIDTHS, smoothed(at, value, np.log(WIDTHS)), color=color, lw=1.5)
+        place.semilogx(np.exp(_tried(at)), smoothed(at, value, _tried(at)), color=color, lw=1.5)
+        for measure, style in zip(MEASURES, (":", "--"), strict=True):
+            for width in best_pupil.predicted(store.noise_sigma(group), (measure,)):
+                if width != "-":
+                    place.axvline(float(width), color=color, ls=style, lw=1, alpha=0.6)
     place.axhline(CHANCE, color="#999999", lw=0.8, ls=":")
     ticks = [0.05, 0.1, 0.2, 0.3, 0.5]
     place.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
