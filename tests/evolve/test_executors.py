@@ -1,6 +1,7 @@
 """Worker processes: every job comes out once, whatever happens to the worker."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -26,6 +27,8 @@ from evolve.genotype import Genotype
 
 CONFIG = tiny()
 GENOTYPE = Genotype(CONFIG.genome)
+
+ROOT = Path(__file__).parents[2]
 
 
 def jobs(folder, count=4):
@@ -150,3 +153,25 @@ def _alive(pid):
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except OSError:
         return False
+
+
+CHILDREN = """
+import multiprocessing, time
+from evolve.executors import _interrupts_held
+children = []
+for _ in range(2):
+    with _interrupts_held():
+        children.append(multiprocessing.get_context("spawn").Process(target=time.sleep, args=(60,)))
+        children[-1].start()
+for child in children:
+    print(next(line for line in open(f"/proc/{child.pid}/status") if line.startswith("SigBlk")).split()[1])
+    child.kill()
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="blocked signals are read from Linux's /proc")
+def test_interrupts_are_held_from_every_child_the_first_included():
+    """In a fresh process: only there is the first child the first."""
+    found = subprocess.run([sys.executable, "-c", CHILDREN], capture_output=True, text=True, check=True, cwd=ROOT)
+    blocked = [int(line, 16) >> (signal.SIGINT - 1) & 1 for line in found.stdout.split()]
+    assert blocked == [1, 1]
