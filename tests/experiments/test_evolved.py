@@ -17,8 +17,7 @@ from evolve.report.eye_figures import relief_heights
 from evolve.store import Run
 from experiments import bending_light, brains_and_acuity, goals_shape_eyes, learning_through_holes
 from experiments.candidates import Row, full_return, parameters, rows_of
-from experiments.drift import SEEDS, Drift, drifted, of_the_end
-from experiments.evolved import Conduct, Store, luck_table, main
+from experiments.evolved import Conduct, Store, main
 from experiments.means import last_mean
 from experiments.store import Origin, write_rows
 from optics import Pupil, backend
@@ -114,44 +113,6 @@ def test_power_law_is_found():
         brains_and_acuity.fitted([with_error(0.3, 1000)] * 5)
 
 
-def through_holes(peak, noise, group="0.001"):
-    """Animals whose success falls off on both sides of a width, but for luck."""
-    chance = np.random.default_rng(1)
-    widths = np.linspace(0.05, 0.65, 40)
-    success = 0.3 + 0.5 * np.exp(-0.5 * (np.log(widths / peak) / 0.4) ** 2) + noise * chance.normal(size=40)
-    pairs = zip(widths, success, strict=True)
-    return [replace(ROW, group=group, relative_aperture=a, success_rate=float(np.clip(s, 0, 1))) for a, s in pairs]
-
-
-@pytest.mark.parametrize("peak", [0.15, 0.25])
-def test_the_best_width_is_found_with_an_interval_that_holds_it(peak):
-    """Animals are spread evenly over a, not over log a, which would move a kernel's mean to the wider side."""
-    found, p = learning_through_holes.best_width(through_holes(peak, 0.1))
-    assert found.low <= peak <= found.high
-    assert found.mean == pytest.approx(peak, rel=0.25)
-    assert p < 0.01
-    sure, _ = learning_through_holes.best_width(through_holes(peak, 0.0))
-    assert sure.mean == pytest.approx(peak, rel=0.03)
-    assert sure.high - sure.low < found.high - found.low
-
-
-def test_no_width_is_best_where_nothing_is_learnt():
-    flat = [replace(row, success_rate=0.33 + 0.1 * np.sin(37.0 * i)) for i, row in enumerate(through_holes(0.2, 0.0))]
-    assert learning_through_holes.best_width(flat)[1] > 0.05
-    conduct = [Conduct("0.001", 0, 40, 5, 5, 1.0, "", 0.001, 1e-4)]
-    assert "| nowhere better |" in learning_through_holes.table(Store(flat, conduct, [], Origin.here(1.0), ""))
-    with pytest.raises(ValueError, match="three animals"):
-        learning_through_holes.best_width([replace(row, failed=1) for row in flat])
-
-
-def test_widths_are_held_against_what_is_predicted_for_their_noise():
-    rows = [*through_holes(0.2, 0.0), *through_holes(0.2, 0.0, "0.01")]
-    conduct = [Conduct(group, 0, 40, 5, 5, 1.0, "", float(group), 1e-4) for group in ("0.001", "0.01")]
-    bright, dark = learning_through_holes.table(Store(rows, conduct, [], Origin.here(1.0), "")).splitlines()[2:]
-    assert [cell.strip() for cell in bright.split("|")[5:7]] == ["0.11", "0.21"]
-    assert [cell.strip() for cell in dark.split("|")[5:7]] == ["0.21", "0.21"]
-
-
 def test_errors_that_do_not_vary_have_no_power_law():
     rows = [with_error(0.9, size) for size in (1000, 5000, 20_000)]
     with pytest.raises(ValueError, match="all the same"):
@@ -175,53 +136,6 @@ def test_unfinished_generations_do_not_count(tmp_path):
     steady = (*SMALL, "search.steady_state=true")
     rows = rows_of(run_of(tmp_path / "steady", "bifurcation-detection", steady, (1.0, 2.0, 30.0)), "detection")
     assert len(rows) == 3, "one by one, candidates are of no generation"
-
-
-def test_chance_moves_genes_that_are_open_and_no_others():
-    config = assemble("navigation", "bifurcation-navigation", assignments=("search.generations=6",))
-    quantities = {"fov": lambda row: row.fov_deg, "up": lambda row: row.height, "fitness": lambda row: row.fitness}
-    drift = drifted(config, "navigation", quantities, 4)
-    assert {one.quantity for one in drift} == {"fov", "up"}, "nobody lived"
-    *fov, end = (one for one in drift if one.quantity == "fov")
-    assert [one.generation for one in fov] == [0, 1, 2, 3]
-    assert all(one.low < one.median < one.high for one in fov)
-    assert fov[0].high - fov[0].low < fov[3].high - fov[3].low, "searches part"
-    assert fov[0].low < 45 < fov[0].high, "from the same start"
-    assert fov[1].low < end.median < fov[3].high
-    assert len(end.ends.split()) == SEEDS
-    held = [one for one in drift if one.quantity == "up"]
-    assert all(one.held for one in held)
-    assert str(held[-1]) == "held at 1"
-
-
-def test_every_phase_has_an_end():
-    """Of its own generations alone: three of one, though there are only two before the second begins."""
-    config = assemble(preset="lens", assignments=("genome.doe.opens_at=2", "genome.refractive_index.opens_at=2"))
-    drift = drifted(config, "lens", {"a": lambda row: row.relative_aperture, "n": lambda row: row.refractive_index}, 6)
-    ends = {(one.quantity, one.generation): one for one in drift if one.ends}
-    assert set(ends) == {("a", 1), ("a", 5), ("n", 1), ("n", 5)}
-    assert ends["n", 1].held
-    assert not ends["n", 5].held
-    assert of_the_end(drift, 3) is None
-
-
-def test_p_counts_searches_that_came_as_far_on_either_side():
-    end = Drift("a", "x", 5, 0.0, 50.0, 100.0, " ".join(str(i) for i in range(1, 100)))  # 1 ... 99
-    assert end.p(50.0) == 1.0
-    assert end.p(-3.0) == end.p(200.0) == pytest.approx(2 / 100)
-    assert end.p(5.0) == end.p(95.0) == pytest.approx(2 * 6 / 100)
-
-
-def test_runs_are_held_against_luck_where_it_was_computed():
-    """The run that went further has its p; one that stopped before would be held against more drift than it had."""
-    rows = [
-        replace(ROW, seed=seed, generation=g, fov_deg=10.0) for seed, last in ((0, 5), (1, 3)) for g in range(last + 1)
-    ]
-    conduct = [Conduct("a", seed, 6, n, 6, 1.0, "", 0.01, 1e-4) for seed, n in ((0, 6), (1, 4))]
-    drift = [Drift("a", "fov", 5, 20.0, 45.0, 80.0, "20 45 80"), Drift("a", "fov", 5, 20.0, 45.0, 80.0)]
-    store = Store(rows, conduct, drift, Origin.here(1.0), "")
-    table = luck_table(store, {"fov": lambda row: row.fov_deg}).splitlines()
-    assert table[2:] == ["| a, seed 0 | 0.5 |", "| a, seed 1 | - |"]
 
 
 def test_runs_of_one_group_differ_in_their_seeds_alone(tmp_path, capsys):

@@ -1,0 +1,60 @@
+"""What luck makes of a search, and what a run is held against."""
+
+from dataclasses import replace
+
+import pytest
+
+from evolve.config_source import assemble
+from experiments.candidates import Row
+from experiments.drift import SEEDS, Drift, drifted, of_the_end
+from experiments.evolved import Conduct, Store, luck_table
+from experiments.store import Origin
+
+ROW = Row(*("a", 0, 0, 0, 0, 0, 1.0, 0.5, 4, 2, 60.0, 45.0, 8, 8, 0.1, 5, 64, 1000))
+
+
+def test_chance_moves_genes_that_are_open_and_no_others():
+    config = assemble("navigation", "bifurcation-navigation", assignments=("search.generations=6",))
+    quantities = {"fov": lambda row: row.fov_deg, "up": lambda row: row.height, "fitness": lambda row: row.fitness}
+    drift = drifted(config, "navigation", quantities, 4)
+    assert {one.quantity for one in drift} == {"fov", "up"}, "nobody lived"
+    *fov, end = (one for one in drift if one.quantity == "fov")
+    assert [one.generation for one in fov] == [0, 1, 2, 3]
+    assert all(one.low < one.median < one.high for one in fov)
+    assert fov[0].high - fov[0].low < fov[3].high - fov[3].low, "searches part"
+    assert fov[0].low < 45 < fov[0].high, "from the same start"
+    assert fov[1].low < end.median < fov[3].high
+    assert len(end.ends.split()) == SEEDS
+    held = [one for one in drift if one.quantity == "up"]
+    assert all(one.held for one in held)
+    assert str(held[-1]) == "held at 1"
+
+
+def test_every_phase_has_an_end():
+    """Of its own generations alone: three of one, though there are only two before the second begins."""
+    config = assemble(preset="lens", assignments=("genome.doe.opens_at=2", "genome.refractive_index.opens_at=2"))
+    drift = drifted(config, "lens", {"a": lambda row: row.relative_aperture, "n": lambda row: row.refractive_index}, 6)
+    ends = {(one.quantity, one.generation): one for one in drift if one.ends}
+    assert set(ends) == {("a", 1), ("a", 5), ("n", 1), ("n", 5)}
+    assert ends["n", 1].held
+    assert not ends["n", 5].held
+    assert of_the_end(drift, 3) is None
+
+
+def test_p_counts_searches_that_came_as_far_on_either_side():
+    end = Drift("a", "x", 5, 0.0, 50.0, 100.0, " ".join(str(i) for i in range(1, 100)))  # 1 ... 99
+    assert end.p(50.0) == 1.0
+    assert end.p(-3.0) == end.p(200.0) == pytest.approx(2 / 100)
+    assert end.p(5.0) == end.p(95.0) == pytest.approx(2 * 6 / 100)
+
+
+def test_runs_are_held_against_luck_where_it_was_computed():
+    """The run that went further has its p; one that stopped before would be held against more drift than it had."""
+    rows = [
+        replace(ROW, seed=seed, generation=g, fov_deg=10.0) for seed, last in ((0, 5), (1, 3)) for g in range(last + 1)
+    ]
+    conduct = [Conduct("a", seed, 6, n, 6, 1.0, "", 0.01, 1e-4) for seed, n in ((0, 6), (1, 4))]
+    drift = [Drift("a", "fov", 5, 20.0, 45.0, 80.0, "20 45 80"), Drift("a", "fov", 5, 20.0, 45.0, 80.0)]
+    store = Store(rows, conduct, drift, Origin.here(1.0), "")
+    table = luck_table(store, {"fov": lambda row: row.fov_deg}).splitlines()
+    assert table[2:] == ["| a, seed 0 | 0.5 |", "| a, seed 1 | - |"]
