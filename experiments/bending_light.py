@@ -5,7 +5,6 @@ python -m experiments.bending_light [--runs VARIANT=DIR ...] [--answer TEXT] [--
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -18,6 +17,7 @@ from experiments import best_pupil, evolved
 from experiments.candidates import Row
 from experiments.drift import SEEDS, shade
 from experiments.evolved import Store, conduct_table, luck, luck_table
+from experiments.glass import relief_of
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.store import read_rows
@@ -41,6 +41,7 @@ QUANTITIES: dict[str, Callable[[Row], float]] = {
     "refractive index": lambda row: row.refractive_index,
     "contrast above the noise": lambda row: row.above_noise,
     "what its glass adds to it": lambda row: row.above_noise - row.above_noise_of_hole,
+    "power of its glass": lambda row: row.glass_power,
     "Strehl ratio": lambda row: row.strehl,
     "image quality": lambda row: row.image_quality,
     "PSNR [dB]": lambda row: row.psnr_db,
@@ -59,25 +60,25 @@ def page(store: Store) -> Page:
         title="Eyes learn to bend light",
         question=(
             "Does a pupil that evolves alone close, and open again when the glass in it may become a lens? Published: "
-            "it does both. Controls: an index held at 1, where no lens can be; other noise, which moves the best pupil "
-            "([where to](best_pupil.md))."
+            "it does both. Control: an index held at 1, where no lens can be. How light moves the best hole is asked "
+            "of animals that do not evolve: [learning through holes](learning_through_holes.md)."
         ),
         answer=store.answer,
         method=(
-            "Aperture, index, fitness and success are means over a generation's candidates, the other measures those "
-            "of its fittest, optics that cannot be computed left out; a line per seed, all seeds are shown; dotted: "
-            f"relief and index join. Tables have means of the phases' last {LAST} generations with 95 % intervals, by "
-            "a bootstrap over seeds and candidates; with few seeds they are too narrow, and hardly more than the range "
-            f"of the seeds. By chance: the median and the range of 95 % of {SEEDS} searches that were told random "
-            "numbers as fitness. What glass adds is the contrast above the noise less that behind a hole as wide; "
-            "Strehl ratios compare with a lens as wide, and a hole that closes has a better one too. PSNR and SSIM "
-            "compare with a perfect lens, without noise, brightness made equal."
+            "Aperture, index, power, fitness and success are means over a generation's candidates, the other measures "
+            "those of its fittest, optics that cannot be computed left out; a line per seed, all seeds are shown; "
+            f"dotted: relief and index join. Tables have means of the phases' last {LAST} generations with 95 % "
+            "intervals, by a bootstrap over seeds and candidates; with few seeds they are too narrow, and hardly more "
+            f"than the range of the seeds. By chance: the median and the range of 95 % of {SEEDS} searches that were "
+            "told random numbers as fitness. Glass of power 1 brings far objects to focus, 0 is no lens, less than 0 "
+            "spreads light (the power of the paraboloid nearest to the relief). What it adds is the contrast above the "
+            "noise less that behind a hole as wide; Strehl ratios compare with a lens as wide, and a hole that closes "
+            "has a better one too. PSNR and SSIM compare with a perfect lens, without noise, brightness made equal."
         ),
         command=(
             "evolve run --preset lens --seed 0    # and 1\n"
             "evolve run --preset lens --set genome.refractive_index.open=false --set genome.refractive_index.start=1\n"
-            "evolve run --preset lens --set eye.noise_sigma=0.0003    # and 0.003\n"
-            "python -m experiments.bending_light --runs lens=DIR lens=DIR index1=DIR bright=DIR dark=DIR"
+            "python -m experiments.bending_light --runs lens=DIR lens=DIR index1=DIR"
         ),
         figures=[
             Figure(
@@ -159,9 +160,9 @@ def prediction(store: Store) -> str:
 
 
 def draw(store: Store, path: Path) -> None:
-    """A panel per quantity, a line per seed."""
-    figure, axes = new_figure(13, 5.2, columns=5, rows=2, sharex=True)
-    for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=True):
+    """A panel per quantity, a line per seed; the last panel is the key."""
+    figure, axes = new_figure(15, 5.2, columns=(len(QUANTITIES) + 2) // 2, rows=2, sharex=True)
+    for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=False):
         for group, color in colors(store).items():
             rows = store.group(group)
             shade(place, store.chance(group, name), color)
@@ -175,6 +176,10 @@ def draw(store: Store, path: Path) -> None:
     axes[0, 0].axhline(best_pupil.best(holes, "hole", holes[0].noise_sigma, "stripes"), color="#777777", ls="--", lw=1)
     for place in axes[1]:
         place.set_xlabel("generation")
+    axes[-1, -1].set_axis_off()
+    for group, color in colors(store).items():
+        axes[-1, -1].plot([], [], color=color, lw=2, label=group)
+    axes[-1, -1].legend(loc="center", frameon=False)
     save(figure, path)
 
 
@@ -185,13 +190,6 @@ def extremes(rows: Sequence[Row]) -> tuple[Row, Row] | tuple[()]:
     late = [r for r in rows if r.generation >= first and r.phase == max(row.phase for row in rows)]
     done = sorted((row for row in late if row.relief and not row.failed), key=lambda row: row.fitness)
     return (done[-1], done[0]) if done else ()
-
-
-def relief_of(row: Row) -> optics.BSplineRelief | np.ndarray:
-    """A row's relief as a pupil of radius 1 takes it: one patch of 4 x 4 genes, or the heights that more genes are."""
-    points = np.array(row.relief.split(), float)
-    side = math.isqrt(points.size)
-    return optics.BSplineRelief(points.reshape(side, side)) if side == 4 else points.reshape(side, side)
 
 
 def draw_reliefs(store: Store, path: Path) -> None:
@@ -216,7 +214,7 @@ def draw_reliefs(store: Store, path: Path) -> None:
 def longer(row: Row, store: Store) -> np.ndarray:
     """Optical path through the relief less the least, over the pupil's square [µm]; NaN outside the pupil."""
     unit = next((one.relief_height for one in store.conduct if one.group == row.group), 0.0)
-    heights, inside = relief_heights(optics.Pupil(1.0, relief_of(row)))
+    heights, inside = relief_heights(optics.Pupil(1.0, relief_of(np.array(row.relief.split(), float))))
     path = 1e6 * unit * (row.refractive_index - 1) * heights
     return np.where(inside, path - path[inside].min(), np.nan)
 

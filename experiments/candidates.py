@@ -12,12 +12,13 @@ import numpy as np
 import optics
 from evolve.analysis import acuity_cpd, polychromatic, succeeded
 from evolve.candidate import Candidate
-from evolve.config import RunConfig
+from evolve.config import EyeConfig, RunConfig
 from evolve.development import Phenotype
 from evolve.policy import PolicyConfig, build_policy, learnt
 from evolve.store import Run
 from evolve.vision import vision
 from experiments.best_pupil import contrast_of, measures
+from experiments.glass import power
 from sim.reward import EVALUATION
 from sim.world import build_world
 
@@ -37,6 +38,7 @@ class Row:
     full_return  of an episode straight to the goal without any contact; NaN where there is always another goal
     above_noise  contrast above the noise; see experiments.best_pupil. of_hole: of the same pupil without its relief
     relief       heights in [0, 1], row by row, of an eye with optics
+    glass_power  of that which brings far objects to focus; see experiments.glass
     peaks_nm     of the pigments, of an eye that inherits them
     """
 
@@ -69,6 +71,7 @@ class Row:
     relief: str = ""
     peaks_nm: str = ""
     full_return: float = NO_NUMBER
+    glass_power: float = NO_NUMBER
 
 
 def rows_of(run: Run, group: str) -> list[Row]:
@@ -106,7 +109,7 @@ def _row(run: Run, group: str, candidate: Candidate, champion: bool) -> Row:
         episodes=len(candidate.returns),
         parameters=parameters(PolicyConfig(shape, animal.neurons, animal.layers)),
         full_return=full_return(config.task),
-        **anatomy(animal),
+        **anatomy(animal, config.eye),
         **(_seen(config, animal) if champion and animal.relative_aperture is not None else {}),
     )
 
@@ -124,7 +127,7 @@ def full_return(task: str) -> float:
     return EVALUATION.progress * distance + EVALUATION.goal
 
 
-def anatomy(animal: Phenotype) -> dict[str, Any]:
+def anatomy(animal: Phenotype, eye: EyeConfig) -> dict[str, Any]:
     """Those fields of a row that are the animal's own."""
     has_optics = animal.relative_aperture is not None
     return {
@@ -140,6 +143,7 @@ def anatomy(animal: Phenotype) -> dict[str, Any]:
         "refractive_index": animal.refractive_index if animal.refractive_index is not None else NO_NUMBER,
         "relief": " ".join(f"{height:.3g}" for height in animal.relief or ()) if has_optics else "",
         "peaks_nm": " ".join(f"{peak:.1f}" for peak in animal.lambda_max_nm or ()),
+        "glass_power": power(animal, eye),
     }
 
 

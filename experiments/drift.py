@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.config import RunConfig
+from evolve.config import EyeConfig, RunConfig
 from evolve.development import Phenotype, develop
 from evolve.search import Search
 from experiments.candidates import NO_NUMBER, Row, anatomy
@@ -99,7 +99,7 @@ def _means(config: RunConfig, quantities: Mapping[str, Callable[[Row], float]], 
     means: list[list[float]] = [[] for _ in quantities]
     for generation in range(generations):
         proposals = search.propose_generation()
-        rows = [_row(develop(proposal.vector, config), generation) for proposal in proposals]
+        rows = [_row(develop(proposal.vector, config), config.eye, generation) for proposal in proposals]
         search.tell([(proposal.id, chance.normal()) for proposal in proposals])
         for mine, value in zip(means, quantities.values(), strict=True):
             finite = [v for v in map(value, rows) if math.isfinite(v)]
@@ -107,7 +107,7 @@ def _means(config: RunConfig, quantities: Mapping[str, Callable[[Row], float]], 
     return means
 
 
-def _row(animal: Phenotype, generation: int) -> Row:
+def _row(animal: Phenotype, eye: EyeConfig, generation: int) -> Row:
     """Of an animal that has not lived."""
     none: dict[str, Any] = {
         "failed": 0,
@@ -116,4 +116,4 @@ def _row(animal: Phenotype, generation: int) -> Row:
         "episodes": 0,
         "parameters": 0,
     }
-    return Row(group="", seed=0, generation=generation, phase=0, index=0, **none, **anatomy(animal))
+    return Row(group="", seed=0, generation=generation, phase=0, index=0, **none, **anatomy(animal, eye))

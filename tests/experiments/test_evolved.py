@@ -18,6 +18,7 @@ from evolve.store import Run
 from experiments import bending_light, brains_and_acuity, goals_shape_eyes, learning_through_holes
 from experiments.candidates import Row, full_return, parameters, rows_of
 from experiments.evolved import Conduct, Store, main
+from experiments.glass import relief_of
 from experiments.means import last_mean
 from experiments.store import Origin, write_rows
 from optics import Pupil, backend
@@ -187,7 +188,7 @@ def test_fittest_and_least_fit_are_of_the_last_phase():
 def test_reliefs_of_any_number_of_genes_are_drawn(tmp_path, side):
     """Heights that rise like the row number rise everywhere and are symmetric, whichever surface joins them."""
     rows = np.repeat(np.arange(side) / (side - 1), side)
-    heights, _ = relief_heights(Pupil(1.0, bending_light.relief_of(replace(ROW, relief=" ".join(map(str, rows))))))
+    heights, _ = relief_heights(Pupil(1.0, relief_of(rows)))
     assert (np.diff(heights, axis=0) > 0).all()
     assert heights.mean() == pytest.approx(0.5)
     failed = [replace(ROW, failed=1, relief="0.5 " * 16, seed=1)]

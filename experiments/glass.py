@@ -1,0 +1,49 @@
+"""What a relief is as a lens."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+import optics
+from evolve.config import EyeConfig
+from evolve.development import Phenotype
+from evolve.report.eye_figures import relief_heights
+
+__all__ = ["power", "relief_of"]
+
+
+def power(animal: Phenotype, config: EyeConfig) -> float:
+    """Power of an eye's glass, of that which brings far objects to focus on its retina: 1 in focus, 0 no lens, less
+    than 0 a diverging one; NaN for the perfect lens, which has no glass.
+
+    It is that of the paraboloid nearest to the relief over the pupil's disk (least squares: Zernike's defocus). Where
+    the way through glass falls by d from middle to rim, P = 2 d / R² (paraxial; Goodman, Introduction to Fourier
+    Optics, §5.1), and the retina lies at f = L / (2 tan(fov/2)): P f = d / (a² L tan(fov/2) / 4).
+    """
+    if animal.relief is None or animal.relative_aperture is None or animal.refractive_index is None:
+        return math.nan
+    fall = _fall(math.isqrt(len(animal.relief))) @ np.array(animal.relief)
+    way = (animal.refractive_index - 1) * config.relief_height * float(fall) + 0.0  # no -0
+    return 4 * way / (animal.relative_aperture**2 * config.sensor_width * math.tan(math.radians(animal.fov_deg) / 2))
+
+
+def relief_of(heights: NDArray[np.float64]) -> optics.BSplineRelief | NDArray[np.float64]:
+    """N² heights as a pupil takes them: one patch of 4 x 4 genes, or the heights that more genes are."""
+    side = math.isqrt(heights.size)
+    return optics.BSplineRelief(heights.reshape(side, side)) if side == 4 else heights.reshape(side, side)
+
+
+@cache
+def _fall(side: int) -> NDArray[np.float64]:
+    """How much the nearest paraboloid falls from middle to rim, per height: a relief is linear in its side² genes."""
+    reliefs = [relief_heights(optics.Pupil(1.0, relief_of(gene))) for gene in np.eye(side * side)]
+    inside = reliefs[0][1]
+    centre = (np.array(inside.shape) - 1) / 2
+    away = (np.argwhere(inside) - centre) / (np.array(inside.shape) / 2)
+    terms = np.stack([np.ones(len(away)), (away**2).sum(axis=1)], axis=1)
+    found: NDArray[np.float64] = -(np.linalg.pinv(terms) @ np.stack([h[inside] for h, _ in reliefs], axis=1))[1]
+    return found
