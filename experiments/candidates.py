@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import torch
 
 import optics
 from evolve.analysis import acuity_cpd, polychromatic, succeeded
@@ -172,4 +173,5 @@ def _seen(config: RunConfig, animal: Phenotype) -> dict[str, Any]:
 @cache
 def parameters(shape: PolicyConfig) -> int:
     """Numbers in a policy of this shape: what training would leave, also where its file is elsewhere."""
-    return sum(tensor.numel() for tensor in learnt(build_policy(shape)).values())
+    with torch.device("meta"):  # shapes alone: drawing the weights would take a hundred times as long
+        return sum(tensor.numel() for tensor in learnt(build_policy(shape)).values())
