@@ -15,16 +15,16 @@ from evolve.config import RunConfig
 from evolve.development import Phenotype, develop
 from evolve.evaluation import Evaluation
 from evolve.executors import cores
-from evolve.genes import CLUSTERS, LAMBDA_MAX
+from evolve.genes import CLUSTERS
 from evolve.genotype import Genotype
 from evolve.ladder import budgets, evaluations, sizes, stretches
 from evolve.ladder import steps as total_steps
+from evolve.remarks import remarks
 
-__all__ = ["Plan", "idle_genes"]
+__all__ = ["Plan"]
 
 REPORT_BYTES = 5_000_000  # report and replay pages together
 EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60  # of the episode that is exported: see evolve.episode
-GREY_TASKS = ("navigation", "detection", "tracking")
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ class Plan:
     def notes(self) -> list[str]:
         """What one should know before it begins."""
         short = self.paces and self.disk_bytes > self.free_bytes
-        return [*idle_genes(self.config), *(["the disk is too small for this run"] if short else [])]
+        return [*remarks(self.config), *(["the disk is too small for this run"] if short else [])]
 
     def record(self) -> dict[str, Any]:
         """The plan for machines."""
@@ -145,29 +145,6 @@ class Plan:
             "free_bytes": self.free_bytes,
             "notes": self.notes(),
         }
-
-
-def idle_genes(config: RunConfig) -> list[str]:
-    """Open genes that cannot change anything as the others are held, one line each."""
-    uses, table = config.genome, config.eye.genes
-    notes = []
-    if uses["placement_range_deg"].open and not uses["n_eyes"].open and uses["n_eyes"].start == 1:
-        notes.append("genome.placement_range_deg is open but changes nothing: genome.n_eyes is held at 1")
-    relief = [name for name in table if name.startswith("doe_")]
-    index = uses["refractive_index"]
-    if not index.open and index.start == 1 and any(uses[name].open for name in (*relief, "dispersion")):
-        notes.append("the relief's open genes change nothing: genome.refractive_index is held at 1")
-    flat = not any(uses[name].open for name in relief) and len({uses[name].start for name in relief}) == 1
-    for name in ("refractive_index", "dispersion"):
-        if flat and uses[name].open:
-            notes.append(f"genome.{name} is open but changes nothing: the relief is held flat")
-    if config.task in GREY_TASKS and any(uses[name].open for name in LAMBDA_MAX):
-        notes.append(f"genes of lambda_max are open but change nothing: the world of {config.task} is grey")
-    types = uses["receptor_types"]
-    most = int(types.high if types.open else types.start)
-    for name in [name for name in list(LAMBDA_MAX)[most:] if uses[name].open]:
-        notes.append(f"genome.{name} is open but changes nothing: genome.receptor_types is at most {most}")
-    return notes
 
 
 def _gene_lines(config: RunConfig) -> list[str]:

@@ -14,6 +14,7 @@ import numpy as np
 
 import optics
 from sim.agent import Eyes
+from sim.colours import band_error, measured
 from sim.depth import ONE_PSF, DepthLayers
 from sim.fields import Unseen
 from sim.lighting import BOUNCE, DIRECT, LEVELS
@@ -130,8 +131,7 @@ def chosen(pilot: Pilot, eyes: Eyes, eye: optics.Eye, tolerance: float | None = 
     rungs = PERFECT_LENS_RUNGS if eye.pupil is None else PUPIL_RUNGS
     errors = pilot.errors(sampling, light_level.level)
     rays, rays_level = _fewest(errors, rungs, allowed * math.sqrt(1 - spent))
-    bands_level = Level("bands", f"{eyes.bands}", None, "the eyes' own")
-    levels = bands_level, depth_level, light_level, rays_level
+    levels = _own_bands(pilot.world, eye), depth_level, light_level, rays_level
     return Fidelity(rays, eyes.bands, depth, allowed, levels, light_level.level), sampling
 
 
@@ -165,6 +165,14 @@ def _bands(eye: optics.Eye, allowed: float) -> tuple[int, Level]:
     except optics.AccuracyError as error:
         return eye.bands, Level("bands", f"{eye.bands}", None, f"the eyes' own: {error}")
     return bands, Level("bands", f"{bands}", allowed, f"fewest with {allowed:.1e} for any colours up to white")
+
+
+def _own_bands(world: World, eye: optics.Eye) -> Level:
+    """What the eye's own bands make of the world's measured reflectances; of colours given as RGB nothing is known."""
+    if not (spectra := measured(world)):
+        return Level("bands", f"{eye.bands}", None, "the eyes' own")
+    error = float(eye.throughput) * band_error(spectra, eye.receptors, eye.bands)
+    return Level("bands", f"{eye.bands}", error, "the eyes' own; error: of measured reflectances in daylight")
 
 
 def _depth(pilot: Pilot, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:

@@ -83,6 +83,7 @@ class Pilot:
     """Tries ways of sampling on one world, as these eyes see it; tracers: of the world at the eye's bands."""
 
     def __init__(self, world: World, stage: Stage, tracers: Tracers, eyes: Eyes, eye: Eye) -> None:
+        self.world = world
         self._stage, self._tracers, self._eyes, self._eye = stage, tracers, eyes, eye
         self._views = glimpses(world, eyes, GLIMPSES[1])
         self._receptors = np.sort(np.random.default_rng(0).permutation(int(np.prod(eyes.resolution)))[:RECEPTORS])

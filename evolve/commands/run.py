@@ -17,8 +17,9 @@ from evolve.dask_executor import DaskExecutor
 from evolve.development import repaired
 from evolve.executors import LocalExecutor
 from evolve.loop import evolve
-from evolve.plan import Plan, idle_genes
+from evolve.plan import Plan
 from evolve.progress import Bar, Events, Lines, Watchers, watcher
+from evolve.remarks import remarks
 from evolve.scalars import Scalars
 from evolve.search import Search
 from evolve.store import Run, next_directory
@@ -45,7 +46,7 @@ def start(arguments: Namespace) -> int:
     run = Run.create(directory, config, starts.name.removeprefix("--from ") if starts else None)
     if not arguments.json:
         print(f"{run.path}: {_plan(config)}", flush=True)
-        for note in idle_genes(config):
+        for note in remarks(config):
             print(f"note: {note}", file=sys.stderr)
     with run.lock():
         return _carry(run, arguments)

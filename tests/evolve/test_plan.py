@@ -14,7 +14,8 @@ from evolve.config_source import assemble
 from evolve.development import develop
 from evolve.fitness import evaluate
 from evolve.genotype import Genotype
-from evolve.plan import Plan, idle_genes
+from evolve.plan import Plan
+from evolve.remarks import idle_genes, remarks
 from optics import backend
 
 PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
@@ -75,6 +76,22 @@ def test_genes_that_cannot_change_anything_are_named():
     assert "the world of detection is grey" in first
     assert others == ["genome.lambda_max_3_nm is open but changes nothing: genome.receptor_types is at most 3"]
     assert len(notes(*inherited, "genome.receptor_types.open=true")) == 1
+
+
+def test_bands_too_few_for_the_colours_of_a_world_are_named():
+    """Four bands put the ultraviolet that a goal reflects where pigments of 410 nm look: 0.18 of white's signal."""
+
+    def notes(task, *settings):
+        return remarks(assemble(task, assignments=settings))
+
+    few = "eye.bands = 4 misjudge what foraging's objects reflect by up to 0.065 of white's signal, more than "
+    assert notes("foraging") == [few + "eye.noise_sigma = 0.01; 16 do not"]
+    assert notes("foraging", "eye.bands=16") == []
+    inherited = ("eye.receptors=genes", "eye.noise_sigma=0.02", "genome.lambda_max_2_nm.open=true")
+    assert "up to 0.18 of white's signal" in notes("foraging", *inherited)[0]
+    assert notes("foraging", *inherited, "eye.bands=16") == []
+    assert "more than 32 would not" in notes("foraging", "eye.noise_sigma=0.0001")[0]
+    assert notes("detection", "eye.bands=1") == [], "a grey world has no colours to misjudge"
 
 
 def test_a_ladder_costs_what_its_rungs_cost(tmp_path, paced):

@@ -1,0 +1,82 @@
+"""What is odd about a run's settings, though nothing forbids it: genes that change nothing, colours seen wrongly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from evolve.config import INHERITED, RunConfig
+from evolve.genes import LAMBDA_MAX
+
+__all__ = ["coarse_bands", "idle_genes", "remarks"]
+
+GREY_TASKS = ("navigation", "detection", "tracking")
+PEAKS = 17  # of an open gene's range, at which its pigment is tried
+
+
+def remarks(config: RunConfig) -> list[str]:
+    """One line each."""
+    return [*idle_genes(config), *coarse_bands(config)]
+
+
+def coarse_bands(config: RunConfig) -> list[str]:
+    """A line where the bands misjudge the world's measured spectra by more than a receptor's noise."""
+    from sim.colours import band_error, measured
+    from sim.world import build_world
+
+    if config.task in GREY_TASKS:
+        return []
+    spectra = measured(build_world(config.task))
+    errors = {n: max(band_error(spectra, types, n) for types in _types(config)) for n in _doublings(config.eye.bands)}
+    error, allowed = errors[config.eye.bands], config.eye.noise_sigma
+    if error <= allowed:
+        return []
+    enough = next(
+        (f"{n} do not" for n, left in errors.items() if left <= allowed), f"more than {max(errors)} would not"
+    )
+    return [
+        f"eye.bands = {config.eye.bands} misjudge what {config.task}'s objects reflect by up to {error:.2g} of white's "
+        f"signal, more than eye.noise_sigma = {allowed:g}; {enough}"
+    ]
+
+
+def _doublings(bands: int) -> list[int]:
+    """So many bands, and twice as many, and so on; 64 are what they are held against."""
+    return [bands * 2**k for k in range(6) if k == 0 or bands * 2**k < 64]
+
+
+def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
+    """Receptors of the run; where they are inherited, each open gene's range in turn, the others at their start."""
+    if config.eye.receptors != INHERITED:
+        return [config.eye.receptors]
+    uses = [config.genome[name] for name in LAMBDA_MAX]
+    count = config.genome["receptor_types"]
+    start = [use.start for use in uses][: int(count.high if count.open else count.start)]
+    tried = [tuple(start)]
+    for place in range(len(start)):
+        if uses[place].open:
+            peaks = np.linspace(uses[place].low, uses[place].high, PEAKS)
+            tried += [(*start[:place], float(peak), *start[place + 1 :]) for peak in peaks]
+    return list(tried)
+
+
+def idle_genes(config: RunConfig) -> list[str]:
+    """Open genes that cannot change anything as the others are held, one line each."""
+    uses, table = config.genome, config.eye.genes
+    notes = []
+    if uses["placement_range_deg"].open and not uses["n_eyes"].open and uses["n_eyes"].start == 1:
+        notes.append("genome.placement_range_deg is open but changes nothing: genome.n_eyes is held at 1")
+    relief = [name for name in table if name.startswith("doe_")]
+    index = uses["refractive_index"]
+    if not index.open and index.start == 1 and any(uses[name].open for name in (*relief, "dispersion")):
+        notes.append("the relief's open genes change nothing: genome.refractive_index is held at 1")
+    flat = not any(uses[name].open for name in relief) and len({uses[name].start for name in relief}) == 1
+    for name in ("refractive_index", "dispersion"):
+        if flat and uses[name].open:
+            notes.append(f"genome.{name} is open but changes nothing: the relief is held flat")
+    if config.task in GREY_TASKS and any(uses[name].open for name in LAMBDA_MAX):
+        notes.append(f"genes of lambda_max are open but change nothing: the world of {config.task} is grey")
+    types = uses["receptor_types"]
+    most = int(types.high if types.open else types.start)
+    for name in [name for name in list(LAMBDA_MAX)[most:] if uses[name].open]:
+        notes.append(f"genome.{name} is open but changes nothing: genome.receptor_types is at most {most}")
+    return notes
