@@ -93,7 +93,7 @@ def _add_runs(commands: _Commands) -> None:
         metavar="NAME",
         default="paper",
         help="settings to begin with: quick (minutes), paper (a day; default), or an experiment: "
-        "bifurcation-navigation, bifurcation-detection, lens, scaling, ultraviolet",
+        "bifurcation-navigation, bifurcation-detection, lens, pupil, scaling, ultraviolet",
     )
     run.add_argument("--scale", help="of an experiment: laptop (hours on two cores; default) or paper (days)")
     run.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings; wins over the preset")

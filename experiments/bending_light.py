@@ -25,7 +25,7 @@ from experiments.store import read_rows
 __all__ = ["page"]
 
 NAME = "bending_light"
-MEASURES = ("contrast", "stripes")
+MEASURES = ("contrast", "stripes_1", "stripes_2", "stripes_4")
 COLORS = {
     "blue": "#0072B2",
     "orange": "#D55E00",
@@ -84,7 +84,8 @@ def page(store: Store) -> Page:
             Figure(
                 NAME,
                 lambda path: draw(store, path),
-                f"Generation by generation: {_legend(store)}. Shaded: by chance. Dashed: the best hole by stripes.",
+                f"Generation by generation: {_legend(store)}. Shaded: by chance. Dashed: the best hole "
+                "by stripes two receptors wide.",
             ),
             Figure(
                 f"{NAME}_reliefs",
@@ -156,7 +157,9 @@ def prediction(store: Store) -> str:
         lines.append(
             [group, f"{sigma:g}", "-" if found is None else str(found), *best_pupil.predicted(sigma, MEASURES)]
         )
-    return markdown_table(["", "noise σ", "a at the end of phase I", *(f"best by {m}" for m in MEASURES)], lines)
+    return markdown_table(
+        ["", "noise σ", "a at the end of phase I", *(f"best by {best_pupil.MEASURES[m]}" for m in MEASURES)], lines
+    )
 
 
 def draw(store: Store, path: Path) -> None:
@@ -173,7 +176,9 @@ def draw(store: Store, path: Path) -> None:
             place.axvline(start - 0.5, color="#777777", ls=":", lw=1)
         place.set_title(name, fontsize=10)
     holes = read_rows(best_pupil.Row, best_pupil.STORED)
-    axes[0, 0].axhline(best_pupil.best(holes, "hole", holes[0].noise_sigma, "stripes"), color="#777777", ls="--", lw=1)
+    axes[0, 0].axhline(
+        best_pupil.best(holes, "hole", holes[0].noise_sigma, "stripes_2"), color="#777777", ls="--", lw=1
+    )
     for place in axes[1]:
         place.set_xlabel("generation")
     axes[-1, -1].set_axis_off()

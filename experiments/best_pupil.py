@@ -24,7 +24,13 @@ from sim import materials
 __all__ = ["Row", "best", "computed", "measures"]
 
 Floats = NDArray[np.float64]
-MEASURES = ("contrast", "stripes", "bits", "image_quality")
+STRIPES = (1, 2, 4)  # receptors that one is wide
+MEASURES = {
+    "contrast": "contrast",
+    **{f"stripes_{width}": f"stripes {width} receptor{'s' * (width > 1)} wide" for width in STRIPES},
+    "bits": "bits",
+    "image_quality": "image quality",
+}
 PUPILS = ("hole", "lens")
 APERTURES = tuple(np.geomspace(0.04, 1.0, 29).tolist())
 STORED = Path(__file__).parents[1] / DATA / "best_pupil.csv"
@@ -46,7 +52,9 @@ class Row:
     image_quality: float
     contrast: float
     bits: float
-    stripes: float
+    stripes_1: float
+    stripes_2: float
+    stripes_4: float
 
 
 def eye(pupil: str, aperture: float) -> optics.Eye:
@@ -75,13 +83,13 @@ def measures(contrasts: Floats, throughput: float, noise_sigma: float) -> tuple[
     return throughput * above, above, bits
 
 
-def stripes(contrasts: Floats, throughput: float) -> float:
-    """T MTF at half the receptors' Nyquist frequency: what stripes two receptors wide leave in the signals, whatever
-    the noise; 0 beyond the MTF's first zero, where they are seen reversed or not at all."""
+def stripes(contrasts: Floats, throughput: float, width: int) -> float:
+    """T MTF where stripes are so many receptors wide, at Nyquist's frequency over the width: what they leave in the
+    signals, whatever the noise; 0 beyond the MTF's first zero, where they are seen reversed or not at all."""
     falls, rises = np.diff(contrasts)[:-1] < 0, np.diff(contrasts)[1:] >= 0
     zeros = np.flatnonzero(falls & rises & (contrasts[1:-1] < ZERO)) + 1
-    middle = (contrasts.size - 1) // 2
-    return 0.0 if zeros.size and zeros[0] < middle else throughput * float(contrasts[middle])
+    place = (contrasts.size - 1) // width
+    return 0.0 if zeros.size and zeros[0] < place else throughput * float(contrasts[place])
 
 
 def contrast_of(seen: optics.Eye) -> Floats:
@@ -98,8 +106,8 @@ def computed(apertures: Sequence[float] = APERTURES, noises: Sequence[float] = N
         for aperture in apertures:
             seen = eye(pupil, aperture)
             contrasts, light = contrast_of(seen), float(seen.throughput)
-            seen_stripes = stripes(contrasts, light)
-            rows += [Row(pupil, aperture, s, *measures(contrasts, light, s), seen_stripes) for s in noises]
+            of_stripes = [stripes(contrasts, light, width) for width in STRIPES]
+            rows += [Row(pupil, aperture, s, *measures(contrasts, light, s), *of_stripes) for s in noises]
     return rows
 
 
@@ -117,7 +125,7 @@ def best(rows: Iterable[Row], pupil: str, noise_sigma: float, measure: str) -> f
 
 
 def predicted(noise_sigma: float, measures: Sequence[str]) -> list[str]:
-    """The stored best hole by each measure, as pages show it; "-" where this noise was not computed."""
+    """The stored best hole by each of MEASURES, as pages show it; "-" where this noise was not computed."""
     rows = read_rows(Row, STORED)
     known = any(math.isclose(row.noise_sigma, noise_sigma) for row in rows)
     return [_shown(best(rows, "hole", noise_sigma, measure)) if known else "-" for measure in measures]
@@ -133,8 +141,16 @@ def page(rows: Sequence[Row], origin: Origin) -> Page:
     """The page of the stored numbers."""
     noises = sorted({row.noise_sigma for row in rows})
     open_best = [best(rows, "hole", sigma, "contrast") for sigma in noises]
-    cells = [[f"{s:g}", *(_shown(best(rows, p, s, m)) for p in PUPILS for m in MEASURES)] for s in noises]
-    header = ["noise σ", *(f"{p}: {m.replace('_', ' ')}" for p in PUPILS for m in MEASURES)]
+    cells = [
+        [
+            f"{s:g}",
+            *(_shown(best(rows, "hole", s, m)) for m in MEASURES),
+            _range([best(rows, "lens", s, m) for m in MEASURES]),
+        ]
+        for s in noises
+    ]
+    widths = [best(rows, "hole", noises[0], f"stripes_{width}") for width in STRIPES]
+    header = ["noise σ", *(f"hole: {name}" for name in MEASURES.values()), "lens: every measure"]
     return Page(
         name="best_pupil",
         title="The best pupil: sharpness against light",
@@ -147,17 +163,18 @@ def page(rows: Sequence[Row], origin: Origin) -> Page:
             f"{_shown(open_best[0])} where σ = {noises[0]:g} and at {open_best[-1]:.2f} where σ = {noises[-1]:g}; at "
             f"the default σ = 0.01 at {_shown(best(rows, 'hole', 0.01, 'contrast'))}. With little noise that is near "
             f"Rayleigh's sharpest pinhole, a = {rayleigh():.2f}; noise opens it. Stripes of one width leave most in "
-            f"the signals where they are neither dark nor blurred, a = {_shown(best(rows, 'hole', 0.01, 'stripes'))} "
-            "for those two receptors wide, whatever the noise. By bits, in which structures that are seen reversed "
-            "count as well as others, and by image quality as `optics.image_quality` has it, contrast times "
-            "throughput, the widest hole that was tried is best at every noise: what a brain is worth that undoes the "
-            "blur. With a lens in focus the widest pupil is best by every measure."
+            f"the signals where they are neither dark nor blurred, behind a hole about four fifths of such a pair "
+            f"of stripes wide whatever the noise: a = {', '.join(map(_shown, widths))} for stripes of "
+            f"{', '.join(map(str, STRIPES))} receptors. By bits, and by image quality as `optics.image_quality` has "
+            "it, contrast times throughput, the widest hole that was tried is best at every noise. With a lens in "
+            "focus the widest pupil is best by every measure."
         ),
         method=(
             f"Eyes 200 µm wide, {FOV_DEG:g}°, {RESOLUTION} x {RESOLUTION} receptors, in white daylight; hole and ideal "
             "lens; exact wave optics. σ is a receptor's noise in units of what white gives at a = 1. With f in units "
             "of the receptors' Nyquist frequency and T = a²: *contrast* is C = ∫ max(MTF - σ/T, 0) df; *image quality* "
-            "is T C; *stripes* are T MTF at half that frequency, up to the MTF's first zero; *bits* per receptor are "
+            "is T C; *stripes* are T MTF where one stripe is 1, 2 or 4 receptors wide, up to the MTF's first zero "
+            "(beyond it they are seen reversed, which the other measures count as well); *bits* per receptor are "
             "what noise leaves of a scene of black and white stripes "
             f"(reflectances {materials.BLACK:g} and {materials.WHITE:g}) of all frequencies alike, "
             "(π/2) ∫ ½ log2(1 + (c T MTF / σ)²) f df with c half their difference (Snyder, Laughlin and Stavenga "
@@ -180,6 +197,10 @@ def page(rows: Sequence[Row], origin: Origin) -> Page:
 
 def _shown(aperture: float) -> str:
     return f"{aperture:.2f}" if aperture > 0.1 else f"{aperture:.3f}"
+
+
+def _range(apertures: Sequence[float]) -> str:
+    return " to ".join(sorted({_shown(min(apertures)), _shown(max(apertures))}))
 
 
 def shades(noises: Sequence[float]) -> tuple[float, float, float]:

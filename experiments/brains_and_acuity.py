@@ -94,7 +94,8 @@ def page(store: Store) -> Page:
             "such budgets it is never reached, the share that is missing of what a straight way to it without any "
             "contact would return. Power laws by least "
             "squares in logarithms; 95 % intervals by a bootstrap over candidates. Parameters are all of a policy's, "
-            "critic included. The best of an acuity is the mean of its best quarter, which bounds what brains add."
+            "critic included. The best of an acuity is the mean of its best quarter, "
+            "chosen by the same episodes and so told a little too good."
         ),
         command=(
             "evolve run --preset scaling\n"

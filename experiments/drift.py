@@ -22,7 +22,8 @@ from experiments.means import LAST
 
 __all__ = ["SEEDS", "Drift", "drifted", "of_the_end", "shade"]
 
-SEEDS = 200
+SEEDS = 1000
+POOLS = 20_000  # of searches drawn together, where several runs are held against luck as one
 FIRST_SEED = 10_000  # none that anybody takes for a run
 
 
@@ -44,12 +45,15 @@ class Drift:
         """Nothing moves it: its gene is closed."""
         return self.low == self.high
 
-    def p(self, value: float) -> float:
+    def p(self, *values: float) -> float:
         """Two-sided p of a value, were it drawn like these: the one that is asked about counts as one of them (Davison
-        and Hinkley 1997, §4.2), so that it is 2 / (searches + 1) at the least."""
-        ends = np.array(self.ends.split(), float)
-        fewer = min((ends <= value).sum(), (ends >= value).sum())
-        return min(1.0, 2 * (float(fewer) + 1) / (ends.size + 1))
+        and Hinkley 1997, §4.2), so that it is 2 / (searches + 1) at the least. Of several runs' values: that of their
+        mean, among the means of as many searches drawn at random, and no less than of one."""
+        ends, asked = np.array(self.ends.split(), float), float(np.mean(values))
+        several = np.random.default_rng(0).choice(ends, (POOLS, len(values))).mean(axis=1)
+        drawn = ends if len(values) == 1 else several
+        share = min((drawn <= asked).sum(), (drawn >= asked).sum()) / drawn.size
+        return min(1.0, 2 * (float(share) * ends.size + 1) / (ends.size + 1))
 
     def __str__(self) -> str:
         return f"held at {self.median:.3g}" if self.held else f"{self.median:.3g} [{self.low:.3g}, {self.high:.3g}]"
@@ -86,6 +90,8 @@ def shade(axes: Any, drift: list[Drift], color: str) -> None:
     if rows:
         x, low, high = ([getattr(one, name) for one in rows] for name in ("generation", "low", "high"))
         axes.fill_between(x, low, high, color=color, alpha=0.1, lw=0)
+        for edge in (low, high):  # ranges of several groups overlap
+            axes.plot(x, edge, color=color, alpha=0.4, lw=0.6)
 
 
 def _drift(group: str, quantity: str, generation: int, means: NDArray[np.float64]) -> Drift:

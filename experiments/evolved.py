@@ -29,6 +29,7 @@ class Conduct:
 
     generations, planned  complete ones, and how many there were to be
     commits               of rhabdom, with which it was begun and continued, first digits; +: with changes
+    worker_hours          by the clock: other work on the machine lengthens them
     noise_sigma           of its receptors · relief_height [m]: what a relief gene of 1 means
     """
 
@@ -37,7 +38,7 @@ class Conduct:
     candidates: int
     generations: int
     planned: int
-    core_hours: float
+    worker_hours: float
     commits: str
     noise_sigma: float
     relief_height: float
@@ -82,11 +83,11 @@ class Store:
 
 def conduct_table(store: Store) -> str:
     """A row per run."""
-    header = ["run", "candidates", "generations", "core hours", "rhabdom at"]
+    header = ["run", "candidates", "generations", "worker hours", "rhabdom at"]
     lines = [
         [
             *(f"{one.group}, seed {one.seed}", str(one.candidates), f"{one.generations} of {one.planned}"),
-            *(f"{one.core_hours:.1f}", one.commits),
+            *(f"{one.worker_hours:.1f}", one.commits),
         ]
         for one in store.conduct
     ]
@@ -94,17 +95,28 @@ def conduct_table(store: Store) -> str:
 
 
 def luck_table(store: Store, quantities: Quantities, phase: int | None = None) -> str:
-    """A row per run: the p of what it came to, against searches by luck alone; of the end of a phase, or of the run."""
+    """A row per run, and one for the runs of a group together: the p of what they came to, against searches by luck
+    alone; of the end of a phase, or of the run."""
     names = [n for n in quantities if any(not one.held for g in store.groups for one in store.chance(g, n))]
     lines = []
-    for one in store.conduct:
-        rows = [r for r in store.group(one.group) if r.seed == one.seed and phase in (None, r.phase)]
-        line = [f"{one.group}, seed {one.seed}"]
-        for name in names:
-            found, end = last_mean(rows, quantities[name]), luck(store, one.group, name, rows)
-            line.append("-" if found is None or end is None or end.held else f"{end.p(found.mean):.2g}")
-        lines.append(line)
+    for group in store.groups:
+        rows = [row for row in store.group(group) if phase in (None, row.phase)]
+        runs = [[row for row in rows if row.seed == seed] for seed in sorted({row.seed for row in rows})]
+        lines += [[f"{group}, seed {run[0].seed}", *_ps(store, [run], quantities, names)] for run in runs]
+        if len(runs) > 1:
+            lines.append([f"{group}, all seeds", *_ps(store, runs, quantities, names)])
     return markdown_table([f"p by chance (two-sided, {2 / (SEEDS + 1):.2g} at the least)", *names], lines)
+
+
+def _ps(store: Store, runs: Sequence[list[Row]], quantities: Quantities, names: Sequence[str]) -> list[str]:
+    """Of each quantity: p of these runs' mean; "-" where nothing moves it, or a run did not get as far as others."""
+    shown = []
+    for name in names:
+        found = [last_mean(run, quantities[name]) for run in runs]
+        ends = [luck(store, run[0].group, name, run) for run in runs]
+        values = [one.mean for one, end in zip(found, ends, strict=True) if one and end and not end.held]
+        shown.append(f"{ends[0].p(*values):.2g}" if ends[0] and len(values) == len(runs) else "-")
+    return shown
 
 
 def luck(store: Store, group: str, quantity: str, rows: Sequence[Row]) -> Drift | None:
@@ -153,7 +165,7 @@ def _collect(chosen: Namespace, stem: Path, quantities: Quantities) -> None:
             configs = {group: run.config for group, run in runs if furthest[group] > 0}
             found = [row for g, config in configs.items() for row in drifted(config, g, quantities, furthest[g])]
             write_rows(found, _beside(stem, "drift"))
-        here = Origin.here(sum(one.core_hours for one in conduct))
+        here = Origin.here(sum(one.worker_hours for one in conduct), "worker")
         replace(here, versions=recorded(runs[0][1].path) or here.versions).write(stem.with_suffix(".json"))
     if chosen.answer:
         write_whole(answer, f"{chosen.answer}\n".encode())

@@ -120,10 +120,11 @@ def page(views: Sequence[View], perfect: View, origin: Origin) -> Page:
         title="What the eye sees, at five stages on the way to a lens",
         question="What does an eye see of one scene while its pupil closes and glass in it becomes a lens?",
         answer=(
-            f"A pinhole shows the scene nearly as a lens does (SSIM {closed.ssim:.2f} beside {focused.ssim:.2f}), and "
-            f"loses it in the noise: {closed.noisy_psnr_db:.0f} dB beside {focused.noisy_psnr_db:.0f} dB on a retina "
-            f"of {COARSE} x {COARSE}. The cup (SSIM {cup.ssim:.2f}) with glass that bends light 0.6 times as strongly "
-            f"as it should stands halfway (SSIM {blurred.ssim:.2f})."
+            f"A pinhole shows the scene sharper than a lens out of focus (SSIM {closed.ssim:.2f} beside "
+            f"{blurred.ssim:.2f}), less sharply than one in focus ({focused.ssim:.2f}), and loses it in the noise: "
+            f"{closed.noisy_psnr_db:.0f} dB beside {focused.noisy_psnr_db:.0f} dB on a retina of {COARSE} x {COARSE}. "
+            f"The lens out of focus is the cup (SSIM {cup.ssim:.2f}) with glass that bends light 0.6 times as strongly "
+            "as it should."
         ),
         method=(
             "A scene of detection, path-traced; goal on the left, an adversary on the right, another behind. Eyes "

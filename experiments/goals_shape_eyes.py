@@ -63,7 +63,10 @@ def page(store: Store) -> Page:
         ),
         figures=[
             Figure(
-                NAME, lambda path: draw(store, path), f"Generation by generation: {_legend(store)}. Shaded: by chance."
+                NAME,
+                lambda path: draw(store, path),
+                f"Generation by generation: {_legend(store)}. Shaded: by chance. Dots with bars: the table's means and "
+                "intervals.",
             ),
         ],
         tables=[table(store), "Every seed:", seeds_table(store), luck_table(store, QUANTITIES), conduct_table(store)],

@@ -24,14 +24,15 @@ __all__ = ["best_width", "page", "smoothed"]
 
 NAME = "learning_through_holes"
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#B8568F", "#B59E00")
-MEASURES = ("contrast", "stripes")
+MEASURES = ("contrast", "stripes_1", "stripes_2", "stripes_4")
+DRAWN = {"contrast": ":", "stripes_2": "--"}
 BANDWIDTH = 0.2  # of the smooth curve, in log a: a fifth of the width
 STEPS = 105  # of a curve
 RESAMPLES = 2000
 SURE = 0.05  # p below which a best width is one
 BINS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65)
 CHANCE = 1 / 3
-CAPTION = "Dots are animals. Upright lines: the best hole by contrast (dotted) and by stripes (dashed). σ: "
+CAPTION = "Dots are animals. Upright: the best hole by contrast (dotted), by stripes two receptors wide (dashed). σ: "
 Floats = NDArray[np.float64]
 
 
@@ -44,7 +45,7 @@ def page(store: Store) -> Page:
         title="Learning through holes",
         question=(
             "How wide a hole do animals learn best behind, and does more light narrow it, as contrast above the noise "
-            "predicts, or not, as the signal of stripes does ([the best pupil](best_pupil.md))?"
+            "predicts, or not, as the signal of stripes of one width does ([the best pupil](best_pupil.md))?"
         ),
         answer=store.answer,
         method=(
@@ -52,8 +53,9 @@ def page(store: Store) -> Page:
             "hole of its own width. Curves: local lines with weights that fall with the distance in log a (Gaussian, "
             f"{BANDWIDTH:g}); the best width is where the curve peaks, with a 95 % interval by a bootstrap over "
             "animals, cut at the widths that were tried. p: of a curve that explains as much where success has nothing "
-            f"to do with the width, by {RESAMPLES} permutations; above {SURE:g} no best width is given. Dotted: the "
-            "goal comes first of three objects by luck."
+            f"to do with the width, by {RESAMPLES} permutations; above {SURE:g} no best width is given. Dotted: of "
+            "three objects one that is reached by luck is the goal; who reaches none scores less. Objects are spheres "
+            "of 0.5 m with stripes of 30°: from 2.5 m away a stripe in the middle is two receptors wide, from 5 m one."
         ),
         command=(
             "evolve run --preset pupil\n"
@@ -125,7 +127,9 @@ def table(store: Store) -> str:
         found, p = best_width(store.group(group))
         shown = str(found) if p < SURE else "nowhere better"
         lines.append([f"{sigma:g}", str(len(_samples(store.group(group))[0])), shown, f"{p:.2g}", *predicted])
-    return markdown_table(["noise σ", "animals", "learnt best at", "p", *(f"best by {m}" for m in MEASURES)], lines)
+    return markdown_table(
+        ["noise σ", "animals", "learnt best at", "p", *(f"best by {best_pupil.MEASURES[m]}" for m in MEASURES)], lines
+    )
 
 
 def by_width(store: Store) -> str:
@@ -150,7 +154,7 @@ def draw(store: Store, path: Path) -> None:
         at, value = _samples(store.group(group))
         place.semilogx(np.exp(at), value, "o", color=color, ms=4, alpha=0.5, mec="none")
         place.semilogx(np.exp(_tried(at)), smoothed(at, value, _tried(at)), color=color, lw=1.5)
-        for measure, style in zip(MEASURES, (":", "--"), strict=True):
+        for measure, style in DRAWN.items():
             for width in best_pupil.predicted(store.noise_sigma(group), (measure,)):
                 if width != "-":
                     place.axvline(float(width), color=color, ls=style, lw=1, alpha=0.6)

@@ -28,7 +28,6 @@ __all__ = ["contrast", "difference", "page"]
 NAME = "seeing_ultraviolet"
 BANDS = 16
 RANGES = (330, 365, 400, 435, 470, 650)  # of the shortest peak [nm]
-SHORTEST, LONGEST = "#6A3D9A", "#D55E00"
 FITNESS = "#0072B2"
 
 
@@ -60,13 +59,20 @@ def shortest(row: Row) -> float:
     return min(peaks(row), default=NO_NUMBER)
 
 
+def middle(row: Row) -> float:
+    """Peak [nm] of the type between the two: the median."""
+    return float(np.median(peaks(row))) if row.peaks_nm else NO_NUMBER
+
+
 def longest(row: Row) -> float:
     """Peak [nm] of the type that sees least of it."""
     return max(peaks(row), default=NO_NUMBER)
 
 
+COLORS = {shortest: "#6A3D9A", middle: "#009E73", longest: "#D55E00"}
 QUANTITIES = {
     "shortest peak [nm]": shortest,
+    "middle peak [nm]": middle,
     "longest peak [nm]": longest,
     "difference of goal and adversary": contrast,
     "fitness": lambda row: row.fitness,
@@ -102,9 +108,9 @@ def page(store: Store) -> Page:
             Figure(
                 NAME,
                 lambda path: draw(store, path),
-                "Violet: the type with the shortest peak; orange: the one with the longest. All seeds are shown. "
-                "Band: where goal and adversaries reflect differently; shaded: where luck leads the types; dotted: "
-                "one goal among three objects.",
+                "Violet: the type with the shortest peak; green: the middle one; orange: the one with the longest. All "
+                "seeds are shown. Goal and adversaries reflect differently below the dashed line; shaded: where luck "
+                "leads the types; dotted: one goal among three objects.",
             )
         ],
         tables=[
@@ -154,17 +160,17 @@ def draw(store: Store, path: Path) -> None:
     nm = np.linspace(330, 650, 65)
     seen.semilogy(nm, [difference(float(peak)) for peak in nm], color="#222222", lw=1.2)
     seen.set(xlabel="peak of the pigment [nm]", title="difference of goal and adversary")
-    for name, color in zip(QUANTITIES, (SHORTEST, LONGEST), strict=False):
+    for name, color in zip(QUANTITIES, COLORS.values(), strict=False):
         shade(moved, store.chance(store.groups[0], name), color)
     for seed in sorted({row.seed for row in rows}):
         mine = [row for row in rows if row.seed == seed]
         last = [row for row in mine if row.generation > max(r.generation for r in mine) - LAST]
-        for value, color in ((shortest, SHORTEST), (longest, LONGEST)):
+        for value, color in COLORS.items():
             found = [value(row) for row in last]
             seen.semilogy(found, [difference(peak) for peak in found], "o", color=color, ms=4, alpha=0.5, mec="none")
             moved.plot(*of_generation(mine, value), color=color, lw=1.2)
         worth.plot(*of_generation(mine, lambda row: row.success_rate), color=FITNESS, lw=1.2)
-    moved.axhspan(330, 400, color=SHORTEST, alpha=0.08, lw=0)
+    moved.axhline(400, color="#777777", lw=1, ls="--")
     moved.set(xlabel="generation", title="peaks [nm]")
     worth.axhline(1 / 3, color="#999999", lw=0.8, ls=":")
     worth.set(xlabel="generation", title="goal reached before any adversary", ylim=(0, 1))

@@ -46,19 +46,21 @@ def write_rows(rows: Iterable[Any], path: Path) -> None:
 class Origin:
     """How stored numbers were made.
 
-    hours     of one core
+    hours     of one core's time, or of one worker's by the clock
     machine   processor and cores
     versions  of what decides the numbers
+    whose     "core" or "worker"
     """
 
     hours: float
     machine: str
     versions: Mapping[str, str]
+    whose: str = "core"
 
     @classmethod
-    def here(cls, hours: float) -> Origin:
+    def here(cls, hours: float, whose: str = "core") -> Origin:
         """Made by this process."""
-        return cls(hours, f"{_processor()}, {os.cpu_count()} cores", present())
+        return cls(hours, f"{_processor()}, {os.cpu_count()} cores", present(), whose)
 
     @classmethod
     def read(cls, path: Path) -> Origin:
@@ -75,7 +77,7 @@ class Origin:
         packages = ", ".join(f"{name} {self.versions[name]}" for name in self.versions if name not in names)
         units = ((1, "hours"), (1 / 60, "minutes"), (0, "seconds"))
         least, unit = next((least, unit) for least, unit in units if self.hours >= least)
-        took = f"{self.hours / (least or 1 / 3600):.2g} core {unit}"
+        took = f"{self.hours / (least or 1 / 3600):.2g} {self.whose} {unit}"
         commit = self.versions["commit"]
         changed = " with changes" if commit.endswith("+") else ""
         python = self.versions["python"]

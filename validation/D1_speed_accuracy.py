@@ -2,9 +2,10 @@
 
 Every way to render a world for its agents' eyes, by its error and its speed. The error is the root mean square, over
 receptors, channels, eyes and states that agents got into, of the difference to a reference: Mitsuba's path tracer in 8
-bands, then the convolution `Eye.see`; it is in units of the photoreceptors' noise, σ = 0.01. Errors below σ/2 change
-nothing that a brain can tell. Speed is agent-steps (all eyes of one agent, once) per second of one core's CPU time, the
-best of several interleaved rounds, behind the pupil, without physics.
+bands, then the convolution `Eye.see`; it is in units of the photoreceptors' noise, σ = 0.01. Errors below σ/2 are
+little beside the noise of one receptor (one that many receptors share could still be learnt). Speed is agent-steps
+(all eyes of one agent, once) per second of one core's CPU time, the best of several interleaved rounds, behind the
+pupil, without physics.
 
 The eyes are those of the published experiments, behind lenses in focus. Levels: back end (closed form, Mitsuba's ray
 tracing in the batched renderer, the reference renderer with few samples), rays per receptor, bands, light (direct; with

@@ -174,7 +174,7 @@ def _legend(figure: Any, columns: int) -> None:
     entries = [
         mark('what "auto" picks', "*", color="#D55E00", ms=12),
         Line2D([], [], color="black", lw=0.9, label="Pareto front"),
-        Patch(color="#009E73", alpha=0.15, label="lost in the noise"),
+        Patch(color="#009E73", alpha=0.15, label="below half the noise"),
         *(mark(NAMES[name], "o", color=color) for name, color in COLORS.items()),
         mark("direct light (number: rays)", "o", color="black", mfc="white"),
         mark("reflected light, too", "o", color="black"),

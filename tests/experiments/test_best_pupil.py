@@ -28,7 +28,7 @@ def test_contrast_below_the_noise_counts_for_nothing():
 
 def test_optimum_is_that_of_the_parabola():
     apertures = np.geomspace(0.05, 0.5, 8)
-    rows = [Row("hole", a, 0.01, 0.0, 1 - np.log(a / 0.21) ** 2, a, 0.0) for a in apertures]
+    rows = [Row("hole", a, 0.01, 0.0, 1 - np.log(a / 0.21) ** 2, a, 0.0, 0.0, 0.0) for a in apertures]
     assert best(rows, "hole", 0.01, "contrast") == pytest.approx(0.21)
     assert best(rows, "hole", 0.01, "bits") == 0.5, "at the end of what was tried"
 
@@ -44,16 +44,19 @@ def test_with_little_noise_the_best_hole_is_rayleighs_pinhole():
 
 def test_stripes_are_seen_best_where_a_disk_of_blur_takes_least():
     """Behind a hole light falls on a disk as wide as the hole: T MTF = a² 2 J1(x) / x with x = π a L f is greatest at
-    J0's first zero. Of a hole of three Fresnel zones the disk is brighter in its middle, hence 8 %; contrast above the
-    noise peaks at half that width or at twice it."""
+    J0's first zero. Of a hole of three Fresnel zones the disk is brighter in its middle, hence 8 %; one of less than
+    one is as wide as diffraction makes it, hence 25 % for the narrowest stripes. Any other of these widths has its
+    optimum at half or twice as much."""
     backend.require()
-    rows = computed(tuple(np.geomspace(0.1, 0.9, 23)), (0.01,))
-    frequency = RESOLUTION / 4  # half of Nyquist's, per width of the retina
-    assert best(rows, "hole", 0.01, "stripes") == pytest.approx(2.405 / (np.pi * frequency), rel=0.08)
-    beyond = [row.stripes for row in rows if row.pupil == "hole" and row.relative_aperture > 4.2 / (np.pi * frequency)]
+    rows = computed(tuple(np.geomspace(0.06, 0.9, 25)), (0.01,))
+    for width, tolerance in ((1, 0.25), (2, 0.08), (4, 0.08)):
+        frequency = RESOLUTION / (2 * width)  # pairs of stripes per width of the retina
+        found = best(rows, "hole", 0.01, f"stripes_{width}")
+        assert found == pytest.approx(2.405 / (np.pi * frequency), rel=tolerance)
+        assert best(rows, "lens", 0.01, f"stripes_{width}") == pytest.approx(0.9)
+    beyond = [row for row in rows if row.pupil == "hole" and row.relative_aperture > 4.2 / (np.pi * RESOLUTION / 4)]
     assert beyond
-    assert max(beyond) == 0.0, "reversed"
-    assert best(rows, "lens", 0.01, "stripes") == pytest.approx(0.9)
+    assert max(row.stripes_2 for row in beyond) == 0.0, "reversed"
 
 
 def test_page_is_what_its_store_says():

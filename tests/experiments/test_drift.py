@@ -6,9 +6,17 @@ import pytest
 
 from evolve.config_source import assemble
 from experiments.candidates import Row
-from experiments.drift import SEEDS, Drift, drifted, of_the_end
+from experiments.drift import Drift, drifted, of_the_end
 from experiments.evolved import Conduct, Store, luck_table
 from experiments.store import Origin
+
+SEARCHES = 60
+
+
+@pytest.fixture(autouse=True)
+def few_searches(monkeypatch):
+    monkeypatch.setattr("experiments.drift.SEEDS", SEARCHES)
+
 
 ROW = Row(*("a", 0, 0, 0, 0, 0, 1.0, 0.5, 4, 2, 60.0, 45.0, 8, 8, 0.1, 5, 64, 1000))
 
@@ -24,7 +32,7 @@ def test_chance_moves_genes_that_are_open_and_no_others():
     assert fov[0].high - fov[0].low < fov[3].high - fov[3].low, "searches part"
     assert fov[0].low < 45 < fov[0].high, "from the same start"
     assert fov[1].low < end.median < fov[3].high
-    assert len(end.ends.split()) == SEEDS
+    assert len(end.ends.split()) == SEARCHES
     held = [one for one in drift if one.quantity == "up"]
     assert all(one.held for one in held)
     assert str(held[-1]) == "held at 1"
@@ -48,6 +56,15 @@ def test_p_counts_searches_that_came_as_far_on_either_side():
     assert end.p(5.0) == end.p(95.0) == pytest.approx(2 * 6 / 100)
 
 
+def test_runs_that_agree_are_less_like_luck_than_one():
+    """Uniform luck in [0, 1]: of two means of it, the p is that of a triangle's corner, 2 x 2 m² for a mean m."""
+    end = Drift("a", "x", 5, 0.0, 0.5, 1.0, " ".join(f"{(i + 0.5) / 1000:.4f}" for i in range(1000)))
+    assert end.p(0.1, 0.1) == pytest.approx(4 * 0.1**2, rel=0.15), "three standard errors of so many draws"
+    assert end.p(0.1) == pytest.approx(2 * 0.1, rel=0.02)
+    assert end.p(0.05, 0.95) == pytest.approx(1.0, abs=0.03), "runs that part are like luck together"
+    assert end.p(-1.0, -1.0) == pytest.approx(2 / 1001), "no surer than so many searches make it"
+
+
 def test_runs_are_held_against_luck_where_it_was_computed():
     """The run that went further has its p; one that stopped before would be held against more drift than it had."""
     rows = [
@@ -57,4 +74,6 @@ def test_runs_are_held_against_luck_where_it_was_computed():
     drift = [Drift("a", "fov", 5, 20.0, 45.0, 80.0, "20 45 80"), Drift("a", "fov", 5, 20.0, 45.0, 80.0)]
     store = Store(rows, conduct, drift, Origin.here(1.0), "")
     table = luck_table(store, {"fov": lambda row: row.fov_deg}).splitlines()
-    assert table[2:] == ["| a, seed 0 | 0.5 |", "| a, seed 1 | - |"]
+    assert table[2:] == ["| a, seed 0 | 0.5 |", "| a, seed 1 | - |", "| a, all seeds | - |"]
+    both = replace(store, rows=[replace(row, seed=seed) for row in rows if row.seed == 0 for seed in (0, 1)])
+    assert luck_table(both, {"fov": lambda row: row.fov_deg}).splitlines()[-1] == "| a, all seeds | 0.5 |"

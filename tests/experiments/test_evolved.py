@@ -23,6 +23,12 @@ from experiments.means import last_mean
 from experiments.store import Origin, write_rows
 from optics import Pupil, backend
 
+
+@pytest.fixture(autouse=True)
+def few_searches(monkeypatch):
+    monkeypatch.setattr("experiments.drift.SEEDS", 10)
+
+
 SMALL = ("search.population=2", "search.generations=2")
 PHASES = (*SMALL, "genome.doe.opens_at=1", "genome.refractive_index.opens_at=1")
 

@@ -47,5 +47,5 @@ def test_widths_are_held_against_what_is_predicted_for_their_noise():
     rows = [*through_holes(0.2, 0.0), *through_holes(0.2, 0.0, "0.01")]
     conduct = [Conduct(group, 0, 40, 5, 5, 1.0, "", float(group), 1e-4) for group in ("0.001", "0.01")]
     bright, dark = learning_through_holes.table(Store(rows, conduct, [], Origin.here(1.0), "")).splitlines()[2:]
-    assert [cell.strip() for cell in bright.split("|")[5:7]] == ["0.11", "0.21"]
-    assert [cell.strip() for cell in dark.split("|")[5:7]] == ["0.21", "0.21"]
+    assert [cell.strip() for cell in bright.split("|")[5:9]] == ["0.11", "0.12", "0.21", "0.41"]
+    assert [cell.strip() for cell in dark.split("|")[5:9]] == ["0.21", "0.12", "0.21", "0.41"]
