@@ -34,6 +34,7 @@ __all__ = [
     "psnr",
     "succeeded",
     "trajectory",
+    "white_strehl",
 ]
 
 Floats = NDArray[np.float64]
@@ -181,13 +182,29 @@ def acuity_cpd(phenotype: Phenotype) -> float:
 
 def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:
     """The PSF of white daylight, (1, y, x): bands weighted as the mean of the receptor channels weighs them."""
+    share = _of_daylight(eye)
+    image = np.tensordot(share, psf.psf.astype(np.float64), axes=1)
+    mean = share @ eye.spectral_bands.wavelengths
+    return replace(psf, tensor=image[None], wavelengths=np.array([mean]), plans=(psf.plan,))
+
+
+def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
+    """Strehl ratio in white daylight: the PSF's peak, over that of an aperture as wide without aberration at any
+    wavelength. (That at the mean wavelength is lower: peaks go with 1/λ².)"""
+    import optics
+
+    share, peaks = _of_daylight(eye), psf.psf.astype(np.float64).max(axis=(1, 2))
+    ideal = peaks / optics.strehl_ratio(psf)
+    return float(polychromatic(eye, psf).psf.max() / (share @ ideal))
+
+
+def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
+    """What each band is of white daylight, to the mean of the receptor channels; they sum to 1."""
     from optics.spectrum import daylight
 
-    bands = eye.spectral_bands
-    weights = bands.weights.mean(axis=0) * daylight(bands.wavelengths)
-    image = np.tensordot(weights / weights.sum(), psf.psf.astype(np.float64), axes=1)
-    mean = np.average(bands.wavelengths, weights=weights)
-    return replace(psf, tensor=image[None], wavelengths=np.array([mean]), plans=(psf.plan,))
+    weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
+    share: NDArray[np.float64] = weights / weights.sum()
+    return share
 
 
 def image_quality(phenotype: Phenotype, config: EyeConfig) -> float:

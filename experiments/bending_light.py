@@ -26,6 +26,7 @@ __all__ = ["page"]
 
 NAME = "bending_light"
 MEASURES = ("contrast", "stripes_1", "stripes_2", "stripes_4")
+MOST_POWER = 2.0  # what counts of it: behind a narrow pupil glass of any power does little
 COLORS = {
     "blue": "#0072B2",
     "orange": "#D55E00",
@@ -41,7 +42,7 @@ QUANTITIES: dict[str, Callable[[Row], float]] = {
     "refractive index": lambda row: row.refractive_index,
     "contrast above the noise": lambda row: row.above_noise,
     "what its glass adds to it": lambda row: row.above_noise - row.above_noise_of_hole,
-    "power of its glass": lambda row: row.glass_power,
+    "power of its glass": lambda row: min(max(row.glass_power, -MOST_POWER), MOST_POWER),
     "Strehl ratio": lambda row: row.strehl,
     "image quality": lambda row: row.image_quality,
     "PSNR [dB]": lambda row: row.psnr_db,
@@ -71,9 +72,10 @@ def page(store: Store) -> Page:
             "intervals, by a bootstrap over seeds and candidates; with few seeds they are too narrow, and hardly more "
             f"than the range of the seeds. By chance: the median and the range of 95 % of {SEEDS} searches that were "
             "told random numbers as fitness. Glass of power 1 brings far objects to focus, 0 is no lens, less than 0 "
-            "spreads light (the power of the paraboloid nearest to the relief). What it adds is the contrast above the "
-            "noise less that behind a hole as wide; Strehl ratios compare with a lens as wide, and a hole that closes "
-            "has a better one too. PSNR and SSIM compare with a perfect lens, without noise, brightness made equal."
+            "spreads light (the power of the paraboloid nearest to the relief; more than 2 counts as 2, since behind "
+            "narrow pupils great powers do little). What glass adds is the contrast above the noise less that behind a "
+            "hole as wide; Strehl ratios compare with a lens as wide, and a hole that closes has a better one too. "
+            "PSNR and SSIM compare with a perfect lens, without noise, brightness made equal."
         ),
         command=(
             "evolve run --preset lens --seed 0    # and 1\n"

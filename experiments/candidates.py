@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 import optics
-from evolve.analysis import acuity_cpd, polychromatic, succeeded
+from evolve.analysis import acuity_cpd, succeeded, white_strehl
 from evolve.candidate import Candidate
 from evolve.config import EyeConfig, RunConfig
 from evolve.development import Phenotype
@@ -152,7 +152,7 @@ def _seen(config: RunConfig, animal: Phenotype) -> dict[str, Any]:
     """Measures of an eye's optics; {} where they cannot be computed."""
     eye = animal.eyes(config.eye).eye()
     try:
-        white = polychromatic(eye, eye.psf())
+        strehl = white_strehl(eye, eye.psf())
         hole = replace(eye, pupil=optics.Pupil(eye.pupil.aperture_radius, aperture=eye.pupil.aperture))
         above, above_of_hole = (
             measures(contrast_of(one), float(one.throughput), max(one.noise_sigma, 1e-9))[1] for one in (eye, hole)
@@ -164,7 +164,7 @@ def _seen(config: RunConfig, animal: Phenotype) -> dict[str, Any]:
         "image_quality": looked.image_quality,
         "above_noise": above,
         "above_noise_of_hole": above_of_hole,
-        "strehl": float(optics.strehl_ratio(white)[0]),
+        "strehl": strehl,
         "psnr_db": looked.psnr_db,
         "ssim": looked.ssim,
     }

@@ -75,7 +75,7 @@ def drifted(
             for start, end in zip(starts, [*starts[1:], generations], strict=True):
                 late = mine[:, max(start, end - LAST) : end]
                 ends = np.nanmean(late[np.isfinite(late).any(axis=1)], axis=1)
-                rows.append(replace(_drift(group, name, end - 1, ends), ends=" ".join(f"{one:.4g}" for one in ends)))
+                rows.append(replace(_drift(group, name, end - 1, ends), ends=" ".join(f"{one:.6g}" for one in ends)))
     return rows
 
 

@@ -12,7 +12,7 @@ from evolve.files import write_whole
 from evolve.store import Run, RunError
 from evolve.versions import commits, recorded
 from experiments.candidates import Row, complete, rows_of
-from experiments.drift import SEEDS, Drift, drifted, of_the_end
+from experiments.drift import Drift, drifted, of_the_end
 from experiments.means import last_mean
 from experiments.page import Page, markdown_table, parser
 from experiments.store import Origin, read_rows, write_rows
@@ -104,8 +104,9 @@ def luck_table(store: Store, quantities: Quantities, phase: int | None = None) -
         runs = [[row for row in rows if row.seed == seed] for seed in sorted({row.seed for row in rows})]
         lines += [[f"{group}, seed {run[0].seed}", *_ps(store, [run], quantities, names)] for run in runs]
         if len(runs) > 1:
-            lines.append([f"{group}, all seeds", *_ps(store, runs, quantities, names)])
-    return markdown_table([f"p by chance (two-sided, {2 / (SEEDS + 1):.2g} at the least)", *names], lines)
+            lines.append([f"{group}, {len(runs)} seeds together", *_ps(store, runs, quantities, names)])
+    searches = max((len(one.ends.split()) for one in store.drift), default=0)
+    return markdown_table([f"p by chance (two-sided, {2 / (searches + 1):.2g} at the least)", *names], lines)
 
 
 def _ps(store: Store, runs: Sequence[list[Row]], quantities: Quantities, names: Sequence[str]) -> list[str]:
@@ -115,7 +116,8 @@ def _ps(store: Store, runs: Sequence[list[Row]], quantities: Quantities, names: 
         found = [last_mean(run, quantities[name]) for run in runs]
         ends = [luck(store, run[0].group, name, run) for run in runs]
         values = [one.mean for one, end in zip(found, ends, strict=True) if one and end and not end.held]
-        shown.append(f"{ends[0].p(*values):.2g}" if ends[0] and len(values) == len(runs) else "-")
+        together = len(values) == len(runs) and len({end.generation for end in ends if end}) == 1
+        shown.append(f"{ends[0].p(*values):.2g}" if ends[0] and together else "-")
     return shown
 
 

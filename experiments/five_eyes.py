@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import optics
 import sim
-from evolve.analysis import polychromatic, psnr
+from evolve.analysis import psnr, white_strehl
 from evolve.report.picture import display
 from evolve.vision import ssim
 from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
@@ -96,7 +96,7 @@ def view(pupil: optics.Pupil | None, radiance: Floats, seed: int = 0) -> View:
     sharp, blocks = (eye(None, side).see(radiance, CELLS // side) for side in (FINE, COARSE))
     seen = gain * np.asarray(fine.see(radiance, CELLS // FINE))
     noisy = gain * np.asarray(coarse.see(radiance, CELLS // COARSE, np.random.default_rng(seed)))
-    strehl = 1.0 if pupil is None else float(optics.strehl_ratio(polychromatic(fine, fine.psf()))[0])
+    strehl = 1.0 if pupil is None else white_strehl(fine, fine.psf())
     return View(seen, noisy, strehl, psnr(seen, sharp), ssim(seen, sharp), psnr(noisy, blocks))
 
 

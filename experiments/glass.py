@@ -26,8 +26,9 @@ def power(animal: Phenotype, config: EyeConfig) -> float:
     """
     if animal.relief is None or animal.relative_aperture is None or animal.refractive_index is None:
         return math.nan
-    fall = _fall(math.isqrt(len(animal.relief))) @ np.array(animal.relief)
-    way = (animal.refractive_index - 1) * config.relief_height * float(fall) + 0.0  # no -0
+    heights = np.array(animal.relief)
+    fall = float(_fall(math.isqrt(heights.size)) @ (heights - heights[0]))  # exactly 0 where it is flat
+    way = (animal.refractive_index - 1) * config.relief_height * fall + 0.0  # no -0
     return 4 * way / (animal.relative_aperture**2 * config.sensor_width * math.tan(math.radians(animal.fov_deg) / 2))
 
 

@@ -55,7 +55,7 @@ def page(store: Store) -> Page:
             "animals, cut at the widths that were tried. p: of a curve that explains as much where success has nothing "
             f"to do with the width, by {RESAMPLES} permutations; above {SURE:g} no best width is given. Dotted: of "
             "three objects one that is reached by luck is the goal; who reaches none scores less. Objects are spheres "
-            "of 0.5 m with stripes of 30°: from 2.5 m away a stripe in the middle is two receptors wide, from 5 m one."
+            "1 m wide with stripes of 30°: from 2.5 m away a stripe in the middle is two receptors wide, from 5 m one."
         ),
         command=(
             "evolve run --preset pupil\n"

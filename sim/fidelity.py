@@ -39,7 +39,8 @@ NEAREST = 0.005  # quantile of the distances that counts as the nearest
 
 @dataclass(frozen=True)
 class Level:
-    """What was chosen for one stage, and why. predicted_error: root mean square, of a signal; None where unknown."""
+    """What was chosen for one stage, and why. predicted_error: of a signal, root mean square (of the eyes' own bands a
+    bound: the worst measured reflectance and type of receptor, which may exceed any tolerance); None where unknown."""
 
     stage: str
     level: str

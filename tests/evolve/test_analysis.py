@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+import optics
 from evolve.analysis import (
     acuity_cpd,
     bootstrap_interval,
@@ -14,6 +15,7 @@ from evolve.analysis import (
     polychromatic,
     psnr,
     trajectory,
+    white_strehl,
 )
 from evolve.candidate import Candidate
 from evolve.config import EyeConfig
@@ -218,6 +220,24 @@ def test_polychromatic_weighs_bands_by_daylight_and_receptors():
     # channels look at white with weights 1, shared by the bands: their mean's share of the first band
     share = float(np.mean(eye.spectral_bands.weights[:, 0])) * DAYLIGHT_475
     assert white.psf.sum() == pytest.approx(share * blue + (1 - share) * red, rel=1e-5)
+
+
+@pytest.mark.parametrize("bands", [1, 4])
+def test_lens_in_focus_has_strehl_1_in_white_light(bands):
+    """Peaks go with 1/λ²: over four bands of 400 to 700 nm the peak at the mean wavelength is 5 % lower than theirs."""
+    plain = optics.Eye(bands=bands)
+    eye = optics.Eye(optics.Pupil(30e-6, thin_lens_focal_length=plain.sensor_distance), bands=bands)
+    psf = eye.psf()
+    assert white_strehl(eye, psf) == pytest.approx(1.0, abs=0.01), "the eye's tolerance"
+    by_mean_wavelength = float(optics.strehl_ratio(polychromatic(eye, psf))[0])
+    assert by_mean_wavelength == pytest.approx(1.0 if bands == 1 else 1.05, abs=0.02)
+
+
+def test_strehl_in_white_light_is_where_the_bands_meet():
+    """Glass that bends blue more than red: less than any band's share of its own peak."""
+    eye = phenotype(relative_aperture=0.3, relief=LENS, dispersion=0.05).eyes(EyeConfig()).eye()
+    psf = eye.psf()
+    assert white_strehl(eye, psf) <= float(np.max(optics.strehl_ratio(psf))) + 1e-6
 
 
 DAYLIGHT_475 = 1.15392  # CIE D65 at 475 nm over that at 560 nm: 115.392 / 100

@@ -85,12 +85,15 @@ def test_bands_too_few_for_the_colours_of_a_world_are_named():
         return remarks(assemble(task, assignments=settings))
 
     few = "eye.bands = 4 misjudge what foraging's objects reflect by up to 0.065 of white's signal, more than "
-    assert notes("foraging") == [few + "eye.noise_sigma = 0.01; 16 do not"]
+    assert notes("foraging") == [few + "a receptor's noise, 0.01; 16 do not"]
+    narrow = ("genome.relative_aperture.open=false", "genome.relative_aperture.start=0.3")
+    assert notes("foraging", *narrow) == [], "in a tenth of the light"
     assert notes("foraging", "eye.bands=16") == []
     inherited = ("eye.receptors=genes", "eye.noise_sigma=0.02", "genome.lambda_max_2_nm.open=true")
     assert "up to 0.18 of white's signal" in notes("foraging", *inherited)[0]
     assert notes("foraging", *inherited, "eye.bands=16") == []
-    assert "more than 32 would not" in notes("foraging", "eye.noise_sigma=0.0001")[0]
+    assert "more than a receptor's noise, 0.001; 32 do not" in notes("foraging", "eye.noise_sigma=0")[0]
+    assert "even 40 do" in notes("foraging", "eye.receptors=honeybee", "eye.bands=40", "eye.noise_sigma=0")[0]
     assert notes("detection", "eye.bands=1") == [], "a grey world has no colours to misjudge"
 
 

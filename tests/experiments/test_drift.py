@@ -74,6 +74,6 @@ def test_runs_are_held_against_luck_where_it_was_computed():
     drift = [Drift("a", "fov", 5, 20.0, 45.0, 80.0, "20 45 80"), Drift("a", "fov", 5, 20.0, 45.0, 80.0)]
     store = Store(rows, conduct, drift, Origin.here(1.0), "")
     table = luck_table(store, {"fov": lambda row: row.fov_deg}).splitlines()
-    assert table[2:] == ["| a, seed 0 | 0.5 |", "| a, seed 1 | - |", "| a, all seeds | - |"]
+    assert table[2:] == ["| a, seed 0 | 0.5 |", "| a, seed 1 | - |", "| a, 2 seeds together | - |"]
     both = replace(store, rows=[replace(row, seed=seed) for row in rows if row.seed == 0 for seed in (0, 1)])
-    assert luck_table(both, {"fov": lambda row: row.fov_deg}).splitlines()[-1] == "| a, all seeds | 0.5 |"
+    assert luck_table(both, {"fov": lambda row: row.fov_deg}).splitlines()[-1] == "| a, 2 seeds together | 0.5 |"

@@ -49,8 +49,10 @@ def test_what_is_no_bowl_has_no_power():
     tilt = np.add.outer(np.zeros(4), np.linspace(0, 1, 4))
     saddle = np.array(paraboloid(1.0, 1e-4)).reshape(4, 4)
     saddle = saddle.mean(axis=0)[None, :] - saddle.mean(axis=1)[:, None]
-    for relief in (tilt, saddle, np.full((4, 4), 0.7)):
+    for relief in (tilt, saddle):
         assert power(replace(ANIMAL, relief=tuple(relief.ravel())), EYE) == pytest.approx(0.0, abs=1e-9)
+    for height in (0.0, 0.5, 0.7):
+        assert power(replace(ANIMAL, relief=(height,) * 16, relative_aperture=0.05), EYE) == 0.0, "to the last bit"
 
 
 def test_finer_reliefs_and_no_glass():
