@@ -27,16 +27,6 @@ __all__ = ["page"]
 NAME = "bending_light"
 MEASURES = ("contrast", "stripes_1", "stripes_2", "stripes_4")
 MOST_POWER = 2.0  # what counts of it: behind a narrow pupil glass of any power does little
-COLORS = {
-    "blue": "#0072B2",
-    "orange": "#D55E00",
-    "green": "#009E73",
-    "purple": "#B8568F",
-    "yellow": "#B59E00",
-    "black": "#222222",
-    "brown": "#8C564B",
-    "grey": "#999999",
-}
 QUANTITIES: dict[str, Callable[[Row], float]] = {
     "relative aperture a": lambda row: row.relative_aperture,
     "refractive index": lambda row: row.refractive_index,
@@ -54,8 +44,6 @@ QUANTITIES: dict[str, Callable[[Row], float]] = {
 
 def page(store: Store) -> Page:
     """The page of stored runs. Raises ValueError with more groups than there are colours."""
-    if len(store.groups) > len(COLORS):
-        raise ValueError(f"{len(store.groups)} groups of runs, must be at most {len(COLORS)}: one colour each")
     return Page(
         name=NAME,
         title="Eyes learn to bend light",
@@ -86,7 +74,7 @@ def page(store: Store) -> Page:
             Figure(
                 NAME,
                 lambda path: draw(store, path),
-                f"Generation by generation: {_legend(store)}. Shaded: by chance. Dashed: the best hole "
+                f"Generation by generation: {store.legend}. Shaded: by chance. Dashed: the best hole "
                 "by stripes two receptors wide.",
             ),
             Figure(
@@ -109,15 +97,6 @@ def page(store: Store) -> Page:
         ],
         origin=store.origin,
     )
-
-
-def _legend(store: Store) -> str:
-    return ", ".join(f"{group} {color}" for group, color in zip(store.groups, COLORS, strict=False))
-
-
-def colors(store: Store) -> dict[str, str]:
-    """Of each group."""
-    return dict(zip(store.groups, COLORS.values(), strict=False))
 
 
 def joining(store: Store) -> int | None:
@@ -168,7 +147,7 @@ def draw(store: Store, path: Path) -> None:
     """A panel per quantity, a line per seed; the last panel is the key."""
     figure, axes = new_figure(15, 5.2, columns=(len(QUANTITIES) + 2) // 2, rows=2, sharex=True)
     for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=False):
-        for group, color in colors(store).items():
+        for group, color in store.colors.items():
             rows = store.group(group)
             shade(place, store.chance(group, name), color)
             for seed in sorted({row.seed for row in rows}):
@@ -184,7 +163,7 @@ def draw(store: Store, path: Path) -> None:
     for place in axes[1]:
         place.set_xlabel("generation")
     axes[-1, -1].set_axis_off()
-    for group, color in colors(store).items():
+    for group, color in store.colors.items():
         axes[-1, -1].plot([], [], color=color, lw=2, label=group)
     axes[-1, -1].legend(loc="center", frameon=False)
     save(figure, path)

@@ -21,6 +21,16 @@ __all__ = ["Conduct", "Quantities", "Store", "conduct_table", "luck", "luck_tabl
 
 Quantities = Mapping[str, Callable[[Row], float]]  # of which it is asked what chance alone makes
 NOT_JUDGED = "Not judged yet."
+COLORS = {
+    "blue": "#0072B2",
+    "orange": "#D55E00",
+    "green": "#009E73",
+    "purple": "#B8568F",
+    "yellow": "#B59E00",
+    "black": "#222222",
+    "brown": "#8C564B",
+    "grey": "#999999",
+}
 
 
 @dataclass(frozen=True)
@@ -71,6 +81,19 @@ class Store:
     def groups(self) -> list[str]:
         """Names of the groups, in the order in which they were given."""
         return list(dict.fromkeys(row.group for row in self.rows))
+
+    @property
+    def colors(self) -> dict[str, str]:
+        """Of each group. Raises ValueError with more groups than there are colours."""
+        if len(self.groups) > len(COLORS):
+            raise ValueError(f"{len(self.groups)} groups of runs, must be at most {len(COLORS)}: one colour each")
+        return dict(zip(self.groups, COLORS.values(), strict=False))
+
+    @property
+    def legend(self) -> str:
+        """The same in words."""
+        names = {value: name for name, value in COLORS.items()}
+        return ", ".join(f"{group} {names[color]}" for group, color in self.colors.items())
 
     def noise_sigma(self, group: str) -> float:
         """Of the receptors in a group's runs."""

@@ -23,7 +23,6 @@ from experiments.page import Figure, Page, markdown_table, new_figure, save
 __all__ = ["best_width", "page", "smoothed"]
 
 NAME = "learning_through_holes"
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#B8568F", "#B59E00")
 MEASURES = ("contrast", "stripes_1", "stripes_2", "stripes_4")
 DRAWN = {"contrast": ":", "stripes_2": "--"}
 BANDWIDTH = 0.2  # of the smooth curve, in log a: a fifth of the width
@@ -38,8 +37,6 @@ Floats = NDArray[np.float64]
 
 def page(store: Store) -> Page:
     """The page of stored runs. Raises ValueError with more groups than there are colours."""
-    if len(store.groups) > len(COLORS):
-        raise ValueError(f"{len(store.groups)} groups of runs, must be at most {len(COLORS)}: one colour each")
     return Page(
         name=NAME,
         title="Learning through holes",
@@ -62,7 +59,7 @@ def page(store: Store) -> Page:
             "evolve run --preset pupil --set eye.noise_sigma=0.003    # and others\n"
             f"python -m experiments.{NAME} --runs 0.001=DIR 0.003=DIR"
         ),
-        figures=[Figure(NAME, lambda path: draw(store, path), CAPTION + _legend(store) + ".")],
+        figures=[Figure(NAME, lambda path: draw(store, path), CAPTION + store.legend + ".")],
         tables=[
             "Best relative aperture a:",
             table(store),
@@ -72,11 +69,6 @@ def page(store: Store) -> Page:
         ],
         origin=store.origin,
     )
-
-
-def _legend(store: Store) -> str:
-    names = ("blue", "orange", "green", "purple", "yellow")
-    return ", ".join(f"{group} {name}" for group, name in zip(store.groups, names, strict=False))
 
 
 def _samples(rows: Sequence[Row]) -> tuple[Floats, Floats]:
@@ -150,7 +142,7 @@ def draw(store: Store, path: Path) -> None:
     """Success over the pupil's width."""
     figure, axes = new_figure(6.4, 4.0)
     place = axes[0, 0]
-    for group, color in zip(store.groups, COLORS, strict=False):
+    for group, color in store.colors.items():
         at, value = _samples(store.group(group))
         place.semilogx(np.exp(at), value, "o", color=color, ms=4, alpha=0.5, mec="none")
         place.semilogx(np.exp(_tried(at)), smoothed(at, value, _tried(at)), color=color, lw=1.5)
