@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import sys
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +31,7 @@ RANGES = (330, 365, 400, 435, 470, 650)  # of the shortest peak [nm]
 FITNESS = "#0072B2"
 
 
-@lru_cache
+@cache  # peaks are known to a tenth of a nanometre
 def difference(peak_nm: float) -> float:
     """What a receptor with a pigment of this peak makes of goal and adversary in daylight: the difference of its
     signals, white being 1."""
