@@ -233,11 +233,4 @@ def test_lens_in_focus_has_strehl_1_in_white_light(bands):
     assert by_mean_wavelength == pytest.approx(1.0 if bands == 1 else 1.05, abs=0.02)
 
 
-def test_strehl_in_white_light_is_where_the_bands_meet():
-    """Glass that bends blue more than red: less than any band's share of its own peak."""
-    eye = phenotype(relative_aperture=0.3, relief=LENS, dispersion=0.05).eyes(EyeConfig()).eye()
-    psf = eye.psf()
-    assert white_strehl(eye, psf) <= float(np.max(optics.strehl_ratio(psf))) + 1e-6
-
-
 DAYLIGHT_475 = 1.15392  # CIE D65 at 475 nm over that at 560 nm: 115.392 / 100
