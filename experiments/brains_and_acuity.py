@@ -7,36 +7,29 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments import evolved
 from experiments.candidates import Row
 from experiments.evolved import Store, conduct_table
-from experiments.means import Interval
 from experiments.page import Figure, Page, markdown_table, new_figure, save
+from experiments.powers import PowerLaw, power_law
 
-__all__ = ["PowerLaw", "error", "fitted", "page"]
+__all__ = ["error", "factors", "fitted", "page"]
 
 NAME = "brains_and_acuity"
 COLORS = {"navigation": "#D55E00", "detection": "#0072B2", "tracking": "#009E73"}
 PUBLISHED = {"navigation": 0.69, "detection": 0.74, "tracking": 0.59}
-RESAMPLES = 2000
 CLASSES = 4  # of acuity
-Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class PowerLaw:
-    """error = scale · (size / 10⁴)^-exponent; explained: share of the variance of log error."""
-
-    exponent: Interval
-    scale: float
-    explained: float
+Size = Callable[[Row], float]
+FACTORS: dict[str, Size] = {
+    "acuity": lambda row: row.cpd,
+    "parameters": lambda row: row.parameters,
+    "memory": lambda row: row.memory_frames,
+}
 
 
 def error(row: Row) -> float:
@@ -52,25 +45,12 @@ def size(row: Row) -> float:
     return row.cpd * row.parameters * row.memory_frames
 
 
-def fitted(rows: Sequence[Row], seed: int = 0) -> PowerLaw:
-    """Least squares in logarithms, with a bootstrap over candidates; raises ValueError with fewer than three sizes, and
-    where all errors are the same."""
-    x = np.log([size(row) / 1e4 for row in rows])
-    y = np.log([error(row) for row in rows])
-    if np.unique(x).size < 3:
-        raise ValueError("a power law needs candidates of at least three sizes")
-    if np.ptp(y) < 1e-9:
-        raise ValueError("errors that are all the same have no power law")
-    slope, offset = np.polyfit(x, y, 1)
-    chance = np.random.default_rng(seed)
-    slopes = []
-    for _ in range(RESAMPLES):
-        chosen = chance.integers(len(x), size=len(x))
-        if np.ptp(x[chosen]) > 0:
-            slopes.append(np.polyfit(x[chosen], y[chosen], 1)[0])
-    low, high = np.quantile(slopes, [0.025, 0.975])
-    left = np.var(y - slope * x - offset) / np.var(y) if np.var(y) > 0 else 1.0
-    return PowerLaw(Interval(-float(slope), -float(high), -float(low)), math.exp(offset), 1 - float(left))
+def fitted(rows: Sequence[Row], *sizes: Size) -> PowerLaw | None:
+    """The power law of candidates' errors; None where there is none."""
+    try:
+        return power_law(np.array([error(row) for row in rows]), *(np.array([f(row) for row in rows]) for f in sizes))
+    except ValueError:
+        return None
 
 
 def trained(store: Store, group: str) -> list[Row]:
@@ -93,7 +73,8 @@ def page(store: Store) -> Page:
             "Error: the share of evaluation episodes in which the goal did not come first; in navigation, where within "
             "such budgets it is never reached, the share that is missing of what a straight way to it without any "
             "contact would return. Power laws by least "
-            "squares in logarithms; 95 % intervals by a bootstrap over candidates. Parameters are all of a policy's, "
+            "squares in logarithms, of the product and of its three factors each; 95 % intervals by a bootstrap over "
+            "candidates. Parameters are all of a policy's, "
             "critic included. The best of an acuity is the mean of its best quarter, "
             "chosen by the same episodes and so told a little too good."
         ),
@@ -104,7 +85,7 @@ def page(store: Store) -> Page:
             "python -m experiments.brains_and_acuity --runs detection=DIR navigation=DIR tracking=DIR"
         ),
         figures=[Figure(NAME, lambda path: draw(store, path), "Each dot is a candidate, darker for finer acuity.")],
-        tables=[exponents(store), ceilings(store), conduct_table(store)],
+        tables=[exponents(store), factors(store), ceilings(store), conduct_table(store)],
         origin=store.origin,
     )
 
@@ -114,18 +95,23 @@ def exponents(store: Store) -> str:
     lines = []
     for group in store.groups:
         rows = trained(store, group)
-        law, published = _law(rows), f"{PUBLISHED[group]:g}" if group in PUBLISHED else "-"
-        exponent, explained = ("-", "-") if law is None else (str(law.exponent), f"{law.explained:.2f}")
+        law, published = fitted(rows, size), f"{PUBLISHED[group]:g}" if group in PUBLISHED else "-"
+        exponent, explained = ("-", "-") if law is None else (str(law.exponents[0]), f"{law.explained:.2f}")
         lines.append([group, str(len(rows)), exponent, published, explained])
     return markdown_table(["task", "candidates", "exponent", "published", "variance explained"], lines)
 
 
-def _law(rows: Sequence[Row]) -> PowerLaw | None:
-    """The fitted power law; None where there is none."""
-    try:
-        return fitted(rows)
-    except ValueError:
-        return None
+def factors(store: Store) -> str:
+    """Exponents of each factor on its own, fitted together: a row per task."""
+    header = ["task", *(f"exponent of {name}" for name in FACTORS), "variance explained"]
+    lines = []
+    for group in store.groups:
+        law = fitted(trained(store, group), *FACTORS.values())
+        found = ["-"] * (len(FACTORS) + 1)
+        if law is not None:
+            found = [*map(str, law.exponents), f"{law.explained:.2f}"]
+        lines.append([group, *found])
+    return markdown_table(header, lines)
 
 
 def ceilings(store: Store) -> str:
@@ -151,10 +137,10 @@ def draw(store: Store, path: Path) -> None:
         ranks = np.argsort(np.argsort([row.cpd for row in rows])) / max(len(rows) - 1, 1)
         for row, rank in zip(rows, ranks, strict=True):
             place.loglog(size(row), error(row), "o", color=color, alpha=0.2 + 0.75 * rank, ms=5, mec="none")
-        if (law := _law(rows)) is not None:
+        if (law := fitted(rows, size)) is not None:
             ends = np.array([min(map(size, rows)), max(map(size, rows))])
-            place.loglog(ends, law.scale * (ends / 1e4) ** -law.exponent.mean, color="#222222", lw=1.2)
-        place.set_title(f"{group}: exponent {'-' if law is None else law.exponent}", fontsize=10)
+            place.loglog(ends, law.error(ends), color="#222222", lw=1.2)
+        place.set_title(f"{group}: exponent {'-' if law is None else law.exponents[0]}", fontsize=10)
         place.set_xlabel("acuity x parameters x memory")
     axes[0, 0].set_ylabel("error")
     save(figure, path)

@@ -106,26 +106,28 @@ def with_error(wanted, size):
     episodes = 10_000
     failures = wanted * (episodes + 1) - 0.5
     changes = {"episodes": episodes, "success_rate": 1 - failures / episodes, "memory_frames": 1, "cpd": 1.0}
-    return replace(ROW, parameters=size, **changes)
+    return replace(ROW, group="navigation", parameters=size, **changes)
 
 
-def test_power_law_is_found():
+def test_exponents_are_of_errors():
     sizes = (1000, 5000, 20_000, 100_000)
-    law = brains_and_acuity.fitted([with_error(0.3 * (size / 1e4) ** -0.4, size) for size in sizes])
-    assert law.exponent.mean == pytest.approx(0.4)
-    assert law.exponent.low == pytest.approx(0.4)
-    assert law.scale == pytest.approx(0.3)
-    assert law.explained == pytest.approx(1.0)
-    with pytest.raises(ValueError, match="three sizes"):
-        brains_and_acuity.fitted([with_error(0.3, 1000)] * 5)
+    for wanted, shown in (([0.3 * (size / 1e4) ** -0.4 for size in sizes], "0.4 [0.4, 0.4] | 0.69 | 1.00"),
+                          ([0.9] * 4, "- | 0.69 | -")):  # fmt: skip
+        rows = [with_error(*pair) for pair in zip(wanted, sizes, strict=True)]
+        store = Store(rows, [], [], Origin.here(1.0), "")
+        assert f"| navigation | 4 | {shown} |" in brains_and_acuity.exponents(store)
+        assert "| navigation | - | - | - | - |" in brains_and_acuity.factors(store), "memory and acuity are the same"
 
 
-def test_errors_that_do_not_vary_have_no_power_law():
-    rows = [with_error(0.9, size) for size in (1000, 5000, 20_000)]
-    with pytest.raises(ValueError, match="all the same"):
-        brains_and_acuity.fitted(rows)
-    store = Store([replace(row, group="navigation") for row in rows], [], [], Origin.here(1.0), "")
-    assert "| navigation | 3 | - | 0.69 | - |" in brains_and_acuity.exponents(store)
+def test_each_factor_has_its_exponent():
+    chance = np.random.default_rng(0)
+    rows = []
+    for cpd, count, frames in zip(*np.exp(chance.uniform(0, 3, (3, 40))), strict=True):
+        wanted = 0.5 * cpd**-0.5 * count**-0.1
+        rows.append(replace(with_error(wanted, count), cpd=cpd, memory_frames=frames))
+    line = brains_and_acuity.factors(Store(rows, [], [], Origin.here(1.0), "")).splitlines()[-1].split("|")
+    found = [float(cell.split()[0]) for cell in line[2:5]]
+    assert found == pytest.approx([0.5, 0.1, 0.0], abs=1e-3), "acuity, parameters, memory"
 
 
 def test_in_a_maze_what_is_missing_of_a_full_return_is_the_error():
