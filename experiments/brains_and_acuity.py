@@ -9,6 +9,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,11 @@ NAME = "brains_and_acuity"
 COLORS = {"navigation": "#D55E00", "detection": "#0072B2", "tracking": "#009E73"}
 PUBLISHED = {"navigation": 0.69, "detection": 0.74, "tracking": 0.59}
 CLASSES = 4  # of acuity
+TICKS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.2, 0.3, 0.5, 0.7, 1)
+CAPTION = (
+    "Each dot is a candidate. Above: darker for finer acuity, with the power law. Below: darker for more parameters "
+    "and memory; lines are the best quarter of each class of acuity."
+)
 Size = Callable[[Row], float]
 FACTORS: dict[str, Size] = {
     "acuity": lambda row: row.cpd,
@@ -84,7 +90,7 @@ def page(store: Store) -> Page:
             "evolve run navigation --preset scaling\n"
             "python -m experiments.brains_and_acuity --runs detection=DIR navigation=DIR tracking=DIR"
         ),
-        figures=[Figure(NAME, lambda path: draw(store, path), "Each dot is a candidate, darker for finer acuity.")],
+        figures=[Figure(NAME, lambda path: draw(store, path), CAPTION)],
         tables=[exponents(store), factors(store), ceilings(store), conduct_table(store)],
         origin=store.origin,
     )
@@ -114,36 +120,76 @@ def factors(store: Store) -> str:
     return markdown_table(header, lines)
 
 
+def classes(rows: Sequence[Row]) -> list[list[Row]]:
+    """Candidates in CLASSES parts of equal size, from coarse acuity to fine; fewer of fewer candidates."""
+    ordered = sorted(rows, key=lambda row: row.cpd)
+    parts = [[ordered[i] for i in part] for part in np.array_split(np.arange(len(ordered)), CLASSES)]
+    return [part for part in parts if part]
+
+
+def best_quarter(rows: Sequence[Row]) -> float:
+    """Mean error of the best quarter."""
+    errors = np.sort([error(row) for row in rows])
+    return float(errors[: max(1, len(errors) // 4)].mean())
+
+
 def ceilings(store: Store) -> str:
     """Mean error and that of the best quarter, by class of acuity."""
     lines = []
     for group in store.groups:
-        rows = sorted(trained(store, group), key=lambda row: row.cpd)
-        for part in np.array_split(np.arange(len(rows)), CLASSES):
-            mine = [rows[i] for i in part]
-            if mine:
-                errors = np.sort([error(row) for row in mine])
-                best = errors[: max(1, len(errors) // 4)].mean()
-                acuity = f"{mine[0].cpd:.2g} to {mine[-1].cpd:.2g}"
-                lines.append([group, acuity, str(len(mine)), f"{errors.mean():.2f}", f"{best:.2f}"])
+        for mine in classes(trained(store, group)):
+            mean = np.mean([error(row) for row in mine])
+            acuity = f"{mine[0].cpd:.2g} to {mine[-1].cpd:.2g}"
+            lines.append([group, acuity, str(len(mine)), f"{mean:.2f}", f"{best_quarter(mine):.2f}"])
     return markdown_table(["task", "acuity [cycles/°]", "candidates", "mean error", "of the best quarter"], lines)
 
 
 def draw(store: Store, path: Path) -> None:
-    """A panel per task."""
-    figure, axes = new_figure(3.6 * len(store.groups) + 0.5, 3.6, columns=len(store.groups), sharey=True)
-    for place, group in zip(axes[0], store.groups, strict=True):
+    """A column per task: error against the product, and against acuity alone."""
+    count = len(store.groups)
+    figure, axes = new_figure(3.4 * count + 0.5, 6.2, columns=count, rows=2, sharey=True)
+    for column, group in zip(axes.T, store.groups, strict=True):
         rows, color = trained(store, group), COLORS.get(group, "#777777")
-        ranks = np.argsort(np.argsort([row.cpd for row in rows])) / max(len(rows) - 1, 1)
-        for row, rank in zip(rows, ranks, strict=True):
-            place.loglog(size(row), error(row), "o", color=color, alpha=0.2 + 0.75 * rank, ms=5, mec="none")
-        if (law := fitted(rows, size)) is not None:
+        dots(column[0], rows, (size, FACTORS["acuity"]), color)
+        law = fitted(rows, size)
+        if law is not None:
             ends = np.array([min(map(size, rows)), max(map(size, rows))])
-            place.loglog(ends, law.error(ends), color="#222222", lw=1.2)
-        place.set_title(f"{group}: exponent {'-' if law is None else law.exponents[0]}", fontsize=10)
-        place.set_xlabel("acuity x parameters x memory")
-    axes[0, 0].set_ylabel("error")
+            column[0].plot(ends, law.error(ends), color="#222222", lw=1.2)
+        column[0].set(title=f"{group}: exponent {'-' if law is None else law.exponents[0]}")
+        column[0].set_xlabel("acuity x parameters x memory")
+        dots(column[1], rows, (FACTORS["acuity"], brain), color)
+        for mine in classes(rows):
+            level = best_quarter(mine)
+            column[1].plot([mine[0].cpd, mine[-1].cpd], [level, level], color="#222222", lw=1.2)
+        column[1].set_xlabel("acuity [cycles/°]")
+    for place in axes[:, 0]:
+        place.set_ylabel("error")
+    for place in axes.flat:
+        place.title.set_fontsize(10)
+        label(place.yaxis, place.get_ylim())
+    for place in axes[1]:
+        label(place.xaxis, place.get_xlim())
     save(figure, path)
+
+
+def label(axis: Any, ends: tuple[float, float]) -> None:
+    """Plain numbers on an axis that spans few decades."""
+    ticks = [tick for tick in TICKS if ends[0] <= tick <= ends[1]]
+    axis.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
+    axis.set_tick_params(which="minor", labelleft=False, labelbottom=False)
+
+
+def brain(row: Row) -> float:
+    """Parameters x memory."""
+    return row.parameters * row.memory_frames
+
+
+def dots(place: Any, rows: Sequence[Row], sizes: tuple[Size, Size], color: str) -> None:
+    """A candidate each: where by the first size, how dark by its rank in the second."""
+    across, shade = sizes
+    ranks = np.argsort(np.argsort([shade(row) for row in rows])) / max(len(rows) - 1, 1)
+    for row, rank in zip(rows, ranks, strict=True):
+        place.loglog(across(row), error(row), "o", color=color, alpha=0.2 + 0.75 * rank, ms=5, mec="none")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
