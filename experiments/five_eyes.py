@@ -94,8 +94,10 @@ def view(pupil: optics.Pupil | None, radiance: Floats, seed: int = 0) -> View:
     fine, coarse = eye(pupil, FINE), eye(pupil, COARSE)
     gain = 1 / float(fine.throughput)
     sharp, blocks = (eye(None, side).see(radiance, CELLS // side) for side in (FINE, COARSE))
-    seen = gain * np.asarray(fine.see(radiance, CELLS // FINE))
-    noisy = gain * np.asarray(coarse.see(radiance, CELLS // COARSE, np.random.default_rng(seed)))
+    seen, noisy = (
+        gain * np.asarray(one.see(radiance, s, rng, sight=one.sight(s, light_from="centres")))
+        for one, s, rng in ((fine, CELLS // FINE, None), (coarse, CELLS // COARSE, np.random.default_rng(seed)))
+    )
     strehl = 1.0 if pupil is None else white_strehl(fine, fine.psf())
     return View(seen, noisy, strehl, psnr(seen, sharp), ssim(seen, sharp), psnr(noisy, blocks))
 

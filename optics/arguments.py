@@ -9,11 +9,27 @@ import numpy as np
 
 from optics.tracked import number
 
-__all__ = ["finite", "in_range", "one_of", "point_2d", "positive", "radiance_cube", "shape_2d", "shown", "whole"]
+__all__ = [
+    "finite",
+    "in_range",
+    "of_kind",
+    "one_of",
+    "point_2d",
+    "positive",
+    "radiance_cube",
+    "reals",
+    "shape_2d",
+    "shown",
+    "vacuum_wavelength",
+    "vacuum_wavelengths",
+    "whole",
+]
 
 
 # Squares of lengths, and their ratios, must stay within double precision.
 SMALLEST, LARGEST = 1e-15, 1e15
+LONGEST_WAVE = 1.0  # no optics is longer; what is, was meant in nanometres
+UNIT = " (550 nm is 550e-9)"
 
 
 def shown(value: Any) -> str:
@@ -44,6 +60,24 @@ def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False
         upper = ", or infinite" if infinite else f" and at most {LARGEST:g}"
         raise ValueError(f"{name} = {shown(value)}: must be greater than 0{size}{upper}, in {unit}")
     return number
+
+
+def vacuum_wavelength(value: Any) -> float:
+    """`value` [m] as float; ValueError unless it is > 0 and no longer than LONGEST_WAVE, as nanometres would be."""
+    wavelength = _number("wavelength", value)
+    if not SMALLEST <= wavelength <= LONGEST_WAVE:
+        raise ValueError(
+            f"wavelength = {shown(value)}: must be greater than 0 and at most {LONGEST_WAVE:g}, in m{UNIT}"
+        )
+    return wavelength
+
+
+def vacuum_wavelengths(values: Any) -> np.ndarray:
+    """`values` [m] as a float64 array of any shape, each checked as by `vacuum_wavelength`."""
+    wavelengths = reals("wavelengths", values)
+    for end in (wavelengths.min(), wavelengths.max()) if wavelengths.size else ():
+        vacuum_wavelength(end)
+    return wavelengths
 
 
 def in_range(name: str, value: float, low: float, high: float) -> float:
@@ -78,18 +112,30 @@ def one_of(name: str, value: Any, options: Iterable[str]) -> str:
     return str(value)
 
 
-def point_2d(name: str, value: Any) -> tuple[float, float]:
+def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
     """(x, y) as finite floats."""
     try:
         x, y = value
     except (TypeError, ValueError):
-        raise ValueError(f"{name} = {shown(value)}: must be two lengths (x, y) [m]") from None
+        raise ValueError(f"{name} = {shown(value)}: must be two {what}") from None
     return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
+
+
+def reals(name: str, values: Any) -> np.ndarray:
+    """`values` as a float64 array of any shape; ValueError unless they are real numbers."""
+    try:
+        given = np.asarray(values)
+    except (TypeError, ValueError):
+        given = np.asarray(None)
+    if given.dtype.kind not in "biuf":
+        kind = "complex ones" if given.dtype.kind == "c" else shown(values)
+        raise ValueError(f"{name}: must be real numbers, not {kind}")
+    return given.astype(np.float64)
 
 
 def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
     """(band, Y, X) float32; ValueError unless it has `bands` bands and at least the shape `least`."""
-    radiance = np.asarray(value, dtype=np.float32)
+    radiance = reals("radiance", value).astype(np.float32)
     if (
         radiance.ndim != 3
         or radiance.shape[0] != bands
@@ -115,8 +161,17 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
     return int(value)
 
 
+def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
+    """`value`; ValueError, with an example of what would be right, unless it is of the kind."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{name} = {shown(value)}: must be a kind of {kind.__name__}, such as {example}")
+    return value
+
+
 def _number(name: str, value: Any) -> float:
     try:
+        if isinstance(value, (str, bytes)):
+            raise TypeError
         return number(value)
     except (TypeError, ValueError):
         raise ValueError(f"{name} = {shown(value)}: must be a number") from None

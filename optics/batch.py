@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from optics.arguments import positive
+from optics.arguments import shown, vacuum_wavelength
 from optics.beam import Beam
 from optics.grid import Grid
 from optics.planner import Plan
@@ -66,10 +66,10 @@ def psf_batch(
     import drjit as dr
 
     for name, values in (("pupils", pupils), ("wavelengths", wavelengths), ("source_distances", source_distances)):
-        if len(values) == 0:
-            raise ValueError(f"{name} is empty: must hold at least one")
+        if not isinstance(values, Sized) or len(values) == 0:
+            raise ValueError(f"{name} = {shown(values)}: must be a sequence of at least one")
     beams = [
-        Beam(pupil, PointSource(depth), positive("wavelength", wavelength), sensor_distance)
+        Beam(pupil, PointSource(depth), vacuum_wavelength(wavelength), sensor_distance)
         for pupil in pupils
         for depth in source_distances
         for wavelength in wavelengths

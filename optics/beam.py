@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from optics.aperture import SoftAperture
+from optics.arguments import of_kind
 from optics.field import Field
 from optics.grid import Grid
 from optics.precision import Precision, opaque
@@ -26,6 +27,9 @@ class Beam:
     source: PointSource
     wavelength: float
     distance: Any
+
+    def __post_init__(self) -> None:
+        of_kind("pupil", self.pupil, Pupil, "Pupil(25e-6)")
 
     @property
     def radius(self) -> Any:

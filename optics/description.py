@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from optics.planner import Plan
 from optics.point_spread import PSFResult
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Description", "describe"]
 
 FREQUENCIES = 513
-CELLS = 4  # per receptor along an axis, where its angular sensitivity is measured
+FINER = 16  # steps per sample of the PSF, where a receptor's angular sensitivity is measured
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ def describe(eye: Eye, z: Any) -> Description:
         image_quality=quality,
         noise=noise,
         photons=photons,
-        acceptance_angle_deg=_acceptance(eye, z) / per_degree,
+        acceptance_angle_deg=_acceptance(eye, white) / per_degree,
         interommatidial_angle_deg=eye.receptor_pitch / per_degree,
         plan=result.plan,
     )
@@ -149,17 +150,26 @@ def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
     return float(frequency[at - 1] + share * (frequency[at] - frequency[at - 1]))
 
 
-def _acceptance(eye: Eye, z: Any) -> float:
+def _acceptance(eye: Eye, white: PSFResult) -> float:
     """Full width [m] at half height, along x through its peak, of PSF ⊗ receptor aperture in white daylight."""
-    kernel = eye.spectral_bands.white_light(plain(eye.kernel(CELLS, z))).mean(axis=0)
-    for _ in range(2):
-        kernel = np.stack([np.convolve(row, np.ones(CELLS)) for row in kernel]).T
-    row = np.pad(kernel[np.unravel_index(np.argmax(kernel), kernel.shape)[0]], 1)
-    half = row.max() / 2
-    first, last = np.flatnonzero(row >= half)[[0, -1]]
-    left = first - (row[first] - half) / (row[first] - row[first - 1])
-    right = last + (row[last] - half) / (row[last] - row[last + 1])
-    return float(right - left) * eye.receptor_pitch / CELLS
+    if eye.pupil is None:
+        return eye.receptor_pitch
+    half = eye.receptor_pitch / 2
+    rows = _within(white.y, white.psf[0], white.y, half)
+    peak = int(np.argmax(_within(white.x, rows.T, white.x, half).max(axis=0)))
+    at = np.arange(white.x[0] - half, white.x[-1] + half, white.dx / FINER)
+    profile = _within(white.x, rows[peak], at, half)
+    above = profile - profile.max() / 2
+    first, last = np.flatnonzero(above >= 0)[[0, -1]]
+    left, right = above[first] / (above[first] - above[first - 1]), above[last] / (above[last] - above[last + 1])
+    return float(last + right - first + left) * white.dx / FINER
+
+
+def _within(x: np.ndarray, image: np.ndarray, at: np.ndarray, half: float) -> np.ndarray:
+    """Integrals along the first axis, of the spline through an image's samples at x, over at ± half."""
+    primitive = CubicSpline(x, image).antiderivative()
+    found: np.ndarray = primitive(np.clip(at + half, x[0], x[-1])) - primitive(np.clip(at - half, x[0], x[-1]))
+    return found
 
 
 def _cycles(frequency: float) -> str:

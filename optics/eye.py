@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from optics.arguments import in_range, positive, radiance_cube, shape_2d, whole
+from optics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
 from optics.imaging import blur, centred, receptor_average
 from optics.photon_budget import PhotonBudget
 from optics.photoreceptor import gaussian_noise, own_type, photon_noise, quantum_catch, throughput
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Eye"]
 
 CELLS_FOR_BANDS = 2  # per receptor, along an axis
+LIGHT_FROM = ("cells", "centres")  # of the scene
 
 
 @dataclass(frozen=True)
@@ -73,8 +74,10 @@ class Eye:
         in_range("tolerance", self.tolerance, 1e-6, 0.5)
         if self.dtype not in ("float32", "float64"):
             raise ValueError(f"dtype = {self.dtype!r}: must be 'float32' or 'float64'")
-        if not isinstance(self.photon_budget, PhotonBudget | None):
-            raise ValueError(f"photon_budget = {self.photon_budget!r}: must be a PhotonBudget or None")
+        if self.pupil is not None:
+            of_kind("pupil", self.pupil, Pupil, "Pupil(25e-6), or None for the perfect lens")
+        if self.photon_budget is not None:
+            of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
         if self.pupil is not None and number(self.relative_aperture) > 1 + 1e-9:
             raise ValueError(
@@ -158,11 +161,13 @@ class Eye:
         right, up = (math.tan(math.radians(in_range("direction_deg", at, -80, 80))) for at in direction_deg)
         return at_border(self._kernel(_whole(samples_per_receptor), z, (right, -up)))
 
-    def _kernel(self, samples_per_receptor: int, z: Any, direction: tuple[float, float]) -> Any:
+    def _kernel(
+        self, samples_per_receptor: int, z: Any, direction: tuple[float, float], from_cell: bool = False
+    ) -> Any:
         """direction: (right, down), tangents."""
         if self.pupil is None:
             return precision(self.dtype).Tensor(np.ones((len(self.spectral_bands.wavelengths), 1, 1)))
-        return visual_kernel(self.pupil, self._retina(samples_per_receptor), z, direction)
+        return visual_kernel(self.pupil, self._retina(samples_per_receptor), z, direction, from_cell)
 
     def _retina(self, samples_per_receptor: int) -> Retina:
         cell = self.receptor_pitch / samples_per_receptor
@@ -186,6 +191,7 @@ class Eye:
         depth_layers: int | str = "auto",
         field_zones: int | str = 1,
         tolerance: float | None = None,
+        light_from: str = "cells",
     ) -> Sight:
         """Kernels for a scene in depth and over the field of view; printed, it says what was chosen and why.
 
@@ -193,17 +199,23 @@ class Eye:
         depth_layers: kernels between nearest and farthest, evenly spaced in 1/z; field_zones: kernels across the
             field's width (1: the axis serves the whole retina). "auto": as few as the tolerance allows.
         tolerance: of a receptor's signal, in units of white's, for any scene no brighter than white (None: the eye's).
+        light_from: "cells", exact for pictures, whose radiance is the same all over a cell; "centres" for cells that
+            hold means of finer detail, as rendered ones do: every cell's light comes from its centre, which errs less
+            than half as much there, by O(samples_per_receptor^-2).
 
         Raises:
+            ValueError: another light_from, or another argument out of range.
             AccuracyError: see `optics.psf`, or the tolerance needs more kernels than any eye is given.
         """
         within = self.tolerance if tolerance is None else in_range("tolerance", tolerance, 1e-6, 0.5)
-        s = _whole(samples_per_receptor)
+        s, from_cell = _whole(samples_per_receptor), light_from == LIGHT_FROM[0]
+        if light_from not in LIGHT_FROM:
+            raise ValueError(f"light_from = {light_from!r}: must be {' or '.join(map(repr, LIGHT_FROM))}")
         half = self.sensor_width / (2 * number(self.sensor_distance))
         tangents = (half, half * self.resolution[0] / self.resolution[1])
 
         def kernel_at(distance: Any, right: float, down: float) -> Any:
-            return self._kernel(s, distance, (right * tangents[0], down * tangents[1]))
+            return self._kernel(s, distance, (right * tangents[0], down * tangents[1]), from_cell)
 
         return prepare(kernel_at, self.resolution, s, z, (depth_layers, field_zones), within)
 
@@ -217,8 +229,9 @@ class Eye:
     ) -> Any:
         """Signals (channel, h, w) of a scene in the tangent plane, by convolution (the reference).
 
-        radiance: (band, Y, X), cells of pitch / samples_per_receptor, centred on the axis, at least h s x w s cells
-            and larger by even numbers; dark outside.
+        radiance: (band, Y, X), the same all over each cell of pitch / samples_per_receptor (another reading:
+            `sight`'s light_from), centred on the axis, at least h s x w s cells and larger by even numbers; dark
+            outside.
         rng: None for signals without noise. Noise carries no derivative.
         z: distance of the scene along the axis [m], a number or one per cell (Y, X).
         sight: what `sight` made for these samples_per_receptor; None makes it.
@@ -227,6 +240,8 @@ class Eye:
             ValueError: radiance of another shape, or not finite.
         """
         s = _whole(samples_per_receptor)
+        if rng is not None:
+            of_kind("rng", rng, np.random.Generator, "np.random.default_rng(0), or None for no noise")
         shape = self.resolution[0] * s, self.resolution[1] * s
         scene = radiance_cube(radiance, self.bands, shape)
         centred(scene, shape)
@@ -248,6 +263,10 @@ class Eye:
             photons = photons[self.mosaic][None]
         caught = clean if photons is None else photon_noise(np.maximum(clean, 0), photons, rng)
         return gaussian_noise(caught, self.noise_sigma, rng) - clean
+
+    def in_bands(self, radiance: Any) -> np.ndarray:
+        """(band,): a spectral radiance in this eye's bands, for `see`: see `SpectralBands.of`."""
+        return self.spectral_bands.of(radiance, self.receptors)
 
     def describe(self, z: Any = math.inf) -> Description:
         """What limits the eye, as a table: see `description.Description`."""

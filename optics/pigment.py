@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optics.arguments import in_range, one_of
+from optics.arguments import in_range, one_of, vacuum_wavelengths
 
 __all__ = ["CHROMOPHORES", "Pigment", "pigment_absorptance"]
 
@@ -74,7 +74,7 @@ def pigment_absorptance(wavelengths: np.ndarray, lambda_max: float, chromophore:
     """
     t = CHROMOPHORES[one_of("chromophore", chromophore, CHROMOPHORES)]
     peak = in_range("lambda_max", lambda_max, LAMBDA_MAX_NM[0] * 1e-9, LAMBDA_MAX_NM[1] * 1e-9) * 1e9
-    nm = np.asarray(wavelengths, dtype=np.float64) * 1e9
+    nm = vacuum_wavelengths(wavelengths) * 1e9
     x = peak / nm
     slope = t.A(peak)
     alpha = 1 / (np.exp(slope * (t.a(peak) - x)) + np.exp(t.B * (t.b - x)) + np.exp(t.C * (t.c - x)) + t.D)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.arguments import in_range, positive
+from optics.arguments import in_range, positive, vacuum_wavelength, vacuum_wavelengths
 from optics.beam import Beam
 from optics.grid import Grid
 from optics.planner import FLOAT_NOISE, AccuracyError, Plan, Sampling, choose
@@ -95,10 +95,12 @@ def psf(
     """
     window = Grid(shape, dx, centre)
     source = PointSource(source_distance, source_angle)
-    lambdas = np.atleast_1d(np.asarray(wavelengths, dtype=np.float64))
+    lambdas = np.atleast_1d(vacuum_wavelengths(wavelengths))
     if lambdas.size == 0:
         raise ValueError("wavelengths is empty: must hold at least one wavelength [m]")
-    beams = [Beam(pupil, source, float(positive("wavelength", at)), sensor_distance) for at in lambdas]
+    if lambdas.ndim > 1:
+        raise ValueError(f"wavelengths has shape {lambdas.shape}: must be one wavelength [m], or a row of them")
+    beams = [Beam(pupil, source, float(at), sensor_distance) for at in lambdas]
     tasks = [problem(beam, window, tolerance, dtype) for beam in beams]
     return spread(beams, tasks, method)
 
@@ -117,7 +119,7 @@ def plan(
     centre: tuple[float, float] = (0.0, 0.0),
 ) -> Plan:
     """What `psf` would do at one wavelength, without doing it: see there for arguments and errors."""
-    beam = Beam(pupil, PointSource(source_distance, source_angle), positive("wavelength", wavelength), sensor_distance)
+    beam = Beam(pupil, PointSource(source_distance, source_angle), vacuum_wavelength(wavelength), sensor_distance)
     return choose(problem(beam, Grid(shape, dx, centre), tolerance, dtype), method)[0]
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.arguments import finite, in_range, positive
+from optics.arguments import finite, in_range, vacuum_wavelength
 from optics.fourier import (
     fourier_sum,
     kept_indices,
@@ -102,7 +102,7 @@ def propagate(
         sources = sources.copy()
     in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5)
     passage = Passage(
-        positive("wavelength", wavelength) / in_range("medium_n", medium_n, 1.0, 10.0),
+        vacuum_wavelength(wavelength) / in_range("medium_n", medium_n, 1.0, 10.0),
         finite("distance", distance),
         method == "fresnel",
         EVERYTHING,

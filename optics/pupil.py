@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from optics.aperture import EDGE_REACH, Aperture
-from optics.arguments import in_range, positive
+from optics.arguments import finite, in_range, of_kind, positive, reals
 from optics.circular import Circle
 from optics.doe import HeightMap, Relief
 from optics.grid import Grid
@@ -51,11 +51,12 @@ class Pupil:
         if not isinstance(self.n, RefractiveIndex):
             in_range("n", self.n, 1.0, 10.0)
             object.__setattr__(self, "n", RefractiveIndex(self.n))
+        of_kind("aperture", self.aperture, Aperture, "Circle()")
         if self.height is not None and not isinstance(self.height, Relief):
-            height = self.height if is_tracked(self.height) else np.asarray(self.height, dtype=np.float64)
+            height = self.height if is_tracked(self.height) else reals("height", self.height)
             object.__setattr__(self, "height", HeightMap(height))
         if self.thin_lens_focal_length is not None:
-            positive("abs(thin_lens_focal_length)", abs(number(self.thin_lens_focal_length)))
+            positive("abs(thin_lens_focal_length)", abs(finite("thin_lens_focal_length", self.thin_lens_focal_length)))
 
     @cached_property
     def radius(self) -> float:

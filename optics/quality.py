@@ -46,10 +46,12 @@ class MTF:
     def profile(self, frequencies: np.ndarray) -> Any:
         """Mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency); 0 beyond the grid.
 
-        Interpolated linearly between the grid's frequencies.
+        Interpolated linearly between the grid's frequencies. Raises ValueError for the MTF of a single sample.
         """
         import drjit as dr
 
+        if self.fx.size < 2:
+            raise ValueError("a PSF of one sample has no frequencies but 0: must be at least 2 x 2")
         types = precision("float64")
         f = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
         angle = 2 * np.pi * (np.arange(ORIENTATIONS) + 0.5) / ORIENTATIONS

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from optics.arguments import finite, in_range, positive
+from optics.arguments import finite, in_range, positive, vacuum_wavelength
 from optics.tracked import number
 
 __all__ = ["RefractiveIndex"]
@@ -44,7 +44,7 @@ class RefractiveIndex:
         Raises:
             ValueError: the curve falls below 1 there.
         """
-        n = self.a + self.b / positive("wavelength", wavelength) ** 2
+        n = self.a + self.b / vacuum_wavelength(wavelength) ** 2
         value = number(n)
         if not (math.isfinite(value) and value >= 1):
             raise ValueError(f"n = {value:g} at wavelength {wavelength:g} m: must be at least 1")

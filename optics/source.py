@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from optics.arguments import in_range, positive
+from optics.arguments import in_range, point_2d, positive
 from optics.precision import Precision, opaque
 from optics.tracked import number
 
@@ -18,7 +18,8 @@ class PointSource:
     """A point source of unit amplitude on the pupil: exp(ik(ρ(x, y) - ρ(0, 0))), ρ the distance from the source.
 
     distance: axial distance in front of the pupil [m]; infinite for a plane wave.
-    angle: (θx, θy) [rad], the direction in which its light travels: an ideal lens focuses it at f (tan θx, tan θy).
+    angle: (θx, θy) [rad], the direction in which its light travels: a thin lens sends it to about f (tan θx, tan θy),
+        with the aberrations that a single stigmatic lens has off its axis.
     """
 
     distance: Any = math.inf
@@ -26,7 +27,7 @@ class PointSource:
 
     def __post_init__(self) -> None:
         positive("source_distance", self.distance, infinite=True)
-        tx, ty = self.angle
+        tx, ty = point_2d("source_angle", self.angle, "angles (x, y) [rad]")
         angle = in_range("source_angle", tx, -1.5, 1.5), in_range("source_angle", ty, -1.5, 1.5)
         object.__setattr__(self, "angle", angle)
 

@@ -13,8 +13,8 @@ from optics.arguments import in_range, whole
 from optics.ladder import worst_difference
 from optics.pigment import pigment_absorptance
 from optics.planner import AccuracyError
-from optics.receptors import receptors_of
-from optics.tabulated import cie_1931, daylight
+from optics.receptors import Receptors, receptors_of
+from optics.tabulated import Spectrum, cie_1931, daylight
 
 __all__ = ["SpectralBands", "cie_1931", "daylight", "pigment_absorptance"]
 
@@ -44,14 +44,10 @@ class SpectralBands:
         receptors: `Receptors`, or what stands for them (see `receptors_of`).
         """
         kinds = receptors_of(receptors)
-        low, high = kinds.limits_nm
-        edges = np.linspace(low, high, whole("bands", bands, 1, FINEST) + 1)
+        edges = np.linspace(*kinds.limits_nm, whole("bands", bands, 1, FINEST) + 1)
         centres = (edges[:-1] + edges[1:]) / 2
-        nm = np.arange(low, high + 0.5)
-        catch = kinds.catch(nm)
-        catch[:, [0, -1]] /= 2  # trapezoid rule
-        hats = np.stack([np.interp(nm, centres, row) for row in np.eye(len(centres))])
-        weights = (catch @ hats.T) / catch.sum(axis=1, keepdims=True) / daylight(centres * 1e-9)
+        nm, catch = _catch(kinds)
+        weights = (catch @ _hats(nm, centres).T) / catch.sum(axis=1, keepdims=True) / daylight(centres * 1e-9)
         return cls(centres * 1e-9, weights, catch.sum(axis=1) * 1e-18)
 
     @classmethod
@@ -93,9 +89,42 @@ class SpectralBands:
             "signal; widen the tolerance or give a number of bands"
         )
 
+    def of(self, radiance: Spectrum | Callable[[np.ndarray], np.ndarray], receptors: Any) -> np.ndarray:
+        """(band,): a spectral radiance in these bands, in units of daylight's at 560 nm; of any shape, such as a
+        fluorescent lamp's lines, which samples at the bands' centres hit or miss.
+
+        Means over the bands, changed by as little as makes Σ_b weights[c, b] radiance[b] what receptor type c catches
+        (quadrature to 1 nm): exactly, if there are as many bands as types. Lines in few bands may leave one below 0.
+
+        radiance: a Spectrum, or a function of wavelengths [m] (of a surface: reflectance times illuminant).
+        receptors: those that these bands were made for.
+        """
+        at = radiance.at if isinstance(radiance, Spectrum) else radiance
+        nm, catch = _catch(receptors_of(receptors))
+        light = np.broadcast_to(at(nm * 1e-9), nm.shape)
+        hats = _hats(nm, self.wavelengths * 1e9)
+        means = hats @ light / hats.sum(axis=1)
+        caught = (catch / catch.sum(axis=1, keepdims=True)) @ (light / daylight(nm * 1e-9))
+        found: np.ndarray = means + np.linalg.pinv(self.weights) @ (caught - self.weights @ means)
+        return found
+
     def white_light(self, kernels: np.ndarray) -> np.ndarray:
         """(channel, k, k): what a scene without colour in daylight has of kernels (band, k, k)."""
         return np.tensordot(self.weights * daylight(self.wavelengths), kernels, axes=1)
+
+
+def _catch(kinds: Receptors) -> tuple[np.ndarray, np.ndarray]:
+    """Wavelengths [nm] over the receptors' range, and what each type catches there of daylight, ready to be summed."""
+    low, high = kinds.limits_nm
+    nm = np.arange(low, high + 0.5)
+    catch = kinds.catch(nm)
+    catch[:, [0, -1]] /= 2  # trapezoid rule
+    return nm, catch
+
+
+def _hats(nm: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """(band, wavelength): linear interpolation between the bands' centres, constant beyond."""
+    return np.stack([np.interp(nm, centres, row) for row in np.eye(len(centres))])
 
 
 def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: tuple[float, float]) -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from optics.aperture import EDGE_REACH
-from optics.arguments import in_range, positive
+from optics.arguments import in_range, positive, vacuum_wavelength
 from optics.grid import Grid
 from optics.plane import Light, PlaneField, PupilSampling, Stop
 from optics.planner import FLOAT_NOISE, AccuracyError, Plan
@@ -97,9 +97,7 @@ def propagate_through(
     if field is not None and source is not None:
         raise ValueError("source: must not be given with u")
     each = in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5) / (2 * len(stops))
-    light = Light(
-        positive("wavelength", wavelength), _medium(elements), backward, max(each, 10 * FLOAT_NOISE[dtype]), dtype
-    )
+    light = Light(vacuum_wavelength(wavelength), _medium(elements), backward, max(each, 10 * FLOAT_NOISE[dtype]), dtype)
     steps: list[Step] = []
     for i, stop in enumerate(stops):
         sampling = None

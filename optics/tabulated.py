@@ -12,7 +12,7 @@ from importlib import resources
 
 import numpy as np
 
-from optics.arguments import one_of
+from optics.arguments import one_of, vacuum_wavelengths
 
 __all__ = [
     "ILLUMINANTS",
@@ -27,6 +27,7 @@ __all__ = [
 ]
 
 LIMITS_NM = (300.0, 780.0)  # CIE D65 is tabulated from here; no eye's receptors reach beyond
+SHORTEST_NM = 1.0  # of a table; what is shorter was meant in metres
 NORMAL_NM = 560.0  # illuminants are 1 here
 
 
@@ -47,8 +48,8 @@ class Spectrum:
         nm, values = (_row(name, getattr(self, name)) for name in ("wavelengths_nm", "values"))
         if len(nm) != len(values):
             raise ValueError(f"values: {len(values)} for {len(nm)} wavelengths_nm: must be as many")
-        if not np.all(np.diff(nm) > 0) or not nm[0] > 0:
-            raise ValueError("wavelengths_nm: must be positive and rise from one entry to the next")
+        if not np.all(np.diff(nm) > 0) or not nm[0] >= SHORTEST_NM:
+            raise ValueError(f"wavelengths_nm: must rise from one entry to the next, from {SHORTEST_NM:g} nm on")
         if min(values) < 0:
             raise ValueError(f"values hold {min(values):g}: must not be negative")
         object.__setattr__(self, "wavelengths_nm", nm)
@@ -61,7 +62,7 @@ class Spectrum:
 
     def at(self, wavelengths: np.ndarray) -> np.ndarray:
         """Values at `wavelengths` [m]."""
-        return np.interp(np.asarray(wavelengths, np.float64) * 1e9, self.wavelengths_nm, self.values)
+        return np.interp(vacuum_wavelengths(wavelengths) * 1e9, self.wavelengths_nm, self.values)
 
 
 def _row(name: str, numbers: Sequence[float]) -> tuple[float, ...]:

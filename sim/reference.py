@@ -59,7 +59,7 @@ class ReferenceRenderer:
         self._integrator, self._spp, self._sampler, self.seed = integrator, spp, sampler, seed
         self._has_depth = depths is not None
         z: Any = np.array(depths) if depths else math.inf
-        self.sight = self.eye.sight(self.samples_per_receptor, z, depth_layers)
+        self.sight = self.eye.sight(self.samples_per_receptor, z, depth_layers, light_from="centres")
         self._data = mujoco.MjData(world.model)
         self._mirror = mirror(world.model, variant=variant, spectra=world.spectra)
 

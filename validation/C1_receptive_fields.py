@@ -88,6 +88,7 @@ def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -
     eye = eyes.eye()
     cells = 1 if eye.pupil is None else CELLS
     reach = eye.kernel(cells).shape[-1] // 2
+    sight = eye.sight(cells, light_from="centres")
     height, width = (cells * n + 2 * reach for n in eye.resolution)
     half = width / 2 * eye.receptor_pitch / cells
     camera = replace(
@@ -98,7 +99,7 @@ def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -
     for i in range(state.n):
         renderer = sim.BatchedRenderer(world, camera, 1, sim.Fidelity(rays, eyes.bands, light=light))
         picture = renderer.receptor_radiance(state.take(np.array([i])))[:, 0, 0]
-        found.append(eye.see(picture, cells))
+        found.append(eye.see(picture, cells, sight=sight))
     return np.array(found)
 
 

@@ -15,6 +15,7 @@ from closed_form import (
     fails_for_some,
     killed_always,
     killed_once,
+    leaves_gaps,
     slow_for_some,
     threads,
     tiny,
@@ -52,6 +53,13 @@ def test_every_job_comes_out_once_with_its_own_outcome(tmp_path, evaluate):
     found = outcomes(evaluate, tmp_path, count=5)
     assert calls(tmp_path) == dict.fromkeys(range(5), 1)
     assert {i: outcome.fitness for i, outcome in found.items()} == {j.id: expected(j) for j in jobs(tmp_path, 5)}
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="tells a process's memory on Linux alone")
+def test_a_worker_gives_back_what_candidates_leave_free(tmp_path):
+    """Of 200 MB each, of which 2 stay in use."""
+    found = outcomes(leaves_gaps, tmp_path, count=3, workers=1)
+    assert found[2].fitness - found[0].fitness < 40
 
 
 def test_progress_names_the_candidate_and_its_steps(tmp_path):

@@ -50,5 +50,5 @@ def test_carries_derivatives():
 @pytest.mark.parametrize("name", ["pupils", "wavelengths", "source_distances"])
 def test_must_not_be_empty(name):
     arguments = {"pupils": pupils(), "wavelengths": WAVELENGTHS, "source_distances": DEPTHS, name: ()}
-    with pytest.raises(ValueError, match=f"{name} is empty"):
+    with pytest.raises(ValueError, match=f"{name} = .*: must be a sequence of at least one"):
         optics.psf_batch(**arguments, **VIEW)

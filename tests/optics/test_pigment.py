@@ -95,3 +95,8 @@ def test_bad_pigments_are_named():
         Pigment(900)
     with pytest.raises(ValueError, match=r"chromophore = 'a2': must be one of 'A1', 'A2'; did you mean 'A2'"):
         Pigment(500, "a2")
+
+
+def test_nanometres_where_metres_are_wanted_are_named():
+    with pytest.raises(ValueError, match=r"wavelength = 530\.0: .* in m \(550 nm is 550e-9\)"):
+        Pigment(530).at(530)

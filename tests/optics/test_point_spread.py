@@ -217,6 +217,12 @@ def test_bands_are_independent_and_keep_their_order():
         ({"wavelengths": [0.0]}, "wavelength"),
         ({"wavelengths": []}, "wavelengths is empty"),
         ({"wavelengths": [math.nan]}, "wavelength"),
+        ({"wavelengths": [550]}, r"wavelength = 550\.0: .* in m \(550 nm is 550e-9\)"),
+        ({"wavelengths": [[5e-7]]}, r"wavelengths has shape \(1, 1\)"),
+        ({"wavelengths": [[5e-7], [4e-7, 5e-7]]}, "wavelengths: must be real numbers"),
+        ({"wavelengths": [5e-7j]}, "wavelengths: must be real numbers, not complex"),
+        ({"wavelengths": "green"}, "wavelengths: must be real numbers, not 'green'"),
+        ({"source_angle": 0.1}, r"source_angle = 0\.1: must be two angles"),
         ({"sensor_distance": -1e-3}, "sensor_distance"),
         ({"sensor_distance": math.inf}, "sensor_distance"),
         ({"source_distance": 0.0}, "source_distance"),
@@ -225,6 +231,7 @@ def test_bands_are_independent_and_keep_their_order():
         ({"shape": (0, 0)}, r"shape = \(0, 0\)"),
         ({"shape": (3.5, 4)}, "shape"),
         ({"tolerance": 0.0}, "tolerance"),
+        ({"tolerance": "1e-3"}, "tolerance = '1e-3': must be a number"),
         ({"tolerance": 2.0}, r"tolerance = 2\.0: must lie in"),
         ({"method": "magic"}, "method = 'magic'"),
         ({"dtype": "float16"}, "dtype = 'float16'"),
@@ -233,6 +240,12 @@ def test_bands_are_independent_and_keep_their_order():
 def test_bad_arguments(arguments, message):
     with pytest.raises(ValueError, match=message):
         optics.psf(LENS, **arguments)
+
+
+@pytest.mark.parametrize("pupil", [None, 20e-6])
+def test_what_is_no_pupil_is_named(pupil):
+    with pytest.raises(ValueError, match=r"pupil = .*: must be a kind of Pupil, such as"):
+        optics.psf(pupil)
 
 
 class TestRefusals:

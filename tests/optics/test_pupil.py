@@ -67,6 +67,14 @@ def test_slopes_and_rays_of_a_prism():
         ({"aperture_radius": 1e-5, "thin_lens_focal_length": 0.0}, "thin_lens_focal_length"),
         ({"aperture_radius": 1e-5, "height": np.zeros((2, 3))}, "height has shape"),
         ({"aperture_radius": 1e-5, "height": np.full((4, 4), np.nan)}, "height holds NaN"),
+        ({"aperture_radius": "20e-6"}, "aperture_radius = '20e-6': must be a number"),
+        (
+            {"aperture_radius": 1e-5, "aperture": "circle"},
+            "aperture = 'circle': must be a kind of Aperture, such as Circle",
+        ),
+        ({"aperture_radius": 1e-5, "thin_lens_focal_length": "a"}, "thin_lens_focal_length = 'a': must be a number"),
+        ({"aperture_radius": 1e-5, "height": "lens"}, "height: must be real numbers, not 'lens'"),
+        ({"aperture_radius": 1e-5, "height": np.full((2, 2), 1j)}, "height: must be real numbers, not complex"),
     ],
 )
 def test_bad_pupils(arguments, message):

@@ -109,3 +109,8 @@ def test_bad_arguments_are_named():
         optics.image_quality(result, nyquist=0)
     with pytest.raises(ValueError, match="throughput"):
         optics.image_quality(result, nyquist=1e4, throughput=1.5)
+
+
+def test_one_sample_has_no_profile():
+    with pytest.raises(ValueError, match="must be at least 2 x 2"):
+        optics.mtf(optics.Eye().psf()).profile([0.0])

@@ -1,12 +1,14 @@
 """Levels of depth and field: each held against the more exact one; errors predicted before they are seen."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from optics import AccuracyError, BSplineRelief, Eye, Pupil
+from optics.eye import LIGHT_FROM
 from optics.ladder import Ladder, checks, hats, worst_difference
 from optics.sight import Sight
 
@@ -49,7 +51,7 @@ class TestDepth:
         radiance, z, exact = scene
         errors = []
         for layers in (1, 3, 5, 9):
-            sight = LENS.sight(S, z, depth_layers=layers)
+            sight = LENS.sight(S, z, layers, light_from="centres")
             assert len(sight.kernels) == layers
             errors.append(np.abs(LENS.see(radiance, S, z=z, sight=sight) - exact).max() / LENS.throughput)
         assert errors[0] > 0.03
@@ -59,7 +61,7 @@ class TestDepth:
     @pytest.mark.parametrize("tolerance", [0.3, 0.05, 0.01])
     def test_predicted_error_holds_and_is_not_cowardly(self, scene, tolerance):
         radiance, z, exact = scene
-        sight = LENS.sight(S, z, tolerance=tolerance)
+        sight = LENS.sight(S, z, tolerance=tolerance, light_from="centres")
         (layers,), predicted = sight.choices[0].counts, sight.choices[0].predicted_error
         assert predicted <= tolerance
         weight = LENS.spectral_bands.weights.max()  # scene cells here reach 1, not white's daylight
@@ -84,7 +86,10 @@ class TestDepth:
 
     def test_a_wrong_depth_is_noticed(self, scene):
         radiance, z, exact = scene
-        error = np.abs(LENS.see(radiance, S, z=z[:, ::-1], sight=LENS.sight(S, z, 9)) - exact).max() / LENS.throughput
+        error = (
+            np.abs(LENS.see(radiance, S, z=z[:, ::-1], sight=LENS.sight(S, z, 9, light_from="centres")) - exact).max()
+            / LENS.throughput
+        )
         assert error > 0.03
 
 
@@ -136,7 +141,7 @@ class TestField:
         exact = reference(eye, radiance, kernel_of)
         errors = []
         for zones in (1, 3, 5, 9):
-            seen = eye.see(radiance, S, sight=eye.sight(S, field_zones=zones))
+            seen = eye.see(radiance, S, sight=eye.sight(S, field_zones=zones, light_from="centres"))
             errors.append(np.abs(seen - exact).max() / eye.throughput)
         assert errors[0] > 0.02
         assert errors == sorted(errors, reverse=True)
@@ -229,3 +234,56 @@ def test_depths_of_another_shape():
 def test_bad_directions(direction):
     with pytest.raises(ValueError, match="direction_deg"):
         LENS.kernel(S, direction_deg=direction)
+
+
+class TestLightFrom:
+    """A picture's cells shine all over: signals then do not depend on how finely the same picture is cut."""
+
+    def stripes(self, s):
+        height, width = LENS.resolution
+        return np.broadcast_to((np.arange(width * s) // s + 1) % 2, (1, height * s, width * s)).astype(float)
+
+    def test_a_picture_cut_finer_is_the_same_picture(self):
+        seen = [LENS.see(self.stripes(s), s) for s in (1, 2, 4, 8)]
+        for one in seen[1:]:
+            np.testing.assert_allclose(one, seen[0], atol=1e-4 * LENS.throughput)
+
+    def test_stripes_are_what_the_diffraction_limit_leaves_of_them(self):
+        """Box scene x Airy's OTF (Goodman, eq. 6-32) x box receptor, at the stripes' own odd harmonics."""
+        eye = replace(LENS, resolution=(41, 41), sensor_width=41 / 9 * LENS.sensor_width, tolerance=1e-3)
+        eye = replace(eye, fov_deg=math.degrees(2 * math.atan(eye.sensor_width / 2 / LENS.sensor_distance)))
+        assert eye.sensor_distance == pytest.approx(LENS.sensor_distance)
+        scene = np.broadcast_to((np.arange(41) + 1) % 2, (1, 41, 41)).astype(float)
+        bright, dark = eye.see(scene, 1)[0, 20, 20:22] / eye.throughput / eye.spectral_bands.weights[0, 0]
+        cutoff = 50e-6 / (550e-9 * eye.sensor_distance) * eye.receptor_pitch
+        contrast = 0.0
+        for harmonic in range(1, math.ceil(2 * cutoff), 2):
+            s = harmonic / 2 / cutoff
+            otf = 2 / math.pi * (math.acos(s) - s * math.sqrt(1 - s * s))
+            contrast += otf * 2 * (2 / math.pi / harmonic) ** 2
+        assert bright - dark == pytest.approx(contrast, abs=2e-3)
+        centres = eye.see(scene, 1, sight=eye.sight(1, light_from="centres"))[0, 20, 20:22] / eye.throughput
+        assert np.diff(centres)[0] / eye.spectral_bands.weights[0, 0] < -contrast - 0.03, "points are another scene"
+
+    def test_detail_within_cells_is_better_put_at_their_centres(self):
+        """Smooth waves, given as their means over cells: errors fall with the square of the cells once these resolve
+        the PSF (0.2 of a receptor); at all sizes light from the centres errs less than half as much."""
+        eye = replace(LENS, tolerance=1e-4)
+        height, width = eye.resolution
+        fine = self.waves(32)
+        exact, errors = eye.see(fine, 32), []
+        for s in (2, 4, 8):
+            means = fine.reshape(1, height * s, 32 // s, width * s, 32 // s).mean(axis=(2, 4))
+            seen = [eye.see(means, s, sight=eye.sight(s, light_from=light_from)) for light_from in LIGHT_FROM]
+            errors.append([np.abs(one - exact)[0, 1:-1, 1:-1].max() for one in seen])
+        cells, centres = np.transpose(errors)
+        assert 1.3 < np.log2(cells[1] / cells[2]) < 2.3
+        assert (centres < cells / 2).all()
+
+    def waves(self, s):
+        down, across = ((np.arange(n * s) + 0.5) / s for n in LENS.resolution)
+        return (0.5 + 0.25 * (np.sin(2.3 * across) + np.cos(1.7 * down)[:, None]))[None]
+
+    def test_unknown_readings_are_refused(self):
+        with pytest.raises(ValueError, match="light_from = 'points': must be 'cells' or 'centres'"):
+            LENS.sight(S, light_from="points")

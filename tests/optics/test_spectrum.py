@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from optics import Eye, illuminant, reflectance
+from optics.receptors import receptors_of
 from optics.spectrum import SpectralBands, cie_1931, daylight, pigment_absorptance
 
 
@@ -119,3 +121,37 @@ def test_tolerances_that_no_bands_meet():
         SpectralBands.for_tolerance(1e-6)
     with pytest.raises(ValueError, match="tolerance = 0"):
         SpectralBands.for_tolerance(0)
+
+
+class TestLightInBands:
+    """Lamps with lines: what receptors catch of them against quadrature to 1 nm, in however few bands."""
+
+    @staticmethod
+    def caught(receptors, light):
+        kinds = receptors_of(receptors)
+        nm = np.arange(kinds.limits_nm[0], kinds.limits_nm[1] + 0.5)
+        per_nm = kinds.catch(nm)
+        return np.trapezoid(per_nm * light(nm * 1e-9) / daylight(nm * 1e-9)) / np.trapezoid(per_nm)
+
+    @pytest.mark.parametrize("lamp", ["FL2", "FL11", "LED-B3", "A"])
+    @pytest.mark.parametrize(("receptors", "bands"), [("rgb", 4), ("lms", 8), ("honeybee", 16)])
+    def test_catches_are_exact(self, lamp, receptors, bands):
+        eye = Eye(resolution=(1, 1), bands=bands, receptors=receptors)
+        leaf, light = reflectance("foliage"), illuminant(lamp)
+        for radiance, expected in (
+            (light, self.caught(receptors, light.at)),
+            (lambda at: leaf.at(at) * light.at(at), self.caught(receptors, lambda at: leaf.at(at) * light.at(at))),
+        ):
+            seen = eye.see(eye.in_bands(radiance)[:, None, None], 1)[:, 0, 0]
+            np.testing.assert_allclose(seen, expected, rtol=1e-5)
+
+    def test_samples_at_the_centres_miss_lines(self):
+        """The wrong way, by as much as a factor of two: the test above is not passed by anything."""
+        eye, light = Eye(resolution=(1, 1), bands=4), illuminant("FL2")
+        seen = eye.see(light.at(eye.spectral_bands.wavelengths)[:, None, None], 1)[:, 0, 0]
+        assert np.abs(seen / self.caught("rgb", light.at) - 1).max() > 0.5
+
+    def test_daylight_and_what_is_linear_between_centres_stay_nearly_as_they_are(self):
+        bands = SpectralBands.uniform(16)
+        np.testing.assert_allclose(bands.of(daylight, "rgb"), daylight(bands.wavelengths), rtol=0.06)
+        np.testing.assert_allclose(bands.of(lambda at: np.full(at.shape, 0.5), "rgb"), 0.5, rtol=0.01)

@@ -72,8 +72,9 @@ def test_a_spectrum_is_linear_inside_and_constant_outside():
 @pytest.mark.parametrize(
     ("nm", "values", "named"),
     [
-        ((500, 400), (1, 1), "wavelengths_nm: must be positive and rise"),
+        ((500, 400), (1, 1), "wavelengths_nm: must rise from one entry to the next, from 1 nm on"),
         ((400, 500), (1, 1, 1), "values: 3 for 2 wavelengths_nm"),
+        ((400e-9, 500e-9), (1, 1), "wavelengths_nm: must rise .* from 1 nm on"),
         ((400, 500), (1, -1), "values hold -1"),
         ((400, 500), (1, np.nan), "values: must be a row of finite numbers"),
         ((), (), "wavelengths_nm: must be a row"),
