@@ -15,7 +15,7 @@ import sim
 from evolve.config import EyeConfig
 from evolve.development import Phenotype
 from evolve.files import write_whole
-from evolve.policy import EyePolicy, load_policy
+from evolve.policy import EyePolicy, TrainingDiverged, load_policy
 from evolve.store import Run, RunError
 from sim.state import WorldState, concatenate
 
@@ -121,8 +121,11 @@ def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_ev
         rays_per_receptor=run.config.eye.rays_per_receptor,
     )
     try:
+        _require_fit(policy, worlds, run.policy_path(candidate.id))
         states, columns = _play(policy, worlds)
-        views = _perfect_views(worlds.simulation.world, eyes, states, radiance_every)
+        views = _perfect_views(worlds, eyes, states, radiance_every)
+    except TrainingDiverged as error:
+        raise RunError(f"{run.policy_path(candidate.id)} is damaged: {error}") from error
     finally:
         worlds.close()
     return Episode(
@@ -137,6 +140,12 @@ def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_ev
         **columns,
         **views,
     )
+
+
+def _require_fit(policy: EyePolicy, worlds: Any, path: Path) -> None:
+    own, here = (space["eyes"].shape for space in (policy.observation_space, worlds.observation_space))
+    if own != here:
+        raise RunError(f"{path} is another animal's: it sees {own}, this one {here} (memory, eye, channel, y, x)")
 
 
 def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any]]:
@@ -161,12 +170,15 @@ def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any]]:
     }
 
 
-def _perfect_views(world: sim.World, eyes: sim.Eyes, states: WorldState, every: int) -> dict[str, Any]:
-    """The same scenes through a perfect lens: by the same receptors, and as radiance on a finer grid."""
+def _perfect_views(worlds: Any, eyes: sim.Eyes, states: WorldState, every: int) -> dict[str, Any]:
+    """The same scenes in the same light through a perfect lens: by the same receptors, and as radiance on a finer
+    grid."""
+    world, light = worlds.simulation.world, worlds.renderer.fidelity.light
     perfect = replace(eyes, optics=None)
     factor = max(1, -(-FINE_PIXELS // max(eyes.resolution)))
     fine = replace(perfect, resolution=(factor * eyes.resolution[0], factor * eyes.resolution[1]))
-    receptors, pictures = (sim.BatchedRenderer(world, e, 1, FINE_RAYS) for e in (perfect, fine))
+    fidelity = sim.Fidelity(FINE_RAYS, eyes.bands, light=light)
+    receptors, pictures = (sim.BatchedRenderer(world, e, 1, fidelity) for e in (perfect, fine))
     scenes = [states.take(np.array([t])) for t in range(states.n)]
     frames = np.arange(0, states.n, every)
     radiance = [np.moveaxis(pictures.receptor_radiance(scenes[t]), 0, 2) for t in frames]

@@ -69,7 +69,7 @@ class LocalExecutor:
         """Evaluate all jobs; each comes out as soon as it is done, in any order. A deque may be added to meanwhile.
 
         Raises:
-            ExecutorError: a worker could not be made ready.
+            ExecutorError: a worker could not be made ready, or the machine refuses something, such as a file.
         """
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
         deaths: dict[int, int] = {}

@@ -85,7 +85,8 @@ def _live(
     progress: Progress | None,
     begun: Checkpoint | None = None,
 ) -> tuple[Training, Episodes]:
-    """Training, and the evaluation episodes after it, in worlds never seen before."""
+    """Training, and the evaluation episodes after it, from starts and objects' places never seen before. A maze is the
+    same for all of a run, and of all runs."""
     weights, worlds, evaluation = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     eyes = phenotype.eyes(config.eye)
     common: dict[str, Any] = {"eyes": eyes, "memory": phenotype.memory_frames}

@@ -261,6 +261,8 @@ def load_policy(path: Path | str) -> EyePolicy:
         config = PolicyConfig(
             tuple(int(n) for n in stored["eyes"]), int(stored["neurons"]), int(stored.get("layers", 2))
         )
+        if not all(torch.isfinite(tensor).all() for tensor in tensors.values()):
+            raise ValueError("it holds numbers that are not finite")
         policy = build_policy(config)
         set_learnt(policy, tensors)
     except FileNotFoundError:

@@ -118,7 +118,10 @@ def _evaluate(function: Callable[..., Evaluation], order: Order, progress: Calla
             rung, content = order.begun
             checkpoints[rung].write_bytes(content)
         ladder = (Stretch(order.budgets, checkpoints),) if checkpoints else ()
-        outcome = evaluated(function, (phenotype, config, order.seed, policy, *ladder), progress)
+        try:
+            outcome = evaluated(function, (phenotype, config, order.seed, policy, *ladder), progress)
+        except OSError as error:
+            raise UnfitWorker(f"a worker's machine refuses: {error}") from error
         return _text(outcome), _content(policy), _content(checkpoints[-1]) if checkpoints else b""
 
 

@@ -22,7 +22,7 @@ from evolve.files import UNFINISHED, sweep, write_whole
 from evolve.genotype import Genotype
 from evolve.lock import RunLock
 from evolve.versions import FILE as VERSIONS
-from evolve.versions import record_start
+from evolve.versions import fingerprint, record_start
 
 __all__ = ["Candidate", "Run", "RunError", "next_directory"]
 
@@ -66,8 +66,9 @@ class Run:
                 _require_no_run(path)
                 (path / POLICIES).mkdir(exist_ok=True)
                 (path / CANDIDATES).touch()
-                record_start(path, 0, origin)
-                write_whole(path / CONFIG, to_toml(config).encode())
+                text = to_toml(config)
+                record_start(path, 0, origin, fingerprint(text))
+                write_whole(path / CONFIG, text.encode())
         except OSError as error:
             raise RunError(f"{path} cannot be written: {error.strerror}") from error
         return cls(path, config)

@@ -1,7 +1,8 @@
-"""Which software a run was started and continued with."""
+"""Which software, and settings, a run was started and continued with."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import platform
 import subprocess
@@ -12,7 +13,7 @@ from typing import Any
 
 from evolve.files import write_whole
 
-__all__ = ["origin", "present", "record_start", "recorded"]
+__all__ = ["altered", "fingerprint", "origin", "present", "record_start", "recorded"]
 
 FILE = "versions.json"
 PACKAGES = (
@@ -52,12 +53,29 @@ def commits(run: Path) -> list[str]:
     return list(dict.fromkeys(commit for commit in known if commit))
 
 
-def record_start(run: Path, candidates: int, origin: str | None = None) -> None:
-    """Write down that a run goes on from `candidates` evaluated ones with the present versions, and `origin`, from
-    whose animal it started."""
+def fingerprint(config: str) -> str:
+    """Of the text of a run's config.toml, but for what decides nothing: the workers' number, and how long it lasts."""
+    lines = [line for line in config.splitlines() if not line.startswith(("workers =", "generations ="))]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
+
+
+def altered(run: Path) -> bool:
+    """Whether a run's config.toml has changed since the run was begun or last continued."""
+    starts = _starts(run)
+    return bool(starts) and starts[-1].get("settings", _settings(run)) != _settings(run)
+
+
+def _settings(run: Path) -> str:
+    return fingerprint((run / "config.toml").read_text(encoding="utf-8"))
+
+
+def record_start(run: Path, candidates: int, origin: str | None = None, settings: str | None = None) -> None:
+    """Write down that a run goes on from `candidates` evaluated ones with the present versions, with which settings
+    (their fingerprint; None: those of its config.toml), and `origin`, from whose animal it started."""
     start: dict[str, Any] = {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "candidates": candidates,
+        "settings": settings or _settings(run),
         "versions": present(),
     }
     if origin is not None:

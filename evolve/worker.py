@@ -25,7 +25,7 @@ __all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "work
 
 @dataclass(frozen=True)
 class Message:
-    """From a worker to its executor: steps trained, an evaluation, why it is unfit for work; "died" says the pipe."""
+    """From a worker to its executor: steps trained, an evaluation, why it cannot work here; "died" says the pipe."""
 
     kind: Literal["progress", "done", "unfit", "died"]
     content: Any = None
@@ -45,7 +45,11 @@ def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: C
             arguments = connection.recv()
         except EOFError:
             return
-        outcome = evaluated(evaluate, arguments, lambda *steps: connection.send(Message("progress", steps)))
+        try:
+            outcome = evaluated(evaluate, arguments, lambda *steps: connection.send(Message("progress", steps)))
+        except OSError as error:
+            connection.send(Message("unfit", f"{error}; mend that, and go on with evolve resume"))
+            return
         connection.send(Message("done", outcome))
 
 
@@ -81,10 +85,17 @@ def evaluate_candidate(
 def evaluated(
     evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], progress: Callable[[int, int], None]
 ) -> Evaluation:
-    """The candidate's evaluation; whatever goes wrong in it becomes its failure."""
+    """The candidate's evaluation; whatever goes wrong in it becomes its failure, but what the machine refuses: a disk
+    that is full says nothing about an animal.
+
+    Raises:
+        OSError: its policy cannot be written, say.
+    """
     began = time.perf_counter()
     try:
         return evaluate(*arguments, progress=progress)
+    except OSError:
+        raise
     except Exception as error:
         return Evaluation.failed(_one_line(error), time.perf_counter() - began)
     finally:

@@ -80,6 +80,7 @@ class Eyes:
         check("noise_sigma", lambda x: 0.0 <= x < math.inf, "non-negative and finite")
         check("bands", counts, "a whole number, at least 1")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
+        check("optics", _is_pupil, "an optics.Pupil or None, the perfect lens")
         if not isinstance(self.photon_budget, PhotonBudget | None):
             raise ValueError(f"Eyes: photon_budget = {self.photon_budget!r}, must be an optics.PhotonBudget or None")
 
@@ -115,6 +116,15 @@ class Eyes:
         """Vertical field of view [deg]: receptors are square on a flat retina."""
         height, width = self.resolution
         return math.degrees(2 * math.atan(math.tan(math.radians(self.fov_deg) / 2) * height / width))
+
+
+def _is_pupil(value: Any) -> bool:
+    """None is one, too."""
+    if value is None:
+        return True
+    from optics import Pupil
+
+    return isinstance(value, Pupil)
 
 
 def eye_positions(azimuths: np.ndarray) -> np.ndarray:

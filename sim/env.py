@@ -45,6 +45,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         observation, reward, terminated, truncated, info = self._batch.step_once(np.asarray(action)[None])
+        info[0].pop("episode", None)  # Stable-Baselines3's; a Gymnasium environment leaves that name to its wrappers
         return _only(observation), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info[0]
 
     def render(self) -> np.ndarray | None:

@@ -37,7 +37,7 @@ class BatchedRenderer:
     world              geometry, materials and lights; shared by all worlds
     eyes               of every agent
     n_envs             number of worlds in a state
-    rays_per_receptor  samples of each receptor (a whole number, perfect lens), or per receptor on average (behind a
+    rays_per_receptor  samples of each receptor (rounded, perfect lens), or per receptor on average (behind a
                        pupil); "auto": as few as the receptors' noise allows in this world, see `sim.choose_fidelity`;
                        or a whole Fidelity. The one in use is in `.fidelity`
     brightest          signal of a white surface that faced all lights at once
@@ -71,6 +71,8 @@ class BatchedRenderer:
         self.tracer: Tracer = tracers.of(self.fidelity.light)
         self._check_room(n_envs)
         self.sensor = sampling.sensor(self.fidelity.rays_per_receptor)
+        if self.eye.pupil is None:  # a whole number of its own for every receptor
+            self.fidelity = replace(self.fidelity, rays_per_receptor=float(self.sensor.rays_per_receptor))
         mixing = self.eye.throughput * self.bands.weights
         self.brightest = float((mixing @ white).max())
         self._readout = self.sensor.readout(mixing, self.tracer.basis)

@@ -197,6 +197,11 @@ class EyesVecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
 
+def _require_whole(name: str, number: Any, least: int) -> None:
+    if not isinstance(number, int | np.integer) or number < least:
+        raise ValueError(f"{name} = {number!r}, must be a whole number, at least {least}")
+
+
 def make_vec_env(
     task: str,
     eyes: Eyes | None = None,
@@ -219,8 +224,8 @@ def make_vec_env(
     seed               of episodes and noise; None draws one
     memory             frames in an observation
     mode               "training", or "evaluation" (objects respawn; rewards weighted as fitness)
-    rays_per_receptor  rays traced for each receptor; "auto": as few as its noise allows, see `sim.BatchedRenderer`;
-                       or a whole Fidelity
+    rays_per_receptor  rays traced for each receptor, in direct light; "auto": as few as its noise allows, and light
+                       that was reflected twice where it counts, see `sim.BatchedRenderer`; or a whole Fidelity
     world_seed, mazes  of the layout that all worlds share: navigation's mazes, and how many
     spectra            of materials and lights, by name, in the place of their colours: see `sim.build_world`
     render_mode        "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye
@@ -230,7 +235,12 @@ def make_vec_env(
     Raises ValueError for a bad argument.
     """
     eyes = Eyes() if eyes is None else eyes
-    Memory(memory)  # complains before the scene is built
+    if not isinstance(eyes, Eyes):
+        raise ValueError(f"eyes = {eyes!r}, must be sim.Eyes or None, the default ones")
+    for name, number, least in (("n_envs", n_envs, 1), ("memory", memory, 1), ("world_seed", world_seed, 0)):
+        _require_whole(name, number, least)
+    if seed is not None:
+        _require_whole("seed", seed, 0)
     check_render_mode(render_mode)
     world = build_world(task, seed=world_seed, mazes=mazes, spectra=spectra)
     simulation = Simulation(world, n_envs, seed, mode, threads=min(dr.thread_count(), n_envs))

@@ -6,7 +6,6 @@ import json
 import sys
 from argparse import Namespace
 from contextlib import nullcontext
-from pathlib import Path
 
 from evolve.ancestor import starts_from
 from evolve.candidate import Candidate
@@ -23,7 +22,7 @@ from evolve.remarks import remarks
 from evolve.scalars import Scalars
 from evolve.search import Search
 from evolve.store import Run, next_directory
-from evolve.versions import present, record_start, recorded
+from evolve.versions import altered, present, record_start, recorded
 from evolve.worker import evaluate_candidate, prepare_device
 from optics import backend
 
@@ -65,7 +64,7 @@ def resume(arguments: Namespace) -> int:
             if not arguments.json:
                 print(f"{run.path}: all {run.config.candidates} candidates have been evaluated")
             return _finish(run, arguments.json)
-        _note_changes(run.path)
+        _note_changes(run)
         record_start(run.path, len(run.candidates))
         if not arguments.json:
             print(f"{run.path}: {len(run.candidates)} of {run.config.candidates} candidates are on record", flush=True)
@@ -163,9 +162,15 @@ def _plan(config: RunConfig) -> str:
     )
 
 
-def _note_changes(path: Path) -> None:
-    """Say which software differs from when the run began; numbers may differ with it."""
-    then, now = recorded(path), present()
+def _note_changes(run: Run) -> None:
+    """Say which software differs from when the run began, and whether settings do; numbers may differ with them."""
+    if altered(run.path):
+        print(
+            f"note: config.toml has changed since the run was last carried on: candidates from {len(run.candidates)} "
+            "on are trained and evaluated by other settings than those before",
+            file=sys.stderr,
+        )
+    then, now = recorded(run.path), present()
     changed = [f"{name} {now[name]} (was {then[name]})" for name in now if name in then and then[name] != now[name]]
     if changed:
         print(f"note: other software than when the run began: {', '.join(changed)}", file=sys.stderr)

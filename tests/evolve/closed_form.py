@@ -3,6 +3,7 @@
 They run in worker processes, so they live in a module of their own.
 """
 
+import errno
 import os
 import signal
 import time
@@ -57,6 +58,13 @@ def killed_always(phenotype, config, seed, policy_path, progress):
     if int(policy_path.stem) == 1:
         os.kill(os.getpid(), signal.SIGSEGV)
     return outcome
+
+
+def disk_full(phenotype, config, seed, policy_path, progress):
+    """There is no room for the second candidate's policy."""
+    if int(policy_path.stem) == 1:
+        raise OSError(errno.ENOSPC, "No space left on device", str(policy_path))
+    return bowl(phenotype, config, seed, policy_path, progress)
 
 
 def threads(phenotype, config, seed, policy_path, progress):

@@ -1,13 +1,16 @@
 """A recorded episode: what it holds agrees with the worlds it was played in, and with its file."""
 
+import math
 import pickle
 
 import numpy as np
 import pytest
+import torch
 
 import sim
 from evolve import export, replay
-from evolve.episode import Episode, record
+from evolve.episode import Episode, _perfect_views, record
+from evolve.policy import PolicyConfig, build_policy, load_policy, save_policy
 from evolve.store import RunError
 
 
@@ -79,6 +82,44 @@ def test_candidates_that_are_not_there_are_named(run, tmp_path):
             record(run)
     finally:
         policy.write_bytes(whole)
+
+
+def test_policies_of_another_animal_or_damaged_are_named(run, monkeypatch):
+    policy = run.policy_path(0)
+    whole = policy.read_bytes()
+    try:
+        seen = load_policy(policy).observation_space["eyes"].shape
+        save_policy(build_policy(PolicyConfig((*seen[:-1], seen[-1] + 1), 8)), policy)
+        with pytest.raises(RunError, match=f"{policy.name} is another animal's: it sees .*, this one "):
+            record(run)
+        for damage, named in (
+            (math.nan, "it holds numbers that are not finite"),
+            (3e38, "is damaged: policy's actions"),
+        ):
+            policy.write_bytes(whole)
+            broken = load_policy(policy)
+            with torch.no_grad():
+                for tensor in broken.parameters():
+                    tensor.fill_(damage)
+            save_policy(broken, policy)
+            with pytest.raises(RunError, match=f"{policy.name}.*{named}"):
+                record(run)
+    finally:
+        policy.write_bytes(whole)
+
+
+def test_perfect_eyes_are_shown_the_same_light():
+    """In a maze a tenth of the light has been reflected twice: a dusk eye's rays follow it, and so do its pictures'."""
+    eyes = sim.Eyes(n_eyes=2, resolution=(4, 6), fov_deg=60, noise_sigma=0.02)
+    worlds = sim.make_vec_env("navigation", eyes, 1, seed=0)
+    worlds.reset()
+    assert worlds.renderer.fidelity.light == "bounce"
+    views = _perfect_views(worlds, eyes, worlds.state, 1)
+    exact = worlds.renderer.signals(worlds.state)
+    assert views["perfect_signals"].mean() == pytest.approx(exact.mean(), rel=0.04)
+    weights = worlds.renderer.bands.weights
+    seen = np.tensordot(weights, views["radiance"].mean(axis=(0, 1, 3, 4)), axes=1).mean()
+    assert seen == pytest.approx(exact.mean(), rel=0.04)
 
 
 def test_exr_files_hold_what_the_eyes_saw(episode, tmp_path):

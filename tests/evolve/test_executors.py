@@ -12,6 +12,7 @@ import pytest
 from closed_form import (
     bowl,
     calls,
+    disk_full,
     fails_for_some,
     killed_always,
     killed_once,
@@ -53,6 +54,11 @@ def test_every_job_comes_out_once_with_its_own_outcome(tmp_path, evaluate):
     found = outcomes(evaluate, tmp_path, count=5)
     assert calls(tmp_path) == dict.fromkeys(range(5), 1)
     assert {i: outcome.fitness for i, outcome in found.items()} == {j.id: expected(j) for j in jobs(tmp_path, 5)}
+
+
+def test_a_full_disk_is_no_animals_failure(tmp_path):
+    with pytest.raises(ExecutorError, match=r"No space left on device.*000001.*go on with evolve resume"):
+        outcomes(disk_full, tmp_path, workers=1)
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="tells a process's memory on Linux alone")

@@ -18,7 +18,7 @@ from evolve.evaluation import Evaluation
 from evolve.genotype import Genotype
 from evolve.lock import LockedError
 from evolve.store import Run, RunError, next_directory
-from evolve.versions import present, record_start, recorded
+from evolve.versions import altered, present, record_start, recorded
 
 CONFIG = tiny()
 DIMENSION = Genotype(CONFIG.genome).dimension
@@ -209,6 +209,21 @@ def test_versions_are_recorded_at_each_start(run):
     record_start(run.path, 7)
     starts = json.loads((run.path / "versions.json").read_text())
     assert [start["candidates"] for start in starts] == [0, 7]
+
+
+def test_settings_that_change_meanwhile_are_noticed(run):
+    """What decides nothing may change: how many work, and for how long."""
+    config = run.path / "config.toml"
+    began = config.read_text()
+    for setting, noticed in (("workers = 0", False), ("generations = ", False), ("noise_sigma = 0.01", True)):
+        changed = began.replace(setting, f"{setting.split('=')[0]}= 1" if "=" in setting else setting)
+        assert changed != began
+        config.write_text(changed)
+        assert altered(run.path) == noticed
+    record_start(run.path, 3)
+    assert not altered(run.path), "it was told once"
+    (run.path / "versions.json").unlink()
+    assert not altered(run.path)
 
 
 def test_default_directory_is_the_first_that_is_free(tmp_path):

@@ -194,6 +194,8 @@ def test_renders_nothing_before_the_world_has_begun():
         ({"render_mode": "human"}, "render_mode = 'human', must be one of 'rgb_array', 'eyes' or None"),
         ({"spectra": {"wal": "foliage"}}, "no material or light 'wal'; did you mean 'wall'"),
         ({"memory": 0}, "memory = 0"),
+        ({"memory": 1.5}, "memory = 1.5, must be a whole number"),
+        ({"world_seed": 1.5}, "world_seed = 1.5, must be a whole number"),
     ],
 )
 def test_bad_options_are_named(options, named):
@@ -206,3 +208,28 @@ def test_actions_of_another_shape_are_named():
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"actions have shape \(1, 3\), must be \(1, 2\)"):
         env.step(np.zeros(3))
+
+
+def test_gymnasiums_own_statistics_can_be_wrapped_around():
+    """It wants to put `episode` into info itself."""
+    env = gymnasium.wrappers.RecordEpisodeStatistics(sim.make_env("detection", EYES, rays_per_receptor=1))
+    env.reset(seed=0)
+    total, done = 0.0, False
+    while not done:
+        _, reward, terminated, truncated, info = env.step(np.array([1.0, 0.1]))
+        total, done = total + reward, terminated or truncated
+    assert info["episode"]["r"] == pytest.approx(total)
+
+
+def test_eyes_and_seeds_of_another_kind_are_named():
+    with pytest.raises(ValueError, match=r"eyes = 'x', must be sim.Eyes"):
+        sim.make_env("detection", "x")
+    with pytest.raises(ValueError, match="seed = -1, must be a whole number, at least 0"):
+        sim.make_vec_env("detection", EYES, 1, seed=-1)
+    with pytest.raises(ValueError, match=r"optics = 'lens', must be an optics.Pupil or None"):
+        sim.Eyes(optics="lens")
+
+
+def test_a_perfect_lens_tells_how_many_rays_it_has():
+    renderer = sim.make_vec_env("detection", EYES, 1, rays_per_receptor=1.6).renderer
+    assert renderer.fidelity.rays_per_receptor == renderer.sensor.rays_per_receptor == 2
