@@ -1,4 +1,4 @@
-"""What is odd about a run's settings, though nothing forbids it: genes that change nothing, colours seen wrongly."""
+"""What is odd about a run's settings, though nothing forbids it: what changes nothing, and colours seen wrongly."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ import numpy as np
 from evolve.config import INHERITED, RunConfig
 from evolve.genes import LAMBDA_MAX
 
-__all__ = ["coarse_bands", "idle_genes", "remarks"]
+__all__ = ["coarse_bands", "idle_genes", "idle_starts", "remarks"]
 
 GREY_TASKS = ("navigation", "detection", "tracking")
 PEAKS = 17  # of an open gene's range, at which its pigment is tried
+SHOWN = 4  # names in a line, at most
 LEAST_ERROR = 1e-3  # of white's signal: what the 64 bands that others are held against may be wrong by themselves
 
 
 def remarks(config: RunConfig) -> list[str]:
     """One line each."""
-    return [*idle_genes(config), *coarse_bands(config)]
+    return [*idle_genes(config), *idle_starts(config), *coarse_bands(config)]
 
 
 def coarse_bands(config: RunConfig) -> list[str]:
@@ -86,4 +87,19 @@ def idle_genes(config: RunConfig) -> list[str]:
     most = int(types.high if types.open else types.start)
     for name in [name for name in list(LAMBDA_MAX)[most:] if uses[name].open]:
         notes.append(f"genome.{name} is open but changes nothing: genome.receptor_types is at most {most}")
+    return notes
+
+
+def idle_starts(config: RunConfig) -> list[str]:
+    """Genes that were given a start though nothing reads them, one line per reason."""
+    unread = {"optical": f"eye.optics = {config.eye.optics}".lower()} if not config.eye.optics else {}
+    if config.eye.receptors != INHERITED:
+        unread["spectral"] = f"eye.receptors = {config.eye.receptors}, not {INHERITED}"
+    notes = []
+    for cluster, why in unread.items():
+        genes = [gene for gene in config.eye.genes.values() if gene.cluster == cluster]
+        given = [g.name for g in genes if config.genome[g.name].start != g.default.start]
+        if given:
+            names = ", ".join(given if len(given) < SHOWN else [*given[: SHOWN - 1], "..."])
+            notes.append(f"what {names} start{'s' * (len(given) == 1)} with changes nothing: {why}")
     return notes

@@ -15,7 +15,7 @@ from evolve.development import develop
 from evolve.fitness import evaluate
 from evolve.genotype import Genotype
 from evolve.plan import Plan
-from evolve.remarks import idle_genes, remarks
+from evolve.remarks import idle_genes, idle_starts, remarks
 from optics import backend
 
 PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
@@ -76,6 +76,20 @@ def test_genes_that_cannot_change_anything_are_named():
     assert "the world of detection is grey" in first
     assert others == ["genome.lambda_max_3_nm is open but changes nothing: genome.receptor_types is at most 3"]
     assert len(notes(*inherited, "genome.receptor_types.open=true")) == 1
+
+
+def test_starts_that_nothing_reads_are_named():
+    def notes(*settings):
+        return idle_starts(assemble("detection", assignments=settings))
+
+    assert notes() == notes("eye.optics=false") == []
+    blue = "genome.lambda_max_0_nm.start=400"
+    assert notes(blue) == ["what lambda_max_0_nm starts with changes nothing: eye.receptors = rgb, not genes"]
+    assert notes(blue, "eye.receptors=genes") == []
+    closed = ("eye.optics=false", "genome.relative_aperture.start=0.2", "genome.refractive_index.start=1.7")
+    assert notes(*closed) == ["what relative_aperture, refractive_index start with changes nothing: eye.optics = false"]
+    relief = [f"genome.doe_{i}{j}.start=0.1" for i in range(4) for j in range(4)]
+    assert "doe_00, doe_01, doe_02, ... start with changes nothing" in notes("eye.optics=false", *relief)[0]
 
 
 def test_bands_too_few_for_the_colours_of_a_world_are_named():
