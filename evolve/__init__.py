@@ -21,6 +21,10 @@ _HOME = {
     "Genotype": "evolve.genotype",
     "Phenotype": "evolve.development",
     "develop": "evolve.development",
+    "Run": "evolve.store",
+    "RunError": "evolve.store",
+    "Candidate": "evolve.candidate",
+    "load_policy": "evolve.policy",
 }
 
 __all__ = sorted(_HOME)

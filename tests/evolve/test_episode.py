@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+import evolve
 import sim
 from evolve import export, replay
 from evolve.episode import Episode, _perfect_views, record
@@ -82,6 +83,19 @@ def test_candidates_that_are_not_there_are_named(run, tmp_path):
             record(run)
     finally:
         policy.write_bytes(whole)
+
+
+def test_an_agent_can_be_taken_out_of_its_run(run):
+    """As the tutorial says, through the package's own names."""
+    opened = evolve.Run.open(run.path)
+    best = opened.best
+    worlds = sim.make_vec_env(
+        opened.config.task, best.phenotype.eyes(opened.config.eye), 2, seed=0, memory=best.phenotype.memory_frames
+    )
+    policy = evolve.load_policy(opened.policy_path(best.id))
+    actions, _ = policy.predict(worlds.reset(), deterministic=True)
+    assert actions.shape == (2, 2)
+    assert np.isfinite(worlds.step(actions)[1]).all()
 
 
 def test_policies_of_another_animal_or_damaged_are_named(run, monkeypatch):
