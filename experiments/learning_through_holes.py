@@ -49,9 +49,9 @@ def page(store: Store) -> Page:
             "Two eyes of 15 x 15 receptors, 45° wide; every animal is trained once from its own seed, behind an open "
             "hole of its own width. Curves: local lines with weights that fall with the distance in log a (Gaussian, "
             f"{BANDWIDTH:g}); the best width is where the curve peaks, with a 95 % interval by a bootstrap over "
-            "animals, cut at the widths that were tried. p: of a curve that explains as much where success has nothing "
-            f"to do with the width, by {RESAMPLES} permutations; above {SURE:g} no best width is given. Dotted: of "
-            "three objects one that is reached by luck is the goal; who reaches none scores less. Objects are spheres "
+            "animals, each curve between its own animals' widths. p: of a curve that explains as much where success "
+            f"has nothing to do with the width, by {RESAMPLES} permutations; above {SURE:g} no best width is given. "
+            "Dotted: of three objects one that is reached by luck is the goal; who reaches none scores less. Objects are spheres "
             "1 m wide with stripes of 30°: from 2.5 m away a stripe in the middle is two receptors wide, from 5 m one."
         ),
         command=(
@@ -99,7 +99,9 @@ def best_width(rows: Sequence[Row], seed: int = 0) -> tuple[Interval, float]:
     for _ in range(RESAMPLES):
         chosen = chance.integers(len(place), size=len(place))
         if np.unique(place[chosen]).size > 1:
-            peaks.append(at[smoothed(place[chosen], value[chosen], at).argmax()])
+            # A local line runs away where there are no animals.
+            among = at[(at >= place[chosen].min() - 1e-9) & (at <= place[chosen].max() + 1e-9)]
+            peaks.append(among[smoothed(place[chosen], value[chosen], among).argmax()])
         as_much += bool(smoothed(place, chance.permutation(value), place).var() >= explained)
     best, low, high = np.exp([at[smoothed(place, value, at).argmax()], *np.quantile(peaks, [0.025, 0.975])])
     return Interval(float(best), float(low), float(high)), as_much / (RESAMPLES + 1)

@@ -34,6 +34,18 @@ def test_the_best_width_is_found_with_an_interval_that_holds_it(peak):
     assert sure.high - sure.low < found.high - found.low
 
 
+def test_curves_do_not_run_away_where_there_are_no_animals():
+    """Of four animals behind narrow holes a resample may hold two, whose line rises without end."""
+    widths = [0.059, 0.069, 0.087, 0.097, *np.linspace(0.25, 0.64, 26)]
+    success = [0.17, 0.16, 0.22, 0.09, *(0.5 - 3 * (np.linspace(0.25, 0.64, 26) - 0.34) ** 2)]
+    rows = [
+        replace(row, relative_aperture=a, success_rate=s)
+        for row, a, s in zip(through_holes(0.3, 0.0), widths, success, strict=False)
+    ]
+    found, _ = learning_through_holes.best_width(rows)
+    assert 0.25 < found.low < found.mean < found.high < 0.45
+
+
 def test_no_width_is_best_where_nothing_is_learnt():
     flat = [replace(row, success_rate=0.33 + 0.1 * np.sin(37.0 * i)) for i, row in enumerate(through_holes(0.2, 0.0))]
     assert learning_through_holes.best_width(flat)[1] > 0.05
