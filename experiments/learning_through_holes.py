@@ -51,8 +51,9 @@ def page(store: Store) -> Page:
             f"{BANDWIDTH:g}); the best width is where the curve peaks, with a 95 % interval by a bootstrap over "
             "animals, each curve between its own animals' widths. p: of a curve that explains as much where success "
             f"has nothing to do with the width, by {RESAMPLES} permutations; above {SURE:g} no best width is given. "
-            "Dotted: of three objects one that is reached by luck is the goal; who reaches none scores less. Objects are spheres "
-            "1 m wide with stripes of 30°: from 2.5 m away a stripe in the middle is two receptors wide, from 5 m one."
+            "Dotted: of three objects one that is reached by luck is the goal; who reaches none scores less. Objects "
+            "are spheres 1 m wide with stripes of 30°: from 2.5 m away a stripe in the middle is two receptors wide, "
+            "from 5 m one."
         ),
         command=(
             "evolve run --preset pupil\n"
