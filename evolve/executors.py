@@ -41,8 +41,8 @@ class LocalExecutor:
     count     workers; 0: one per core that this process may use
     prepare   called once in each new worker; an exception there ends the run, because no candidate could be evaluated
 
-    An exception in `evaluate` is that candidate's failure. A worker that dies takes nobody with it: it is replaced and
-    its candidate evaluated again, `ATTEMPTS` times in all.
+    An exception in `evaluate` is that candidate's failure, but an OSError, which ends the run. A worker that dies takes
+    nobody with it: it is replaced and its candidate evaluated again, `ATTEMPTS` times in all.
     """
 
     evaluate: Callable[..., Evaluation]

@@ -96,7 +96,12 @@ def evaluate(order: Order) -> Reply:
     with _one_at_a_time:
         _prepare(order)
         module, name = order.function.split(":")
-        return _evaluate(getattr(import_module(module), name), order, progress)
+        try:
+            return _evaluate(getattr(import_module(module), name), order, progress)
+        except OSError as error:
+            raise UnfitWorker(
+                f"a worker's machine refuses: {error}; mend that, and go on with evolve resume"
+            ) from error
 
 
 def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:
@@ -118,10 +123,7 @@ def _evaluate(function: Callable[..., Evaluation], order: Order, progress: Calla
             rung, content = order.begun
             checkpoints[rung].write_bytes(content)
         ladder = (Stretch(order.budgets, checkpoints),) if checkpoints else ()
-        try:
-            outcome = evaluated(function, (phenotype, config, order.seed, policy, *ladder), progress)
-        except OSError as error:
-            raise UnfitWorker(f"a worker's machine refuses: {error}") from error
+        outcome = evaluated(function, (phenotype, config, order.seed, policy, *ladder), progress)
         return _text(outcome), _content(policy), _content(checkpoints[-1]) if checkpoints else b""
 
 

@@ -54,8 +54,10 @@ def commits(run: Path) -> list[str]:
 
 
 def fingerprint(config: str) -> str:
-    """Of the text of a run's config.toml, but for what decides nothing: the workers' number, and how long it lasts."""
-    lines = [line for line in config.splitlines() if not line.startswith(("workers =", "generations ="))]
+    """Of the text of a run's config.toml, but for what trains and evaluates nobody otherwise: remarks, the workers'
+    number, and how long the run lasts."""
+    left_out = ("workers =", "generations =", "#")
+    lines = [line.strip() for line in config.splitlines() if line.strip() and not line.startswith(left_out)]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
 
 

@@ -100,8 +100,7 @@ def best_width(rows: Sequence[Row], seed: int = 0) -> tuple[Interval, float]:
     for _ in range(RESAMPLES):
         chosen = chance.integers(len(place), size=len(place))
         if np.unique(place[chosen]).size > 1:
-            # A local line runs away where there are no animals.
-            among = at[(at >= place[chosen].min() - 1e-9) & (at <= place[chosen].max() + 1e-9)]
+            among = _tried(place[chosen])  # a local line runs away where there are no animals
             peaks.append(among[smoothed(place[chosen], value[chosen], among).argmax()])
         as_much += bool(smoothed(place, chance.permutation(value), place).var() >= explained)
     best, low, high = np.exp([at[smoothed(place, value, at).argmax()], *np.quantile(peaks, [0.025, 0.975])])

@@ -152,7 +152,8 @@ class Eye:
         z: the scene's distance along the axis [m]. direction_deg: (right, up) from the axis where the light comes
         from; the centre cell is its geometric image. The sum is the fraction of the pupil's power that lands inside;
         the window is as wide as it must be to lose less than the tolerance (limits: see `receptive_field`). The
-        perfect lens has the 1 x 1 kernel 1. Signals are a² Σ_b weights[c, b] (kernel_b ⊗ radiance_b).
+        perfect lens has the 1 x 1 kernel 1. Of light from cells' centres, signals are a² Σ_b weights[c, b]
+        (kernel_b ⊗ radiance_b), averaged over receptors; `see` takes it from all over the cells (see `sight`).
 
         Raises:
             AccuracyError: see `optics.psf`.
@@ -265,7 +266,8 @@ class Eye:
         return gaussian_noise(caught, self.noise_sigma, rng) - clean
 
     def in_bands(self, radiance: Any) -> np.ndarray:
-        """(band,): a spectral radiance in this eye's bands, for `see`: see `SpectralBands.of`."""
+        """(band,): a spectral radiance in this eye's bands, for `see`: each type of receptor then catches of it what it
+        should, if bands are at least as many as types. A band may be negative; see `SpectralBands.of`."""
         return self.spectral_bands.of(radiance, self.receptors)
 
     def describe(self, z: Any = math.inf) -> Description:

@@ -94,7 +94,8 @@ class SpectralBands:
         fluorescent lamp's lines, which samples at the bands' centres hit or miss.
 
         Means over the bands, changed by as little as makes Σ_b weights[c, b] radiance[b] what receptor type c catches
-        (quadrature to 1 nm): exactly, if there are as many bands as types. Lines in few bands may leave one below 0.
+        (quadrature to 1 nm): exactly, if bands are at least as many as types, else as nearly as they can. Lines in few
+        bands may leave one below 0.
 
         radiance: a Spectrum, or a function of wavelengths [m] (of a surface: reflectance times illuminant).
         receptors: those that these bands were made for.

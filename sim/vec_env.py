@@ -198,7 +198,7 @@ class EyesVecEnv(VecEnv):
 
 
 def _require_whole(name: str, number: Any, least: int) -> None:
-    if not isinstance(number, int | np.integer) or number < least:
+    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
         raise ValueError(f"{name} = {number!r}, must be a whole number, at least {least}")
 
 

@@ -1,5 +1,6 @@
 """As `closed_form`, for workers that share nothing with the test but a folder: RHABDOM_TEST names it."""
 
+import errno
 import hashlib
 import os
 import signal
@@ -35,6 +36,11 @@ def endless(phenotype, config, seed, policy_path, progress):
             log.write(".")
         progress(step, 300)
         time.sleep(0.1)
+
+
+def disk_full(phenotype, config, seed, policy_path, progress):
+    """There is no room for anybody's policy."""
+    raise OSError(errno.ENOSPC, "No space left on device", str(policy_path))
 
 
 def fails_for_some(phenotype, config, seed, policy_path, progress):

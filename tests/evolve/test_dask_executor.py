@@ -130,6 +130,14 @@ def test_failures_and_infinities_come_through(tmp_path, cluster):
     assert executor.count == 2
 
 
+def test_a_full_disk_is_no_animals_failure(tmp_path, cluster):
+    with (
+        cluster.executor("disk_full") as executor,
+        pytest.raises(ExecutorError, match=r"a worker's machine refuses: .*No space left on device"),
+    ):
+        list(executor.run(jobs(tmp_path)))
+
+
 def test_worker_killed_in_mid_candidate_is_replaced_and_its_candidate_evaluated_again(tmp_path, cluster):
     cluster.calls()
     with cluster.executor("killed_once") as executor:

@@ -215,8 +215,14 @@ def test_settings_that_change_meanwhile_are_noticed(run):
     """What decides nothing may change: how many work, and for how long."""
     config = run.path / "config.toml"
     began = config.read_text()
-    for setting, noticed in (("workers = 0", False), ("generations = ", False), ("noise_sigma = 0.01", True)):
-        changed = began.replace(setting, f"{setting.split('=')[0]}= 1" if "=" in setting else setting)
+    changes = (
+        ("workers = ", "workers = 1", False),
+        ("generations = ", "generations = 1", False),
+        ("[eye]", "# what eyes have in common\n\n[eye]", False),
+        ("noise_sigma = ", "noise_sigma = 1", True),
+    )
+    for setting, other, noticed in changes:
+        changed = began.replace(setting, other)
         assert changed != began
         config.write_text(changed)
         assert altered(run.path) == noticed
