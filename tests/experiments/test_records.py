@@ -20,6 +20,11 @@ RESULTS = Path(__file__).parents[2] / "docs/results"
 RECORDS = sorted((RESULTS / "records").iterdir())
 PAGES = {
     "bending_light": {"lens": ("lens-0", "lens-1"), "index1": ("index1-0",)},
+    "brains_and_acuity": {
+        "detection": ("scaling-detection",),
+        "tracking": ("scaling-tracking",),
+        "navigation": ("scaling-navigation",),
+    },
     "goals_shape_eyes": {
         "navigation": ("navigation-0", "navigation-1"),
         "detection": ("detection-0", "detection-1"),
