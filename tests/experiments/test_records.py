@@ -29,7 +29,7 @@ PAGES = {
         "navigation": ("navigation-0", "navigation-1"),
         "detection": ("detection-0", "detection-1"),
     },
-    "learning_through_holes": {"0.001": ("pupil-001",)},
+    "learning_through_holes": {"0.0003": ("pupil-0003",), "0.001": ("pupil-001",), "0.003": ("pupil-003",)},
     "seeing_ultraviolet": {"foraging": ("ultraviolet-0", "ultraviolet-1")},
 }
 OPTICAL = ("image_quality", "above_noise", "above_noise_of_hole", "strehl", "psnr_db", "ssim")
