@@ -289,14 +289,3 @@ def test_an_annulus_lets_in_what_is_open():
 
     eye = Eye(Pupil(50e-6, aperture=Annulus(0.5)))
     assert eye.throughput == pytest.approx(0.25 * 0.75)
-
-
-def test_what_is_of_another_kind_is_named():
-    with pytest.raises(ValueError, match="photon_budget = 1000"):
-        Eye(photon_budget=1000)
-    with pytest.raises(ValueError, match="pupil = 'lens': must be a kind of Pupil"):
-        Eye(pupil="lens")
-    with pytest.raises(ValueError, match="rng = 0: must be a kind of Generator"):
-        Eye(bands=1).see(np.zeros((1, 15, 15)), 1, rng=0)
-    with pytest.raises(ValueError, match="radiance: must be real numbers, not complex"):
-        Eye(bands=1).see(np.zeros((1, 15, 15)) * 1j, 1)

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -105,3 +106,14 @@ def test_any_light_or_a_refusal(tolerance, illuminance, time, efficiency):
         return
     assert (photons > 0).all()
     assert np.isfinite(photons).all()
+
+
+def test_what_is_of_another_kind_is_named():
+    with pytest.raises(ValueError, match="photon_budget = 1000"):
+        Eye(photon_budget=1000)
+    with pytest.raises(ValueError, match="pupil = 'lens': must be a kind of Pupil"):
+        Eye(pupil="lens")
+    with pytest.raises(ValueError, match="rng = 0: must be a kind of Generator"):
+        Eye(bands=1).see(np.zeros((1, 15, 15)), 1, rng=0)
+    with pytest.raises(ValueError, match="radiance: must be real numbers, not complex"):
+        Eye(bands=1).see(np.zeros((1, 15, 15)) * 1j, 1)
