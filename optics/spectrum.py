@@ -93,19 +93,21 @@ class SpectralBands:
         """(band,): a spectral radiance in these bands, in units of daylight's at 560 nm; of any shape, such as a
         fluorescent lamp's lines, which samples at the bands' centres hit or miss.
 
-        Means over the bands, changed by as little as makes Σ_b weights[c, b] radiance[b] what receptor type c catches
-        (quadrature to 1 nm): exactly, if bands are at least as many as types, else as nearly as they can. Lines in few
-        bands may leave one below 0.
+        Means over the bands, as far as receptors see them and in parts of daylight, changed by as little as makes
+        Σ_b weights[c, b] radiance[b] what receptor type c catches (quadrature to 1 nm): exactly, if bands are at least
+        as many as types, else as nearly as they can. Lines in few bands may leave one below 0.
 
         radiance: a Spectrum, or a function of wavelengths [m] (of a surface: reflectance times illuminant).
         receptors: those that these bands were made for.
         """
         at = radiance.at if isinstance(radiance, Spectrum) else radiance
         nm, catch = _catch(receptors_of(receptors))
-        light = np.broadcast_to(at(nm * 1e-9), nm.shape)
-        hats = _hats(nm, self.wavelengths * 1e9)
-        means = hats @ light / hats.sum(axis=1)
-        caught = (catch / catch.sum(axis=1, keepdims=True)) @ (light / daylight(nm * 1e-9))
+        catch /= catch.sum(axis=1, keepdims=True)
+        of_daylight = np.broadcast_to(at(nm * 1e-9), nm.shape) / daylight(nm * 1e-9)
+        seen = catch.sum(axis=0)
+        shares = _hats(nm, self.wavelengths * 1e9) * (seen + 1e-6 * seen.max())  # what nobody sees has a mean, too
+        means = daylight(self.wavelengths) * (shares @ of_daylight) / shares.sum(axis=1)
+        caught = catch @ of_daylight
         found: np.ndarray = means + np.linalg.pinv(self.weights) @ (caught - self.weights @ means)
         return found
 

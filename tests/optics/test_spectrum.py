@@ -151,7 +151,15 @@ class TestLightInBands:
         seen = eye.see(light.at(eye.spectral_bands.wavelengths)[:, None, None], 1)[:, 0, 0]
         assert np.abs(seen / self.caught("rgb", light.at) - 1).max() > 0.5
 
-    def test_daylight_and_what_is_linear_between_centres_stay_nearly_as_they_are(self):
-        bands = SpectralBands.uniform(16)
-        np.testing.assert_allclose(bands.of(daylight, "rgb"), daylight(bands.wavelengths), rtol=0.06)
-        np.testing.assert_allclose(bands.of(lambda at: np.full(at.shape, 0.5), "rgb"), 0.5, rtol=0.01)
+    @pytest.mark.parametrize(("receptors", "bands"), [("rgb", 4), ("honeybee", 16), ("rgb", 64)])
+    def test_daylight_stays_what_it_is_and_half_of_it_is_half(self, receptors, bands):
+        spectral = SpectralBands.uniform(bands, receptors)
+        for share in (1.0, 0.5):
+            found = spectral.of(lambda at, share=share: share * daylight(at), receptors)
+            np.testing.assert_allclose(found, share * daylight(spectral.wavelengths), rtol=1e-9)
+
+    def test_fewer_bands_than_types_meet_them_halfway(self):
+        bands, light = SpectralBands.uniform(1), illuminant("FL2")
+        caught, seen = self.caught("rgb", light.at), bands.weights @ bands.of(light, "rgb")
+        assert np.ptp(seen) < 1e-9, "one band: white in FL2 looks grey"
+        assert caught.min() < seen[0] < caught.max()
