@@ -22,11 +22,11 @@ def remarks(config: RunConfig) -> list[str]:
 
 def coarse_bands(config: RunConfig) -> list[str]:
     """A line where the bands misjudge the world's measured spectra by more than a receptor's noise."""
+    if config.task in GREY_TASKS:
+        return []
     from sim.colours import band_error, measured
     from sim.world import build_world
 
-    if config.task in GREY_TASKS:
-        return []
     spectra = measured(build_world(config.task))
     light, counts = _most_light(config), _doublings(config.eye.bands)
     errors = {n: light * max(band_error(spectra, types, n) for types in _types(config)) for n in counts}

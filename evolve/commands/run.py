@@ -42,11 +42,12 @@ def start(arguments: Namespace) -> int:
     directory = arguments.out or next_directory(config.task, arguments.preset.removesuffix(f"-{config.task}"))
     if arguments.dry_run:
         return _show(Plan.of(config, directory), arguments.json)
+    notes = [] if arguments.json else remarks(config)  # looks at the world, which takes its time: nothing is begun yet
     run = Run.create(directory, config, starts.name.removeprefix("--from ") if starts else None)
     if not arguments.json:
-        print(f"{run.path}: {_plan(config)}", flush=True)
-        for note in remarks(config):
+        for note in notes:
             print(f"note: {note}", file=sys.stderr)
+        print(f"{run.path}: {_plan(config)}", flush=True)
     with run.lock():
         return _carry(run, arguments)
 
