@@ -68,8 +68,6 @@ def test_search_still_proposes_what_is_on_record(record, tmp_path):
         with pytest.raises(NobodyThere):
             evolve(run, Nobody(), Nobody())
     altered = replace(run.config, search=replace(run.config.search, sigma=0.9 * run.config.search.sigma))
-    if run.config.search.steady_state:  # candidates spread evenly, by the seed alone
-        altered = replace(run.config, seed=run.config.seed + 1)
     (run.path / "config.toml").write_text(to_toml(altered))
     with pytest.raises(RunError):
         evolve(Run.open(run.path), Nobody(), Nobody())
