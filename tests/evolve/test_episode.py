@@ -98,7 +98,7 @@ def test_an_agent_can_be_taken_out_of_its_run(run):
     assert np.isfinite(worlds.step(actions)[1]).all()
 
 
-def test_policies_of_another_animal_or_damaged_are_named(run, monkeypatch):
+def test_policies_of_another_animal_or_damaged_are_named(run):
     policy = run.policy_path(0)
     whole = policy.read_bytes()
     try:

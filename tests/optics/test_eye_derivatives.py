@@ -34,7 +34,7 @@ def eye_of(radius, relief, n, fov):
 
 def seen(radius, relief, n, z, fov):
     """One number: signals of a random scene, weighted at random."""
-    rng = np.random.default_rng(8)
+    rng = np.random.default_rng(5)
     eye = eye_of(radius, relief, n, fov)
     signal = eye.see(rng.random((1, 12, 14)), S, z=z * 2e-3)
     weights = rng.standard_normal(signal.shape)
@@ -64,7 +64,7 @@ def test_see_follows_central_differences(name):
     dr.backward(seen(**START | {name: value}))
     backward = dr.grad(value)[0]
     expected = difference(name)
-    assert abs(expected) > 5e-5
+    assert abs(expected) > 1e-4
     # Another fov moves the PSF's samples too: differences hold what splines between them err.
     assert forward == pytest.approx(expected, rel=5e-4 if name == "fov" else 1e-4)
     assert backward == pytest.approx(forward, rel=1e-9)
