@@ -19,6 +19,7 @@ from optics.tabulated import Spectrum, cie_1931, daylight
 __all__ = ["SpectralBands", "cie_1931", "daylight", "pigment_absorptance"]
 
 CANDIDATES, FINEST = (1, 2, 4, 8, 16, 32), 64
+CATCHES_FIRST = 1e4  # how much more than means they weigh in least squares
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,9 @@ class SpectralBands:
             "signal; widen the tolerance or give a number of bands"
         )
 
-    def of(self, radiance: Spectrum | Callable[[np.ndarray], np.ndarray], receptors: Any) -> np.ndarray:
+    def of(
+        self, radiance: Spectrum | Callable[[np.ndarray], np.ndarray], receptors: Any, nonnegative: bool = False
+    ) -> np.ndarray:
         """(band,): a spectral radiance in these bands, in units of daylight's at 560 nm; of any shape, such as a
         fluorescent lamp's lines, which samples at the bands' centres hit or miss.
 
@@ -99,6 +102,7 @@ class SpectralBands:
 
         radiance: a Spectrum, or a function of wavelengths [m] (of a surface: reflectance times illuminant).
         receptors: those that these bands were made for.
+        nonnegative: no band below 0; what is caught is then as near as that allows.
         """
         at = radiance.at if isinstance(radiance, Spectrum) else radiance
         nm, catch = _catch(receptors_of(receptors))
@@ -109,11 +113,21 @@ class SpectralBands:
         means = daylight(self.wavelengths) * (shares @ of_daylight) / shares.sum(axis=1)
         caught = catch @ of_daylight
         found: np.ndarray = means + np.linalg.pinv(self.weights) @ (caught - self.weights @ means)
-        return found
+        return _nonnegative(self.weights, caught, means) if nonnegative and found.min() < 0 else found
 
     def white_light(self, kernels: np.ndarray) -> np.ndarray:
         """(channel, k, k): what a scene without colour in daylight has of kernels (band, k, k)."""
         return np.tensordot(self.weights * daylight(self.wavelengths), kernels, axes=1)
+
+
+def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> np.ndarray:
+    """x >= 0 with weights @ x as near to what is caught as can be, and of those the nearest to the means."""
+    from scipy.optimize import lsq_linear
+
+    equations = np.concatenate([weights * CATCHES_FIRST, np.eye(len(means))])
+    wanted = np.concatenate([caught * CATCHES_FIRST, means])
+    found: np.ndarray = lsq_linear(equations, wanted, bounds=(0, np.inf), method="bvls").x
+    return found
 
 
 def _catch(kinds: Receptors) -> tuple[np.ndarray, np.ndarray]:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sim.fidelity import Fidelity, choose_fidelity
     from sim.reference import ReferenceRenderer
     from sim.render import BatchedRenderer
-    from sim.scene.mirror import Mirror, mirror
+    from sim.scene.mirror import Mirror, MirrorWarning, mirror
     from sim.vec_env import make_vec_env
     from sim.world import TASKS, World, build_world
 
@@ -34,6 +34,7 @@ _HOME = {
     "World": "sim.world",
     "build_world": "sim.world",
     "Mirror": "sim.scene.mirror",
+    "MirrorWarning": "sim.scene.mirror",
     "mirror": "sim.scene.mirror",
     "BatchedRenderer": "sim.render",
     "ReferenceRenderer": "sim.reference",
@@ -52,6 +53,7 @@ __all__ = [
     "Eyes",
     "Fidelity",
     "Mirror",
+    "MirrorWarning",
     "ReferenceRenderer",
     "View",
     "World",

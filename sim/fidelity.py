@@ -14,7 +14,7 @@ import numpy as np
 
 import optics
 from sim.agent import Eyes
-from sim.colours import band_error, measured
+from sim.colours import band_error, lit_in_bands, measured
 from sim.depth import ONE_PSF, DepthLayers
 from sim.fields import Unseen
 from sim.lighting import BOUNCE, DIRECT, LEVELS
@@ -114,7 +114,8 @@ def choose_fidelity(world: World, eyes: Eyes, tolerance: float | None = None) ->
     allowed = _allowed(eyes, eyes.eye(), tolerance)
     bands, level = _bands(eyes.eye(), SHARE_OF_BANDS * allowed)
     chosen_eyes = replace(eyes, bands=bands)
-    stage, eye = build_stage(world), chosen_eyes.eye()
+    eye = chosen_eyes.eye()
+    stage = build_stage(lit_in_bands(world, eye))
     tracers = Tracers(world, stage, eye.spectral_bands.wavelengths)
     fidelity, _ = chosen(Pilot(world, stage, tracers, chosen_eyes, eye), chosen_eyes, eye, allowed)
     return replace(fidelity, levels=(level, *fidelity.levels[1:]))

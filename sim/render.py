@@ -18,6 +18,7 @@ import numpy as np
 import optics
 from sim import lighting, room
 from sim.agent import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
+from sim.colours import lit_in_bands
 from sim.fidelity import Fidelity, chosen
 from sim.pilot import Pilot
 from sim.recording import aligned, garbage_kept
@@ -60,7 +61,7 @@ class BatchedRenderer:
         self.world, self.eyes = world, eyes if asked is None else replace(eyes, bands=asked.bands)
         self.eye = self.eyes.eye()
         self.bands: optics.SpectralBands = self.eye.spectral_bands
-        self._stage = build_stage(world)
+        self._stage = build_stage(lit_in_bands(world, self.eye))
         tracers = Tracers(world, self._stage, self.bands.wavelengths, tracer)
         with variant(self._stage.variant):
             white = lighting.white_radiance(self._stage.scene, self.bands.wavelengths)

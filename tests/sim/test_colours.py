@@ -1,15 +1,20 @@
 """What a few bands make of measured colours is known before anything is rendered."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 import optics
 import sim
 from sim.colours import band_error, measured
+from sim.simulation import Simulation
 from sim.tasks.foraging import ULTRAVIOLET, petal
 
 PETALS = [petal(share) for share in ULTRAVIOLET.values()]
 NM = np.arange(300.0, 781.0)
+GREY = optics.Spectrum((300.0, 780.0), (0.4, 0.4))
+DAYLIGHT = optics.illuminant("D65")
 
 
 def exact(reflectance, peak_nm, low, high):
@@ -62,3 +67,41 @@ def test_a_renderer_says_what_its_bands_are_worth():
     assert behind == pytest.approx(few.predicted_error / 4), "a quarter of the light"
     grey = sim.BatchedRenderer(sim.build_world("detection"), sim.Eyes(1, (2, 2)), 1).fidelity.levels[0]
     assert grey.predicted_error is None
+
+
+class TestLampsWithLines:
+    """Grey things under a fluorescent lamp: as receptors see them in 64 bands they see them in few."""
+
+    @staticmethod
+    def signals(renderer, bands, receptors="rgb", **spectra):
+        world = sim.build_world("detection", spectra={"wall": GREY, "floor": GREY, "light_0": "FL2", **spectra})
+        simulation = Simulation(world, 1, 3, "training", 1)
+        state = simulation.reset()
+        simulation.close()
+        eyes = sim.Eyes(1, (3, 3), fov_deg=80, bands=bands, receptors=receptors, noise_sigma=0)
+        if renderer == "batched":
+            return sim.BatchedRenderer(world, eyes, 1, 4).signals(state)
+        return sim.ReferenceRenderer(world, eyes, "direct", spp=4).signals(state)
+
+    @pytest.mark.parametrize("renderer", ["batched", "reference"])
+    def test_few_bands_catch_what_many_do(self, renderer):
+        """To float32; samples at the bands' centres are off by a factor of two (below)."""
+        few, many = (self.signals(renderer, bands) for bands in (4, 64))
+        np.testing.assert_allclose(few, many, rtol=1e-4)
+        assert few.max() > 0.05
+
+    def test_samples_at_the_centres_miss_lines(self, monkeypatch):
+        monkeypatch.setattr("sim.render.lit_in_bands", lambda world, eye: world)
+        few, many = (self.signals("batched", bands) for bands in (4, 64))
+        assert (few > 1.9 * many)[many > 0.1].any()
+
+    def test_daylight_by_name_is_daylight(self):
+        named, own = (self.signals("batched", 4, light_0=light) for light in ("D65", DAYLIGHT))
+        np.testing.assert_allclose(named, own, rtol=1e-4)
+
+    def test_too_few_bands_are_told(self):
+        with pytest.warns(sim.MirrorWarning, match=r"'light_0' in 4 bands: receptor type 2 catches 0.043 of it, should"):
+            self.signals("batched", 4, "honeybee")
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            self.signals("batched", 16, "honeybee")
