@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.arguments import in_range, positive, shown
+from optics.arguments import in_range, positive, reals, shown
 from optics.field import Field
 from optics.fourier import dft2
 from optics.grid import Grid
@@ -23,6 +23,7 @@ from optics.tracked import at_border, number
 __all__ = ["MTF", "encircled_energy", "image_quality", "mtf", "strehl_ratio"]
 
 ORIENTATIONS = 64
+HELD_TOO_MUCH = 1e-2  # above all that arrives: sums over coarse samples err
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +73,16 @@ class MTF:
         return at_border(types.Tensor(mean, (waves, f.size)))
 
 
-def mtf(result: PSFResult) -> MTF:
+def mtf(result: PSFResult, arriving: Any = None) -> MTF:
     """|F{PSF}| over its value at zero frequency (Goodman, Introduction to Fourier Optics, §6.3.2).
 
-    Light that falls outside the PSF's window is missing from it: a window that holds little of the power shows too
-    much contrast at low frequencies (see `PSFResult.power`).
+    arriving: what of the pupil's power arrives on the unbounded plane, a number or (wavelength,), in (0, 1]; 1 unless
+        the relief sends light into evanescent waves. None: no more than the window holds (`PSFResult.power`). A window
+        that loses a share of the light then shows contrasts too high by that share; measured by all that arrives, they
+        are right from the first frequency above 0 on.
+
+    Raises:
+        ValueError: less arrives than is in the window.
     """
     import drjit as dr
 
@@ -84,18 +90,31 @@ def mtf(result: PSFResult) -> MTF:
     waves, height, width = result.tensor.shape
     side = max(height, width)
     pitch, middle = 1 / (side * result.dx), (side // 2) * side + side // 2
-    flat, planes = types.Float(_flat(result.tensor)), []
+    flat, planes, missing = types.Float(_flat(result.tensor)), [], _missing(result, arriving)
     for index in range(waves):
         plane = dr.gather(types.Float, flat, dr.arange(types.Index, height * width) + index * height * width)
         field = Field(plane, dr.zeros(types.Float, height * width), Grid((height, width), result.dx), types)
         otf = dft2(field, side, (side, side), -1, pitch)
         size = dr.sqrt(dr.maximum(otf.intensity, 1e-300))
-        planes.append(size / dr.gather(types.Float, size, types.Index(middle)))
+        zero = dr.gather(types.Float, size, types.Index(middle))
+        whole = dr.arange(types.Index, side * side) == middle
+        planes.append(size / dr.select(whole, zero, zero + missing[index] / result.dx**2))
     tensor = types.Tensor(planes[0] if waves == 1 else dr.concat(planes), (waves, side, side))
     f = Grid.square(side, pitch).x
     radius, distance = result.pupil.radius, number(result.sensor_distance)
     cutoff = 2 * radius / np.hypot(radius, distance) * result.pupil.medium_n / result.wavelengths
     return MTF(tensor, f, f, cutoff)
+
+
+def _missing(result: PSFResult, arriving: Any) -> np.ndarray:
+    """Share of the pupil's power that arrives outside the window, (wavelength,)."""
+    held = result.power
+    if arriving is None:
+        return np.zeros_like(held)
+    known = np.broadcast_to(np.asarray(reals("arriving", arriving), dtype=np.float64), held.shape)
+    if not ((known > 0) & (known <= 1) & (known > held - HELD_TOO_MUCH)).all():
+        raise ValueError(f"arriving = {shown(arriving)}: must be in (0, 1], and not less than the window's {shown(held)}")
+    return np.maximum(known - held, 0)
 
 
 def strehl_ratio(result: PSFResult) -> Any:

@@ -169,9 +169,8 @@ class TestQuality:
         rings, errors, renormalised = (8, 16, 32), [], []
         for count in rings:
             result = self.window(count, 4)
-            measured = optics.mtf(result).profile(f)[0]
-            errors.append(np.abs(measured - expected).mean())
-            renormalised.append(np.abs(measured * result.power[0] - expected).mean())
+            errors.append(np.abs(optics.mtf(result).profile(f)[0] - expected).mean())
+            renormalised.append(np.abs(optics.mtf(result, arriving=1).profile(f)[0] - expected).mean())
         assert reference.order_of_convergence(rings, errors) == pytest.approx(-1, abs=0.25)
         # divided by all of the pupil's light instead of the window's, only the sharp edge of the window is left
         assert renormalised[-1] < 2e-3

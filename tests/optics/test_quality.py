@@ -41,6 +41,19 @@ def test_mtf_is_one_at_zero_frequency_and_nothing_beyond_the_cutoff():
     assert transfer.mtf[0][beyond].max() < 2e-3
 
 
+def test_all_that_arrives_is_what_a_small_window_measures_contrast_by():
+    """Two rings hold 0.91 of the light: by their own light contrasts are a tenth too high."""
+    result = ideal(8, 1.6e-6, 13)
+    f = np.array([0.3, 0.5, 0.7]) * optics.mtf(result).cutoff[0]
+    expected = circular_mtf(f, optics.mtf(result).cutoff[0])
+    (by_all,), (by_window,) = (optics.mtf(result, arriving).profile(f) for arriving in (1.0, None))
+    assert np.abs(by_all - expected).max() < 0.02
+    np.testing.assert_allclose(by_window, by_all / result.power[0], rtol=1e-4)
+    assert optics.mtf(result, 1.0).mtf[0, 6, 6] == 1
+    with pytest.raises(ValueError, match="arriving = 0.5: must be in"):
+        optics.mtf(result, 0.5)
+
+
 def test_mtf_keeps_the_order_of_axes():
     """A PSF stretched along x blurs along fx."""
     result = ideal(8, 2e-6, 65)
