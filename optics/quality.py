@@ -113,9 +113,7 @@ def _missing(result: PSFResult, arriving: Any) -> np.ndarray:
         return np.zeros_like(held)
     known = np.broadcast_to(np.asarray(reals("arriving", arriving), dtype=np.float64), held.shape)
     if not ((known > 0) & (known <= 1) & (known > held - HELD_TOO_MUCH)).all():
-        raise ValueError(
-            f"arriving = {shown(arriving)}: must be in (0, 1], not less than the window's {shown(held)}"
-        )
+        raise ValueError(f"arriving = {shown(arriving)}: must be in (0, 1], not less than the window's {shown(held)}")
     return np.maximum(known - held, 0)
 
 

@@ -100,9 +100,7 @@ class TestLampsWithLines:
         np.testing.assert_allclose(named, own, rtol=1e-4)
 
     def test_too_few_bands_are_told(self):
-        with pytest.warns(
-            sim.MirrorWarning, match=r"'light_0' in 4 bands: receptor type 2 catches 0.043 of it"
-        ):
+        with pytest.warns(sim.MirrorWarning, match=r"'light_0' in 4 bands: receptor type 2 catches 0.043 of it"):
             self.signals("batched", 4, "honeybee")
         with warnings.catch_warnings():
             warnings.simplefilter("error")
