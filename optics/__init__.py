@@ -17,6 +17,7 @@ _CONTENTS = {
     "PSFResult": "point_spread",
     "PhotonBudget": "photon_budget",
     "Pigment": "pigment",
+    "PixelRelief": "pixel_relief",
     "Plan": "planner",
     "PointSource": "source",
     "Polygon": "polygonal",

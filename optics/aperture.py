@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from optics.arguments import LARGEST, in_range, positive
+from optics.outline import Outline
 from optics.precision import Precision
 from optics.soft_edge import SoftEdge
 
@@ -87,6 +88,11 @@ class Aperture(ABC):
     @abstractmethod
     def half_widths(self) -> tuple[float, float]:
         """Half the width and height of the smallest centred rectangle that holds the aperture."""
+
+    @property
+    @abstractmethod
+    def outline(self) -> Outline:
+        """Its edge."""
 
     @abstractmethod
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 
 from optics.aperture import Aperture, Nodes, SoftAperture
 from optics.arguments import in_range, shown
+from optics.outline import Outline
 from optics.precision import Precision
 from optics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
 from optics.soft_edge import SoftEdge
@@ -37,6 +38,10 @@ class Circle(Aperture):
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return np.asarray(np.hypot(x, y) <= 1)
+
+    @property
+    def outline(self) -> Outline:
+        return Outline((1.0,))
 
     def _nodes(self, cycles: float, digits: float) -> Nodes:
         return _ring_nodes(0.0, cycles, digits)
@@ -74,6 +79,10 @@ class Annulus(Aperture):
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         r = np.hypot(x, y)
         return np.asarray((r >= self.inner) & (r <= 1))
+
+    @property
+    def outline(self) -> Outline:
+        return Outline((self.inner, 1.0))
 
     def _nodes(self, cycles: float, digits: float) -> Nodes:
         return _ring_nodes(self.inner, cycles, digits)

@@ -24,6 +24,7 @@ __all__ = [
     "cached_nodes",
     "direct_sum",
     "node_count",
+    "node_rule",
     "nodes",
     "turns",
 ]
@@ -82,8 +83,7 @@ class NodeSampling:
 
 def nodes(problem: Problem) -> list[NodeSampling]:
     """Enough nodes for the cycles that pupil and path together turn through."""
-    digits = min(SPARE_DIGITS - math.log10(problem.tolerance), MOST_DIGITS)
-    cycles = turns(problem, digits)
+    cycles, digits = node_rule(problem)
     count = node_count(problem.aperture, cycles, digits)
     line, outputs = None, math.prod(problem.window.shape)
     if problem.symmetric:
@@ -94,6 +94,12 @@ def nodes(problem: Problem) -> list[NodeSampling]:
         count = count if line is None else math.ceil(count / 2)
     seconds = 1e-3 + count * outputs / PAIRS_PER_SECOND + count * 4e-9
     return [NodeSampling(problem.aperture, cycles, digits, count, line, seconds)]
+
+
+def node_rule(problem: Problem) -> tuple[float, float]:
+    """Cycles per radius and digits that nodes must be good for."""
+    digits = min(SPARE_DIGITS - math.log10(problem.tolerance), MOST_DIGITS)
+    return turns(problem, digits), digits
 
 
 def turns(problem: Problem, digits: float) -> float:

@@ -1,6 +1,6 @@
 """Reliefs: height maps of the pupil's glass, over the square that holds the pupil.
 
-A relief is a smooth function of (x, y) in units of the aperture radius; inside the pupil both lie in [-1, 1].
+A relief is a function of (x, y) in units of the aperture radius; inside the pupil both lie in [-1, 1].
 Row index and y grow together, as do column index and x.
 """
 
@@ -34,6 +34,11 @@ class Relief(ABC):
     @abstractmethod
     def knots(self) -> int:
         """Polynomial pieces across the pupil."""
+
+    @property
+    def pixels(self) -> int:
+        """Squares across the pupil between which the height jumps, in each of which it is the same; 0: it is smooth."""
+        return 0
 
     @property
     def rotationally_symmetric(self) -> bool:
@@ -130,12 +135,7 @@ class HeightMap(Relief):
     _heights: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        samples = np.array(plain(self.samples))
-        if samples.ndim != 2 or samples.shape[0] != samples.shape[1] or samples.size == 0:
-            raise ValueError(f"height has shape {samples.shape}: must be square (n, n), n at least 1")
-        if not np.isfinite(samples).all():
-            raise ValueError("height holds NaN or infinity: must be finite heights [m]")
-        samples.setflags(write=False)
+        samples = square_heights(self.samples)
         object.__setattr__(self, "_heights", samples)
         if not is_tracked(self.samples):
             object.__setattr__(self, "samples", samples)
@@ -211,6 +211,21 @@ class HeightMap(Relief):
     @property
     def rotationally_symmetric(self) -> bool:
         return len(self._heights) == 1
+
+
+def square_heights(samples: Any) -> np.ndarray:
+    """The same without derivatives, as an array that nobody can change.
+
+    Raises:
+        ValueError: not square, empty, or not finite.
+    """
+    heights = np.array(plain(samples))
+    if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.size == 0:
+        raise ValueError(f"height has shape {heights.shape}: must be square (n, n), n at least 1")
+    if not np.isfinite(heights).all():
+        raise ValueError("height holds NaN or infinity: must be finite heights [m]")
+    heights.setflags(write=False)
+    return heights
 
 
 def _cubic_basis(t: Any) -> list[Any]:

@@ -13,13 +13,15 @@ from optics.chebyshev import chebyshev_points, lagrange
 from optics.field import Field
 from optics.grid import Grid
 from optics.precision import Precision, opaque, precision, with_room
-from optics.problem import Problem, PupilEdge
+from optics.problem import Problem
+from optics.pupil_samples import PupilSamples, samples_of
 
 __all__ = ["LowRankSampling", "low_rank"]
 
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
 FLOPS = {"float32": 45e9, "float64": 22e9}
 MOST_ENTRIES = 4_000_000  # of the matrix between pupil and window
+MOST_PIXEL_ENTRIES = 16_000_000  # for them only the direct sum is left
 
 
 @dataclass(frozen=True)
@@ -27,8 +29,7 @@ class LowRankSampling:
     """Pupil samples; `rank` Chebyshev points per axis of the window, `half_width` [m] about its centre, and the
     distance c [m] of Fourier's kernel e^{-ik ξ·x/c}."""
 
-    edge: PupilEdge
-    pupil: Grid
+    pupil: PupilSamples
     rank: int
     half_width: float
     scale: float
@@ -42,39 +43,35 @@ class LowRankSampling:
 
     def plane(self, problem: Problem) -> float:
         """Width [m] over which rounding spreads the pupil's light."""
-        return problem.wavelength * problem.distance / self.pupil.dx
+        return problem.wavelength * problem.distance / float(np.diff(self.pupil.at).mean())
 
     @property
     def samples(self) -> tuple[int, int]:
-        return self.pupil.shape
+        return len(self.pupil.at), len(self.pupil.at)
 
     @property
     def largest(self) -> int:
-        return self.rank * self.pupil.shape[0]
+        return self.rank * len(self.pupil.at)
 
 
 def low_rank(problem: Problem) -> list[LowRankSampling]:
     """As few pupil samples as the turns of pupil and path together allow, and the rank that the slow rest needs."""
-    edge = problem.soft_edge(problem.turning)
-    pitch = 1 / (problem.turning + edge.stopband)
-    pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
+    pupil = samples_of(problem)
+    if pupil is None:
+        return []
     half = max(problem.window.own_half_width, problem.window.dx)
     scale = math.hypot(problem.distance, 0.6 * half, *problem.window.centre)
-    most = math.isqrt(MOST_ENTRIES) // pupil.shape[0]
-    rank = _rank(problem, edge.outermost, half, scale, most)
+    most = math.isqrt(MOST_ENTRIES if problem.pixelated is None else MOST_PIXEL_ENTRIES) // len(pupil.at)
+    rank = _rank(problem, pupil.outermost, half, scale, most)
     if rank is None:
         return []
-    inner = rank * pupil.shape[0]
+    inner = rank * len(pupil.at)
     height, width = problem.window.shape
     flops = 8 * (inner * inner * width + height * inner * width)
     seconds = (
-        1.5e-3
-        + flops / FLOPS[problem.dtype]
-        + inner * inner * 2e-8
-        + pupil.shape[0] ** 2 * edge.seconds_per_point
-        + inner * (height + width) * 1e-8
+        1.5e-3 + flops / FLOPS[problem.dtype] + inner * inner * 2e-8 + pupil.seconds + inner * (height + width) * 1e-8
     )
-    return [LowRankSampling(edge, pupil, rank, half, scale, seconds)]
+    return [LowRankSampling(pupil, rank, half, scale, seconds)]
 
 
 def _rank(problem: Problem, outermost: float, half: float, scale: float, most: int) -> int | None:
@@ -142,8 +139,8 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
     """W[(b, η), (a, ξ)] = P(ξ, η) G(ξ, η; x_a, y_b) as two tensors."""
     import drjit as dr
 
-    n, rank = how.pupil.shape[0], how.rank
-    u = beam.behind(how.edge.aperture, how.pupil, types).scaled(how.pupil.dx**2)
+    n, rank = len(how.pupil.at), how.rank
+    u = how.pupil.field(beam, types)
     dr.eval(u.re, u.im)
     column, row = Grid.square(n * rank, 1.0).coordinates(types)  # counted from the centre
     middle = dr.opaque(types.Float64, (n * rank) // 2)
@@ -151,14 +148,15 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
     points = types.Float64(how.half_width * chebyshev_points(rank))
     x, y = (dr.gather(types.Float64, points, types.Index(index)) for index in (a, b))
     x, y = x + opaque(types, problem.window.centre[0]), y + opaque(types, problem.window.centre[1])
-    pitch, centre = opaque(types, how.pupil.dx), dr.opaque(types.Float64, n // 2)
-    xi, eta = (i - centre) * pitch, (j - centre) * pitch
+    xi, eta = (how.pupil.places(index, beam, types) for index in (i, j))
     z, wavelength = opaque(types, beam.distance), opaque(types, problem.wavelength)
     rho2 = x * x + y * y + z * z
     along = x * xi + y * eta
     excess = xi * xi + eta * eta - 2 * along
     distance = dr.sqrt(rho2 + excess)
-    waves = (excess / (distance + dr.sqrt(rho2)) + along * opaque(types, 1 / how.scale)) / wavelength
+    # Fourier's kernel stays where it is while nodes move with the radius; what they move by is the rest's.
+    fixed = x * dr.detach(xi) + y * dr.detach(eta)
+    waves = (excess / (distance + dr.sqrt(rho2)) + fixed * opaque(types, 1 / how.scale)) / wavelength
     slow = Field.from_waves(z / (wavelength * distance * distance), waves, Grid.square(n * rank, 1.0), types)
     near = types.Float(wavelength / (2 * math.pi * distance))
     slow = slow * Field(near, types.Float(-1), slow.grid, types)
@@ -180,7 +178,7 @@ def _fourier(
     at: np.ndarray, middle: float, problem: Problem, how: LowRankSampling, types: Precision
 ) -> tuple[Any, Any]:
     """A[x, (a, ξ)] = L_a(x) e^{-ik ξ x/c} as two tensors."""
-    rank, xi = how.rank, how.pupil.x
+    rank, xi = how.rank, how.pupil.at
     waves = np.tile(np.outer(at, xi) / (-problem.wavelength * how.scale), rank)
     weight = np.repeat(lagrange(at - middle, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
     wheel = weight * np.exp(2j * np.pi * waves)

@@ -115,6 +115,10 @@ class PupilSampling:
         """
         pupil = stop.pupil
         assert pupil is not None
+        if pupil.pixels:
+            raise ValueError(
+                "elements: a PixelRelief jumps, which the grids between planes cannot carry: use psf for one"
+            )
         slope = 1.02 * pupil.slopes(light.wavelength, source).steepest / light.wavelength
         turns = arriving + slope + pupil.bandwidth(light.wavelength, light.ripple)
         band = light.reaching(stop.half_width + following.half_width, following.distance)

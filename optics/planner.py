@@ -85,6 +85,7 @@ APPROXIMATE: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "pinhole": pinhole,
 }
 METHODS = EXACT | APPROXIMATE
+FOR_PIXELS = ("low_rank", "rayleigh_sommerfeld")  # have nodes where light jumps from pixel to pixel; no grid has
 # Largest square array: 4096² complex64 is 134 MB, and a handful of such arrays live at once.
 MOST_SAMPLES = 4096
 FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}  # relative to the field's root mean square, see tests
@@ -179,7 +180,8 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
 @lru_cache(maxsize=256)
 def _weigh(problem: Problem, methods: tuple[str, ...]) -> dict[str, Sampling | None]:
     """The cheapest sampling of each method."""
-    found = {name: METHODS[name](problem) for name in methods}
+    able = methods if problem.pixelated is None else [name for name in methods if name in FOR_PIXELS]
+    found = {name: METHODS[name](problem) for name in able}
     return {name: min(samplings, key=_cost) if samplings else None for name, samplings in found.items()}
 
 
@@ -251,6 +253,8 @@ def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: f
 
 def _refusal(problem: Problem, found: list[Sampling], most_seconds: float) -> str:
     width = 2 * problem.window.half_width
+    if not found and problem.pixelated is not None:
+        return "a relief of pixels jumps, which no grid carries: ask for method='auto' or 'rayleigh_sommerfeld'"
     if not found:
         return (
             f"tolerance = {problem.tolerance:g} over a window of {width:.3g} m at a distance of "

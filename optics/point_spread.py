@@ -13,6 +13,7 @@ import numpy as np
 from optics.arguments import in_range, positive, vacuum_wavelength, vacuum_wavelengths
 from optics.beam import Beam
 from optics.grid import Grid
+from optics.pixels import PixelatedAperture
 from optics.planner import FLOAT_NOISE, AccuracyError, Plan, Sampling, choose
 from optics.precision import opaque, precision
 from optics.problem import Problem
@@ -136,10 +137,11 @@ def problem(beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") 
 def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
     pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
     slopes = pupil.slopes(wavelength, beam.source)
-    detail = pupil.bandwidth(wavelength, tolerance / 10)
+    pixels = pupil.pixels if pupil.bends(wavelength) else 0
+    detail = 0.0 if pixels else pupil.bandwidth(wavelength, tolerance / 10)
     turning, inside = slopes.turning(distance, window, pupil.medium_n)
     return Problem(
-        aperture=pupil.aperture,
+        aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
         radius=pupil.radius,
         wavelength=wavelength / pupil.medium_n,
         distance=distance,
@@ -151,7 +153,7 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
         symmetric=pupil.rotationally_symmetric(wavelength) and beam.source.angle == (0.0, 0.0),
         tolerance=tolerance,
         dtype=dtype,
-        rays=Rays.of(slopes, pupil.aperture, distance, pupil.medium_n),
+        rays=None if pixels else Rays.of(slopes, pupil.aperture, distance, pupil.medium_n),
     )
 
 

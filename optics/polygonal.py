@@ -9,6 +9,7 @@ import numpy as np
 
 from optics.aperture import Aperture, Nodes, SoftAperture
 from optics.arguments import finite, positive, shown
+from optics.outline import Outline
 from optics.quadrature import gauss_legendre, gauss_legendre_count
 from optics.soft_edge import SoftEdge
 from optics.soft_polygon import SoftPolygon
@@ -73,6 +74,10 @@ class Polygon(Aperture):
                 inside ^= ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) * (x1 - x0) / (y1 - y0))
         return inside
 
+    @property
+    def outline(self) -> Outline:
+        return Outline(vertices=self.vertices)
+
     def _nodes(self, cycles: float, digits: float) -> Nodes:
         centre = kernel_point(self.vertices)
         if centre is None:
@@ -123,6 +128,15 @@ class Slit(Aperture):
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return np.asarray((np.abs(x) <= self.width / 2) & (np.abs(y) <= self.height / 2))
 
+    @property
+    def outline(self) -> Outline:
+        return Outline(vertices=self._corners)
+
+    @property
+    def _corners(self) -> np.ndarray:
+        x, y = self.half_widths
+        return np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
+
     def _nodes(self, cycles: float, digits: float) -> Nodes:
         """Tensor Gauss-Legendre."""
         u, u_weight = gauss_legendre(gauss_legendre_count(cycles * self.width, digits + 0.3))
@@ -131,8 +145,7 @@ class Slit(Aperture):
         return Nodes(x.ravel(), y.ravel(), np.outer(v_weight, u_weight).ravel() * self.area)
 
     def _softened(self, edge: SoftEdge) -> SoftAperture:
-        x, y = self.half_widths
-        return SoftPolygon(edge, np.array([[-x, -y], [x, -y], [x, y], [-x, y]]))
+        return SoftPolygon(edge, self._corners)
 
 
 def _twice_area(vertices: np.ndarray) -> float:

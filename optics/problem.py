@@ -8,6 +8,7 @@ from typing import Any
 
 from optics.aperture import EDGE_REACH, Aperture, SoftAperture
 from optics.grid import Grid
+from optics.pixels import PixelatedAperture
 from optics.precision import Precision, opaque
 from optics.rays import Rays
 
@@ -54,6 +55,11 @@ class Problem:
     widest_band: float = math.inf
     reach: float | None = None
     rays: Rays | None = None
+
+    @property
+    def pixelated(self) -> PixelatedAperture | None:
+        """The aperture, if the light behind it jumps from pixel to pixel."""
+        return self.aperture if isinstance(self.aperture, PixelatedAperture) else None
 
     @property
     def ripple(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -13,6 +13,7 @@ from optics.arguments import finite, in_range, of_kind, positive, reals
 from optics.circular import Circle
 from optics.doe import HeightMap, Relief
 from optics.grid import Grid
+from optics.pixel_relief import PixelRelief
 from optics.precision import Precision, opaque, precision
 from optics.refractive_index import RefractiveIndex
 from optics.source import PointSource
@@ -26,7 +27,8 @@ class Pupil:
     """Transmittance A(x, y) exp(ik (n - medium_n) h(x, y)), thin-element model.
 
     aperture_radius: R [m].
-    height: None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (see HeightMap); or a Relief.
+    height: None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (see HeightMap); or a Relief, such
+        as PixelRelief for one of steps.
     n: refractive index of the relief, constant or dispersive.
     medium_n: index of what surrounds the pupil, on both sides.
     thin_lens_focal_length: adds an ideal lens exp(-ik(√(r² + f²) - f)) [m]; negative diverges.
@@ -68,6 +70,15 @@ class Pupil:
         """[m²]"""
         return self.aperture.area * self.radius**2
 
+    @property
+    def pixels(self) -> int:
+        """Squares across the pupil between which its relief jumps; 0: it is smooth."""
+        return 0 if self.height is None else int(self.height.pixels)
+
+    @cached_property
+    def _level(self) -> Pupil:
+        return replace(self, height=None)
+
     def index_step(self, wavelength: float) -> Any:
         """n(λ) - medium_n."""
         return self.n.at(wavelength) - self.medium_n
@@ -97,8 +108,17 @@ class Pupil:
         return total
 
     def slopes(self, wavelength: float, source: PointSource) -> Slopes:
-        """Gradient of the optical path over the disk and its soft edge, by central differences."""
-        return _slopes(self, wavelength, number(source.distance), source.angle)
+        """Gradient of the optical path over the disk and its soft edge, by central differences: between a relief's
+        jumps, where pixels are level, that of all the rest."""
+        return _slopes(self._level if self.pixels else self, wavelength, number(source.distance), source.angle)
+
+    def scatter(self, wavelength: float, share: float) -> float:
+        """Spatial frequency [1/m] along x and y beyond which the jumps of a relief of pixels send no more than this
+        share of the light; 0 for a smooth one, which bends it (`slopes`)."""
+        if not isinstance(self.height, PixelRelief) or not self.bends(wavelength):
+            return 0.0
+        turns = number(self.index_step(wavelength)) / wavelength
+        return self.height.scatter(turns, self.aperture, share) / self.radius
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
         """Spatial frequency [1/m] above which the relief changes the phase by less than `tolerance` rad."""

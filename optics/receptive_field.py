@@ -140,7 +140,8 @@ def perfect_psf(retina: Retina, radius: float) -> PSFResult:
 
 def _view(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _View:
     """Half the loss goes to rays outside the window, half to what the hard edge sends further than δ [1/m] off its
-    geometric direction: 1/(π²Rδ) of the light, as in the Airy pattern (1 - 2/(πv), v = 2πRδ; Born & Wolf §8.5.2)."""
+    geometric direction: 1/(π²Rδ) of the light, as in the Airy pattern (1 - 2/(πv), v = 2πRδ; Born & Wolf §8.5.2).
+    Pixels send light off it, too, and lose as much beyond what is counted."""
     pupil, wavelength = beam.pupil, beam.wavelength
     lam, z, radius = wavelength / pupil.medium_n, number(retina.distance), pupil.radius
     slopes = pupil.slopes(wavelength, beam.source)
@@ -148,7 +149,7 @@ def _view(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _View:
     shadow = float(
         np.quantile(np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1])), 1 - retina.tolerance / 2, method="higher")
     )
-    tail = 2 / (math.pi**2 * radius * retina.tolerance)
+    tail = 2 / (math.pi**2 * radius * retina.tolerance) + pupil.scatter(wavelength, retina.tolerance / 4)
     half = WIDEST_TANGENT * z + radius
     if math.isfinite(shadow):
         off = max(abs(at) for at in centre)
