@@ -67,8 +67,9 @@ def page(store: Store) -> Page:
         ),
         command=(
             "evolve run --preset lens --seed 0    # and 1\n"
-            "evolve run --preset lens --set genome.refractive_index.open=false --set genome.refractive_index.start=1\n"
-            "python -m experiments.bending_light --runs lens=DIR lens=DIR index1=DIR"
+            "evolve run --preset lens --set genome.refractive_index.open=false --set genome.refractive_index.start=1"
+            " --seed 0    # and 1\n"
+            "python -m experiments.bending_light --runs lens=DIR lens=DIR index1=DIR index1=DIR"
         ),
         figures=[
             Figure(
