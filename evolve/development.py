@@ -69,6 +69,7 @@ class Phenotype:
 
     def eyes(self, eye: EyeConfig) -> sim.Eyes:
         """The eyes as the simulation wants them."""
+        import optics
         import sim
 
         return sim.Eyes(
@@ -79,6 +80,7 @@ class Phenotype:
             optics=self.pupil(eye),
             sensor_width=eye.sensor_width,
             noise_sigma=eye.noise_sigma,
+            photon_budget=optics.PhotonBudget(eye.illuminance, eye.integration_time) if eye.illuminance else None,
             bands=eye.bands,
             receptors=eye.receptors if self.lambda_max_nm is None else self.lambda_max_nm,
         )

@@ -5,14 +5,14 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import sim
-from evolve.config import EyeConfig
+from evolve.config import EyeConfig, WorldConfig
 from evolve.development import Phenotype
 from evolve.files import write_whole
 from evolve.policy import EyePolicy, TrainingDiverged, load_policy
@@ -30,7 +30,7 @@ class Episode:
     """One evaluation episode. Time runs along the first axis: at time t the eyes saw, then the agent acted,
     and `reward`, `reward_terms` and `contact` are what that action led to.
 
-    task, candidate_id, seed, phenotype, eye   which episode of whom
+    task, candidate_id, seed, phenotype, eye, world   which episode of whom, and where
     position (t, 2) [m], heading (t,) [rad], objects (t, object, 3) [m]   before the action
     action (t, 2)             as Gymnasium's action in [-1, 1]
     reward (t,), reward_terms name -> (t,), contact (t,) bool   after it
@@ -58,6 +58,7 @@ class Episode:
     wavelengths_nm: np.ndarray
     radiance_frames: np.ndarray
     radiance: np.ndarray
+    world: WorldConfig = field(default_factory=WorldConfig)
 
     def __len__(self) -> int:
         """Actions taken."""
@@ -77,6 +78,7 @@ class Episode:
             "seed": self.seed,
             "phenotype": self.phenotype.to_json(),
             "eye": asdict(self.eye),
+            "world": asdict(self.world),
             "terms": list(self.reward_terms),
         }
         terms = {f"term_{name}": term for name, term in self.reward_terms.items()}
@@ -92,6 +94,7 @@ class Episode:
                 arrays = dict(file)
             rest = json.loads(str(arrays.pop("rest")))
             rest |= {"phenotype": Phenotype.from_json(rest["phenotype"]), "eye": EyeConfig(**rest["eye"])}
+            rest["world"] = WorldConfig(**rest.get("world", {}))
             terms = {name: arrays.pop(f"term_{name}") for name in rest.pop("terms")}
             return cls(**rest, reward_terms=terms, **arrays)
         except (OSError, EOFError, KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile) as error:
@@ -119,6 +122,7 @@ def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_ev
         memory=candidate.phenotype.memory_frames,
         mode="evaluation",
         rays_per_receptor=run.config.eye.rays_per_receptor,
+        **run.config.world.evaluation,
     )
     try:
         _require_fit(policy, worlds, run.policy_path(candidate.id))
@@ -134,6 +138,7 @@ def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_ev
         seed=seed,
         phenotype=candidate.phenotype,
         eye=run.config.eye,
+        world=run.config.world,
         position=states.position,
         heading=states.heading,
         objects=states.objects,

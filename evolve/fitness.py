@@ -85,19 +85,27 @@ def _live(
     progress: Progress | None,
     begun: Checkpoint | None = None,
 ) -> tuple[Training, Episodes]:
-    """Training, and the evaluation episodes after it, from starts and objects' places never seen before. A maze is the
-    same for all of a run, and of all runs."""
+    """Training, and the evaluation episodes after it, from starts and objects' places never seen before. Mazes are
+    the same for all of a run, and of all runs."""
     weights, worlds, evaluation = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     eyes = phenotype.eyes(config.eye)
     common: dict[str, Any] = {"eyes": eyes, "memory": phenotype.memory_frames}
     closely: dict[str, Any] = {"rays_per_receptor": config.eye.rays_per_receptor}
     evaluation_worlds = sim.make_vec_env(
-        config.task, n_envs=config.evaluation.episodes, seed=evaluation, mode="evaluation", **common, **closely
+        config.task,
+        n_envs=config.evaluation.episodes,
+        seed=evaluation,
+        mode="evaluation",
+        **{**common, **closely, **config.world.evaluation},
     )
     coarse = _coarser(evaluation_worlds.renderer.fidelity, eyes, config.learning.rays_per_eye)
     coarsely: dict[str, Any] = {"rays_per_receptor": coarse}
     training_worlds = sim.make_vec_env(
-        config.task, n_envs=config.learning.n_envs, seed=worlds, mode="training", **common, **coarsely
+        config.task,
+        n_envs=config.learning.n_envs,
+        seed=worlds,
+        mode="training",
+        **{**common, **coarsely, **config.world.training},
     )
     with closing(training_worlds), closing(evaluation_worlds):
         brain: dict[str, Any] = {"neurons": phenotype.neurons, "layers": phenotype.layers, "begun": begun}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import optics
 import sim
 from evolve.analysis import image_quality, polychromatic, psnr
-from evolve.config import RunConfig
+from evolve.config import RunConfig, WorldConfig
 from evolve.development import Phenotype
 
 __all__ = ["Vision", "ssim", "vision"]
@@ -43,24 +43,25 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
     eyes = animal.eyes(config.eye)
     try:
         quality, contrast = image_quality(animal, config.eye), _contrast(eyes.eye())
-        seen, perfect = views(eyes, config.task)
+        seen, perfect = views(eyes, config.task, config.world)
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)
     gain = 1 / float(eyes.eye().throughput)
     return Vision(quality, contrast, psnr(seen, perfect, gain), ssim(gain * seen, perfect))
 
 
-def views(eyes: sim.Eyes, task: str) -> tuple[Floats, Floats]:
+def views(eyes: sim.Eyes, task: str, world: WorldConfig | None = None) -> tuple[Floats, Floats]:
     """Signals without noise of the eyes, and of the same behind a perfect lens, (scene, eye, channel, height, width);
     the scenes are the same for all eyes."""
     perfect = replace(eyes, optics=None)
-    worlds = sim.make_vec_env(task, perfect, SCENES, 0, mode="evaluation")
+    where = (world or WorldConfig()).evaluation
+    worlds = sim.make_vec_env(task, perfect, SCENES, 0, mode="evaluation", **where)
     try:
         worlds.reset()
-        world, states = worlds.simulation.world, worlds.state
+        built, states = worlds.simulation.world, worlds.state
     finally:
         worlds.close()
-    seen, sharp = (sim.BatchedRenderer(world, e, SCENES, RAYS).signals(states) for e in (eyes, perfect))
+    seen, sharp = (sim.BatchedRenderer(built, e, SCENES, RAYS).signals(states) for e in (eyes, perfect))
     return np.asarray(seen), np.asarray(sharp)
 
 

@@ -122,11 +122,12 @@ class _ClosedForm:
 
 @dataclass(frozen=True)
 class Case:
-    """`change`, made to a small run with settings `given`, moves `output`."""
+    """`change`, made to a small run of `task` with settings `given`, moves `output`."""
 
     change: str
     output: Callable
     given: tuple[str, ...] = PERFECT
+    task: str = "detection"
 
 
 # Steps too small to move a weight: but for the receptors' adapting, evaluations play the same, and soon none improves.
@@ -136,6 +137,7 @@ TOUCHING = (
     *("learning.first_speed=1", "learning.total_steps=1024", "learning.n_steps=32", "learning.batch_size=128"),
     *PERFECT,
 )
+NAVIGATING = ("genome.resolution_height.start=1", "eye.rays_per_receptor=1", *PERFECT)
 FIELDS = {
     "task": Case("task=tracking", life),
     "seed": Case("seed=1", history),
@@ -143,6 +145,8 @@ FIELDS = {
     "eye.optics": Case("eye.optics=false", sight, ()),
     "eye.sensor_width": Case("eye.sensor_width=100e-6", point_image, ()),
     "eye.noise_sigma": Case("eye.noise_sigma=0.1", sight),
+    "eye.illuminance": Case("eye.illuminance=100", sight),
+    "eye.integration_time": Case("eye.integration_time=0.5", sight, ("eye.illuminance=100", *PERFECT)),
     "eye.receptors": Case("eye.receptors=honeybee", sight),
     "eye.bands": Case("eye.bands=3", sight),
     "eye.relief_height": Case("eye.relief_height=80e-6", point_image, ()),
@@ -151,6 +155,8 @@ FIELDS = {
     "eye.relief_symmetric": Case("eye.relief_symmetric=true", history, ()),
     "eye.head_radius": Case("eye.head_radius=100e-6", sight),
     "eye.receptor_width": Case("eye.receptor_width=100e-6", sight),
+    "world.mazes": Case("world.mazes=2", life, NAVIGATING, "navigation"),
+    "world.unseen": Case("world.unseen=true", life, NAVIGATING, "navigation"),
     "search.optimizer": Case("search.optimizer=mutation", history),
     "search.steady_state": Case("search.steady_state=true", history),
     "search.population": Case("search.population=4", history),
@@ -230,8 +236,8 @@ def test_tables_name_every_setting_and_every_gene():
 @pytest.mark.parametrize("name", FIELDS)
 def test_every_setting_moves_its_output(name):
     case = FIELDS[name]
-    before = _settled(case.output, "detection", case.given)
-    task = case.change.removeprefix("task=") if name == "task" else "detection"
+    before = _settled(case.output, case.task, case.given)
+    task = case.change.removeprefix("task=") if name == "task" else case.task
     change = () if name == "task" else (case.change,)
     config = assemble(task, "quick", assignments=(*SMALL, *case.given, *change))
     assert case.output(config, develop(Genotype(config.genome).start, config)) != before

@@ -41,7 +41,8 @@ class Stage:
     @classmethod
     def of(cls, episode: Episode) -> Stage:
         """The stage of an episode."""
-        world = sim.build_world(episode.task)
+        where = episode.world.evaluation
+        world = sim.build_world(episode.task, seed=where["world_seed"], mazes=where["mazes"])
         model = world.model
         walls = np.array([_footprint(model, i) for i in range(model.ngeom) if model.geom(i).name.startswith("wall")])
         low, high = walls[:, :2] - walls[:, 2:], walls[:, :2] + walls[:, 2:]

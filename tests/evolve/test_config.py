@@ -279,3 +279,21 @@ def test_heights_of_more_points_become_no_other_number_of_them():
             assignments=["eye.relief_points=9"],
             starts=Source("--from a:1", {"genome": heights, "eye": {"relief_points": 6}}),
         )
+
+
+def test_only_navigation_has_mazes():
+    assert assemble("navigation", assignments=["world.mazes=4", "world.unseen=true"]).world.evaluation == {
+        "mazes": 4,
+        "world_seed": 1,
+    }
+    for change in ("world.mazes=2", "world.unseen=true"):
+        with pytest.raises(ConfigError, match="detection has no mazes, only navigation has"):
+            assemble("detection", assignments=[change])
+
+
+def test_photons_are_counted_in_some_light():
+    assert assemble("detection", assignments=["eye.illuminance=10", "eye.integration_time=0.1"]).eye.illuminance == 10
+    with pytest.raises(ConfigError, match=r"eye\.illuminance = 1e-09: must be 0, no shot noise, or at least 1e-06 lx"):
+        assemble("detection", assignments=["eye.illuminance=1e-9"])
+    with pytest.raises(ConfigError, match=r"eye\.integration_time = 0\.1: counts photons, and there are none"):
+        assemble("detection", assignments=["eye.integration_time=0.1"])

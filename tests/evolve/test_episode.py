@@ -1,5 +1,7 @@
 """A recorded episode: what it holds agrees with the worlds it was played in, and with its file."""
 
+import dataclasses
+import json
 import math
 import pickle
 
@@ -10,8 +12,10 @@ import torch
 import evolve
 import sim
 from evolve import export, replay
+from evolve.config import WorldConfig
 from evolve.episode import Episode, _perfect_views, record
 from evolve.policy import PolicyConfig, build_policy, load_policy, save_policy
+from evolve.report.stage import Stage
 from evolve.store import RunError
 
 
@@ -157,3 +161,21 @@ def test_replay_sums_up_and_writes_a_page(run, episode, capsys):
     assert printed["actions"] == "256"
     assert page.parent == run.path
     assert page.read_text().startswith("<!doctype html>")
+
+
+def test_a_maze_is_that_which_was_walked_through(episode, tmp_path):
+    """In the file, and in the ground plan; files from before there was a choice are of the first maze."""
+    world = WorldConfig(mazes=2, unseen=True)
+    walked = dataclasses.replace(episode, task="navigation", world=world)
+    walked.save(tmp_path / "walked.npz")
+    again = Episode.load(tmp_path / "walked.npz")
+    assert again.world == world
+    model = sim.build_world("navigation", seed=1, mazes=2).model
+    walls = [i for i in range(model.ngeom) if model.geom(i).name.startswith("wall")]
+    np.testing.assert_array_equal(Stage.of(again).walls[:, :2], model.geom_pos[walls, :2])
+    with np.load(tmp_path / "walked.npz") as file:
+        columns = dict(file)
+    rest = json.loads(str(columns.pop("rest")))
+    del rest["world"]
+    np.savez(tmp_path / "old.npz", rest=np.array(json.dumps(rest)), **columns)
+    assert Episode.load(tmp_path / "old.npz").world == WorldConfig()

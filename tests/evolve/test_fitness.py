@@ -8,6 +8,7 @@ import pytest
 from small_run import LEARNING, PHENOTYPE, small_config
 
 import sim
+from evolve.config import WorldConfig
 from evolve.fitness import evaluate
 from evolve.learner import play
 from evolve.policy import load_policy
@@ -84,3 +85,20 @@ def test_a_training_that_diverges_is_a_failure_with_a_reason(tmp_path, monkeypat
     assert evaluation.failure is not None
     assert "not finite" in evaluation.failure
     assert not list(tmp_path.iterdir())
+
+
+def test_unseen_mazes_are_seen_by_the_evaluation_alone(tmp_path):
+    """The same training, other episodes after it; with more mazes, another training."""
+    outcomes = {}
+    for name, world in {
+        "one": WorldConfig(),
+        "other": WorldConfig(unseen=True),
+        "two": WorldConfig(mazes=2),
+    }.items():
+        config = replace(small_config(), task="navigation", world=world)
+        path = tmp_path / f"{name}.safetensors"
+        outcomes[name] = evaluate(PHENOTYPE, config, 5, path).returns, path.read_bytes()
+    (seen, taught), (unseen, taught_as_well), (_, of_two) = outcomes.values()
+    assert taught == taught_as_well
+    assert seen != unseen
+    assert of_two != taught
