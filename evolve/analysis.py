@@ -213,12 +213,13 @@ def image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
     A perfect lens has contrast 1 at all of them. Raises optics.AccuracyError where the PSF cannot be computed.
     """
     import optics
+    from optics.description import noise_of
 
     eye = phenotype.eyes(config).eye()
     if eye.pupil is None:
-        return max(1 - eye.noise_sigma, 0.0)
+        return max(1 - noise_of(eye), 0.0)
     white = polychromatic(eye, eye.psf())
-    return float(optics.image_quality(white, 1 / (2 * eye.receptor_pitch), eye.throughput, eye.noise_sigma)[0])
+    return float(optics.image_quality(white, 1 / (2 * eye.receptor_pitch), eye.throughput, noise_of(eye))[0])
 
 
 def bootstrap_interval(

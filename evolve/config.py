@@ -43,7 +43,7 @@ TASKS: Mapping[str, str] = {
 }
 
 
-LEAST_LIGHT = 1e-6  # [lx]
+LEAST_EXPOSURE = 2e-4  # [lx s]: of some 30 photons from white at a = 1; of few, noise is not what it is taken for
 INHERITED = "genes"  # in place of receptors' name: each animal's are as its spectral genes say
 
 
@@ -97,10 +97,11 @@ class RunConfig:
     def _check_light(self) -> None:
         """So little light that it must be a mistake, or a time to count photons in where none are counted."""
         light, default = self.eye.illuminance, EyeConfig.integration_time
-        if 0 < light < LEAST_LIGHT:
+        if 0 < light * self.eye.integration_time < LEAST_EXPOSURE:
             raise ConfigError(
-                f"eye.illuminance = {light:g}: must be 0, no shot noise, or at least {LEAST_LIGHT:g} lx",
-                "eye.illuminance",
+                f"eye.illuminance = {light:g}, eye.integration_time = {self.eye.integration_time:g}: too few photons; "
+                f"must be at least {LEAST_EXPOSURE:g} lx s together, or eye.illuminance 0, no shot noise",
+                *("eye.illuminance", "eye.integration_time"),
             )
         if light == 0 and self.eye.integration_time != default:
             raise ConfigError(

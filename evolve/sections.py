@@ -71,7 +71,11 @@ class WorldConfig:
     """What the worlds of a run are like, beside its task."""
 
     mazes: int = setting(1, Interval(1, 32), "mazes of navigation; episodes begin in any of them")
-    unseen: bool = setting(False, None, "evaluate in as many mazes that no training has seen; off: in the same")
+    unseen: bool = setting(
+        False,
+        None,
+        "evaluate in as many mazes that nobody trains in; off: in the same. The search, and when to stop, go by these",
+    )
 
     @property
     def training(self) -> dict[str, Any]:

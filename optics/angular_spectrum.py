@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 from optics.beam import Beam
 from optics.field import Field
@@ -14,7 +14,26 @@ from optics.paraxial import paraxial_integral
 from optics.precision import Precision, opaque, precision
 from optics.problem import Problem, PupilEdge, Taper, tapers
 
-__all__ = ["GridSampling", "split", "whole"]
+__all__ = ["GridSampling", "SpectrumSampling", "arrived", "split", "whole"]
+
+
+class SpectrumSampling(Protocol):
+    """What decides the way from the spectrum on: see `GridSampling`."""
+
+    @property
+    def method(self) -> str: ...
+
+    @property
+    def taper(self) -> Taper: ...
+
+    @property
+    def output_period(self) -> int: ...
+
+    @property
+    def spectrum(self) -> Grid: ...
+
+    @property
+    def relay(self) -> Grid: ...
 
 
 @dataclass(frozen=True)
@@ -123,15 +142,19 @@ def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Pr
     """U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10), up to a phase that intensity forgets."""
     u = beam.behind(how.edge.aperture, how.pupil, types)
     spectrum = dft2(u, how.pupil_period, how.spectrum.shape, -1, how.spectrum.dx)
-    spectrum = spectrum * _transfer(beam, problem, how, types)
-    scale = (how.pupil.dx / how.period) ** 2
+    return arrived(spectrum, beam, problem, how).scaled((how.pupil.dx / how.period) ** 2)
+
+
+def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
+    """Over the window, of light that has this spectrum at the pupil; up to a phase that intensity forgets."""
+    spectrum = spectrum * _transfer(beam, problem, how, precision(problem.dtype))
     if how.method == "angular_spectrum":
         window = problem.window
-        return dft2(spectrum, how.output_period, window.shape, +1, window.dx, window.centre).scaled(scale)
-    return _paraxial_rest(spectrum, beam, problem, how).scaled(scale)
+        return dft2(spectrum, how.output_period, window.shape, +1, window.dx, window.centre)
+    return _paraxial_rest(spectrum, beam, problem, how)
 
 
-def _transfer(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
+def _transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precision) -> Field:
     """exp(ikz (cos θ - 1)) under the spectral taper; the split method leaves the paraxial -ikz sin²θ/2 for later.
 
     Goodman, eq. 3-74. cos θ - 1 = -q, q = sin²θ / (1 + cos θ), and with the paraxial part taken out -q²/2: no
@@ -148,7 +171,7 @@ def _transfer(beam: Beam, problem: Problem, how: GridSampling, types: Precision)
     return Field.from_waves(how.taper.fade(f, types), waves, how.spectrum, types)
 
 
-def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: GridSampling) -> Field:
+def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
     """Fresnel's integral of the relay field."""
     u = dft2(spectrum, how.output_period, how.relay.shape, +1, how.relay.dx)
     return paraxial_integral(u, beam.distance, problem.wavelength, problem.window)

@@ -89,6 +89,14 @@ class Description:
         return self.acceptance_angle_deg / self.interommatidial_angle_deg
 
 
+def noise_of(eye: Eye) -> float:
+    """Standard deviation of a receptor's signal where it sees white in daylight: its own noise, and that of photons."""
+    if eye.photons is None:
+        return float(eye.noise_sigma)
+    light = number(eye.throughput)
+    return math.hypot(eye.noise_sigma, light / math.sqrt(float(eye.photons.mean()) * light))
+
+
 def describe(eye: Eye, z: Any) -> Description:
     """The eye's limits for a scene at distance z [m].
 
@@ -97,8 +105,7 @@ def describe(eye: Eye, z: Any) -> Description:
     """
     distance, light, result = number(eye.sensor_distance), number(eye.throughput), eye.psf(z)
     white, wavelength = _white(eye, result)
-    photons = None if eye.photons is None else float(eye.photons.mean()) * light
-    noise = math.hypot(eye.noise_sigma, 0.0 if photons is None else light / math.sqrt(photons))
+    photons, noise = None if eye.photons is None else float(eye.photons.mean()) * light, noise_of(eye)
     if eye.pupil is None:
         diffraction, strehl, quality = math.inf, 1.0, max(1 - noise, 0.0)
         noise_limit = math.inf if noise < 1 else 0.0

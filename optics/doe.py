@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from optics.arguments import reals
 from optics.precision import Precision
 from optics.tracked import is_tracked, plain
 
@@ -219,7 +220,7 @@ def square_heights(samples: Any) -> np.ndarray:
     Raises:
         ValueError: not square, empty, or not finite.
     """
-    heights = np.array(plain(samples))
+    heights = np.array(plain(samples) if is_tracked(samples) else reals("height", samples))
     if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.size == 0:
         raise ValueError(f"height has shape {heights.shape}: must be square (n, n), n at least 1")
     if not np.isfinite(heights).all():

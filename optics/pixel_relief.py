@@ -22,8 +22,8 @@ REPETITIONS = 32  # of the pixels' frequencies; all beyond have 1/(π² 32) of t
 class PixelRelief(Relief):
     """Heights [m] of n x n square pixels that fill the square [-a, a]²: a diffractive optical element of steps.
 
-    samples: (n, n), (y, x). A relief of N levels is one whose samples have no other values: rounded,
-    `np.round(h / step) * step`; one wave high, wrapped, `h % (wavelength / (n - 1))`.
+    samples: (n, n), (y, x). Of a smooth height h, N levels one step apart, wrapped to one wave in glass of index n,
+        step = wavelength / (n - 1) / N, are `np.round(h / step) % N * step`.
 
     A Dr.Jit tensor of samples carries derivatives. (Smooth surfaces: `HeightMap`, which joins its samples.)
 
@@ -50,16 +50,19 @@ class PixelRelief(Relief):
 
     def bandwidth(self, level: float) -> float:
         """Jumps have no end of frequencies."""
-        return math.inf
+        return 0.0 if self._level else math.inf
 
     def scatter(self, turns: float, opening: Aperture, share: float) -> float:
         """Spatial frequency [cycles per aperture radius] along x and y beyond which no more than this share of the
         light goes that fills the opening, `turns` [1/m] waves per height: that of a transform over the pixels, sinc² of
         a pixel's width at each repetition."""
-        n = self.pixels
+        n = len(self._heights)
         centres = (np.arange(n) + 0.5) * 2 / n - 1
-        inside = opening.contains(centres[None, :], centres[:, None])
-        wave = np.where(inside, np.exp(2j * np.pi * turns * self._heights), 0)
+        x, y = centres[None, :], centres[:, None]
+        inside, reached = opening.contains(x, y), opening.contains(x, y) | opening.outline.near(x, y, 1 / n)
+        if np.ptp(self._heights[reached]) == 0:
+            return 0.0
+        wave = np.where(inside if inside.any() else reached, np.exp(2j * np.pi * turns * self._heights), 0)
         return max(
             _reach(np.square(np.abs(np.fft.fft(wave, axis=axis))).sum(axis=1 - axis), share / 2) for axis in (0, 1)
         )
@@ -70,7 +73,16 @@ class PixelRelief(Relief):
 
     @property
     def pixels(self) -> int:
-        return len(self._heights)
+        """None of which anything is told apart by where all are level, unless derivatives ask about each of them."""
+        return 0 if self._level else len(self._heights)
+
+    @property
+    def rotationally_symmetric(self) -> bool:
+        return self._level
+
+    @property
+    def _level(self) -> bool:
+        return not is_tracked(self.samples) and bool(np.ptp(self._heights) == 0)
 
 
 def _reach(power: np.ndarray, share: float) -> float:

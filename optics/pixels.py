@@ -3,7 +3,7 @@
 Whole pixels have Gauss-Legendre nodes. Those that the opening's edge cuts are divided where the edge enters and leaves
 them, into panels with smooth ends: exact edge, spectral convergence (`PixelatedAperture.nodes`). Where nodes must lie
 on a grid of rows and columns, cut pixels have the nodes of whole ones, with the weights that integrate the
-interpolating polynomial over what is left of them (`PixelatedAperture.tensor_nodes`).
+interpolating polynomial over what is left of them (`PixelatedAperture.weights`).
 """
 
 from __future__ import annotations
@@ -22,20 +22,13 @@ from optics.outline import Outline
 from optics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
 from optics.soft_edge import SoftEdge
 
-__all__ = ["PixelatedAperture", "TensorNodes"]
+__all__ = ["PixelatedAperture"]
 
 EDGE_DEGREE = 4  # more than the digits asked for: of the polynomials that a curved edge is to these digits
 ROUNDING = 1e-12
+STEEPNESS = 3.0  # of panels' lengths beside a square root
 MOMENT_DIGITS = 8.0  # of what is left of a cut pixel
 MOST_NODES = 32  # along a pixel: beyond, what is left of pixels that the edge cuts is a matter of too many moments
-
-
-@dataclass(frozen=True, eq=False)
-class TensorNodes:
-    """at: places of rows, and of columns, ascending, in units of R, (node,) · weights [R²], (row, column)"""
-
-    at: np.ndarray
-    weights: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -64,15 +57,24 @@ class PixelatedAperture(Aperture):
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return self.opening.contains(x, y)
 
-    def tensor_nodes(self, cycles: float, digits: float) -> TensorNodes | None:
-        """Rows and columns of nodes, as good as `nodes` are; None where pixels are too coarse for that."""
+    def nodes_across(self, cycles: float, digits: float) -> int | None:
+        """Of each pixel, so that rows and columns of nodes are as good as `nodes`; None where they are too many."""
         share = min(1.0, len(self._cut) * self._pitch**2 / self.area)  # all that interpolation counts for
         turns = np.array(pi * cycles * self._pitch)
         across = max(
             gauss_legendre_count(cycles * self._pitch, digits + 0.3),
             int(harmonics(turns, max(digits + 0.3 + log10(share), 0.3))) if share else 1,
         )
-        return _tensor_nodes(self, across) if across <= MOST_NODES else None
+        return across if across <= MOST_NODES else None
+
+    def rows(self, across: int) -> np.ndarray:
+        """Places of rows and of columns of nodes, ascending, in units of R, (count x across,)."""
+        u, _ = gauss_legendre(across)
+        return (self._centres[:, None] + (u - 0.5) * self._pitch).ravel()
+
+    def weights(self, across: int) -> np.ndarray:
+        """Of the nodes [R²], (row, column)."""
+        return _weights(self, across)
 
     @cached_property
     def _pitch(self) -> float:
@@ -125,10 +127,14 @@ class PixelatedAperture(Aperture):
         outline = self.outline
         within = np.concatenate([outline.turning, outline.heights(left), outline.heights(right)])
         ends = np.unique([bottom, top, *within[(within > bottom) & (within < top)]])
-        for low, high in pairwise(ends):
+        for low, high in pairwise(_graded(ends, outline.tangent)):
             if high - low < ROUNDING:
                 continue
-            y, weight = _panel(low, high, outline.tangent, cycles, digits, 2 * degree + EDGE_DEGREE + ceil(digits))
+            # Where the edge slants, nodes slide along it, and the wave turns by as much more.
+            inner = low + (high - low) * np.array([1e-6, 1 - 1e-6])
+            slide = np.abs(np.diff(np.clip(outline.crossings(inner), left, right), axis=0)).max(initial=0.0)
+            turns = cycles * float(np.hypot(slide, high - low))
+            y, weight = _panel(low, high, outline.tangent, turns, digits, 2 * degree + EDGE_DEGREE + ceil(digits))
             sides = np.clip(outline.crossings(y), left, right)
             u, share = gauss_legendre(gauss_legendre_count(cycles * self._pitch, digits + 0.3, degree))
             for start, end in zip(sides.T[::2], sides.T[1::2], strict=True):
@@ -142,22 +148,38 @@ class PixelatedAperture(Aperture):
         raise TypeError("jumps between pixels have no band limit: a soft edge does not make them fit for a grid")
 
 
+def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+    """Ends of panels, with more of them where a circle's top or bottom is nearer to a panel than the panel is long:
+    polynomials do not follow the square root beside it."""
+    more = []
+    for at in tangent:
+        for low, high in pairwise(ends):
+            gap = max(low - at, at - high)
+            if ROUNDING < gap < high - low:
+                distances = gap * STEEPNESS ** np.arange(
+                    1, 1 + ceil(np.log((gap + high - low) / gap) / np.log(STEEPNESS))
+                )
+                places = at + distances if at < low else at - distances
+                more.append(places[(places > low) & (places < high)])
+    return np.unique(np.concatenate([ends, *more]))
+
+
 def _panel(
     low: float, high: float, tangent: np.ndarray, cycles: float, digits: float, degree: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Heights and weights between two ends. Where one is a circle's top or bottom, whose chord begins there like a
-    square root, y goes there like sin²."""
+    """Heights and weights between two ends, for a wave of so many cycles between them. Where one is a circle's top or
+    bottom, whose chord begins there like a square root, y goes there like sin²."""
     span = high - low
     touching = any(abs(end - at) < ROUNDING for at in tangent for end in (low, high))
     slower = pi / 2 if touching else 1.0
-    u, weight = gauss_legendre(gauss_legendre_count(slower * cycles * span, digits + 0.3, ceil(slower * degree)))
+    u, weight = gauss_legendre(gauss_legendre_count(slower * cycles, digits + 0.3, ceil(slower * degree)))
     if not touching:
         return low + span * u, span * weight
     return low + span * np.sin(pi * u / 2) ** 2, span * weight * np.sin(pi * u) * pi / 2
 
 
-@lru_cache(maxsize=16)
-def _tensor_nodes(aperture: PixelatedAperture, across: int) -> TensorNodes:
+@lru_cache(maxsize=4)
+def _weights(aperture: PixelatedAperture, across: int) -> np.ndarray:
     u, weight = gauss_legendre(across)
     pitch, count = aperture._pitch, aperture.count
     weights = np.zeros((count, across, count, across))
@@ -170,6 +192,5 @@ def _tensor_nodes(aperture: PixelatedAperture, across: int) -> TensorNodes:
             in_x, in_y = (lagrange((at - aperture._centres[k]) / pitch + 0.5, u) for at, k in ((x, column), (y, row)))
             total += in_y * size @ in_x.T
         weights[row, :, column, :] = total
-    at = (aperture._centres[:, None] + (u - 0.5) * pitch).ravel()
     side = count * across
-    return TensorNodes(at, weights.reshape(side, side))
+    return weights.reshape(side, side)

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Protocol
 
+from optics import pixel_spectrum
 from optics.angular_spectrum import split, whole
 from optics.beam import Beam
 from optics.direct_sum import nodes
@@ -85,7 +86,13 @@ APPROXIMATE: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "pinhole": pinhole,
 }
 METHODS = EXACT | APPROXIMATE
-FOR_PIXELS = ("low_rank", "rayleigh_sommerfeld")  # have nodes where light jumps from pixel to pixel; no grid has
+# Have nodes where light jumps from pixel to pixel; no grid has.
+FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
+    "low_rank": low_rank,
+    "angular_spectrum": pixel_spectrum.whole,
+    "split_angular_spectrum": pixel_spectrum.split,
+    "rayleigh_sommerfeld": nodes,
+}
 # Largest square array: 4096² complex64 is 134 MB, and a handful of such arrays live at once.
 MOST_SAMPLES = 4096
 FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}  # relative to the field's root mean square, see tests
@@ -180,8 +187,8 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
 @lru_cache(maxsize=256)
 def _weigh(problem: Problem, methods: tuple[str, ...]) -> dict[str, Sampling | None]:
     """The cheapest sampling of each method."""
-    able = methods if problem.pixelated is None else [name for name in methods if name in FOR_PIXELS]
-    found = {name: METHODS[name](problem) for name in able}
+    known = METHODS if problem.pixelated is None else FOR_PIXELS
+    found = {name: known[name](problem) for name in methods if name in known}
     return {name: min(samplings, key=_cost) if samplings else None for name, samplings in found.items()}
 
 
@@ -232,7 +239,7 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None],
     why = (
         f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "
         f"{problem.band() * problem.wavelength:.2g}; "
-        + ("cheapest of those that meet the tolerance" if len(options) > 1 else "asked for")
+        + ("cheapest of those that meet the tolerance" if len(weighed) > 1 else "asked for")
     )
     error = _sampling_error(problem) + best.model_error
     padding = getattr(best, "padding", 1.0)
@@ -254,7 +261,10 @@ def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: f
 def _refusal(problem: Problem, found: list[Sampling], most_seconds: float) -> str:
     width = 2 * problem.window.half_width
     if not found and problem.pixelated is not None:
-        return "a relief of pixels jumps, which no grid carries: ask for method='auto' or 'rayleigh_sommerfeld'"
+        return (
+            "a relief of pixels jumps, which asks for nodes fitted to them, and not too many: this cannot be; ask for "
+            f"method='auto' or one of {', '.join(FOR_PIXELS)}"
+        )
     if not found:
         return (
             f"tolerance = {problem.tolerance:g} over a window of {width:.3g} m at a distance of "

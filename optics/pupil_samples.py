@@ -15,11 +15,11 @@ from optics.beam import Beam
 from optics.direct_sum import node_rule
 from optics.field import Field
 from optics.grid import Grid
-from optics.pixels import TensorNodes
+from optics.pixels import PixelatedAperture
 from optics.precision import Precision, opaque
 from optics.problem import Problem, PupilEdge
 
-__all__ = ["GridSamples", "PixelSamples", "PupilSamples", "samples_of"]
+__all__ = ["GridSamples", "PixelSamples", "PupilSamples", "pixel_samples", "samples_of"]
 
 
 class PupilSamples(Protocol):
@@ -74,43 +74,50 @@ class GridSamples:
 
 @dataclass(frozen=True)
 class PixelSamples:
-    """Nodes of an opening in pixels."""
+    """Nodes of an opening in pixels, so many across each; made when they are needed, since plans are kept for long."""
 
-    nodes: TensorNodes
+    aperture: PixelatedAperture
+    across: int
     radius: float
 
     @property
     def at(self) -> np.ndarray:
-        return self.nodes.at * self.radius
+        return self.aperture.rows(self.across) * self.radius
 
     @property
     def outermost(self) -> float:
         """Cut pixels have nodes beyond the edge, which is itself nowhere further off than the radius."""
-        row, column = np.nonzero(self.nodes.weights)
-        return self.radius * float(np.hypot(self.nodes.at[row], self.nodes.at[column]).max())
+        return self.radius * (1 + math.sqrt(2) * 2 / self.aperture.count)
 
     @property
     def seconds(self) -> float:
-        return self.nodes.weights.size * 1e-8
+        return (self.aperture.count * self.across) ** 2 * 1e-8
 
     def places(self, index: Any, beam: Beam, types: Precision) -> Any:
         import drjit as dr
 
-        return dr.gather(types.Float64, types.Float64(self.nodes.at), types.Index(index)) * opaque(types, beam.radius)
+        return dr.gather(types.Float64, types.Float64(self.aperture.rows(self.across)), types.Index(index)) * opaque(
+            types, beam.radius
+        )
 
     def field(self, beam: Beam, types: Precision) -> Field:
-        radius, at = opaque(types, beam.radius), self.nodes.at
+        radius, at = opaque(types, beam.radius), self.aperture.rows(self.across)
         x, y = (types.Float64(np.ascontiguousarray(axis.ravel())) for axis in np.meshgrid(at, at))
-        weight = types.Float64(self.nodes.weights.ravel()) * radius * radius
+        weight = types.Float64(self.aperture.weights(self.across).ravel()) * radius * radius
         grid = Grid.square(len(at), 2 * self.radius / len(at))
         return Field.from_waves(weight, beam.waves(x * radius, y * radius, types), grid, types)
+
+
+def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, radius: float) -> PixelSamples | None:
+    """As few as are good to so many digits for so many cycles per radius; None where pixels are too coarse."""
+    across = aperture.nodes_across(cycles, digits)
+    return None if across is None else PixelSamples(aperture, across, radius)
 
 
 def samples_of(problem: Problem) -> PupilSamples | None:
     """As few as the turns of pupil and path together allow; None where pixels are too coarse for them."""
     if problem.pixelated is not None:
-        nodes = problem.pixelated.tensor_nodes(*node_rule(problem))
-        return None if nodes is None else PixelSamples(nodes, problem.radius)
+        return pixel_samples(problem.pixelated, *node_rule(problem), problem.radius)
     edge = problem.soft_edge(problem.turning)
     pitch = 1 / (problem.turning + edge.stopband)
     return GridSamples(edge, Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch))

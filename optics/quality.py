@@ -1,6 +1,7 @@
 """What a PSF is worth: contrast over spatial frequency, peak, concentration, and one number for an eye.
 
-Where the PSF carries derivatives, so do these numbers: they are Dr.Jit arrays then, NumPy arrays otherwise.
+Where the PSF carries derivatives, so do these numbers, but for encircled energy: they are Dr.Jit arrays then, NumPy
+arrays otherwise.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.arguments import in_range, positive, reals, shown
+from optics.arguments import in_range, point_2d, positive, reals, shown
 from optics.field import Field
 from optics.fourier import dft2
 from optics.grid import Grid
@@ -23,7 +24,7 @@ from optics.tracked import at_border, number
 __all__ = ["MTF", "encircled_energy", "image_quality", "mtf", "strehl_ratio"]
 
 ORIENTATIONS = 64
-HELD_TOO_MUCH = 1e-2  # above all that arrives: sums over coarse samples err
+HELD_TOO_MUCH = 1e-2  # above all that arrives, by which sums over coarse samples may err
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,8 @@ def mtf(result: PSFResult, arriving: Any = None) -> MTF:
         are right from the first frequency above 0 on.
 
     Raises:
-        ValueError: less arrives than is in the window.
+        ValueError: arriving has another shape, or less arrives than is in the window (but for a hundredth, by which
+            sums over coarse samples may err).
     """
     import drjit as dr
 
@@ -90,15 +92,18 @@ def mtf(result: PSFResult, arriving: Any = None) -> MTF:
     waves, height, width = result.tensor.shape
     side = max(height, width)
     pitch, middle = 1 / (side * result.dx), (side // 2) * side + side // 2
-    flat, planes, missing = types.Float(_flat(result.tensor)), [], _missing(result, arriving)
+    flat, planes, known = types.Float(_flat(result.tensor)), [], _arriving(result, arriving)
     for index in range(waves):
         plane = dr.gather(types.Float, flat, dr.arange(types.Index, height * width) + index * height * width)
         field = Field(plane, dr.zeros(types.Float, height * width), Grid((height, width), result.dx), types)
         otf = dft2(field, side, (side, side), -1, pitch)
         size = dr.sqrt(dr.maximum(otf.intensity, 1e-300))
         zero = dr.gather(types.Float, size, types.Index(middle))
-        whole = dr.arange(types.Index, side * side) == middle
-        planes.append(size / dr.select(whole, zero, zero + missing[index] / result.dx**2))
+        if known is None or known[index] <= result.power[index]:
+            planes.append(size / zero)
+            continue
+        at_zero = dr.arange(types.Index, side * side) == middle
+        planes.append(dr.select(at_zero, 1, size * (result.dx**2 / float(known[index]))))
     tensor = types.Tensor(planes[0] if waves == 1 else dr.concat(planes), (waves, side, side))
     f = Grid.square(side, pitch).x
     radius, distance = result.pupil.radius, number(result.sensor_distance)
@@ -106,15 +111,16 @@ def mtf(result: PSFResult, arriving: Any = None) -> MTF:
     return MTF(tensor, f, f, cutoff)
 
 
-def _missing(result: PSFResult, arriving: Any) -> np.ndarray:
-    """Share of the pupil's power that arrives outside the window, (wavelength,)."""
-    held = result.power
+def _arriving(result: PSFResult, arriving: Any) -> np.ndarray | None:
+    """Share of the pupil's power that arrives anywhere, (wavelength,)."""
     if arriving is None:
-        return np.zeros_like(held)
-    known = np.broadcast_to(np.asarray(reals("arriving", arriving), dtype=np.float64), held.shape)
+        return None
+    held, known = result.power, reals("arriving", arriving)
+    if known.shape not in ((), held.shape):
+        raise ValueError(f"arriving has shape {known.shape}: must be a number, or one per wavelength {held.shape}")
     if not ((known > 0) & (known <= 1) & (known > held - HELD_TOO_MUCH)).all():
         raise ValueError(f"arriving = {shown(arriving)}: must be in (0, 1], not less than the window's {shown(held)}")
-    return np.maximum(known - held, 0)
+    return np.broadcast_to(known, held.shape)
 
 
 def strehl_ratio(result: PSFResult) -> Any:
@@ -145,19 +151,25 @@ def strehl_ratio(result: PSFResult) -> Any:
 
 
 def encircled_energy(
-    result: PSFResult, radii: np.ndarray | float, centre: tuple[float, float] = (0.0, 0.0)
+    result: PSFResult, radii: np.ndarray | float, centre: tuple[float, float] | None = None
 ) -> np.ndarray:
     """Fraction of the pupil's power within `radii` [m] of `centre` (x, y) [m] on the sensor, (wavelength, radius).
 
+    centre: None for the middle of the PSF's window. Carries no derivative.
     A sample on the circle counts by how far it reaches inside, which makes the error fall with dx².
 
     Raises:
         ValueError: a radius that is negative or leaves the window.
     """
-    wanted = np.atleast_1d(np.asarray(radii, dtype=np.float64))
-    x, y = result.x[None, :] - centre[0], result.y[:, None] - centre[1]
+    wanted = np.atleast_1d(reals("radii", radii))
+    if wanted.ndim > 1:
+        raise ValueError(f"radii has shape {wanted.shape}: must be a number or a row of them [m]")
+    middle = result.centre if centre is None else point_2d("centre", centre)
+    x, y = result.x[None, :] - middle[0], result.y[:, None] - middle[1]
     edge = min(-x[0, 0], x[0, -1], -y[0, 0], y[-1, 0])
-    if not ((wanted >= 0) & (wanted <= edge)).all():
+    if edge < 0:
+        raise ValueError(f"centre = {shown(centre)}: must lie within the PSF's window, around {shown(result.centre)}")
+    if not ((wanted >= 0) & (wanted <= edge * (1 + 1e-9))).all():
         raise ValueError(f"radii = {shown(radii)}: must be in [0, {edge:g}] m, inside the PSF's window")
     distance = np.hypot(x, y)
     inside = np.clip((wanted[:, None, None] - distance) / result.dx + 0.5, 0, 1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +10,7 @@ from optics.tracked import number
 
 __all__ = ["RefractiveIndex"]
 
+LARGEST = 10.0
 # Fraunhofer lines of the Abbe number V_d = (n_d - 1) / (n_F - n_C) [m].
 LINE_F, LINE_D, LINE_C = 486.134e-9, 587.562e-9, 656.281e-9
 
@@ -42,10 +42,13 @@ class RefractiveIndex:
         """n at a vacuum wavelength [m]; a Dr.Jit array if the coefficients are.
 
         Raises:
-            ValueError: the curve falls below 1 there.
+            ValueError: the curve leaves [1, 10] there.
         """
         n = self.a + self.b / vacuum_wavelength(wavelength) ** 2
         value = number(n)
-        if not (math.isfinite(value) and value >= 1):
-            raise ValueError(f"n = {value:g} at wavelength {wavelength:g} m: must be at least 1")
+        if not 1 <= value <= LARGEST:
+            raise ValueError(
+                f"n = {value:g} at wavelength {wavelength:g} m: must be in [1, {LARGEST:g}] (b is in m²: "
+                "4.2e-3 µm² are 4.2e-15)"
+            )
         return n

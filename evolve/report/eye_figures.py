@@ -18,6 +18,7 @@ from evolve.development import Phenotype
 from evolve.report.markup import KEY, figure, number
 from evolve.report.svg import drawing, inline
 from evolve.report.theme import ACCENT, INK, MUTED, VERMILLION
+from optics.description import noise_of
 from optics.precision import precision
 from optics.spectrum import daylight
 
@@ -192,7 +193,7 @@ def _mtf(light: Light) -> str:
     green = int(np.argmin(np.abs(light.psf.wavelengths - 550e-9)))
     strehl = optics.strehl_ratio(light.psf)[green]
     of_whom = "" if _is_round(eye.pupil) else " of a circle as wide"
-    quality = optics.image_quality(light.white, nyquist, eye.throughput, eye.noise_sigma)[0]
+    quality = optics.image_quality(light.white, nyquist, eye.throughput, noise_of(eye))[0]
     caption = (
         f"<b>Modulation transfer function</b> in white daylight, mean of all orientations ({KEY.format('accent')}), "
         f"and the diffraction limit{of_whom} (dashed). Dotted: the receptors' Nyquist frequency, "

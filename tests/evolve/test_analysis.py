@@ -234,3 +234,11 @@ def test_lens_in_focus_has_strehl_1_in_white_light(bands):
 
 
 DAYLIGHT_475 = 1.15392  # CIE D65 at 475 nm over that at 560 nm: 115.392 / 100
+
+
+def test_photons_count_in_image_quality():
+    """As much as the eye's own description says."""
+    animal, dusk = phenotype(relative_aperture=0.3, relief=LENS), EyeConfig(bands=2, illuminance=0.05)
+    dim, bright = (image_quality(animal, config) for config in (dusk, EyeConfig(bands=2)))
+    assert dim < 0.9 * bright
+    assert dim == pytest.approx(animal.eyes(dusk).eye().describe().image_quality, rel=1e-3)

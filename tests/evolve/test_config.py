@@ -293,7 +293,9 @@ def test_only_navigation_has_mazes():
 
 def test_photons_are_counted_in_some_light():
     assert assemble("detection", assignments=["eye.illuminance=10", "eye.integration_time=0.1"]).eye.illuminance == 10
-    with pytest.raises(ConfigError, match=r"eye\.illuminance = 1e-09: must be 0, no shot noise, or at least 1e-06 lx"):
-        assemble("detection", assignments=["eye.illuminance=1e-9"])
+    with pytest.raises(
+        ConfigError, match=r"eye\.illuminance = 0\.001.*: too few photons; must be at least 0\.0002 lx s"
+    ):
+        assemble("detection", assignments=["eye.illuminance=1e-3"])
     with pytest.raises(ConfigError, match=r"eye\.integration_time = 0\.1: counts photons, and there are none"):
         assemble("detection", assignments=["eye.integration_time=0.1"])

@@ -117,6 +117,7 @@ def test_a_derivative_asks_about_every_control_point():
 QUALITIES = {
     "strehl_ratio": optics.strehl_ratio,
     "mtf": lambda result: optics.mtf(result).profile(np.array([2e4, 5e4])),
+    "mtf of all the light": lambda result: optics.mtf(result, arriving=1.0).profile(np.array([2e4, 5e4])),
     "image_quality": lambda result: optics.image_quality(result, 1e5, 0.5, 0.01),
 }
 

@@ -52,6 +52,8 @@ def test_all_that_arrives_is_what_a_small_window_measures_contrast_by():
     assert optics.mtf(result, 1.0).mtf[0, 6, 6] == 1
     with pytest.raises(ValueError, match=r"arriving = 0\.5: must be in"):
         optics.mtf(result, 0.5)
+    with pytest.raises(ValueError, match=r"arriving has shape \(2,\): must be a number, or one per wavelength \(1,\)"):
+        optics.mtf(result, [1.0, 1.0])
 
 
 def test_mtf_keeps_the_order_of_axes():

@@ -158,6 +158,13 @@ class TestLightInBands:
             found = spectral.of(lambda at, share=share: share * daylight(at), receptors)
             np.testing.assert_allclose(found, share * daylight(spectral.wavelengths), rtol=1e-9)
 
+    def test_no_band_is_below_0_where_none_may_be(self):
+        bands, light = SpectralBands.uniform(8, "honeybee"), illuminant("FL11")
+        free, bound = (bands.of(light, "honeybee", nonnegative=only) for only in (False, True))
+        assert free.min() < -0.01
+        assert bound.min() >= 0
+        np.testing.assert_allclose(bands.weights @ bound, self.caught("honeybee", light.at), rtol=1e-4)
+
     def test_fewer_bands_than_types_meet_them_halfway(self):
         bands, light = SpectralBands.uniform(1), illuminant("FL2")
         caught, seen = self.caught("rgb", light.at), bands.weights @ bands.of(light, "rgb")
