@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 from optics.beam import Beam
 from optics.field import Field
@@ -17,32 +17,36 @@ from optics.problem import Problem, PupilEdge, Taper, tapers
 __all__ = ["GridSampling", "SpectrumSampling", "arrived", "split", "whole"]
 
 
-class SpectrumSampling(Protocol):
-    """What decides the way from the spectrum on: see `GridSampling`."""
+class SpectrumSampling:
+    """Samples of a spectrum, and of what it becomes.
+
+    method: "angular_spectrum" or "split_angular_spectrum". taper: where the spectrum fades out.
+    period: width [m] after which the pupil plane repeats: the spectrum's samples lie 1/period apart.
+    output_period: samples over the period of the plane that the last transform starts from or ends on.
+    """
+
+    method: str
+    taper: Taper
+    period: float
+    output_period: int
 
     @property
-    def method(self) -> str: ...
+    def spectrum(self) -> Grid:
+        return Grid.square(2 * math.ceil(self.taper.end * self.period) + 1, 1 / self.period)
 
     @property
-    def taper(self) -> Taper: ...
+    def relay(self) -> Grid:
+        return Grid.square(self.output_period, self.period / self.output_period)
 
-    @property
-    def output_period(self) -> int: ...
-
-    @property
-    def spectrum(self) -> Grid: ...
-
-    @property
-    def relay(self) -> Grid: ...
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light."""
+        whole = self.method == "angular_spectrum"
+        return self.period if whole else problem.wavelength * problem.distance / self.relay.dx
 
 
 @dataclass(frozen=True)
-class GridSampling:
-    """Samples of "angular_spectrum" and "split_angular_spectrum".
-
-    period: width [m] after which the pupil plane repeats, in pupil_period samples; spectrum_samples lie 1/period apart.
-    output_period: samples over the period of the plane that the last transform starts from or ends on.
-    """
+class GridSampling(SpectrumSampling):
+    """Of a pupil whose soft edge a grid carries, pupil_period samples to the period."""
 
     method: str
     edge: PupilEdge
@@ -60,22 +64,9 @@ class GridSampling:
         across = 2 * math.ceil(self.edge.outermost / pitch) + 1
         return Grid.square(min(self.pupil_period, across), pitch)
 
-    @property
-    def spectrum(self) -> Grid:
-        return Grid.square(2 * math.ceil(self.taper.end * self.period) + 1, 1 / self.period)
-
-    @property
-    def relay(self) -> Grid:
-        return Grid.square(self.output_period, self.period / self.output_period)
-
     def intensity(self, beam: Beam, problem: Problem) -> Any:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _angular_spectrum(beam, problem, self, precision(problem.dtype)).intensity
-
-    def plane(self, problem: Problem) -> float:
-        """Width [m] over which rounding spreads the pupil's light."""
-        whole = self.method == "angular_spectrum"
-        return self.period if whole else problem.wavelength * problem.distance / self.relay.dx
 
     @property
     def padding(self) -> float:

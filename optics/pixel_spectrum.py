@@ -6,11 +6,10 @@ light beyond, which jumps send everywhere. From the spectrum on all is as for ot
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from optics.angular_spectrum import arrived
+from optics.angular_spectrum import SpectrumSampling, arrived
 from optics.beam import Beam
 from optics.direct_sum import node_rule
 from optics.field import Field
@@ -25,8 +24,8 @@ __all__ = ["PixelSpectrum", "split", "whole"]
 
 
 @dataclass(frozen=True)
-class PixelSpectrum:
-    """Nodes, and samples of "angular_spectrum" and "split_angular_spectrum": see `GridSampling`."""
+class PixelSpectrum(SpectrumSampling):
+    """Of a pupil of pixels with nodes fitted to them."""
 
     method: str
     pupil: PixelSamples
@@ -36,24 +35,11 @@ class PixelSpectrum:
     seconds: float = 0.0
     model_error: float = 0.0
 
-    @property
-    def spectrum(self) -> Grid:
-        return Grid.square(2 * math.ceil(self.taper.end * self.period) + 1, 1 / self.period)
-
-    @property
-    def relay(self) -> Grid:
-        return Grid.square(self.output_period, self.period / self.output_period)
-
     def intensity(self, beam: Beam, problem: Problem) -> Any:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         types = precision(problem.dtype)
         spectrum = _spectrum(self.pupil.field(beam, types), beam, self, types)
         return arrived(spectrum, beam, problem, self).scaled(1 / self.period**2).intensity
-
-    def plane(self, problem: Problem) -> float:
-        """Width [m] over which rounding spreads the pupil's light."""
-        whole = self.method == "angular_spectrum"
-        return self.period if whole else problem.wavelength * problem.distance / self.relay.dx
 
     @property
     def samples(self) -> tuple[int, int]:
