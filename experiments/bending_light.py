@@ -66,10 +66,10 @@ def page(store: Store) -> Page:
             "PSNR and SSIM compare with a perfect lens, without noise, brightness made equal."
         ),
         command=(
-            "evolve run --preset lens --seed 0    # and 1\n"
+            "evolve run --preset lens --seed 0    # and 1 and 2\n"
             "evolve run --preset lens --set genome.refractive_index.open=false --set genome.refractive_index.start=1"
             " --seed 0    # and 1\n"
-            "python -m experiments.bending_light --runs lens=DIR lens=DIR index1=DIR index1=DIR"
+            "python -m experiments.bending_light --runs lens=DIR lens=DIR lens=DIR index1=DIR index1=DIR"
         ),
         figures=[
             Figure(

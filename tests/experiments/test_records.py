@@ -19,7 +19,7 @@ from experiments.store import read_rows, write_rows
 RESULTS = Path(__file__).parents[2] / "docs/results"
 RECORDS = sorted((RESULTS / "records").iterdir())
 PAGES = {
-    "bending_light": {"lens": ("lens-0", "lens-1"), "index1": ("index1-0", "index1-1")},
+    "bending_light": {"lens": ("lens-0", "lens-1", "lens-2"), "index1": ("index1-0", "index1-1")},
     "brains_and_acuity": {
         "detection": ("scaling-detection",),
         "tracking": ("scaling-tracking",),
