@@ -30,16 +30,22 @@ __all__ = [
 SMALLEST, LARGEST = 1e-15, 1e15
 LONGEST_WAVE = 1.0  # no optics is longer; what is, was meant in nanometres
 UNIT = " (550 nm is 550e-9)"
+LINE = 200  # characters of a message that a value may take
 
 
 def shown(value: Any) -> str:
-    """`value` as a reader would type it, whatever NumPy's print options are (colour-science alters them)."""
+    """`value` as a reader would type it, whatever NumPy's print options are (colour-science alters them); by its kind
+    and shape where that takes more than a line."""
     if isinstance(value, np.generic):
         return repr(value.item())
     if isinstance(value, (tuple, list)):
         ends = "()" if isinstance(value, tuple) else "[]"
         return f"{ends[0]}{', '.join(map(shown, value))}{',' if ends == '()' and len(value) == 1 else ''}{ends[1]}"
-    return repr(value)
+    text = repr(value)
+    if len(text) <= LINE and "\n" not in text:
+        return text
+    shape = getattr(value, "shape", None)
+    return type(value).__name__ if shape is None else f"{type(value).__name__} of shape {tuple(shape)}"
 
 
 def finite(name: str, value: float) -> float:

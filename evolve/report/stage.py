@@ -45,8 +45,10 @@ class Stage:
         world = sim.build_world(episode.task, seed=where["world_seed"], mazes=where["mazes"])
         model = world.model
         walls = np.array([_footprint(model, i) for i in range(model.ngeom) if model.geom(i).name.startswith("wall")])
-        low, high = walls[:, :2] - walls[:, 2:], walls[:, :2] + walls[:, 2:]
         region = world.goal_region
+        if where["mazes"] > 1:
+            walls, region = _own_maze(walls, region, where["mazes"], float(episode.position[0, 1]))
+        low, high = walls[:, :2] - walls[:, 2:], walls[:, :2] + walls[:, 2:]
         return cls(
             eyes=episode.eyes,
             object_names=tuple(world.objects),
@@ -58,6 +60,20 @@ class Stage:
             seconds=SUBSTEPS * float(model.opt.timestep),
             gain=1 / episode.eyes.eye().throughput,
         )
+
+
+def _own_maze(
+    walls: np.ndarray, region: np.ndarray | None, mazes: int, y: float
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Walls and goal of the maze around y [m], of as many that lie north of each other, all as high."""
+    south, north = (walls[:, 1] - walls[:, 3]).min(), (walls[:, 1] + walls[:, 3]).max()
+    height = (north - south) / mazes
+    low = south + height * int(np.clip((y - south) // height, 0, mazes - 1))
+    own = walls[(walls[:, 1] > low) & (walls[:, 1] < low + height)]
+    if region is None:
+        return own, None
+    rim = region[1] - south
+    return own, np.array([region[0], low + rim, region[2], low + height - rim])
 
 
 def _footprint(model: mujoco.MjModel, geom: int) -> tuple[float, float, float, float]:

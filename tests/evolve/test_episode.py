@@ -172,7 +172,12 @@ def test_a_maze_is_that_which_was_walked_through(episode, tmp_path):
     assert again.world == world
     model = sim.build_world("navigation", seed=1, mazes=2).model
     walls = [i for i in range(model.ngeom) if model.geom(i).name.startswith("wall")]
-    np.testing.assert_array_equal(Stage.of(again).walls[:, :2], model.geom_pos[walls, :2])
+    shown, y = Stage.of(again), model.geom_pos[walls, 1]
+    north = y[y > 0] if again.position[0, 1] > 0 else y[y < 0]
+    np.testing.assert_array_equal(shown.walls[:, 1], north)
+    assert shown.bounds[3] - shown.bounds[1] == pytest.approx(26.0)
+    (x_min, low, _, high), alone = shown.goal_region, sim.build_world("navigation").goal_region
+    assert (x_min, high - low) == pytest.approx((alone[0], alone[3] - alone[1]))
     with np.load(tmp_path / "walked.npz") as file:
         columns = dict(file)
     rest = json.loads(str(columns.pop("rest")))

@@ -268,3 +268,15 @@ def test_a_stack_says_that_it_cannot():
     pupil = Pupil(1e-4, PixelRelief(RANDOM))
     with pytest.raises(ValueError, match="PixelRelief jumps"):
         optics.propagate_through([pupil, optics.FreeSpace(1e-3)], wavelength=WAVELENGTH, out_dx=1e-6, out_shape=(9, 9))
+
+
+def test_a_message_takes_one_line_whatever_it_is_about():
+    """By kind and shape where a value would fill a page."""
+    relief = PixelRelief(np.zeros((16, 16)))
+    for wrong, named in (
+        (relief, "aperture_radius = PixelRelief"),
+        (np.zeros((30, 30)), r"ndarray of shape \(30, 30\)"),
+    ):
+        with pytest.raises(ValueError, match=named) as caught:
+            Pupil(wrong)
+        assert "\n" not in str(caught.value)
