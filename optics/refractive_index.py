@@ -46,9 +46,9 @@ class RefractiveIndex:
         """
         n = self.a + self.b / vacuum_wavelength(wavelength) ** 2
         value = number(n)
-        if not 1 <= value <= LARGEST:
-            raise ValueError(
-                f"n = {value:g} at wavelength {wavelength:g} m: must be in [1, {LARGEST:g}] (b is in m²: "
-                "4.2e-3 µm² are 4.2e-15)"
-            )
+        if not value >= 1:
+            raise ValueError(f"n = {value:g} at wavelength {wavelength:g} m: must be at least 1")
+        if value > LARGEST:
+            hint = "b is in m²: 4.2e-3 µm² are 4.2e-15"
+            raise ValueError(f"n = {value:g} at wavelength {wavelength:g} m: must be at most {LARGEST:g} ({hint})")
         return n

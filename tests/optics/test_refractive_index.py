@@ -29,3 +29,10 @@ def test_index_below_one_is_refused():
         RefractiveIndex(0.9)
     with pytest.raises(ValueError, match="at least 1"):
         RefractiveIndex(1.1, -1e-13).at(400e-9)
+
+
+def test_square_micrometres_are_told_from_square_metres():
+    with pytest.raises(
+        ValueError, match=r"n = 1\.38843e\+10 at wavelength 5\.5e-07 m: must be at most 10 \(b is in m²"
+    ):
+        RefractiveIndex(1.5, 4.2e-3).at(550e-9)
