@@ -200,7 +200,7 @@ def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
 
 def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
     """What each band is of white daylight, to the mean of the receptor channels; they sum to 1."""
-    from optics.spectrum import daylight
+    from optics.spectra.bands import daylight
 
     weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
     share: NDArray[np.float64] = weights / weights.sum()
@@ -213,7 +213,7 @@ def image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
     A perfect lens has contrast 1 at all of them. Raises optics.AccuracyError where the PSF cannot be computed.
     """
     import optics
-    from optics.description import noise_of
+    from optics.eye.summary import noise_of
 
     eye = phenotype.eyes(config).eye()
     if eye.pupil is None:

@@ -62,7 +62,7 @@ def _is_users(error: Exception) -> bool:
     from evolve.executors import ExecutorError
     from evolve.lock import LockedError
     from evolve.store import RunError
-    from optics.backend import BackendError
+    from optics.numerics.backend import BackendError
 
     return isinstance(error, ConfigError | RunError | LockedError | ExecutorError | BackendError | OSError)
 

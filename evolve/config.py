@@ -19,7 +19,7 @@ from evolve.sections import (
     setting,
 )
 from evolve.settings import ConfigError
-from optics.receptors import RECEPTORS
+from optics.spectra.receptors import RECEPTORS
 
 __all__ = [
     "INHERITED",

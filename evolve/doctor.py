@@ -9,7 +9,7 @@ import subprocess
 import sys
 from importlib import metadata
 
-from optics import backend
+from optics.numerics import backend
 
 __all__ = ["examine", "main"]
 

@@ -59,7 +59,7 @@ def prepare_device() -> None:
     Raises:
         BackendError: Dr.Jit cannot work here.
     """
-    from optics import backend
+    from optics.numerics import backend
 
     backend.require()
     import drjit

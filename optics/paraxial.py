@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from optics.field import Field
-from optics.fourier import dft2
-from optics.grid import Grid
-from optics.precision import opaque
-from optics.tracked import is_tracked, number
+from optics.numerics.autodiff import is_tracked, number
+from optics.numerics.field import Field
+from optics.numerics.fourier import dft2
+from optics.numerics.grid import Grid
+from optics.numerics.precision import opaque
 
 __all__ = ["paraxial_integral"]
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import torch
 
-from optics.doe import BSplineRelief, HeightMap
-from optics.point_spread import psf as drjit_psf
-from optics.precision import precision
-from optics.pupil import Pupil
+from optics.elements.pupil import Pupil
+from optics.elements.relief import BSplineRelief, HeightMap
+from optics.numerics.precision import precision
+from optics.point_spread.psf import psf as drjit_psf
 
 __all__ = ["PointSpread", "psf"]
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from optics.photon_budget import PhotonBudget
-from optics.receptors import receptors_of
+from optics.spectra.photon_budget import PhotonBudget
+from optics.spectra.receptors import receptors_of
 
 if TYPE_CHECKING:
     from optics import Eye, Pupil

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from optics import Eye, SpectralBands, Spectrum, receptors_of
-from optics.spectrum import daylight
+from optics.spectra.bands import daylight
 from sim.scene.mirror import MirrorWarning
 from sim.world import World
 

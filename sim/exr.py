@@ -124,7 +124,7 @@ def preview(radiance: np.ndarray, wavelengths_nm: np.ndarray) -> np.ndarray:
 
     A band counts for the wavelengths nearer to it than to the next; with few bands the colours are rough.
     """
-    from optics.spectrum import cie_1931, daylight
+    from optics.spectra.bands import cie_1931, daylight
 
     order = np.argsort(wavelengths_nm)
     nm = np.clip(np.asarray(wavelengths_nm, float)[order], 360.0, 780.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from optics import Eye
-from optics.receptors import Receptors
+from optics.spectra.receptors import Receptors
 from sim.color import encode_srgb
 
 SIZE = (240, 960)  # pixels that the pictures of all eyes fill at most, if a receptor needs no more than one

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from optics.tabulated import Spectrum
+from optics.spectra.spectrum import Spectrum
 
 CELL = 2.0  # [m] side of a grid cell
 WALL_HEIGHT = 1.0  # [m]: as high as the objects; a receptor row of 11° sees nothing but wall up to 8 m away

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from optics.tabulated import Spectrum, daylight
+from optics.spectra.spectrum import Spectrum, daylight
 from sim.color import encode_srgb
 from sim.exr import preview
 

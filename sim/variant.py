@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import mitsuba as mi
 
-from optics import backend
+from optics.numerics import backend
 
 DEFAULT_VARIANT = "llvm_ad_spectral"
 

@@ -10,7 +10,7 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
-from optics.tabulated import Spectrum
+from optics.spectra.spectrum import Spectrum
 from sim.agent import Eyes
 from sim.eye_images import side_by_side
 from sim.fidelity import Fidelity

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from optics.tabulated import Spectrum
+from optics.spectra.spectrum import Spectrum
 from sim import materials
 from sim.agent import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.alone import AgentAlone

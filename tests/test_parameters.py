@@ -26,7 +26,7 @@ from evolve.genes import LAMBDA_MAX
 from evolve.genotype import GENES, Genotype
 from evolve.loop import evolve as carry
 from evolve.store import Run
-from optics import backend
+from optics.numerics import backend
 
 # One training of two updates and one evaluation episode, through a perfect lens: about a second.
 SMALL = (

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 import optics
-from optics.planner import METHODS
+from optics.point_spread.planner import METHODS
 from validation.cases import WAVELENGTH, Case, draw_case
 from validation.page import Page, parser
 from validation.reference import relative_l2

@@ -29,7 +29,7 @@ import numpy as np
 
 import optics
 from optics import Pupil, RefractiveIndex
-from optics.spectrum import daylight, pigment_absorptance
+from optics.spectra.bands import daylight, pigment_absorptance
 from validation.page import Page, parser
 from validation.reference import circular_aperture_on_axis, ideal_lens_field, plane_wave, relative_l2
 

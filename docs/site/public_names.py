@@ -1,7 +1,7 @@
 """Public names for the reference: packages load lazily, so that griffe, which reads source, finds no imports in them.
 
 Their tables of contents (`_CONTENTS`, `_HOME`: name to module) become aliases: `::: optics.psf` then finds
-optics.point_spread.psf.
+optics.point_spread.psf.psf.
 """
 
 from __future__ import annotations

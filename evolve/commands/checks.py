@@ -7,7 +7,7 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from optics import backend
+from optics.numerics import backend
 
 __all__ = ["doctor", "validate"]
 

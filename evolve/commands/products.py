@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from evolve.store import Run
-from optics import backend
+from optics.numerics import backend
 
 __all__ = ["export", "replay", "report"]
 

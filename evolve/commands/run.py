@@ -24,7 +24,7 @@ from evolve.search import Search
 from evolve.store import Run, next_directory
 from evolve.versions import altered, present, record_start, recorded
 from evolve.worker import evaluate_candidate, prepare_device
-from optics import backend
+from optics.numerics import backend
 
 __all__ = ["resume", "start"]
 

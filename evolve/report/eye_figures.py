@@ -18,9 +18,9 @@ from evolve.development import Phenotype
 from evolve.report.markup import KEY, figure, number
 from evolve.report.svg import drawing, inline
 from evolve.report.theme import ACCENT, INK, MUTED, VERMILLION
-from optics.description import noise_of
-from optics.precision import precision
-from optics.spectrum import daylight
+from optics.eye.summary import noise_of
+from optics.numerics.precision import precision
+from optics.spectra.bands import daylight
 
 __all__ = ["eye_figures", "relief_heights"]
 

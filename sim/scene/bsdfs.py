@@ -15,7 +15,7 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from optics.tabulated import Spectrum
+from optics.spectra.spectrum import Spectrum
 from sim.color import decode_srgb
 from sim.scene import spectra, surfaces
 

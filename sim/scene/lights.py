@@ -19,7 +19,7 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from optics.tabulated import Spectrum, daylight
+from optics.spectra.spectrum import Spectrum, daylight
 from sim.color import decode_srgb
 from sim.scene import sky, surfaces
 from sim.scene.spectra import HEADLIGHT, Spectra, described, in_daylight

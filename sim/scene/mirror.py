@@ -15,7 +15,7 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from optics.tabulated import Spectrum
+from optics.spectra.spectrum import Spectrum
 from sim.scene import bsdfs, cameras, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
 from sim.scene.spectra import of_geom, resolve

@@ -14,7 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from optics.tabulated import LIMITS_NM, Spectrum, daylight, illuminant, reflectance
+from optics.spectra.spectrum import LIMITS_NM, Spectrum, daylight, illuminant, reflectance
 
 HEADLIGHT = "headlight"
 Spectra = Mapping[str, Spectrum]

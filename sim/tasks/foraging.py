@@ -12,7 +12,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from optics.tabulated import LIMITS_NM, Spectrum
+from optics.spectra.spectrum import LIMITS_NM, Spectrum
 from sim import materials
 from sim.layout import Layout
 from sim.tasks.detection import STRIPES, furnished_field

@@ -211,8 +211,8 @@ def test_relief_may_have_more_points_and_keeps_the_presets_surface():
     import optics
     from evolve.development import develop
     from evolve.genotype import Genotype
-    from optics import backend
-    from optics.precision import precision
+    from optics.numerics import backend
+    from optics.numerics.precision import precision
 
     backend.require()
 

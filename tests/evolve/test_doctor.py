@@ -5,7 +5,7 @@ import json
 import pytest
 
 from evolve import doctor
-from optics import backend
+from optics.numerics import backend
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from evolve.fitness import evaluate
 from evolve.genotype import Genotype
 from evolve.plan import Plan
 from evolve.remarks import idle_genes, idle_starts, remarks
-from optics import backend
+from optics.numerics import backend
 
 PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
 

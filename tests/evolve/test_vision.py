@@ -10,7 +10,7 @@ from evolve.config_source import assemble
 from evolve.development import develop
 from evolve.genotype import Genotype
 from evolve.vision import ssim, vision
-from optics import backend
+from optics.numerics import backend
 
 CONFIG = assemble("detection", "quick")
 

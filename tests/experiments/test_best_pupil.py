@@ -7,7 +7,7 @@ import pytest
 
 from experiments.best_pupil import RESOLUTION, SCENE, Row, best, computed, measures, page, rayleigh
 from experiments.store import Origin, read_rows
-from optics import backend
+from optics.numerics import backend
 
 RESULTS = Path(__file__).parents[2] / "docs/results"
 

@@ -21,7 +21,8 @@ from experiments.evolved import Conduct, Store, main
 from experiments.glass import relief_of
 from experiments.means import last_mean
 from experiments.store import Origin, write_rows
-from optics import Pupil, backend
+from optics import Pupil
+from optics.numerics import backend
 
 
 @pytest.fixture(autouse=True)

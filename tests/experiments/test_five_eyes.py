@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import experiments.five_eyes as five
-from optics import backend
+from optics.numerics import backend
 
 
 @pytest.fixture(scope="module")

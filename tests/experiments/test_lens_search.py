@@ -9,7 +9,8 @@ import experiments.lens_search as lens_search
 from experiments.lens_search import RELIEF_HEIGHT, Row, gradient, loss, searched, strehl
 from experiments.lens_search_page import found_after, page
 from experiments.store import Origin, read_rows
-from optics import BSplineRelief, backend
+from optics import BSplineRelief
+from optics.numerics import backend
 
 RESULTS = Path(__file__).parents[2] / "docs/results"
 

@@ -4,9 +4,9 @@ import numpy as np
 
 import optics
 from optics import BSplineRelief, Grid, PointSource, Pupil
-from optics.beam import Beam
-from optics.planner import choose
-from optics.point_spread import problem
+from optics.elements.beam import Beam
+from optics.point_spread.planner import choose
+from optics.point_spread.psf import problem
 from validation.reference import relative_l2
 
 KINDS = ("flat", "lens", "defocus", "relief")

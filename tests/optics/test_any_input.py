@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 import optics
 from optics import AccuracyError, Annulus, BSplineRelief, Circle, Pupil, RefractiveIndex
-from optics.planner import APPROXIMATE, METHODS
-from optics.polygonal import Polygon, Slit
+from optics.apertures.polygonal import Polygon, Slit
+from optics.point_spread.planner import APPROXIMATE, METHODS
 from validation.reference import relative_l2
 
 SLOW = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]

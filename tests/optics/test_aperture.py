@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from scipy.special import j0, j1
 
-from optics.circular import Annulus, Circle
-from optics.polygonal import Polygon, Slit
-from optics.precision import precision
-from optics.quadrature import gauss_legendre
+from optics.apertures.circular import Annulus, Circle
+from optics.apertures.polygonal import Polygon, Slit
+from optics.numerics.precision import precision
+from optics.numerics.quadrature import gauss_legendre
 from validation.reference.apertures import annulus_spectrum, disk_spectrum, polygon_spectrum, rectangle_spectrum
 
 TYPES = precision("float64")

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from optics import backend
+from optics.numerics import backend
 
 
 @pytest.fixture(autouse=True)

@@ -30,7 +30,7 @@ def test_equals_one_by_one():
 def test_carries_derivatives():
     import drjit as dr
 
-    from optics.precision import precision
+    from optics.numerics.precision import precision
 
     def total(radius):
         batch = optics.psf_batch(

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.special import j0
 
-from optics.bessel import bessel_j0
-from optics.precision import precision
+from optics.numerics.bessel import bessel_j0
+from optics.numerics.precision import precision
 
 
 # Rounding of the phase grows with x in float64 too: 2π x 1000 cycles have an ulp of 1e-12.

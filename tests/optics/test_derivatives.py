@@ -5,7 +5,7 @@ import pytest
 
 import optics
 from optics import BSplineRelief, Pupil
-from optics.precision import precision
+from optics.numerics.precision import precision
 
 WAVELENGTH, SHAPE = 550e-9, (17, 15)
 # Whole waves of defocus, an index step and a source nearby: every parameter moves the picture.

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from optics import BSplineRelief, HeightMap
-from optics.precision import precision
+from optics.numerics.precision import precision
 
 TYPES = precision("float64")
 

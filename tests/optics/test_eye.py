@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optics import AccuracyError, BSplineRelief, Eye, Pupil
-from optics.spectrum import daylight
+from optics.spectra.bands import daylight
 
 S = 4  # cells per receptor
 

@@ -14,7 +14,7 @@ START = {"radius": 1.0, "relief": 1.0, "n": 1.0, "z": 1.0, "fov": 1.0}
 
 
 def types():
-    from optics.precision import precision
+    from optics.numerics.precision import precision
 
     return precision("float64")
 

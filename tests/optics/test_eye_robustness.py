@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from optics import Eye, PhotonBudget, Pupil
-from optics.spectrum import SpectralBands
+from optics.spectra.bands import SpectralBands
 
 QUIETLY = settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 ODD = [0, -1, 0.5, math.nan, math.inf, -math.inf, 1e-300, 1e300, "auto", "much", None, (1, 2), [], b"x"]

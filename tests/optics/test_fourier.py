@@ -4,9 +4,9 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from optics import fourier
-from optics.field import Field
-from optics.precision import precision
+from optics.numerics import fourier
+from optics.numerics.field import Field
+from optics.numerics.precision import precision
 
 CASES = [((5, 6), 8, (4, 3)), ((7, 8), 12, (12, 12)), ((17, 20), 6, (5, 6)), ((9, 4), 5, (13, 11)), ((6, 6), 6, (6, 6))]
 

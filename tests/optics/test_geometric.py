@@ -103,7 +103,7 @@ class TestPinhole:
         assert plan.method != "pinhole"
 
     def test_derivatives_are_refused(self):
-        from optics.precision import precision
+        from optics.numerics.precision import precision
 
         distance = precision("float64").Float64(240e-6)
         import drjit as dr

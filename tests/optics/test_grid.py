@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from optics import Grid
-from optics.precision import precision
+from optics.numerics.precision import precision
 
 
 @pytest.mark.parametrize("shape", [(4, 7), (5, 2), (1, 1)])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from optics.imaging import blur, centred, receptor_average
-from optics.precision import precision
+from optics.eye.retinal_image import blur, centred, receptor_average
+from optics.numerics.precision import precision
 
 
 def blurred(scene, kernel, shape=None):

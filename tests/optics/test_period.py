@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import optics
-from optics.free_space import EVERYTHING, Passage
-from optics.grid import Grid
-from optics.period import blurred_back, sampling
+from optics.numerics.grid import Grid
+from optics.propagation.sampling import blurred_back, sampling
+from optics.propagation.transfer_function import EVERYTHING, Passage
 
 WAVELENGTH = 550e-9
 # [m] of room: blur falls to a fifth (disk near the window) ... a thirtieth of what it is with next to none, which moves

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from optics import Eye, PhotonBudget, Pupil
-from optics.spectrum import SpectralBands, daylight, pigment_absorptance
+from optics.spectra.bands import SpectralBands, daylight, pigment_absorptance
 
 BRIGHT = PhotonBudget(illuminance=1e4, integration_time=0.02, quantum_efficiency=0.5)
 

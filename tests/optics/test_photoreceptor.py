@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from optics.photoreceptor import gaussian_noise, photon_noise, quantum_catch, throughput
-from optics.precision import precision
+from optics.eye.photoreceptor import gaussian_noise, photon_noise, quantum_catch, throughput
+from optics.numerics.precision import precision
 
 
 def test_throughput_is_the_area():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from optics import Pigment
-from optics.pigment import pigment_absorptance
+from optics.spectra.pigment import pigment_absorptance
 
 NM = np.arange(300.0, 780.0, 0.1)
 

@@ -5,7 +5,7 @@ import pytest
 
 import optics
 from optics import AccuracyError, Annulus, Circle, PixelRelief, Polygon, Pupil, Slit
-from optics.precision import precision
+from optics.numerics.precision import precision
 from validation import reference
 
 WAVELENGTH = 550e-9

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from optics import Annulus, Circle, Polygon, Slit
-from optics.pixels import PixelatedAperture
+from optics.apertures.pixelated import PixelatedAperture
 
 OPENINGS = {
     "circle": Circle(),

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from optics import AccuracyError, BSplineRelief, Grid, PointSource, Pupil
-from optics.beam import Beam
-from optics.planner import APPROXIMATE, EXACT, METHODS, choose
-from optics.point_spread import problem
+from optics.elements.beam import Beam
+from optics.point_spread.planner import APPROXIMATE, EXACT, METHODS, choose
+from optics.point_spread.psf import problem
 
 
 def problem_of(pupil, distance, window, tolerance, **more):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from optics.circular import Annulus, Circle
-from optics.polygonal import Polygon, Slit
-from optics.precision import precision
-from optics.triangles import triangles
+from optics.apertures.circular import Annulus, Circle
+from optics.apertures.polygonal import Polygon, Slit
+from optics.apertures.triangulation import triangles
+from optics.numerics.precision import precision
 
 TYPES = precision("float64")
 U_SHAPE = [(-0.6, -0.6), (0.6, -0.6), (0.6, 0.6), (0.4, 0.6), (0.4, -0.4), (-0.4, -0.4), (-0.4, 0.6), (-0.6, 0.6)]

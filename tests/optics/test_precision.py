@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from optics.precision import with_room
+from optics.numerics.precision import with_room
 
 
 def test_memory_goes_on_after_the_last_number():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optics import BSplineRelief, HeightMap, PointSource, Pupil, RefractiveIndex
-from optics.precision import precision
+from optics.numerics.precision import precision
 
 TYPES = precision("float64")
 X, Y = np.random.default_rng(0).uniform(-30e-6, 30e-6, (2, 50))

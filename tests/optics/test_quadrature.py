@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from optics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
+from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
 
 
 @pytest.mark.parametrize("digits", [1, 3, 8, 12])

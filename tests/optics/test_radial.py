@@ -7,7 +7,7 @@ import pytest
 
 import optics
 from optics import Pupil
-from optics.radial import RadialLine
+from optics.numerics.radial_profile import RadialLine
 from validation.reference import circular_aperture_on_axis, ideal_lens_field, relative_l2
 
 

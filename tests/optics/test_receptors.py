@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optics import Eye, PhotonBudget, Pigment, Pupil, Receptors, Spectrum, receptors_of
-from optics.spectrum import SpectralBands, daylight, pigment_absorptance
+from optics.spectra.bands import SpectralBands, daylight, pigment_absorptance
 
 BAYER = ((0, 1), (1, 2))
 
@@ -160,7 +160,7 @@ def test_derivatives_flow_through_a_mosaic():
     """d signal / d radius of every receptor's own type, backwards, against central differences (error O(step⁴))."""
     import drjit as dr
 
-    from optics.precision import precision
+    from optics.numerics.precision import precision
 
     types, step = precision("float64"), 2e-3
     kinds = receptors_of("honeybee").arranged(BAYER)

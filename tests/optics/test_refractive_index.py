@@ -5,7 +5,7 @@ import math
 import pytest
 
 from optics import RefractiveIndex
-from optics.refractive_index import LINE_C, LINE_D, LINE_F
+from optics.elements.refractive_index import LINE_C, LINE_D, LINE_F
 
 
 def test_constant_index():

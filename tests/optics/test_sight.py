@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from optics import AccuracyError, BSplineRelief, Eye, Pupil
-from optics.eye import LIGHT_FROM
-from optics.ladder import Ladder, checks, hats, worst_difference
-from optics.sight import Sight
+from optics.eye.eye import LIGHT_FROM
+from optics.eye.kernel_bank import Sight
+from optics.eye.kernel_interpolation import Ladder, checks, hats, worst_difference
 
 S = 2
 NEAR, FAR = 0.6e-3, 5e-3

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.special import j0
 
-from optics.quadrature import gauss_legendre
-from optics.soft_edge import SoftEdge, kaiser_beta
+from optics.apertures.soft_edge import SoftEdge, kaiser_beta
+from optics.numerics.quadrature import gauss_legendre
 
 
 def spectrum(edge, f):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optics import PointSource
-from optics.precision import precision
+from optics.numerics.precision import precision
 
 TYPES = precision("float64")
 X, Y = np.random.default_rng(0).uniform(-50e-6, 50e-6, (2, 50))

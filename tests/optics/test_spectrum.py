@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from optics import Eye, illuminant, reflectance
-from optics.receptors import receptors_of
-from optics.spectrum import SpectralBands, cie_1931, daylight, pigment_absorptance
+from optics.spectra.bands import SpectralBands, cie_1931, daylight, pigment_absorptance
+from optics.spectra.receptors import receptors_of
 
 
 @pytest.mark.filterwarnings("ignore")

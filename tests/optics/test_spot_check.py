@@ -5,11 +5,11 @@ import pytest
 
 import optics
 from optics import Grid, PointSource, Pupil
-from optics.beam import Beam
-from optics.direct_sum import cached_nodes
-from optics.planner import choose
-from optics.point_spread import problem
-from optics.spot_check import CAUTION, spot_check
+from optics.elements.beam import Beam
+from optics.methods.rayleigh_sommerfeld import cached_nodes
+from optics.point_spread.planner import choose
+from optics.point_spread.psf import problem
+from optics.point_spread.spot_check import CAUTION, spot_check
 
 
 def picture(shape, dx, tolerance=1e-4):

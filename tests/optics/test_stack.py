@@ -168,7 +168,7 @@ def test_free_space_has_a_length():
 def test_derivatives_are_refused_not_dropped():
     import drjit as dr
 
-    from optics.precision import precision
+    from optics.numerics.precision import precision
 
     radius = precision("float64").Float64(1e-5)
     dr.enable_grad(radius)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-import optics.table
-from optics.precision import precision
-from optics.table import Table
+import optics.numerics.interpolation
+from optics.numerics.interpolation import Table
+from optics.numerics.precision import precision
 
 TYPES = precision("float64")
 PLACES = np.linspace(-1.2, 1.2, 4001)
@@ -29,7 +29,9 @@ def test_as_exact_as_asked(error):
 def test_sixth_order():
     def error(n):
         h = 2 / (n - 1)
-        samples = step(-1 + h * np.arange(-optics.table.MARGIN, n + optics.table.MARGIN))
+        samples = step(
+            -1 + h * np.arange(-optics.numerics.interpolation.MARGIN, n + optics.numerics.interpolation.MARGIN)
+        )
         return np.abs(values(Table(-1.0, h, samples)) - step(PLACES)).max()
 
     assert np.log2(error(101) / error(201)) == pytest.approx(6, abs=0.3)

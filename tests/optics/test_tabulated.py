@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from optics import Spectrum, illuminant, reflectance
-from optics.tabulated import ILLUMINANTS, REFLECTANCES, cie_1931, cone_fundamentals, daylight
+from optics.spectra.spectrum import ILLUMINANTS, REFLECTANCES, cie_1931, cone_fundamentals, daylight
 
 VISIBLE = np.arange(380.0, 781.0, 5.0)
 

@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from optics.spectrum import daylight
+from optics.spectra.bands import daylight
 from sim.exr import ExrError, View, preview, read_exr, write_exr
 
 NM = np.array([410.0, 450.125, 1640 / 3, 690.0])

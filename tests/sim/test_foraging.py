@@ -7,8 +7,8 @@ import pytest
 
 import optics
 import sim
-from optics.spectrum import SpectralBands
-from optics.tabulated import ILLUMINANTS, illuminant
+from optics.spectra.bands import SpectralBands
+from optics.spectra.spectrum import ILLUMINANTS, illuminant
 from sim.picture import pose
 from sim.simulation import Simulation
 from sim.tasks.foraging import ULTRAVIOLET, petal

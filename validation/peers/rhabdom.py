@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import optics
-from optics.planner import EXACT
+from optics.point_spread.planner import EXACT
 from validation.peers.problem import WAVELENGTH, Case, Run, SampleGrid
 
 __all__ = ["TOLERANCES", "plain_angular_spectrum", "psf_runs"]

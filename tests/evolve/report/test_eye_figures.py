@@ -10,7 +10,7 @@ from evolve.episode import record
 from evolve.report.eye_figures import Light, diffraction_limit, relief_heights
 from evolve.report.views import through
 from evolve.store import Run
-from optics.spectrum import daylight
+from optics.spectra.bands import daylight
 
 
 def test_noise_free_view_is_what_the_animal_sees(run):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sim
-from optics.tabulated import daylight
+from optics.spectra.spectrum import daylight
 from sim.color import decode_srgb
 from sim.scene.cameras import Viewpoint
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sim
-from optics.spectrum import daylight
+from optics.spectra.bands import daylight
 from sim.color import decode_srgb
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import MirrorWarning

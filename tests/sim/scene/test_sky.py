@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import sim
-from optics.tabulated import daylight
+from optics.spectra.spectrum import daylight
 from sim.color import encode_srgb
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import MirrorWarning

@@ -6,7 +6,7 @@ import pytest
 
 import sim
 from optics import Spectrum, illuminant, reflectance
-from optics.tabulated import daylight
+from optics.spectra.spectrum import daylight
 from sim.scene.cameras import Viewpoint
 
 NM = np.array([310.0, 352.5, 387.0, 450.0, 556.0, 640.0, 770.0])

@@ -1,0 +1,128 @@
+"""An aperture's face: its shape, softened so that a grid can carry it, or as edge-fitted quadrature nodes.
+
+A hard edge has no band limit: sampled on a Cartesian grid, its error falls only like N⁻¹ to N⁻¹·⁵. Here the aperture is
+convolved with a low-pass kernel of compact support (optics.apertures.soft_edge), so that sums over samples (the trapezoid rule)
+converge as fast as the kernel's side lobes fall. The function is 1 or 0 except within `reach` of the edge.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.apertures.outline import Outline
+from optics.apertures.soft_edge import SoftEdge
+from optics.numerics.arguments import LARGEST, in_range, positive
+from optics.numerics.precision import Precision
+
+__all__ = ["EDGE_REACH", "Aperture", "Nodes", "SoftAperture"]
+
+# The soft edge reaches at most this far beyond the aperture, in radii.
+EDGE_REACH = 0.25
+
+
+class SoftAperture(ABC):
+    """An aperture whose edge a grid can carry. Lengths in units of the pupil's radius R, frequencies in cycles per R.
+
+    Its spectrum is the aperture's own up to `passband` and vanishes beyond `stopband`, to `ripple`; further than
+    `reach` from the edge it is 1 or 0.
+    """
+
+    edge: SoftEdge
+
+    @property
+    def passband(self) -> float:
+        return self.edge.passband
+
+    @property
+    def stopband(self) -> float:
+        return self.edge.stopband
+
+    @property
+    def ripple(self) -> float:
+        return self.edge.ripple
+
+    @property
+    def reach(self) -> float:
+        return self.edge.reach
+
+    @property
+    def seconds_per_point(self) -> float:
+        """What `transmittance` takes for a point, roughly."""
+        return 1e-8
+
+    @abstractmethod
+    def transmittance(self, x: Any, y: Any, types: Precision) -> Any:
+        """At points (x, y), flat Dr.Jit Float64 arrays; differentiable in both."""
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Quadrature nodes x, y and weights over an aperture: flat float64 arrays, in units of R and R²."""
+
+    x: np.ndarray
+    y: np.ndarray
+    weight: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.weight)
+
+
+class Aperture(ABC):
+    """An opening in an opaque screen, within the unit circle: lengths are in units of the pupil's radius R."""
+
+    @property
+    @abstractmethod
+    def area(self) -> float:
+        """In R²."""
+
+    @property
+    @abstractmethod
+    def rotationally_symmetric(self) -> bool:
+        """Whether the aperture is the same seen from every side."""
+
+    @property
+    @abstractmethod
+    def half_widths(self) -> tuple[float, float]:
+        """Half the width and height of the smallest centred rectangle that holds the aperture."""
+
+    @property
+    @abstractmethod
+    def outline(self) -> Outline:
+        """Its edge."""
+
+    @abstractmethod
+    def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Which points lie within the aperture."""
+
+    def nodes(self, cycles: float, digits: float) -> Nodes:
+        """Nodes whose sum is good to 10^-digits of the area, for integrands of at most `cycles` cycles per R.
+
+        That bounds the local frequency in any direction, everywhere; a varying amplitude needs a share of it too.
+
+        Raises:
+            ValueError: cycles outside [0, 1e5] or digits outside [0, 16].
+        """
+        return self._nodes(in_range("cycles", cycles, 0.0, 1e5), in_range("digits", digits, 0.0, 16.0))
+
+    def soften(self, passband: float, ripple: float, widest_reach: float = EDGE_REACH) -> SoftAperture:
+        """The aperture, low-passed from `passband` [cycles per R] on with the transition that costs fewest samples.
+
+        Raises:
+            ValueError: passband negative, ripple outside [1e-13, 0.5], or widest_reach not positive.
+        """
+        in_range("passband", passband, 0.0, LARGEST)
+        in_range("ripple", ripple, 1e-13, 0.5)
+        positive("widest_reach", widest_reach, "pupil radii")
+        return self._softened(SoftEdge.cheapest(passband, ripple, widest_reach, self.half_widths))
+
+    @abstractmethod
+    def _nodes(self, cycles: float, digits: float) -> Nodes:
+        """Edge-fitted nodes."""
+
+    @abstractmethod
+    def _softened(self, edge: SoftEdge) -> SoftAperture:
+        """The aperture convolved with the edge's kernel."""

@@ -1,0 +1,196 @@
+"""Quadrature over an opening that square pixels tile, for integrands that jump from one pixel to the next.
+
+Whole pixels have Gauss-Legendre nodes. Those that the opening's edge cuts are divided where the edge enters and leaves
+them, into panels with smooth ends: exact edge, spectral convergence (`PixelatedAperture.nodes`). Where nodes must lie
+on a grid of rows and columns, cut pixels have the nodes of whole ones, with the weights that integrate the
+interpolating polynomial over what is left of them (`PixelatedAperture.weights`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import pairwise
+from math import ceil, log10, pi
+
+import numpy as np
+
+from optics.apertures.aperture import Aperture, Nodes, SoftAperture
+from optics.apertures.outline import Outline
+from optics.apertures.soft_edge import SoftEdge
+from optics.chebyshev import lagrange
+from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
+
+__all__ = ["PixelatedAperture"]
+
+EDGE_DEGREE = 4  # more than the digits asked for: of the polynomials that a curved edge is to these digits
+ROUNDING = 1e-12
+STEEPNESS = 3.0  # of panels' lengths beside a square root
+MOMENT_DIGITS = 8.0  # of what is left of a cut pixel
+MOST_NODES = 32  # along a pixel: beyond, what is left of pixels that the edge cuts is a matter of too many moments
+
+
+@dataclass(frozen=True)
+class PixelatedAperture(Aperture):
+    """An opening over which a wave jumps at the borders of count x count square pixels that fill [-1, 1]²."""
+
+    opening: Aperture
+    count: int
+
+    @property
+    def area(self) -> float:
+        return self.opening.area
+
+    @property
+    def rotationally_symmetric(self) -> bool:
+        return False
+
+    @property
+    def half_widths(self) -> tuple[float, float]:
+        return self.opening.half_widths
+
+    @property
+    def outline(self) -> Outline:
+        return self.opening.outline
+
+    def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return self.opening.contains(x, y)
+
+    def nodes_across(self, cycles: float, digits: float) -> int | None:
+        """Of each pixel, so that rows and columns of nodes are as good as `nodes`; None where they are too many."""
+        share = min(1.0, len(self._cut) * self._pitch**2 / self.area)  # all that interpolation counts for
+        turns = np.array(pi * cycles * self._pitch)
+        across = max(
+            gauss_legendre_count(cycles * self._pitch, digits + 0.3),
+            int(harmonics(turns, max(digits + 0.3 + log10(share), 0.3))) if share else 1,
+        )
+        return across if across <= MOST_NODES else None
+
+    def rows(self, across: int) -> np.ndarray:
+        """Places of rows and of columns of nodes, ascending, in units of R, (count x across,)."""
+        u, _ = gauss_legendre(across)
+        return (self._centres[:, None] + (u - 0.5) * self._pitch).ravel()
+
+    def weights(self, across: int) -> np.ndarray:
+        """Of the nodes [R²], (row, column)."""
+        return _weights(self, across)
+
+    @cached_property
+    def _pitch(self) -> float:
+        return 2 / self.count
+
+    @cached_property
+    def _centres(self) -> np.ndarray:
+        centres: np.ndarray = (np.arange(self.count) + 0.5) * self._pitch - 1
+        return centres
+
+    @cached_property
+    def _near(self) -> np.ndarray:
+        """Which pixels the edge may cut, (row, column)."""
+        return self.outline.near(self._centres[None, :], self._centres[:, None], self._pitch / 2)
+
+    @cached_property
+    def _whole(self) -> np.ndarray:
+        """Which pixels lie inside, (row, column)."""
+        return self.contains(self._centres[None, :], self._centres[:, None]) & ~self._near
+
+    @cached_property
+    def _cut(self) -> np.ndarray:
+        """(row, column) of each pixel that may be cut."""
+        return np.argwhere(self._near)
+
+    def _nodes(self, cycles: float, digits: float) -> Nodes:
+        u, weight = gauss_legendre(gauss_legendre_count(cycles * self._pitch, digits + 0.3))
+        row, column = np.nonzero(self._whole)
+        along, across = (self._centres[place][:, None, None] for place in (row, column))
+        offset = (u - 0.5) * self._pitch
+        shape = len(row), len(u), len(u)
+        parts = [
+            (
+                np.broadcast_to(across + offset, shape).ravel(),
+                np.broadcast_to(along + offset[:, None], shape).ravel(),
+                np.broadcast_to(np.outer(weight, weight) * self._pitch**2, shape).ravel(),
+            ),
+            *(piece for at in self._cut for piece in self._pieces(at, cycles, digits)),
+        ]
+        x, y, size = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return Nodes(x, y, size)
+
+    def _pieces(
+        self, at: np.ndarray, cycles: float, digits: float, degree: int = 0
+    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """x, y and weights over each panel of the part of a cut pixel that is inside, for a wave times a polynomial of
+        this degree in either direction."""
+        bottom, left = self._centres[at] - self._pitch / 2
+        top, right = bottom + self._pitch, left + self._pitch
+        outline = self.outline
+        within = np.concatenate([outline.turning, outline.heights(left), outline.heights(right)])
+        ends = np.unique([bottom, top, *within[(within > bottom) & (within < top)]])
+        for low, high in pairwise(_graded(ends, outline.tangent)):
+            if high - low < ROUNDING:
+                continue
+            # Where the edge slants, nodes slide along it, and the wave turns by as much more.
+            inner = low + (high - low) * np.array([1e-6, 1 - 1e-6])
+            slide = np.abs(np.diff(np.clip(outline.crossings(inner), left, right), axis=0)).max(initial=0.0)
+            turns = cycles * float(np.hypot(slide, high - low))
+            y, weight = _panel(low, high, outline.tangent, turns, digits, 2 * degree + EDGE_DEGREE + ceil(digits))
+            sides = np.clip(outline.crossings(y), left, right)
+            u, share = gauss_legendre(gauss_legendre_count(cycles * self._pitch, digits + 0.3, degree))
+            for start, end in zip(sides.T[::2], sides.T[1::2], strict=True):
+                if not (end > start).any():
+                    continue
+                x = start[:, None] + (end - start)[:, None] * u
+                size = (weight * (end - start))[:, None] * share
+                yield x.ravel(), np.broadcast_to(y[:, None], x.shape).ravel(), size.ravel()
+
+    def _softened(self, edge: SoftEdge) -> SoftAperture:
+        raise TypeError("jumps between pixels have no band limit: a soft edge does not make them fit for a grid")
+
+
+def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+    """Ends of panels, with more of them where a circle's top or bottom is nearer to a panel than the panel is long:
+    polynomials do not follow the square root beside it."""
+    more = []
+    for at in tangent:
+        for low, high in pairwise(ends):
+            gap = max(low - at, at - high)
+            if ROUNDING < gap < high - low:
+                distances = gap * STEEPNESS ** np.arange(
+                    1, 1 + ceil(np.log((gap + high - low) / gap) / np.log(STEEPNESS))
+                )
+                places = at + distances if at < low else at - distances
+                more.append(places[(places > low) & (places < high)])
+    return np.unique(np.concatenate([ends, *more]))
+
+
+def _panel(
+    low: float, high: float, tangent: np.ndarray, cycles: float, digits: float, degree: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Heights and weights between two ends, for a wave of so many cycles between them. Where one is a circle's top or
+    bottom, whose chord begins there like a square root, y goes there like sin²."""
+    span = high - low
+    touching = any(abs(end - at) < ROUNDING for at in tangent for end in (low, high))
+    slower = pi / 2 if touching else 1.0
+    u, weight = gauss_legendre(gauss_legendre_count(slower * cycles, digits + 0.3, ceil(slower * degree)))
+    if not touching:
+        return low + span * u, span * weight
+    return low + span * np.sin(pi * u / 2) ** 2, span * weight * np.sin(pi * u) * pi / 2
+
+
+@lru_cache(maxsize=4)
+def _weights(aperture: PixelatedAperture, across: int) -> np.ndarray:
+    u, weight = gauss_legendre(across)
+    pitch, count = aperture._pitch, aperture.count
+    weights = np.zeros((count, across, count, across))
+    rows, columns = np.nonzero(aperture._whole)
+    weights[rows, :, columns, :] = np.outer(weight, weight) * pitch**2
+    for row, column in aperture._cut:
+        # Exact for the Lagrange polynomials of the nodes, which have degree across - 1 in x and in y.
+        total = np.zeros((across, across))
+        for x, y, size in aperture._pieces(np.array([row, column]), 0.0, MOMENT_DIGITS, across - 1):
+            in_x, in_y = (lagrange((at - aperture._centres[k]) / pitch + 0.5, u) for at, k in ((x, column), (y, row)))
+            total += in_y * size @ in_x.T
+        weights[row, :, column, :] = total
+    side = count * across
+    return weights.reshape(side, side)

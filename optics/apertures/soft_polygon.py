@@ -1,0 +1,147 @@
+"""A polygon convolved with the soft edge's kernel, at any point.
+
+The kernel's share within the triangle of a point and an edge is ∫ G(r) dθ over the angle θ under which the edge is
+seen, G(r) = ∫₀^r g(r') r' dr' and r the distance to the edge. The polygon's transmittance is the sum over its edges
+(angles, and so shares, are negative where the point lies outside an edge). With t along an edge at signed distance d,
+G dθ = d H(r) dt, r² = d² + t², where H = G/r² is smooth; beyond the kernel's reach G = 1/2π, and angles are enough.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import ceil, log10, pi
+from typing import Any
+
+import numpy as np
+
+from optics.apertures.aperture import SoftAperture
+from optics.apertures.soft_edge import SoftEdge
+from optics.numerics.interpolation import Table
+from optics.numerics.precision import Precision, opaque
+from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
+
+__all__ = ["SoftPolygon"]
+
+# Squared length far below any that counts: keeps roots and angles differentiable on an edge or a corner.
+TINY = 1e-40
+
+
+@dataclass(frozen=True, eq=False)
+class SoftPolygon(SoftAperture):
+    """Vertices (n, 2), counterclockwise."""
+
+    edge: SoftEdge
+    vertices: np.ndarray
+
+    @property
+    def seconds_per_point(self) -> float:
+        return len(self.vertices) * 1e-8 * (1 + self.edge.cycles)
+
+    def transmittance(self, x: Any, y: Any, types: Precision) -> Any:
+        import drjit as dr
+
+        along = np.roll(self.vertices, -1, axis=0) - self.vertices
+        length = np.hypot(*along.T)
+        columns = (*self.vertices.T, *(along / length[:, None]).T, length)
+        sides = [types.Float64(np.ascontiguousarray(column)) for column in columns]
+        count = dr.opaque(types.Index, len(length))
+        line = _Line(self.edge, types)
+
+        def add(i: Any, total: Any, x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
+            x0, y0, tx, ty, length = (dr.gather(types.Float64, side, i) for side in sides)
+            d = tx * (y - y0) - ty * (x - x0)
+            start = -(tx * (x - x0) + ty * (y - y0))
+            return i + 1, total + line.between(d, start, start + length), x, y
+
+        width = max(dr.width(x), dr.width(y))
+        state = dr.zeros(types.Index, width), dr.zeros(types.Float64, width), types.Float64(x), types.Float64(y)
+        return dr.while_loop(state, lambda i, total, x, y: i < count, add, max_iterations=-1)[1]
+
+
+class _Line:
+    """What a piece of a line adds: W(d, s) for the piece from the foot of the perpendicular d to a distance s along it.
+
+    Beyond the reach that is an angle; the whole chord within the reach comes from the half-plane's profile, whose line
+    goes on for ever; what ends within the reach is ∫ d H(r) dt.
+    """
+
+    def __init__(self, edge: SoftEdge, types: Precision) -> None:
+        import drjit as dr
+
+        self.types = types
+        self.reach = opaque(types, edge.reach)
+        self.radial, self.straight = _radial_table(edge), _straight_table(edge)
+        # H is even in t, so that half the nodes of an even rule from -s to s are enough.
+        nodes, weights = gauss_legendre(2 * ceil(gauss_legendre_count(2 * edge.cycles, -log10(edge.ripple)) / 2))
+        half = len(nodes) // 2
+        self.nodes, self.weights = types.Float64(2 * nodes[half:] - 1), types.Float64(2 * weights[half:])
+        self.count = dr.opaque(types.Index, half)
+
+    def between(self, d: Any, start: Any, end: Any) -> Any:
+        """From `start` to `end` at the signed distance d, positive inside."""
+        import drjit as dr
+
+        near = dr.abs(d) < self.reach
+        half = dr.sqrt(dr.maximum(self.reach * self.reach - d * d, TINY))
+        zero = dr.zeros(self.types.Float64, dr.width(d))
+        chord = dr.if_stmt((d, zero), near, lambda d, zero: self.straight.at(d, self.types) / 2 - 0.25, _nothing)
+        return self._to(end, d, near, half, chord, zero) - self._to(start, d, near, half, chord, zero)
+
+    def _to(self, s: Any, d: Any, near: Any, half: Any, chord: Any, zero: Any) -> Any:
+        """W(d, s); `chord` is half the whole chord's share and 0 where the line is not near."""
+        import drjit as dr
+
+        within = near & (dr.abs(s) < half)
+        # Selected before they are divided: no lane may divide by 0, for its derivative would be NaN.
+        slope = dr.select(within, 0, dr.select(near, -d, s)) / dr.select(within, 1, dr.select(near, s, d))
+        through = dr.select(within, 0, dr.select(s < 0, -chord, chord))
+        return dr.atan(slope) / (2 * pi) + through + dr.if_stmt((s, d, zero), within, self._integral, _nothing)
+
+    def _integral(self, s: Any, d: Any, zero: Any) -> Any:
+        """∫ d H(r) dt from 0 to s."""
+        import drjit as dr
+
+        types = self.types
+
+        def add(j: Any, total: Any, s: Any, d: Any) -> tuple[Any, Any, Any, Any]:
+            t = s * dr.gather(types.Float64, self.nodes, j)
+            value = self.radial.at(dr.sqrt(d * d + t * t + TINY), types)
+            return j + 1, total + dr.gather(types.Float64, self.weights, j) * value, s, d
+
+        start = dr.zeros(types.Index, dr.width(d)), zero, s, d
+        total = dr.while_loop(start, lambda j, *_: j < self.count, add, max_iterations=-1)[1]
+        return total * s * d
+
+
+def _nothing(*arguments: Any) -> Any:
+    return arguments[-1]
+
+
+@lru_cache(maxsize=64)
+def _radial_table(edge: SoftEdge) -> Table:
+    """H(r) = G(r)/r², G = ∫₀^r g(r') r' dr'."""
+    u, weight = gauss_legendre(int(24 + 4 * edge.cycles + edge.beta))
+
+    def mean(r: np.ndarray) -> np.ndarray:
+        r = np.maximum(np.abs(r), 1e-9 * edge.reach)
+        within = np.minimum(r, edge.reach)
+        return np.asarray(edge.ring(np.outer(within, u)) @ weight * within / (2 * pi * r**2))
+
+    # A little further than the reach, whence the interpolation's outermost samples come.
+    return Table.of(mean, (-1.1 * edge.reach, 1.1 * edge.reach), 2.2 * edge.cycles, edge.ripple / 4)
+
+
+@lru_cache(maxsize=64)
+def _straight_table(edge: SoftEdge) -> Table:
+    """Transmittance at a distance d inside a half-plane: 1 - ∫ g(r) r 2 arccos(d/r) dr from d to the reach."""
+    u, weight = gauss_legendre(int(24 + 4 * edge.cycles + 2 * edge.beta))
+
+    def inside(d: np.ndarray) -> np.ndarray:
+        depth = np.abs(d)[:, None]
+        r = depth + (edge.reach - depth) * np.sin(pi * u / 2) ** 2
+        jacobian = (edge.reach - depth) * np.sin(pi * u) * pi / 2
+        beyond = (jacobian * edge.ring(r) * np.arccos(np.clip(depth / r, 0, 1)) / pi) @ weight
+        return np.where(d < 0, beyond, 1 - beyond)
+
+    return Table.of(inside, (-edge.reach, edge.reach), 2 * edge.cycles, edge.ripple / 4)

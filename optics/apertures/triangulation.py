@@ -1,0 +1,105 @@
+"""Simple polygons: the check that they are, their triangles, and quadrature nodes over a triangle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
+
+__all__ = ["crossing", "kernel_point", "triangle_nodes", "triangles"]
+
+# Relative to the lengths involved: what counts as touching or parallel.
+ROUNDING = 1e-12
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def crossing(vertices: np.ndarray) -> tuple[int, int] | None:
+    """The first two edges that meet other than at a shared end, or None for a simple polygon."""
+    n = len(vertices)
+    along = np.roll(vertices, -1, axis=0) - vertices
+    following = np.roll(along, -1, axis=0)
+    size = np.hypot(*along.T) * np.hypot(*following.T)
+    backwards = (np.abs(_cross(along, following)) <= ROUNDING * size) & (np.sum(along * following, axis=1) < 0)
+    if backwards.any():
+        i = int(np.argmax(backwards))
+        return i, (i + 1) % n
+    for i in range(n - 2):
+        others = slice(i + 2, n if i else n - 1)
+        meets = _meet(vertices[i], along[i], vertices[others], along[others])
+        if meets.any():
+            return i, i + 2 + int(np.argmax(meets))
+    return None
+
+
+def _meet(a: np.ndarray, along: np.ndarray, others: np.ndarray, along_others: np.ndarray) -> np.ndarray:
+    """Which of the other segments share a point with the one from a."""
+    gap = others - a
+    determinant = _cross(along, along_others)
+    parallel = np.abs(determinant) <= ROUNDING * np.hypot(*along) * np.hypot(*along_others.T)
+    safe = np.where(parallel, 1.0, determinant)
+    s, t = _cross(gap, along_others) / safe, _cross(gap, along) / safe
+    cross = (np.abs(s - 0.5) <= 0.5 + ROUNDING) & (np.abs(t - 0.5) <= 0.5 + ROUNDING)
+    on_one_line = np.abs(_cross(gap, along)) <= ROUNDING * np.hypot(*along)
+    ends = gap @ along, (gap + along_others) @ along
+    overlap = on_one_line & (np.maximum(*ends) >= 0) & (np.minimum(*ends) <= along @ along)
+    return np.asarray(np.where(parallel, overlap, cross))
+
+
+def kernel_point(vertices: np.ndarray) -> np.ndarray | None:
+    """The centroid, where it sees the whole counterclockwise polygon, else None."""
+    following = np.roll(vertices, -1, axis=0)
+    twice = _cross(vertices, following)
+    centroid = ((vertices + following) * twice[:, None]).sum(axis=0) / (3 * twice.sum())
+    sees = np.all(_cross(following - vertices, centroid - vertices) > 1e-9)
+    return centroid if sees else None
+
+
+def triangles(vertices: np.ndarray) -> np.ndarray:
+    """(m, 3, 2): a counterclockwise polygon cut into triangles by clipping ears (Meisters 1975)."""
+    left, ears = list(range(len(vertices))), []
+    while len(left) > 3:
+        # Among the ears the one with the shortest cut, so that triangles stay compact.
+        best, shortest = -1, np.inf
+        for k in range(len(left)):
+            a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
+            cut = float(np.hypot(*(vertices[c] - vertices[a])))
+            if cut < shortest and _is_ear(vertices, a, b, c, left):
+                best, shortest = k, cut
+        a, b, c = left[best - 1], left[best], left[(best + 1) % len(left)]
+        ears.append((a, b, c))
+        del left[best]
+    ears.append((left[0], left[1], left[2]))
+    corners = vertices[np.array(ears)]
+    flat = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) > 1e-14
+    return np.asarray(corners[flat])
+
+
+def _is_ear(vertices: np.ndarray, a: int, b: int, c: int, left: list[int]) -> bool:
+    """Whether the triangle a, b, c turns left and holds no other corner."""
+    corner = vertices[[a, b, c]]
+    if _cross(corner[1] - corner[0], corner[2] - corner[1]) < 0:
+        return False
+    others = vertices[[k for k in left if k not in (a, b, c)]]
+    sides = [_cross(corner[(k + 1) % 3] - corner[k], others - corner[k]) >= 0 for k in range(3)]
+    return not np.any(sides[0] & sides[1] & sides[2])
+
+
+def triangle_nodes(corners: np.ndarray, cycles: float, digits: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x, y, weight: Gauss-Legendre from the first corner to the opposite side, and along the lines parallel to it
+    with fewer nodes on the shorter ones (Duffy 1982).
+    """
+    apex, side = corners[0], corners[2] - corners[1]
+    far = max(np.hypot(*(corners[1] - apex)), np.hypot(*(corners[2] - apex)))
+    u, u_weight = gauss_legendre(gauss_legendre_count(cycles * far, digits, degree=1))
+    counts = (harmonics(np.pi * cycles * np.hypot(*side) * u, digits) + 1) // 2
+    twice = abs(_cross(corners[1] - apex, side))
+    rows = []
+    for n, at, weight in zip(counts, u, u_weight, strict=True):
+        v, v_weight = gauss_legendre(int(n))
+        points = apex + at * (corners[1] - apex + v[:, None] * side)
+        rows.append(np.column_stack([points, twice * at * weight * v_weight]))
+    x, y, weight = np.concatenate(rows).T
+    return x, y, weight

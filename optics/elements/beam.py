@@ -1,0 +1,47 @@
+"""Light of one wavelength from a source through a pupil, on its way to a plane behind it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from optics.apertures.aperture import SoftAperture
+from optics.elements.pupil import Pupil
+from optics.elements.source import PointSource
+from optics.numerics.arguments import of_kind
+from optics.numerics.field import Field
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, opaque
+
+__all__ = ["Beam"]
+
+
+@dataclass(frozen=True)
+class Beam:
+    """Light of one vacuum wavelength [m] from a source through a pupil to a plane at `distance` [m].
+
+    Radius, relief, index and distances may be Dr.Jit arrays that carry derivatives.
+    """
+
+    pupil: Pupil
+    source: PointSource
+    wavelength: float
+    distance: Any
+
+    def __post_init__(self) -> None:
+        of_kind("pupil", self.pupil, Pupil, "Pupil(25e-6)")
+
+    @property
+    def radius(self) -> Any:
+        """[m]"""
+        return self.pupil.aperture_radius
+
+    def waves(self, x: Any, y: Any, types: Precision) -> Any:
+        """Optical path in wavelengths at the pupil's points, float64."""
+        return self.pupil.path(x, y, self.wavelength, self.source, types) * opaque(types, 1 / self.wavelength)
+
+    def behind(self, soft: SoftAperture, grid: Grid, types: Precision) -> Field:
+        """Field just behind the pupil, aperture softened."""
+        x, y = grid.coordinates(types)
+        scale = 1 / opaque(types, self.radius)
+        return Field.from_waves(soft.transmittance(x * scale, y * scale, types), self.waves(x, y, types), grid, types)

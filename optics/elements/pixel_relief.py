@@ -1,0 +1,96 @@
+"""Reliefs of square pixels, each as high as it is told: what lithography and spatial light modulators make."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from optics.apertures.aperture import Aperture
+from optics.elements.relief import Relief, square_heights
+from optics.numerics.autodiff import is_tracked
+from optics.numerics.precision import Precision
+
+__all__ = ["PixelRelief"]
+
+REPETITIONS = 32  # of the pixels' frequencies; all beyond have 1/(π² 32) of the light at most
+
+
+@dataclass(frozen=True, eq=False)
+class PixelRelief(Relief):
+    """Heights [m] of n x n square pixels that fill the square [-a, a]²: a diffractive optical element of steps.
+
+    samples: (n, n), (y, x). Of a smooth height h, N levels one step apart, wrapped to one wave in glass of index n,
+        step = wavelength / (n - 1) / N, are `np.round(h / step) % N * step`.
+
+    A Dr.Jit tensor of samples carries derivatives. (Smooth surfaces: `HeightMap`, which joins its samples.)
+
+    Raises:
+        ValueError: not square, empty, or not finite.
+    """
+
+    samples: Any
+    _heights: np.ndarray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        heights = square_heights(self.samples)
+        object.__setattr__(self, "_heights", heights)
+        if not is_tracked(self.samples):
+            object.__setattr__(self, "samples", heights)
+
+    def height(self, x: Any, y: Any, types: Precision) -> Any:
+        import drjit as dr
+
+        n = len(self._heights)
+        known = dr.ravel(self.samples) if is_tracked(self.samples) else self._heights.ravel()
+        column, row = (dr.clip(dr.floor((place + 1) * (n / 2)), 0, n - 1) for place in (x, y))
+        return dr.gather(types.Float64, types.Float64(known), types.Index(row * n + column))
+
+    def bandwidth(self, level: float) -> float:
+        """Jumps have no end of frequencies."""
+        return 0.0 if self._level else math.inf
+
+    def scatter(self, turns: float, opening: Aperture, share: float) -> float:
+        """Spatial frequency [cycles per aperture radius] along x and y beyond which no more than this share of the
+        light goes that fills the opening, `turns` [1/m] waves per height: that of a transform over the pixels, sinc² of
+        a pixel's width at each repetition."""
+        n = len(self._heights)
+        centres = (np.arange(n) + 0.5) * 2 / n - 1
+        x, y = centres[None, :], centres[:, None]
+        inside, reached = opening.contains(x, y), opening.contains(x, y) | opening.outline.near(x, y, 1 / n)
+        if np.ptp(self._heights[reached]) == 0:
+            return 0.0
+        wave = np.where(inside if inside.any() else reached, np.exp(2j * np.pi * turns * self._heights), 0)
+        return max(
+            _reach(np.square(np.abs(np.fft.fft(wave, axis=axis))).sum(axis=1 - axis), share / 2) for axis in (0, 1)
+        )
+
+    @property
+    def knots(self) -> int:
+        return 1
+
+    @property
+    def pixels(self) -> int:
+        """None of which anything is told apart by where all are level, unless derivatives ask about each of them."""
+        return 0 if self._level else len(self._heights)
+
+    @property
+    def rotationally_symmetric(self) -> bool:
+        return self._level
+
+    @property
+    def _level(self) -> bool:
+        return not is_tracked(self.samples) and bool(np.ptp(self._heights) == 0)
+
+
+def _reach(power: np.ndarray, share: float) -> float:
+    """Frequency [cycles per aperture radius] that a share of the power over the pixels' frequencies goes beyond."""
+    n = len(power)
+    order = np.arange(-(n // 2) - n * REPETITIONS, n - n // 2 + n * REPETITIONS)
+    sent = power[order % n] * np.sinc(order / n) ** 2
+    outwards = np.argsort(np.abs(order), kind="stable")
+    beyond = 1 - np.cumsum(sent[outwards]) / power.sum()
+    within = np.flatnonzero(beyond <= share)
+    return float(np.abs(order[outwards[within[0]]]) / 2) if within.size else math.inf

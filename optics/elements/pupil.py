@@ -1,0 +1,201 @@
+"""The pupil: an aperture with a relief and, for validation, an ideal lens."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from optics.apertures.aperture import EDGE_REACH, Aperture
+from optics.apertures.circular import Circle
+from optics.elements.pixel_relief import PixelRelief
+from optics.elements.refractive_index import RefractiveIndex
+from optics.elements.relief import HeightMap, Relief
+from optics.elements.source import PointSource
+from optics.numerics.arguments import finite, in_range, of_kind, positive, reals
+from optics.numerics.autodiff import is_tracked, number
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, opaque, precision
+
+__all__ = ["Pupil", "Slopes"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pupil:
+    """Transmittance A(x, y) exp(ik (n - medium_n) h(x, y)), thin-element model.
+
+    aperture_radius: R [m].
+    height: None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (see HeightMap); or a Relief, such
+        as PixelRelief for one of steps.
+    n: refractive index of the relief, constant or dispersive.
+    medium_n: index of what surrounds the pupil, on both sides.
+    thin_lens_focal_length: adds an ideal lens exp(-ik(√(r² + f²) - f)) [m]; negative diverges.
+    aperture: its shape within the circle of radius R: Circle (default), Annulus, Polygon, Slit.
+
+    Radius, height, n and focal length may be Dr.Jit arrays (a height map: a tensor): derivatives flow through them.
+
+    Raises:
+        ValueError: names argument, value and valid range.
+    """
+
+    aperture_radius: Any
+    height: Any = None
+    n: Any = 1.5
+    medium_n: float = 1.0
+    thin_lens_focal_length: Any = None
+    aperture: Aperture = field(default_factory=Circle)
+
+    def __post_init__(self) -> None:
+        positive("aperture_radius", self.aperture_radius)
+        in_range("medium_n", self.medium_n, 1.0, 10.0)
+        if not isinstance(self.n, RefractiveIndex):
+            in_range("n", self.n, 1.0, 10.0)
+            object.__setattr__(self, "n", RefractiveIndex(self.n))
+        of_kind("aperture", self.aperture, Aperture, "Circle()")
+        if self.height is not None and not isinstance(self.height, Relief):
+            height = self.height if is_tracked(self.height) else reals("height", self.height)
+            object.__setattr__(self, "height", HeightMap(height))
+        if self.thin_lens_focal_length is not None:
+            positive("abs(thin_lens_focal_length)", abs(finite("thin_lens_focal_length", self.thin_lens_focal_length)))
+
+    @cached_property
+    def radius(self) -> float:
+        """R [m], without derivative."""
+        return number(self.aperture_radius)
+
+    @property
+    def area(self) -> float:
+        """[m²]"""
+        return self.aperture.area * self.radius**2
+
+    @property
+    def pixels(self) -> int:
+        """Squares across the pupil between which its relief jumps; 0: it is smooth."""
+        return 0 if self.height is None else int(self.height.pixels)
+
+    @cached_property
+    def _level(self) -> Pupil:
+        return replace(self, height=None)
+
+    def index_step(self, wavelength: float) -> Any:
+        """n(λ) - medium_n."""
+        return self.n.at(wavelength) - self.medium_n
+
+    def bends(self, wavelength: float) -> bool:
+        """Whether the relief does anything, or is asked what it would do."""
+        step = self.index_step(wavelength)
+        return self.height is not None and (is_tracked(step) or step != 0)
+
+    def rotationally_symmetric(self, wavelength: float) -> bool:
+        relief_is = not self.bends(wavelength) or self.height.rotationally_symmetric
+        return self.aperture.rotationally_symmetric and relief_is
+
+    def path(self, x: Any, y: Any, wavelength: float, source: PointSource, types: Precision) -> Any:
+        """Optical path [m] through source and pupil at points (x, y) [m], flat float64 arrays."""
+        import drjit as dr
+
+        total = source.path(x, y, types)
+        if self.thin_lens_focal_length is not None:
+            f = opaque(types, self.thin_lens_focal_length)
+            r2 = x * x + y * y
+            total -= r2 / (dr.sqrt(r2 + f * f) + dr.abs(f)) * dr.sign(f)
+        total *= opaque(types, self.medium_n)
+        if self.bends(wavelength):
+            scale = 1 / opaque(types, self.aperture_radius)
+            total += opaque(types, self.index_step(wavelength)) * self.height.height(x * scale, y * scale, types)
+        return total
+
+    def slopes(self, wavelength: float, source: PointSource) -> Slopes:
+        """Gradient of the optical path over the disk and its soft edge, by central differences: between a relief's
+        jumps, where pixels are level, that of all the rest."""
+        return _slopes(self._level if self.pixels else self, wavelength, number(source.distance), source.angle)
+
+    def scatter(self, wavelength: float, share: float) -> float:
+        """Spatial frequency [1/m] along x and y beyond which the jumps of a relief of pixels send no more than this
+        share of the light; 0 for a smooth one, which bends it (`slopes`)."""
+        if not isinstance(self.height, PixelRelief) or not self.bends(wavelength):
+            return 0.0
+        turns = number(self.index_step(wavelength)) / wavelength
+        return self.height.scatter(turns, self.aperture, share) / self.radius
+
+    def bandwidth(self, wavelength: float, tolerance: float) -> float:
+        """Spatial frequency [1/m] above which the relief changes the phase by less than `tolerance` rad."""
+        step = abs(number(self.index_step(wavelength)))
+        if self.height is None or step == 0:
+            return 0.0
+        level = tolerance * wavelength / (2 * np.pi * step)
+        return self.height.bandwidth(level) / self.radius
+
+
+@lru_cache(maxsize=64)
+def _slopes(pupil: Pupil, wavelength: float, distance: float, angle: tuple[float, float]) -> Slopes:
+    types = precision("float64")
+    pieces = pupil.height.knots if pupil.bends(wavelength) else 0
+    n = int(min(1025, max(65 if pieces else 33, 4 * pieces + 1)))
+    grid = Grid.square(n, 2 * (1 + EDGE_REACH) * pupil.radius / (n - 1))
+    x, y = grid.coordinates(types)
+    path = pupil.path(x, y, wavelength, PointSource(distance, angle), types).numpy().reshape(grid.shape)
+    return Slopes(grid, _derivative(path.T, grid.dx).T, _derivative(path, grid.dx), pupil.radius)
+
+
+def _derivative(values: np.ndarray, step: float) -> np.ndarray:
+    """Along axis 0, by central differences of fourth order (second order near the ends)."""
+    slope = np.gradient(values, step, axis=0)
+    slope[2:-2] = (8 * (values[3:-1] - values[1:-3]) - values[4:] + values[:-4]) / (12 * step)
+    return slope
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Gradient of the optical path on a grid that covers the disk and its soft edge."""
+
+    grid: Grid
+    along_x: np.ndarray
+    along_y: np.ndarray
+    radius: float
+
+    @cached_property
+    def distance_from_axis(self) -> np.ndarray:
+        return np.hypot(self.grid.x[None, :], self.grid.y[:, None])
+
+    @cached_property
+    def steepest(self) -> float:
+        """Largest slope over the disk and its soft edge."""
+        inside = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
+        return float(np.hypot(self.along_x, self.along_y)[inside].max())
+
+    @cached_property
+    def steepest_inside(self) -> float:
+        """Largest slope over the disk alone."""
+        return float(np.hypot(self.along_x, self.along_y)[self.distance_from_axis <= self.radius].max())
+
+    def turning(self, distance: float, window: Grid, medium_n: float) -> tuple[float, float]:
+        """Largest slope of the path through the pupil and on to any point of the window in a plane at `distance` [m],
+        |∇L + n (ξ - x) / D|: over the disk and its soft edge, and over the disk alone."""
+        soft = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
+        x = np.broadcast_to(self.grid.x[None, :], soft.shape)[soft]
+        y = np.broadcast_to(self.grid.y[:, None], soft.shape)[soft]
+        angle = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+        (cx, cy), outermost = window.centre, window.own_half_diagonal
+        targets = [(cx, cy), *zip(cx + outermost * np.cos(angle), cy + outermost * np.sin(angle), strict=True)]
+        worst = np.zeros(x.size)
+        for tx, ty in targets:
+            scale = medium_n / np.sqrt((x - tx) ** 2 + (y - ty) ** 2 + distance**2)
+            slope = np.hypot(self.along_x[soft] + (x - tx) * scale, self.along_y[soft] + (y - ty) * scale)
+            worst = np.maximum(worst, slope)
+        # A cell more than the disk, so that its rim is not missed.
+        inside = self.distance_from_axis[soft] <= self.radius + self.grid.dx
+        return float(worst.max()), float(worst[inside].max())
+
+    def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
+        """Where rays from the disk's points meet a plane at `distance` [m]; evanescent ones end at infinity."""
+        inside = self.distance_from_axis <= self.radius
+        px, py = self.along_x[inside] / medium_n, self.along_y[inside] / medium_n
+        axial = np.sqrt(np.maximum(1 - px**2 - py**2, 0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x, y = (np.where(axial > 0, distance * p / axial, np.inf * np.sign(p)) for p in (px, py))
+        here = np.broadcast_to(self.grid.x[None, :], inside.shape)[inside]
+        there = np.broadcast_to(self.grid.y[:, None], inside.shape)[inside]
+        return here + x, there + y

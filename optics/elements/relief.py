@@ -1,0 +1,263 @@
+"""Reliefs: height maps of the pupil's glass, over the square that holds the pupil.
+
+A relief is a function of (x, y) in units of the aperture radius; inside the pupil both lie in [-1, 1].
+Row index and y grow together, as do column index and x.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.arguments import reals
+from optics.numerics.autodiff import is_tracked, plain
+from optics.numerics.precision import Precision
+
+__all__ = ["BSplineRelief", "HeightMap", "Relief"]
+
+
+class Relief(ABC):
+    """A height map [m]."""
+
+    @abstractmethod
+    def height(self, x: Any, y: Any, types: Precision) -> Any:
+        """Height [m] at normalised positions: flat Dr.Jit float64 arrays in and out."""
+
+    @abstractmethod
+    def bandwidth(self, level: float) -> float:
+        """Spatial frequency [cycles per aperture radius] above which the relief's content is below `level` [m]."""
+
+    @property
+    @abstractmethod
+    def knots(self) -> int:
+        """Polynomial pieces across the pupil."""
+
+    @property
+    def pixels(self) -> int:
+        """Squares across the pupil between which the height jumps, in each of which it is the same; 0: it is smooth."""
+        return 0
+
+    @property
+    def rotationally_symmetric(self) -> bool:
+        """Whether the height depends on the distance from the axis alone, under any change that is asked about."""
+        return False
+
+
+@dataclass(frozen=True, eq=False)
+class BSplineRelief(Relief):
+    """One uniform bicubic B-spline patch: heights h(x, y) = Σ_ij c[i, j] B_i(v) B_j(u), u = (x/a + 1)/2.
+
+    control_points: (4, 4) heights [m], (y, x), knots -3 ... 4. The patch is every bicubic polynomial, so it contains
+    every paraboloid exactly (`paraboloid`). Outside the square the polynomial goes on.
+    Piegl & Tiller, The NURBS Book, ch. 2.
+
+    A Dr.Jit tensor of control points carries derivatives.
+
+    Raises:
+        ValueError: not 4 x 4 finite numbers.
+    """
+
+    control_points: Any
+
+    def __post_init__(self) -> None:
+        points = np.array(plain(self.control_points))
+        if is_tracked(self.control_points) and points.size == 16:
+            points = points.reshape(4, 4)
+        if points.shape != (4, 4) or not np.isfinite(points).all():
+            raise ValueError(f"control_points has shape {points.shape}: must be 4 x 4 finite heights [m]")
+        if not is_tracked(self.control_points):
+            points.setflags(write=False)
+            object.__setattr__(self, "control_points", points)
+
+    @classmethod
+    def paraboloid(cls, height: float, curvature: float, radius: float) -> BSplineRelief:
+        """h = height - curvature (x² + y²)/2 [m], curvature in 1/m, over a pupil of the given radius [m].
+
+        With curvature medium_n / ((n - medium_n) f) it is the paraxial lens exp(-ikr²/2f), to the phase of `height`.
+
+        On uniform knots the polar form gives x² the control values X_i² - δ²/3, X_i = (2i - 3) a the Greville
+        abscissae and δ = 2a the knot spacing.
+        """
+        greville = (2 * np.arange(4) - 3) * radius
+        square = greville**2 - (2 * radius) ** 2 / 3
+        return cls(height - curvature * (square[:, None] + square[None, :]) / 2)
+
+    def height(self, x: Any, y: Any, types: Precision) -> Any:
+        import drjit as dr
+
+        points = types.Float64(
+            dr.ravel(self.control_points) if is_tracked(self.control_points) else self.control_points.ravel()
+        )
+        across, along = _cubic_basis((x + 1) / 2), _cubic_basis((y + 1) / 2)
+        total = types.Float64(0)
+        for i in range(4):
+            row = types.Float64(0)
+            for j in range(4):
+                row = dr.fma(across[j], dr.gather(types.Float64, points, types.Index(4 * i + j)), row)
+            total = dr.fma(along[i], row, total)
+        return total
+
+    def bandwidth(self, level: float) -> float:
+        return 1.0  # a cubic polynomial: half a cycle per half width, doubled
+
+    @property
+    def knots(self) -> int:
+        return 1
+
+    @property
+    def rotationally_symmetric(self) -> bool:
+        """A paraboloid on the axis, whose control values lie on c₀ + c₁ (i² + j²), or a constant."""
+        if is_tracked(self.control_points):
+            return False  # a derivative asks about every control point
+        points = self.control_points
+        square = (2 * np.arange(4) - 3) ** 2
+        corner, curvature = points[1, 1], (points[0, 1] - points[1, 1]) / 8
+        paraboloid = corner + curvature * (square[:, None] + square[None, :] - 2)
+        return bool(np.abs(points - paraboloid).max() <= 1e-12 * np.abs(points).max())
+
+
+@dataclass(frozen=True, eq=False)
+class HeightMap(Relief):
+    """Heights [m] sampled at cell centres over the square [-a, a]², joined by cubic splines (not-a-knot ends).
+
+    samples: (n, n), (y, x). Beyond the outermost centres the spline goes on for a cell, then straight.
+
+    A Dr.Jit tensor of samples carries derivatives.
+
+    Raises:
+        ValueError: not square, empty, or not finite.
+    """
+
+    samples: Any
+    _heights: np.ndarray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        samples = square_heights(self.samples)
+        object.__setattr__(self, "_heights", samples)
+        if not is_tracked(self.samples):
+            object.__setattr__(self, "samples", samples)
+
+    @cached_property
+    def _margin(self) -> int:
+        return max(3, len(self._heights) // 4)
+
+    @cached_property
+    def _coefficients(self) -> np.ndarray:
+        along_y = _spline_coefficients(self._heights, self._margin)
+        return np.ascontiguousarray(_spline_coefficients(along_y.T, self._margin).T)
+
+    def _values(self, types: Precision) -> Any:
+        """Spline coefficients as a flat array; they are linear in the samples, M h Mᵀ."""
+        import drjit as dr
+
+        if not is_tracked(self.samples):
+            return types.Float64(self._coefficients.ravel())
+        matmul: Any = dr.matmul
+        n = len(self._heights)
+        tensor: Any = types.Tensor64(types.Float64(dr.ravel(self.samples)), (n, n))
+        matrix = types.Tensor64(np.ascontiguousarray(_spline_coefficients(np.eye(n), self._margin)))
+        return matmul(matmul(matrix, tensor), matrix, Bt=True).array
+
+    def height(self, x: Any, y: Any, types: Precision) -> Any:
+        import drjit as dr
+
+        n = len(self._heights)
+        width = n + 2 * self._margin
+        values = self._values(types)
+        columns = dr.opaque(types.Index, width)
+        (column, across), (row, along) = (self._cell(position, n, width, types) for position in (x, y))
+        total = types.Float64(0)
+        for i in range(4):
+            start = (row + i) * columns + column
+            line = types.Float64(0)
+            for j in range(4):
+                line = dr.fma(across[j], dr.gather(types.Float64, values, start + j), line)
+            total = dr.fma(along[i], line, total)
+        return total
+
+    def _cell(self, position: Any, n: int, width: int, types: Precision) -> tuple[Any, list[Any]]:
+        """First of the four coefficients that act at a position, and the four weights."""
+        import drjit as dr
+
+        half, shift = dr.opaque(types.Float64, n / 2), dr.opaque(types.Float64, self._margin - 0.5)
+        place = position * half + half + shift
+        cell = dr.clip(dr.floor(place), 1, dr.opaque(types.Float64, width - 3))
+        return types.Index(cell) - 1, _cubic_basis(place - cell)
+
+    def bandwidth(self, level: float) -> float:
+        """From the samples' spectrum. A cubic spline repeats content of frequency f around multiples of the sampling
+        rate, weaker by the fourth power of the frequencies' ratio."""
+        n = len(self._heights)
+        if n < 4:
+            return 1.0
+        window = np.hanning(n + 2)[1:-1]
+        residue = self._heights - _plane(self._heights)
+        spectrum = np.abs(np.fft.fft2(residue * window[:, None] * window)) / n
+        frequency = np.abs(np.fft.fftfreq(n, 2 / n))
+        radial = np.maximum(frequency[:, None], frequency[None, :])
+        order = np.argsort(radial, axis=None)[::-1]
+        power = np.cumsum((spectrum.ravel()[order] / n) ** 2)
+        reached = radial.ravel()[order][int(np.searchsorted(power, level**2).clip(max=power.size - 1))]
+        images = (np.sum((spectrum / n * radial**4) ** 2) / level**2) ** 0.125
+        return float(max(1.0, reached, images if images > n / 2 - reached else 0.0))
+
+    @property
+    def knots(self) -> int:
+        return len(self._heights)
+
+    @property
+    def rotationally_symmetric(self) -> bool:
+        return len(self._heights) == 1
+
+
+def square_heights(samples: Any) -> np.ndarray:
+    """The same without derivatives, as an array that nobody can change.
+
+    Raises:
+        ValueError: not square, empty, or not finite.
+    """
+    heights = np.array(plain(samples) if is_tracked(samples) else reals("height", samples))
+    if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.size == 0:
+        raise ValueError(f"height has shape {heights.shape}: must be square (n, n), n at least 1")
+    if not np.isfinite(heights).all():
+        raise ValueError("height holds NaN or infinity: must be finite heights [m]")
+    heights.setflags(write=False)
+    return heights
+
+
+def _cubic_basis(t: Any) -> list[Any]:
+    """The four uniform cubic B-splines that act on a knot interval, at t in [0, 1]."""
+    s = 1 - t
+    return [s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6]
+
+
+def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
+    """Uniform B-spline coefficients along axis 0, `margin` more at either end: c = s - s''/6 of a cubic spline s."""
+    from scipy.interpolate import make_interp_spline
+
+    n = len(samples)
+    places = np.arange(-2, n + 2)
+    if n < 4:
+        polynomial = np.polynomial.polynomial.polyfit(np.arange(n), samples, n - 1)
+        second = np.polynomial.polynomial.polyder(polynomial, 2)
+        value = np.polynomial.polynomial.polyval(places, polynomial).T
+        bend = np.polynomial.polynomial.polyval(places, second).T
+    else:
+        spline = make_interp_spline(np.arange(n), samples, k=3)
+        value, bend = spline(places), spline(places, nu=2)
+    core = value - bend / 6
+    steps = np.arange(1, margin - 1)[:, None]
+    before = core[0] + (core[0] - core[1]) * steps[::-1]
+    after = core[-1] + (core[-1] - core[-2]) * steps
+    return np.concatenate([before, core, after])
+
+
+def _plane(samples: np.ndarray) -> np.ndarray:
+    """Least-squares plane through the samples."""
+    position = np.linspace(-1, 1, len(samples))
+    slope = position / np.sum(position**2) / len(samples)
+    return samples.mean() + (slope @ samples.sum(axis=1)) * position[:, None] + (samples.sum(axis=0) @ slope) * position

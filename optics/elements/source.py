@@ -1,0 +1,47 @@
+"""Light sources: a point at some distance, or a plane wave."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from optics.numerics.arguments import in_range, point_2d, positive
+from optics.numerics.autodiff import number
+from optics.numerics.precision import Precision, opaque
+
+__all__ = ["PointSource"]
+
+
+@dataclass(frozen=True)
+class PointSource:
+    """A point source of unit amplitude on the pupil: exp(ik(ρ(x, y) - ρ(0, 0))), ρ the distance from the source.
+
+    distance: axial distance in front of the pupil [m]; infinite for a plane wave.
+    angle: (θx, θy) [rad], the direction in which its light travels: a thin lens sends it to about f (tan θx, tan θy),
+        with the aberrations that a single stigmatic lens has off its axis.
+    """
+
+    distance: Any = math.inf
+    angle: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        positive("source_distance", self.distance, infinite=True)
+        tx, ty = point_2d("source_angle", self.angle, "angles (x, y) [rad]")
+        angle = in_range("source_angle", tx, -1.5, 1.5), in_range("source_angle", ty, -1.5, 1.5)
+        object.__setattr__(self, "angle", angle)
+
+    def path(self, x: Any, y: Any, types: Precision) -> Any:
+        """Optical path [m] in vacuum at the pupil's points, less the one at the centre (flat float64 arrays)."""
+        import drjit as dr
+
+        tx, ty = (math.tan(theta) for theta in self.angle)
+        norm = math.sqrt(1 + tx * tx + ty * ty)
+        along = x * opaque(types, tx / norm) + y * opaque(types, ty / norm)
+        if math.isinf(number(self.distance)):
+            return along
+        centre = opaque(types, self.distance) * norm
+        # ρ - ρ₀ = (r² + 2 ρ₀ (x, y)·t) / (ρ + ρ₀): no difference of nearly equal numbers
+        excess = x * x + y * y + 2 * centre * along
+        rho = dr.sqrt(excess + centre * centre)
+        return excess / (rho + centre)

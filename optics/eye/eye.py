@@ -1,0 +1,281 @@
+"""An eye: a pupil in front of a flat retina of photoreceptors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from optics.elements.pupil import Pupil
+from optics.eye.kernel_bank import Sight, prepare
+from optics.eye.photoreceptor import gaussian_noise, own_type, photon_noise, quantum_catch, throughput
+from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
+from optics.eye.retinal_image import blur, centred, receptor_average
+from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
+from optics.numerics.autodiff import at_border, is_tracked, number, plain
+from optics.numerics.precision import precision
+from optics.point_spread.psf import PSFResult
+from optics.spectra.bands import SpectralBands
+from optics.spectra.photon_budget import PhotonBudget
+from optics.spectra.receptors import receptors_of
+
+if TYPE_CHECKING:
+    from optics.eye.summary import Description
+
+__all__ = ["Eye"]
+
+CELLS_FOR_BANDS = 2  # per receptor, along an axis
+LIGHT_FROM = ("cells", "centres")  # of the scene
+
+
+@dataclass(frozen=True)
+class Eye:
+    """Pupil, retina and noise. Arrays are in visual-field orientation, row 0 at the top, column 0 on the left.
+
+    pupil: None is the perfect lens: no blur, full throughput.
+    resolution: receptors (height, width); square, pitch = sensor_width / width.
+    fov_deg: horizontal field of view, in [1e-3, 170]; the retina lies at f = L / (2 tan(fov/2)).
+    sensor_width: L [m].
+    bands: spectral bands, 1 to 64, or "auto": as few as keep a receptor's predicted error within the tolerance; that
+        takes PSFs of many bands, so it is for an eye that will be used often. The field then holds what was chosen.
+    noise_sigma: standard deviation of a receptor's Gaussian noise, in signal units.
+    photon_budget: the light there is; its shot noise comes before the Gaussian noise (None: no shot noise).
+    receptors: types of receptor: "rgb" (three channels, red, green, blue), "lms" (human cones), "honeybee", "goldfish",
+        wavelengths of pigments' peaks [nm], or `Receptors`, which can be a mosaic. The field then holds `Receptors`.
+    tolerance: relative L2 error asked of the PSF; signal error, relative to white's, of whatever else is chosen.
+    dtype: "float32" or "float64", of PSF, kernel and signals.
+
+    Whatever the pupil is made of, fov_deg and distances z may be Dr.Jit arrays that carry derivatives; what comes of
+    them is then a Dr.Jit tensor, otherwise a NumPy array.
+
+    Raises:
+        ValueError: names argument, value and valid range.
+    """
+
+    pupil: Pupil | None = None
+    resolution: tuple[int, int] = (15, 15)
+    fov_deg: Any = 45.0
+    sensor_width: float = 200e-6
+    bands: Any = 4
+    noise_sigma: float = 0.01
+    tolerance: float = 1e-2
+    dtype: str = "float32"
+    photon_budget: PhotonBudget | None = None
+    receptors: Any = "rgb"
+    spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "resolution", shape_2d("resolution", self.resolution))
+        in_range("fov_deg", self.fov_deg, 1e-3, 170)
+        positive("sensor_width", self.sensor_width)
+        in_range("noise_sigma", self.noise_sigma, 0, 1e6)
+        in_range("tolerance", self.tolerance, 1e-6, 0.5)
+        if self.dtype not in ("float32", "float64"):
+            raise ValueError(f"dtype = {self.dtype!r}: must be 'float32' or 'float64'")
+        if self.pupil is not None:
+            of_kind("pupil", self.pupil, Pupil, "Pupil(25e-6), or None for the perfect lens")
+        if self.photon_budget is not None:
+            of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
+        object.__setattr__(self, "receptors", receptors_of(self.receptors))
+        if self.pupil is not None and number(self.relative_aperture) > 1 + 1e-9:
+            raise ValueError(
+                f"pupil.aperture_radius = {self.pupil.radius:g}: must be at most sensor_width / 2 = "
+                f"{self.sensor_width / 2:g} m"
+            )
+        spectral = self._chosen_bands() if self.bands == "auto" else SpectralBands.uniform(self.bands, self.receptors)
+        object.__setattr__(self, "spectral_bands", spectral)
+        object.__setattr__(self, "bands", len(spectral.wavelengths))
+
+    @property
+    def sensor_distance(self) -> Any:
+        """f [m], from pupil to retina."""
+        if is_tracked(self.fov_deg):
+            import drjit as dr
+
+            return self.sensor_width / (2 * dr.tan(dr.deg2rad(self.fov_deg) / 2))
+        return self.sensor_width / (2 * math.tan(math.radians(self.fov_deg) / 2))
+
+    @property
+    def receptor_pitch(self) -> float:
+        """[m]"""
+        return self.sensor_width / self.resolution[1]
+
+    @property
+    def relative_aperture(self) -> Any:
+        """a = 2 R / L; 1 for the perfect lens."""
+        return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.sensor_width
+
+    @property
+    def throughput(self) -> Any:
+        """a², times the open share of the aperture's disk."""
+        return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
+
+    @property
+    def channels(self) -> int:
+        """Signals at each place of the retina: as many as types of receptor, or one in a mosaic."""
+        return self.receptors.channels
+
+    @property
+    def mosaic(self) -> np.ndarray | None:
+        """Type of every receptor, (h, w) int; None where every receptor has all types."""
+        return self.receptors.layout(self.resolution)
+
+    @property
+    def photons(self) -> np.ndarray | None:
+        """Photons that a signal of 1 stands for, per type of receptor (type,); None without a photon budget."""
+        if self.photon_budget is None:
+            return None
+        etendue = math.pi / 4 * (self.sensor_width * self.receptor_pitch / number(self.sensor_distance)) ** 2
+        return self.photon_budget.photons(self.spectral_bands, etendue)
+
+    def psf(self, z: Any = math.inf) -> PSFResult:
+        """PSF on the retina (sensor orientation) of a point on the axis at distance z [m], over the kernel's window.
+
+        The perfect lens has one sample that holds all power.
+
+        Raises:
+            AccuracyError: see `optics.psf`.
+        """
+        positive("z", z, infinite=True)
+        if self.pupil is None:
+            return perfect_psf(self._retina(1), self.sensor_width / 2)
+        return retinal_psf(self.pupil, self._retina(4), z)
+
+    def kernel(
+        self, samples_per_receptor: int, z: Any = math.inf, direction_deg: tuple[float, float] = (0.0, 0.0)
+    ) -> Any:
+        """Receptive kernel (band, ky, kx): the PSF integrated over square cells of pitch / samples_per_receptor, in
+        visual-field orientation (the PSF turned by 180°), ky and kx odd.
+
+        z: the scene's distance along the axis [m]. direction_deg: (right, up) from the axis where the light comes
+        from; the centre cell is its geometric image. The sum is the fraction of the pupil's power that lands inside;
+        the window is as wide as it must be to lose less than the tolerance (limits: see `receptive_field`). The
+        perfect lens has the 1 x 1 kernel 1. Of light from cells' centres, signals are a² Σ_b weights[c, b]
+        (kernel_b ⊗ radiance_b), averaged over receptors; `see` takes it from all over the cells (see `sight`).
+
+        Raises:
+            AccuracyError: see `optics.psf`.
+        """
+        positive("z", z, infinite=True)
+        right, up = (math.tan(math.radians(in_range("direction_deg", at, -80, 80))) for at in direction_deg)
+        return at_border(self._kernel(_whole(samples_per_receptor), z, (right, -up)))
+
+    def _kernel(
+        self, samples_per_receptor: int, z: Any, direction: tuple[float, float], from_cell: bool = False
+    ) -> Any:
+        """direction: (right, down), tangents."""
+        if self.pupil is None:
+            return precision(self.dtype).Tensor(np.ones((len(self.spectral_bands.wavelengths), 1, 1)))
+        return visual_kernel(self.pupil, self._retina(samples_per_receptor), z, direction, from_cell)
+
+    def _retina(self, samples_per_receptor: int) -> Retina:
+        cell = self.receptor_pitch / samples_per_receptor
+        return Retina(self.sensor_distance, self.spectral_bands.wavelengths, cell, self.tolerance, self.dtype)
+
+    def _chosen_bands(self) -> SpectralBands:
+        pupil, cell = self.pupil, self.receptor_pitch / CELLS_FOR_BANDS
+        if pupil is None:
+            return SpectralBands.for_tolerance(self.tolerance, receptors=self.receptors)
+
+        def kernels(wavelengths: np.ndarray) -> np.ndarray:
+            retina = Retina(self.sensor_distance, wavelengths, cell, self.tolerance, self.dtype)
+            return plain(visual_kernel(pupil, retina, math.inf))
+
+        return SpectralBands.for_tolerance(self.tolerance, kernels, CELLS_FOR_BANDS, self.receptors)
+
+    def sight(
+        self,
+        samples_per_receptor: int,
+        z: Any = math.inf,
+        depth_layers: int | str = "auto",
+        field_zones: int | str = 1,
+        tolerance: float | None = None,
+        light_from: str = "cells",
+    ) -> Sight:
+        """Kernels for a scene in depth and over the field of view; printed, it says what was chosen and why.
+
+        z: distances [m] that occur: one, or an array whose nearest and farthest count.
+        depth_layers: kernels between nearest and farthest, evenly spaced in 1/z; field_zones: kernels across the
+            field's width (1: the axis serves the whole retina). "auto": as few as the tolerance allows.
+        tolerance: of a receptor's signal, in units of white's, for any scene no brighter than white (None: the eye's).
+        light_from: "cells", exact for pictures, whose radiance is the same all over a cell; "centres" for cells that
+            hold means of finer detail, as rendered ones do: every cell's light comes from its centre, which errs less
+            than half as much there, by O(samples_per_receptor^-2).
+
+        Raises:
+            ValueError: another light_from, or another argument out of range.
+            AccuracyError: see `optics.psf`, or the tolerance needs more kernels than any eye is given.
+        """
+        within = self.tolerance if tolerance is None else in_range("tolerance", tolerance, 1e-6, 0.5)
+        s, from_cell = _whole(samples_per_receptor), light_from == LIGHT_FROM[0]
+        if light_from not in LIGHT_FROM:
+            raise ValueError(f"light_from = {light_from!r}: must be {' or '.join(map(repr, LIGHT_FROM))}")
+        half = self.sensor_width / (2 * number(self.sensor_distance))
+        tangents = (half, half * self.resolution[0] / self.resolution[1])
+
+        def kernel_at(distance: Any, right: float, down: float) -> Any:
+            return self._kernel(s, distance, (right * tangents[0], down * tangents[1]), from_cell)
+
+        return prepare(kernel_at, self.resolution, s, z, (depth_layers, field_zones), within)
+
+    def see(
+        self,
+        radiance: np.ndarray,
+        samples_per_receptor: int,
+        rng: np.random.Generator | None = None,
+        z: Any = math.inf,
+        sight: Sight | None = None,
+    ) -> Any:
+        """Signals (channel, h, w) of a scene in the tangent plane, by convolution (the reference).
+
+        radiance: (band, Y, X), the same all over each cell of pitch / samples_per_receptor (another reading:
+            `sight`'s light_from), centred on the axis, at least h s x w s cells and larger by even numbers; dark
+            outside.
+        rng: None for signals without noise. Noise carries no derivative.
+        z: distance of the scene along the axis [m], a number or one per cell (Y, X).
+        sight: what `sight` made for these samples_per_receptor; None makes it.
+
+        Raises:
+            ValueError: radiance of another shape, or not finite.
+        """
+        s = _whole(samples_per_receptor)
+        if rng is not None:
+            of_kind("rng", rng, np.random.Generator, "np.random.default_rng(0), or None for no noise")
+        shape = self.resolution[0] * s, self.resolution[1] * s
+        scene = radiance_cube(radiance, self.bands, shape)
+        centred(scene, shape)
+        prepared = self.sight(s, z) if sight is None else sight.of(shape)
+        types = precision(self.dtype)
+        scenes = [scene * share for share in prepared.shares(scene.shape[1:], z)]
+        image = blur(scenes, list(prepared.kernels.values()), shape, types)
+        irradiance = receptor_average(image, s, types)
+        signal = quantum_catch(irradiance, self.spectral_bands.weights, self.throughput, types)
+        if self.mosaic is not None:
+            signal = own_type(signal, self.mosaic, types)
+        return at_border(signal) if rng is None else at_border(signal + types.Tensor(self._noise(signal, rng)))
+
+    def _noise(self, signal: Any, rng: np.random.Generator) -> np.ndarray:
+        """What noise adds to the signal."""
+        clean = plain(signal)
+        photons = self.photons
+        if photons is not None and self.mosaic is not None:
+            photons = photons[self.mosaic][None]
+        caught = clean if photons is None else photon_noise(np.maximum(clean, 0), photons, rng)
+        return gaussian_noise(caught, self.noise_sigma, rng) - clean
+
+    def in_bands(self, radiance: Any) -> np.ndarray:
+        """(band,): a spectral radiance in this eye's bands, for `see`: each type of receptor then catches of it what it
+        should, if bands are at least as many as types. A band may be negative; see `SpectralBands.of`."""
+        return self.spectral_bands.of(radiance, self.receptors)
+
+    def describe(self, z: Any = math.inf) -> Description:
+        """What limits the eye, as a table: see `description.Description`."""
+        from optics.eye.summary import describe
+
+        return describe(self, z)
+
+
+def _whole(samples_per_receptor: int) -> int:
+    return whole("samples_per_receptor", samples_per_receptor, 1, 64)

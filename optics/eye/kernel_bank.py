@@ -1,0 +1,149 @@
+"""The kernels of an eye for a scene in depth and over its field of view: as few as the tolerance allows.
+
+A kernel depends on where the light comes from. It is computed at nodes, evenly spaced in vergence 1/z (defocus is
+linear in it) and over the tangent plane, and interpolated linearly between them (see `ladder`):
+
+    signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.eye.kernel_interpolation import Choice, Ladder, hats, nodes
+from optics.numerics.arguments import positive, shown, whole
+from optics.numerics.autodiff import is_tracked, number, plain
+
+__all__ = ["Sight", "prepare"]
+
+MOST_NODES = 64
+DEPTH_RUNGS, FIELD_RUNGS = (1, 3, 5, 9, 17), (1, 3, 5, 9)
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The kernels of an eye at all nodes, and what each cell of a scene has of them.
+
+    vergence: (nearest, farthest) 1/z [1/m]; field: (half height, half width) of the retina in cells.
+    kernels: per node (layer, row, column): Dr.Jit (band, k, k). choices: one per stage.
+    """
+
+    vergence: tuple[float, float]
+    field: tuple[float, float]
+    kernels: dict[tuple[int, int, int], Any]
+    choices: tuple[Choice, ...]
+
+    def shares(self, shape: tuple[int, int], z: Any) -> list[Any]:
+        """Share of every node in each cell of a scene, (Y, X) per node; distances z [m], a number or (Y, X).
+
+        Raises:
+            ValueError: z of another shape.
+        """
+        if not is_tracked(z) and np.ndim(z) and np.shape(z) != shape:
+            raise ValueError(f"z has shape {np.shape(z)}: must be one distance or one per cell, {shape}")
+        if len(self.kernels) == 1:
+            return [1]
+        layers, rows, columns = (1 + max(node[axis] for node in self.kernels) for axis in range(3))
+        near, far = self.vergence
+        depth = (2 / np.broadcast_to(plain(z), shape) - near - far) / ((near - far) or 1.0)
+        down, across = ((np.arange(n) - (n - 1) / 2) / half for n, half in zip(shape, self.field, strict=True))
+        by_depth, by_row, by_column = hats(depth, layers), hats(down, rows), hats(across, columns)
+        return [by_depth[i] * by_row[j][:, None] * by_column[k] for i, j, k in self.kernels]
+
+    def of(self, shape: tuple[int, int]) -> Sight:
+        """Itself; ValueError unless it was made for a retina of `shape` cells."""
+        if (shape[0] / 2, shape[1] / 2) != self.field:
+            made = " x ".join(f"{2 * half:g}" for half in self.field)
+            raise ValueError(f"sight is for a retina of {made} cells: must be for {shape[0]} x {shape[1]}")
+        return self
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.choices))
+
+
+@dataclass(frozen=True)
+class _Range:
+    """Distances from nearest to farthest, by their vergence; a Dr.Jit distance stands for itself."""
+
+    vergence: tuple[float, float]
+    only: Any
+
+    @classmethod
+    def of(cls, z: Any) -> _Range:
+        if is_tracked(z):
+            positive("z", z, infinite=True)
+            return cls((1 / number(z), 1 / number(z)), z)
+        distances = _distances(z)
+        near, far = float(distances.min()), float(distances.max())
+        return cls((1 / near, 1 / far), near if near == far else None)
+
+    def distance(self, place: float) -> Any:
+        """[m], at a place from -1 (farthest) to 1 (nearest)."""
+        if self.only is not None:
+            return self.only
+        near, far = self.vergence
+        at = (near + far + place * (near - far)) / 2
+        return 1 / at if at > 0 else math.inf
+
+
+def prepare(
+    kernel_at: Callable[[Any, float, float], Any],
+    resolution: tuple[int, int],
+    samples_per_receptor: int,
+    z: Any,
+    counts: tuple[int | str, int | str],
+    tolerance: float,
+) -> Sight:
+    """Choose how many kernels, and make them. kernel_at(z, right, down): positions in the field from -1 to 1 at the
+    retina's edges; counts of depth layers and of zones across the longer side, or "auto"."""
+    s, depths = samples_per_receptor, _Range.of(z)
+    layers, zones = (
+        None if count == "auto" else whole(name, count, 1, MOST_NODES)
+        for name, count in zip(("depth_layers", "field_zones"), counts, strict=True)
+    )
+    along = Ladder("depth", lambda at: kernel_at(depths.distance(at[0]), 0.0, 0.0), [(n,) for n in DEPTH_RUNGS], s)
+    across = Ladder(
+        "field", lambda at: kernel_at(depths.distance(0), at[1], at[0]), [_grid(n, resolution) for n in FIELD_RUNGS], s
+    )
+    if depths.only is not None:
+        depth = Choice("depth", (1,), 0.0, "all at one distance")
+    else:
+        depth = _chosen(along, None if layers is None else (layers,), tolerance)
+    wide = _chosen(across, None if zones is None else _grid(zones, resolution), tolerance)
+    deep, down, right = (nodes(n) for n in (*depth.counts, *wide.counts))
+    places = itertools.product(range(len(deep)), range(len(down)), range(len(right)))
+    kernels = {(i, j, k): kernel_at(depths.distance(deep[i]), right[k], down[j]) for i, j, k in places}
+    return Sight(depths.vergence, (resolution[0] * s / 2, resolution[1] * s / 2), kernels, (depth, wide))
+
+
+def _chosen(ladder: Ladder, asked: tuple[int, ...] | None, tolerance: float) -> Choice:
+    return ladder.choose(tolerance) if asked is None else Choice(ladder.stage, asked, None, "as asked")
+
+
+def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:
+    """(rows, columns) of nodes over the field, no denser one way than the other; rungs stay within each other."""
+    height, width = resolution
+    finest = max(across - 1, 0)
+
+    def along(receptors: int) -> int:
+        halvings = max(0, round(math.log2(max(height, width) / receptors)))
+        return 1 if receptors == 1 else 1 + (finest >> halvings)
+
+    return along(height), along(width)
+
+
+def _distances(z: Any) -> np.ndarray:
+    try:
+        distances = np.atleast_1d(np.asarray(z, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise ValueError(f"z = {shown(z)}: must be a distance [m], or an array of them") from None
+    if distances.size == 0 or np.isnan(distances).any():
+        raise ValueError("z is empty or holds NaN: must be distances greater than 0, in m, or infinite")
+    positive("z", float(distances.min()), infinite=True)
+    return distances

@@ -1,0 +1,126 @@
+"""How many kernels stand for a whole range of them: the fewest whose interpolation a receptor cannot tell from all.
+
+Kernels are computed at nodes, evenly spaced over [-1, 1] along every axis, and interpolated linearly between them: the
+error falls with the square of the nodes' distance. A rung's own is told by kernels between its nodes; most of them are
+nodes of the next rung.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.autodiff import plain
+from optics.point_spread.planner import AccuracyError
+
+__all__ = ["Choice", "Ladder", "hats", "nodes", "worst_difference"]
+
+MOST_CHECKS = 8  # kernels that tell a rung's error
+CAUTION = 1.3  # of that error: the worst place may lie between
+Place = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was chosen for one stage, and why. predicted_error: of a receptor's signal, for any scene no brighter than
+    white, in units of white's signal; None where the number was asked for."""
+
+    stage: str
+    counts: tuple[int, ...]
+    predicted_error: float | None
+    why: str
+
+    def __str__(self) -> str:
+        error = "not predicted" if self.predicted_error is None else f"error {self.predicted_error:.1e}"
+        return f"{self.stage:<7}{' x '.join(map(str, self.counts)):>7}   {error:<15}{self.why}"
+
+
+def nodes(count: int) -> np.ndarray:
+    """Positions in [-1, 1]."""
+    return np.linspace(-1, 1, count) if count > 1 else np.zeros(1)
+
+
+def hats(position: np.ndarray, count: int) -> np.ndarray:
+    """Linear interpolation between nodes, constant beyond: (node, ...)."""
+    if count == 1:
+        return np.ones((1, *position.shape))
+    return np.stack([np.interp(position, nodes(count), row) for row in np.eye(count)])
+
+
+def checks(rung: tuple[int, ...]) -> list[Place]:
+    """Where a rung errs most: at the far ends if it has one node, else halfway between nodes along every axis. Of many
+    places a few, corners among them."""
+    if max(rung) == 1:
+        return [place for place in _places([nodes(3)] * len(rung)) if any(place)]
+    found = _places((nodes(n)[1:] + nodes(n)[:-1]) / 2 if n > 1 else nodes(1) for n in rung)
+    if len(found) <= MOST_CHECKS:
+        return found
+    return [found[round(at)] for at in np.linspace(0, len(found) - 1, MOST_CHECKS)]
+
+
+def _places(axes: Iterable[np.ndarray]) -> list[Place]:
+    return list(itertools.product(*(map(float, axis) for axis in axes)))
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """One stage: rungs are numbers of nodes along each of its axes; kernel_at a place in [-1, 1]^axes."""
+
+    stage: str
+    kernel_at: Callable[[Place], Any]
+    rungs: Sequence[tuple[int, ...]]
+    samples_per_receptor: int
+    known: dict[Place, np.ndarray] = field(default_factory=dict)
+
+    def choose(self, tolerance: float) -> Choice:
+        """The lowest rung whose predicted error is within the tolerance.
+
+        Raises:
+            AccuracyError: the highest is not.
+        """
+        error = math.inf
+        for rung in self.rungs:
+            error = CAUTION * self.error(rung)
+            if error <= tolerance:
+                return Choice(self.stage, rung, error, f"fewest within the tolerance of {tolerance:g}")
+        raise AccuracyError(
+            f"tolerance = {tolerance:g}: {' x '.join(map(str, self.rungs[-1]))} {self.stage} nodes leave {error:.1e} "
+            "of white's signal; widen the tolerance or give a number of nodes"
+        )
+
+    def error(self, rung: tuple[int, ...]) -> float:
+        """Worst signal error, at `checks`, of what is interpolated from this rung's nodes."""
+        coarse = _places(nodes(n) for n in rung)
+        worst = 0.0
+        for place in checks(rung):
+            by_axis = [hats(np.asarray(at), n) for at, n in zip(place, rung, strict=True)]
+            shares = [math.prod(map(float, share)) for share in itertools.product(*by_axis)]
+            between = [(s, self._kernel(node)) for s, node in zip(shares, coarse, strict=True) if s > 0]
+            worst = max(worst, worst_difference([*between, (-1, self._kernel(place))], self.samples_per_receptor))
+        return worst
+
+    def _kernel(self, place: Place) -> np.ndarray:
+        if place not in self.known:
+            self.known[place] = plain(self.kernel_at(place))
+        return self.known[place]
+
+
+def worst_difference(terms: Sequence[tuple[float, np.ndarray]], samples_per_receptor: int) -> float:
+    """Largest |signal| that Σ share · kernel, kernels (band, k, k), can make of any scene with radiance in [0, 1]:
+    the sum over what is positive, or negative, in the receptor's receptive field (kernel ⊗ receptor aperture)."""
+    side = max(kernel.shape[-1] for _, kernel in terms)
+    total = np.zeros((terms[0][1].shape[0], side, side))
+    for share, kernel in terms:
+        margin = (side - kernel.shape[-1]) // 2
+        inner = slice(margin, side - margin)
+        total[:, inner, inner] += share * kernel
+    s = samples_per_receptor
+    for _ in range(2):  # box along one axis, then the other
+        summed = np.cumsum(np.pad(total, ((0, 0), (0, 0), (s, s - 1))), axis=2)
+        total = np.swapaxes(summed[..., s:] - summed[..., :-s], 1, 2) / s
+    return float(max(np.maximum(sign * total, 0).sum(axis=(1, 2)).max() for sign in (1, -1)))

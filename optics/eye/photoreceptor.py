@@ -1,0 +1,64 @@
+"""What a photoreceptor makes of the light on it: throughput, spectral weighting, noise."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.arguments import in_range, positive
+from optics.numerics.precision import Precision, opaque
+
+__all__ = ["gaussian_noise", "own_type", "photon_noise", "quantum_catch", "throughput"]
+
+MOST_PHOTONS = 1e18  # a count must fit a 64-bit integer
+
+
+def throughput(relative_aperture: Any, open_share: float = 1.0) -> Any:
+    """Light gathered, a² times the share of the disk that is open: the pupil's area against that of the widest disk
+    (diameter = sensor width). A Dr.Jit array where relative_aperture is one."""
+    a = in_range("relative_aperture", relative_aperture, 0.0, 1.0 + 1e-9)
+    if a > 1:  # by rounding
+        relative_aperture = relative_aperture * (1 / a)
+    return relative_aperture * relative_aperture * open_share
+
+
+def quantum_catch(irradiance: Any, weights: np.ndarray, gathered: Any, types: Precision) -> Any:
+    """a² Σ_b weights[c, b] irradiance[b]: Dr.Jit (band, y, x) -> (channel, y, x); gathered: a²."""
+    import drjit as dr
+
+    matmul: Any = dr.matmul
+    bands, height, width = irradiance.shape
+    flat = matmul(types.Tensor(weights), types.Tensor(irradiance.array, (bands, height * width)))
+    return types.Tensor(flat.array * types.Float(opaque(types, gathered)), (len(weights), height, width))
+
+
+def own_type(signals: Any, mosaic: np.ndarray, types: Precision) -> Any:
+    """What each receptor of a mosaic (y, x) reports, of the signals that every type would give there: Dr.Jit
+    (type, y, x) -> (1, y, x)."""
+    import drjit as dr
+
+    mine = mosaic == np.arange(signals.shape[0])[:, None, None]
+    return types.Tensor(dr.sum(signals * types.Tensor(mine.astype(np.float64)), axis=0).array, (1, *mosaic.shape))
+
+
+def gaussian_noise(signal: np.ndarray, sigma: float, rng: np.random.Generator) -> np.ndarray:
+    """Signal plus noise of fixed standard deviation `sigma` [signal units]: a dim eye is a noisy eye."""
+    sigma = in_range("sigma", sigma, 0.0, 1e6)
+    return signal + sigma * rng.standard_normal(signal.shape)
+
+
+def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Poisson noise where a signal of 1 is `photons` absorbed photons: standard deviation √(signal/photons).
+
+    signal: (channel, y, x); photons: one number, one per channel, or one per receptor (channel, y, x).
+    """
+    budget = np.atleast_1d(np.asarray(photons, dtype=np.float64))
+    positive("photons", float(budget.min()), "1")
+    if not np.all(signal >= 0):
+        raise ValueError(f"signal = {np.min(signal):g} at its least: must not be negative")
+    if budget.ndim == 1:
+        budget = budget.reshape(-1, *(1,) * (np.ndim(signal) - 1))
+    expected = np.asarray(signal, dtype=np.float64) * budget
+    in_range("signal x photons", float(expected.max(initial=0.0)), 0, MOST_PHOTONS)
+    return rng.poisson(expected) / budget

@@ -1,0 +1,110 @@
+"""Images on the retina: convolution of the padded scene with the kernel. The reference other renderers must meet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.field import Field
+from optics.numerics.fourier import dft2, fast_length
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, with_room
+
+__all__ = ["blur", "centred", "receptor_average"]
+
+
+def blur(scenes: Sequence[np.ndarray], kernels: Sequence[Any], shape: tuple[int, int], types: Precision) -> Any:
+    """Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u], dark outside: the middle `shape` of it, Dr.Jit (band, *shape).
+
+    scenes: (band, Y, X) each; kernels: (band, ky, kx) tensors or arrays, odd, one per scene. A convolution, not a
+    correlation: a point of light at v shows the kernel around v. All are in visual-field orientation; the kernel's
+    centre cell (ky//2, kx//2) is its origin.
+    """
+    import drjit as dr
+
+    bands = len(scenes[0])
+    pairs = [(scene, _tensor(kernel, types)) for scene, kernel in zip(scenes, kernels, strict=True)]
+    found = [_blurred([(scene[b], kernel[b]) for scene, kernel in pairs], shape, types) for b in range(bands)]
+    return types.Tensor(found[0] if bands == 1 else dr.concat(found), (bands, *shape))
+
+
+def _blurred(pairs: list[tuple[np.ndarray, Any]], shape: tuple[int, int], types: Precision) -> Any:
+    """One band, flat. The sums run over one period, long enough that what wraps around lands outside `shape`."""
+    if all(kernel.shape == (1, 1) for _, kernel in pairs):
+        return sum(_flat(centred(scene, shape), types) * kernel.array for scene, kernel in pairs)
+    # What lies further from the receptors than the kernel reaches is not seen, nor does the kernel's far rim see any.
+    lit = [
+        (centred(scene, _within(scene.shape, shape, kernel.shape)), kernel[_middle(kernel.shape, shape, scene.shape)])
+        for scene, kernel in pairs
+    ]
+    reach = max(sum(sizes) // 2 for a, b in lit for sizes in zip(a.shape, b.shape, shape, strict=True))
+    period = fast_length(reach + 2)
+    total: Field | None = None
+    for scene, kernel in lit:
+        product = _spectrum(_flat(scene, types), scene.shape, period, types)
+        product = product * _spectrum(kernel.array, kernel.shape, period, types)
+        total = product if total is None else Field(total.re + product.re, total.im + product.im, total.grid, types)
+    assert total is not None
+    return dft2(total, period, shape, 1, 1.0).re / period**2
+
+
+def _spectrum(flat: Any, shape: tuple[int, ...], period: int, types: Precision) -> Field:
+    import drjit as dr
+
+    field = Field(flat, dr.zeros(types.Float, flat.shape[0]), Grid((shape[0], shape[1]), 1.0), types)
+    return dft2(field, period, (period, period), -1, 1.0)
+
+
+def _tensor(kernel: Any, types: Precision) -> Any:
+    if isinstance(kernel, np.ndarray):
+        return types.Tensor(_flat(kernel, types), kernel.shape)
+    return kernel
+
+
+def _flat(array: np.ndarray, types: Precision) -> Any:
+    return types.Float(with_room(np.asarray(array, types.complex_dtype(0).real.dtype)))
+
+
+def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, ...]) -> tuple[int, int]:
+    """The scene's middle that the kernel joins to `shape`: no larger than the scene, and of its parity."""
+    height, width = (n - 2 * max(0, (n - m - k + 1) // 2) for n, m, k in zip(scene, shape, kernel, strict=True))
+    return height, width
+
+
+def _middle(kernel: tuple[int, ...], shape: tuple[int, int], scene: tuple[int, ...]) -> tuple[slice, slice]:
+    """The kernel's middle that joins some point of the scene to `shape`."""
+    cuts = [max(0, k // 2 - (m + n) // 2) for k, m, n in zip(kernel, shape, scene, strict=True)]
+    rows, columns = (slice(cut, k - cut) for cut, k in zip(cuts, kernel, strict=True))
+    return rows, columns
+
+
+def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """The middle `shape` of (…, Y, X).
+
+    Raises:
+        ValueError: the margins around it are not equal on both sides.
+    """
+    margins = [size - n for size, n in zip(image.shape[-2:], shape, strict=True)]
+    if any(margin < 0 or margin % 2 for margin in margins):
+        raise ValueError(
+            f"radiance has {image.shape[-2]} x {image.shape[-1]} cells: must exceed {shape[0]} x {shape[1]} "
+            "(receptors x samples_per_receptor) by even numbers, to be centred on the axis"
+        )
+    top, left = (margin // 2 for margin in margins)
+    return image[..., top : top + shape[0], left : left + shape[1]]
+
+
+def receptor_average(image: Any, samples_per_receptor: int, types: Precision) -> Any:
+    """Mean over each receptor's square aperture, Dr.Jit tensors: (band, h s, w s) -> (band, h, w)."""
+    import drjit as dr
+
+    matmul: Any = dr.matmul
+    down, across = (_means(n // samples_per_receptor, samples_per_receptor, types) for n in image.shape[1:])
+    return matmul(down, matmul(image, across, Bt=True))
+
+
+def _means(receptors: int, samples: int, types: Precision) -> Any:
+    """(receptor, cell): 1/s over each receptor's own cells."""
+    return types.Tensor(np.kron(np.eye(receptors), np.full((1, samples), 1 / samples)))

@@ -1,0 +1,183 @@
+"""What limits an eye, in one table."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from optics.numerics.autodiff import number, plain
+from optics.point_spread.image_quality import image_quality, mtf, strehl_ratio
+from optics.point_spread.planner import Plan
+from optics.point_spread.psf import PSFResult
+from optics.spectra.spectrum import daylight
+
+if TYPE_CHECKING:
+    from optics.eye.eye import Eye
+
+__all__ = ["Description", "describe"]
+
+FREQUENCIES = 513
+FINER = 16  # steps per sample of the PSF, where a receptor's angular sensitivity is measured
+
+
+@dataclass(frozen=True)
+class Description:
+    """An eye's limits in white daylight, near its axis. Frequencies [cycles/degree] across the visual field.
+
+    relative_aperture: a; throughput: a²; f_number: f/2R. wavelength: daylight's mean by the receptors' weights [m].
+    diffraction_cpd: cut-off of an aperture this wide, 2 sin θ/λ on the retina. sampling_cpd: Nyquist frequency of the
+        receptors, 1/(2 Δφ). noise_cpd: where the contrast that the optics leave first sinks below the noise.
+    acuity_cpd: the least of the three; binding: which.
+    strehl_ratio: of the band nearest `wavelength`; image_quality: see `quality.image_quality`.
+    noise: standard deviation of a receptor that looks at white, of all sources, in units of the signal.
+    photons: absorbed by it per integration time, mean of the channels (None: no photon budget).
+    acceptance_angle_deg: full width at half height of a receptor's angular sensitivity, horizontally;
+        interommatidial_angle_deg: Δφ between neighbours. plan: of the least accurate band's PSF.
+    """
+
+    relative_aperture: float
+    throughput: float
+    f_number: float
+    wavelength: float
+    diffraction_cpd: float
+    sampling_cpd: float
+    noise_cpd: float
+    strehl_ratio: float
+    image_quality: float
+    noise: float
+    photons: float | None
+    acceptance_angle_deg: float
+    interommatidial_angle_deg: float
+    plan: Plan
+
+    @property
+    def _limits(self) -> dict[str, float]:
+        return {"diffraction": self.diffraction_cpd, "sampling": self.sampling_cpd, "noise": self.noise_cpd}
+
+    @property
+    def binding(self) -> str:
+        return min(self._limits, key=self._limits.__getitem__)
+
+    @property
+    def acuity_cpd(self) -> float:
+        return self._limits[self.binding]
+
+    def __str__(self) -> str:
+        shot = "" if self.photons is None else f", of {self.photons:.3g} photons per receptor"
+        rows = {
+            "aperture": f"a = {self.relative_aperture:.3g}, f/{self.f_number:.3g}, throughput {self.throughput:.3g}",
+            "image": f"Strehl ratio {self.strehl_ratio:.3g}, quality {self.image_quality:.3g}",
+            "noise": f"{self.noise:.2g} of {self.throughput:.3g} for white{shot}",
+            **{f"limit: {name}": f"{_cycles(limit)}{self._mark(name)}" for name, limit in self._limits.items()},
+            "acuity": f"{_cycles(self.acuity_cpd)}, {self.binding} binds",
+            "acceptance": f"{self.acceptance_angle_deg:.3g}°, {self._overlap:.3g} of the angle between receptors",
+            "receptors": f"{self.interommatidial_angle_deg:.3g}° apart",
+            "PSF": f"{self.plan.method}, {self.plan.samples[0]} x {self.plan.samples[1]} samples, "
+            f"{self.plan.dtype}, predicted error {self.plan.predicted_error:.1e}",
+        }
+        return "\n".join(f"{name:<20}{value}" for name, value in rows.items())
+
+    def _mark(self, name: str) -> str:
+        return "  <- binding" if name == self.binding else ""
+
+    @property
+    def _overlap(self) -> float:
+        return self.acceptance_angle_deg / self.interommatidial_angle_deg
+
+
+def noise_of(eye: Eye) -> float:
+    """Standard deviation of a receptor's signal where it sees white in daylight: its own noise, and that of photons."""
+    if eye.photons is None:
+        return float(eye.noise_sigma)
+    light = number(eye.throughput)
+    return math.hypot(eye.noise_sigma, light / math.sqrt(float(eye.photons.mean()) * light))
+
+
+def describe(eye: Eye, z: Any) -> Description:
+    """The eye's limits for a scene at distance z [m].
+
+    Raises:
+        AccuracyError: see `optics.psf`.
+    """
+    distance, light, result = number(eye.sensor_distance), number(eye.throughput), eye.psf(z)
+    white, wavelength = _white(eye, result)
+    photons, noise = None if eye.photons is None else float(eye.photons.mean()) * light, noise_of(eye)
+    if eye.pupil is None:
+        diffraction, strehl, quality = math.inf, 1.0, max(1 - noise, 0.0)
+        noise_limit = math.inf if noise < 1 else 0.0
+    else:
+        diffraction = float(mtf(white).cutoff[0])
+        nearest = int(np.argmin(np.abs(result.wavelengths - wavelength)))
+        strehl = float(plain(strehl_ratio(result))[nearest])
+        quality = float(plain(image_quality(white, 1 / (2 * eye.receptor_pitch), light, noise))[0])
+        noise_limit = _noise_limit(white, diffraction, noise / light)
+    per_degree = math.radians(distance)
+    return Description(
+        relative_aperture=number(eye.relative_aperture),
+        throughput=light,
+        f_number=distance / (2 * result.pupil.radius),
+        wavelength=wavelength,
+        diffraction_cpd=diffraction * per_degree,
+        sampling_cpd=per_degree / (2 * eye.receptor_pitch),
+        noise_cpd=noise_limit * per_degree,
+        strehl_ratio=strehl,
+        image_quality=quality,
+        noise=noise,
+        photons=photons,
+        acceptance_angle_deg=_acceptance(eye, white) / per_degree,
+        interommatidial_angle_deg=eye.receptor_pitch / per_degree,
+        plan=result.plan,
+    )
+
+
+def _white(eye: Eye, result: PSFResult) -> tuple[PSFResult, float]:
+    """The PSF of white daylight as the mean of the channels weighs it, and its mean wavelength [m]."""
+    worth = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
+    image = np.tensordot(worth / worth.sum(), result.psf.astype(np.float64), axes=1)
+    wavelength = float(np.average(eye.spectral_bands.wavelengths, weights=worth))
+    wavelengths = np.array([wavelength])
+    return replace(result, tensor=image[None], wavelengths=wavelengths, plans=(result.plan,)), wavelength
+
+
+def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
+    """Frequency [1/m] at which the MTF first meets the floor; the cut-off if it never does."""
+    frequency = np.linspace(0, cutoff, FREQUENCIES)
+    above = mtf(white).profile(frequency)[0] - floor
+    drowned = np.flatnonzero(above <= 0)
+    if drowned.size == 0 or floor <= 0:
+        return cutoff
+    at = int(drowned[0])
+    if at == 0:
+        return 0.0
+    share = above[at - 1] / (above[at - 1] - above[at])
+    return float(frequency[at - 1] + share * (frequency[at] - frequency[at - 1]))
+
+
+def _acceptance(eye: Eye, white: PSFResult) -> float:
+    """Full width [m] at half height, along x through its peak, of PSF ⊗ receptor aperture in white daylight."""
+    if eye.pupil is None:
+        return eye.receptor_pitch
+    half = eye.receptor_pitch / 2
+    rows = _within(white.y, white.psf[0], white.y, half)
+    peak = int(np.argmax(_within(white.x, rows.T, white.x, half).max(axis=0)))
+    at = np.arange(white.x[0] - half, white.x[-1] + half, white.dx / FINER)
+    profile = _within(white.x, rows[peak], at, half)
+    above = profile - profile.max() / 2
+    first, last = np.flatnonzero(above >= 0)[[0, -1]]
+    left, right = above[first] / (above[first] - above[first - 1]), above[last] / (above[last] - above[last + 1])
+    return float(last + right - first + left) * white.dx / FINER
+
+
+def _within(x: np.ndarray, image: np.ndarray, at: np.ndarray, half: float) -> np.ndarray:
+    """Integrals along the first axis, of the spline through an image's samples at x, over at ± half."""
+    primitive = CubicSpline(x, image).antiderivative()
+    found: np.ndarray = primitive(np.clip(at + half, x[0], x[-1])) - primitive(np.clip(at - half, x[0], x[-1]))
+    return found
+
+
+def _cycles(frequency: float) -> str:
+    return f"{frequency:.3g} cycles/degree"

@@ -1,0 +1,194 @@
+"""The Rayleigh-Sommerfeld integral by one Fourier transform onto directions for each of a few nodes of the window."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.chebyshev import chebyshev_points, lagrange
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem, PupilEdge
+from optics.numerics.field import Field
+from optics.numerics.fourier import dft2, fast_length, predicted_seconds
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, opaque, precision, with_room
+from optics.numerics.radial_profile import TAPS, lagrange_weights
+
+__all__ = ["FarFieldSampling", "far_field"]
+
+MOST_DIRECTIONS = 4096
+CHEBYSHEV_NODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16)
+
+
+@dataclass(frozen=True)
+class FarFieldSampling:
+    """Pupil samples, direction cosines (pitch 1/period of their transform), and nodes per axis over the window.
+
+    The nodes are Chebyshev points in the angle atan(x/z) up to half_angle [rad]: in x the kernel has a pole at ±iz.
+    """
+
+    edge: PupilEdge
+    pupil: Grid
+    directions: Grid
+    period: int
+    nodes: int
+    half_angle: float
+    seconds: float
+    method: str = "far_field"
+    model_error: float = 0.0
+
+    def intensity(self, beam: Beam, problem: Problem) -> Any:
+        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        return _far_field(beam, problem, self, precision(problem.dtype))
+
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light."""
+        return problem.wavelength * problem.distance / self.pupil.dx
+
+    @property
+    def padding(self) -> float:
+        return self.period / self.pupil.shape[0]
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        return self.pupil.shape
+
+    @property
+    def largest(self) -> int:
+        return max(self.pupil.shape[0], self.directions.shape[0])
+
+
+def far_field(problem: Problem) -> list[FarFieldSampling]:
+    """Directions beyond the intensity's Nyquist rate; as many nodes as the kernel's slow part needs."""
+    half = problem.window.half_width
+    nodes = _nodes_needed(problem, problem.ripple)
+    if nodes is None:
+        return []
+    edge = problem.soft_edge(problem.turning)
+    pitch = 1 / (problem.turning + edge.stopband)
+    pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
+    oversampling = math.pi / _step(problem.ripple)  # of the intensity's Nyquist rate
+    sine = half / math.hypot(half, problem.distance)
+    corner = math.sqrt(2) * half / math.hypot(half, half, problem.distance)
+    # Interpolation reaches over the window's rim, but must not reach grazing incidence.
+    finest = problem.wavelength * max(TAPS / (0.98 - sine), TAPS / (0.98 - corner)) if corner < 0.95 else math.inf
+    if not finest / pitch < MOST_DIRECTIONS:
+        return []
+    period = fast_length(max(4 * oversampling * problem.radius, finest) / pitch)  # a whole number, for the FFT
+    step = problem.wavelength / (period * pitch)
+    directions = Grid.square(2 * (math.ceil(sine / step) + TAPS) + 1, step)
+    once = predicted_seconds(pupil.shape, period, directions.shape) + 2e-3
+    once += pupil.shape[0] ** 2 * (5e-8 + edge.seconds_per_point / nodes**2) + directions.shape[0] ** 2 * 2e-8
+    seconds = nodes**2 * once + math.prod(problem.window.shape) * 1e-7
+    return [FarFieldSampling(edge, pupil, directions, period, nodes, math.atan2(half, problem.distance), seconds)]
+
+
+def _step(error: float) -> float:
+    """Radians per sample at which eight-point Lagrange interpolation errs by 1.07e-3 step⁸ = error."""
+    return min(1.5, (error / 1.07e-3) ** 0.125)
+
+
+def _nodes_needed(problem: Problem, error: float) -> int | None:
+    """Chebyshev nodes along an axis that interpolate the far-field kernel's slow part, tried on the aperture's rim."""
+    angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
+    rim_x, rim_y = problem.radius * np.cos(angle), problem.radius * np.sin(angle)
+    half_angle = math.atan2(problem.window.half_width, problem.distance)
+    test = half_angle * np.linspace(-1, 1, 41)
+    for n in CHEBYSHEV_NODES:
+        places = half_angle * chebyshev_points(n)
+        weights = lagrange(test, places)
+        worst = 0.0
+        for across in (0.0, problem.window.half_width):
+            exact, known = (_slow_part(problem, rim_x, rim_y, angles, across) for angles in (test, places))
+            worst = max(worst, float(np.abs(exact - known @ weights).max()))
+        if worst < error:
+            return n
+    return None
+
+
+def _slow_part(problem: Problem, rim_x: np.ndarray, rim_y: np.ndarray, angle: np.ndarray, y: float) -> np.ndarray:
+    """exp(ik(D - ρ + s·ξ)), D the distance from ξ to (z tan(angle), y, z), ρ that from the axis, s the direction."""
+    x = problem.distance * np.tan(angle)
+    rho = np.sqrt(x * x + y * y + problem.distance**2)
+    along = (x * rim_x + y * rim_y) / rho
+    excess = problem.radius**2 - 2 * rho * along
+    distance = excess / (np.sqrt(rho**2 + excess) + rho)
+    return np.exp(2j * np.pi / problem.wavelength * (distance + along))
+
+
+def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Any:
+    """Rayleigh-Sommerfeld's integral with the plane wave of each direction split off:
+
+    U(x) = z/(λρ²) ∫ P(ξ) G(ξ; x) e^{-ik s·ξ} dξ,  G = (ρ/D)² (1/(kD) - i) e^{ik(D - ρ + s·ξ)},
+
+    ρ = |(x, z)|, D = |(x - ξ, z)|, s = x/ρ. G hardly varies with x (it is Fresnel's quadratic phase and less), so it is
+    taken at nodes x_ab and the integrals, one Fourier transform each, are interpolated.
+    """
+    import drjit as dr
+
+    u = beam.behind(how.edge.aperture, how.pupil, types)
+    dr.eval(u.re, u.im)
+    s = how.directions.x
+    cosine = np.sqrt(np.maximum(1 - s[:, None] ** 2 - s[None, :] ** 2, 1e-6))
+    nodes = how.half_angle * chebyshev_points(how.nodes)
+    edge = math.asin(min(float(s[-1]), 0.999))  # a margin beyond the window, for the interpolation that follows
+    angle = np.clip(np.arctan2(s[None, :], cosine), -edge, edge)
+    along_x = lagrange(angle, nodes)
+    total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
+    for a, across in enumerate(np.tan(nodes)):
+        for b, along in enumerate(np.tan(nodes)):
+            part = u * _slow_kernel(float(across), float(along), beam, how.pupil, types)
+            part = dft2(part, how.period, how.directions.shape, -1, how.directions.dx)
+            weight = types.Float(with_room((along_x[a] * along_x[b].T).astype(types.dtype)))
+            total_re, total_im = total_re + weight * part.re, total_im + weight * part.im
+            dr.eval(total_re, total_im)
+    return _onto_window(total_re * total_re + total_im * total_im, beam, problem, how, types)
+
+
+def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Precision) -> Field:
+    """G(ξ; x) on the pupil's grid for x in the direction of the two tangents, less a constant phase."""
+    import drjit as dr
+
+    px, py = grid.coordinates(types)
+    wavelength = beam.wavelength / beam.pupil.medium_n
+    slant = math.sqrt(1 + tan_x**2 + tan_y**2)
+    far = opaque(types, beam.distance) * opaque(types, slant)
+    along = px * opaque(types, tan_x / slant) + py * opaque(types, tan_y / slant)
+    excess = px * px + py * py - 2 * far * along
+    distance = dr.sqrt(far * far + excess)
+    waves = (excess / (distance + far) + along) * opaque(types, 1 / wavelength)
+    near = opaque(types, wavelength / (2 * math.pi)) / distance
+    size = dr.square(far / distance)
+    return Field.from_waves(size, waves, grid, types) * Field(
+        types.Float(dr.ones(types.Float64, dr.width(px))), types.Float(near), grid, types
+    )
+
+
+def _onto_window(squared: Any, beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Any:
+    """Eight-point Lagrange interpolation from direction cosines to the window."""
+    import drjit as dr
+
+    x, y = problem.window.coordinates(types)
+    z, side = opaque(types, beam.distance), how.directions.shape[0]
+    rho = dr.sqrt(x * x + y * y + z * z)
+    pitch, middle = opaque(types, 1 / how.directions.dx), dr.opaque(types.Float64, side // 2)
+    cells, weights = [], []
+    for position in (y, x):
+        place = position / rho * pitch + middle
+        cell = dr.clip(dr.floor(place), TAPS // 2 - 1, dr.opaque(types.Float64, side - TAPS // 2 - 1))
+        cells.append(types.Index(cell) - (TAPS // 2 - 1))
+        weights.append(lagrange_weights(types.Float(place - cell)))
+    image, columns = types.Float(0), dr.opaque(types.Index, side)
+    for i, down in enumerate(weights[0]):
+        start, line = (cells[0] + i) * columns + cells[1], types.Float(0)
+        for j, across in enumerate(weights[1]):
+            line = dr.fma(across, dr.gather(types.Float, squared, start + j), line)
+        image = dr.fma(down, line, image)
+    amplitude = types.Float(opaque(types, how.pupil.dx**2 / problem.wavelength) * z / (rho * rho))
+    image = dr.maximum(image, 0) * amplitude * amplitude
+    if problem.reach is not None:
+        image = dr.select(x * x + y * y > opaque(types, problem.reach**2), 0, image)
+    return image

@@ -1,0 +1,136 @@
+"""The paraxial methods: Fresnel's and Fraunhofer's integral, and how wrong they will be."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.apertures.aperture import EDGE_REACH
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem, PupilEdge
+from optics.methods.rays import MARGIN, Rays, brightness, disk_area, mismatch
+from optics.numerics.fourier import predicted_seconds
+from optics.numerics.grid import Grid
+from optics.numerics.precision import precision
+from optics.paraxial import paraxial_integral
+
+__all__ = ["ParaxialSampling", "fraunhofer", "fresnel"]
+
+RAYS, ENDS = 48, 24  # from whose origins, and at whose ends, the neglected phase is looked at
+# Of a ray's first Fresnel zone: how far from its origin light still adds up coherently at its end.
+ZONES = 3.0
+MUCH = 0.7  # a field that errs by more is another field
+
+
+@dataclass(frozen=True)
+class ParaxialSampling:
+    """Pupil samples; model_error: relative L2 error of the intensity that the approximation itself will make."""
+
+    method: str
+    edge: PupilEdge
+    pupil: Grid
+    seconds: float
+    model_error: float
+
+    def intensity(self, beam: Beam, problem: Problem) -> Any:
+        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        u = beam.behind(self.edge.aperture, self.pupil, precision(problem.dtype))
+        curved = self.method == "fresnel"
+        return paraxial_integral(u, beam.distance, problem.wavelength, problem.window, curved).intensity
+
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light."""
+        return problem.wavelength * problem.distance / self.pupil.dx
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        return self.pupil.shape
+
+    @property
+    def largest(self) -> int:
+        return self.pupil.shape[0]
+
+
+def fresnel(problem: Problem) -> list[ParaxialSampling]:
+    """Fresnel's integral (Goodman, Introduction to Fourier Optics, eq. 4-17)."""
+    reach = (1 + EDGE_REACH) * problem.radius + problem.outermost
+    excess = reach / problem.distance - reach / math.hypot(reach, problem.distance)
+    turning = min(
+        problem.turning + excess / problem.wavelength,
+        problem.phase_band + reach / (problem.wavelength * problem.distance),
+    )
+    return _sampling("fresnel", problem, turning)
+
+
+def fraunhofer(problem: Problem) -> list[ParaxialSampling]:
+    """Fraunhofer's integral (Goodman, eq. 4-25): the quadratic phase is left out."""
+    return _sampling(
+        "fraunhofer", problem, problem.phase_band + problem.outermost / (problem.wavelength * problem.distance)
+    )
+
+
+def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSampling]:
+    if problem.rays is None:
+        return []
+    edge = problem.soft_edge(turning)
+    pitch = 1 / (turning + edge.stopband)
+    pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
+    seconds = (
+        3e-4
+        + predicted_seconds(pupil.shape, 0.5, problem.window.shape)
+        + pupil.shape[0] ** 2 * (5e-8 + edge.seconds_per_point)
+    )
+    return [ParaxialSampling(method, edge, pupil, seconds, model_error(problem, method == "fresnel"))]
+
+
+def model_error(problem: Problem, curved: bool) -> float:
+    """Relative L2 error of the intensity that the kernel makes, from its ratio q to the exact one,
+
+        q = (D/z)² e^{-ik(D - z - d²/2z)},   d = |x - ξ|, D = √(d² + z²)   (d² without ξ² in Fraunhofer's),
+
+    seen from the places where rays end. What adds up coherently there comes from around the ray's origin: from its
+    Fresnel zone, or from the whole aperture where several rays meet. A phase common to all of it is no error.
+    """
+    rays = problem.rays
+    if rays is None or len(rays) == 0:
+        return 1.0
+    some, ends = rays.some(RAYS), rays.some(ENDS)
+    x, y = _places(problem, ends)
+    d2 = (x[:, None] - some.x) ** 2 + (y[:, None] - some.y) ** 2
+    z = problem.distance
+    root = np.sqrt(d2 + z * z)
+    waves = d2 * d2 / (2 * z * (root + z) ** 2)  # d²/2z - (D - z)
+    if not curved:
+        waves = waves - (some.x**2 + some.y**2) / (2 * z)
+    ratio = (root / z) ** 2 * np.exp(2j * np.pi * waves / problem.wavelength)
+    zone = math.inf if rays.folded else ZONES * np.sqrt(problem.wavelength * z / np.maximum(ends.least, 1e-12))[:, None]
+    apart2 = (ends.x[:, None] - some.x) ** 2 + (ends.y[:, None] - some.y) ** 2
+    nearest = apart2 == apart2.min(axis=1, keepdims=True)
+    near = np.tile((apart2 <= np.square(zone)) | nearest, (len(x) // len(ends), 1))
+    count = near.sum(axis=1)
+    mean = (ratio * near).sum(axis=1) / count
+    common = mean / np.maximum(np.abs(mean), 1e-30)
+    squared = (np.abs(ratio - common[:, None]) ** 2 * near).sum(axis=1) / count
+    error = 2 * math.sqrt(squared.mean())
+    return MARGIN * error if error < MUCH or curved else _misplaced(problem)
+
+
+def _misplaced(problem: Problem) -> float:
+    """Without the quadratic phase a wide shadow shrinks to a spot: how much brighter than the truth that is."""
+    rays, cell = problem.rays, problem.window.dx**2
+    assert rays is not None
+    diffracted = math.pi * (problem.wavelength * problem.distance / (2 * problem.radius)) ** 2
+    area = disk_area(rays.to_x - rays.x, rays.to_y - rays.y)
+    return mismatch(brightness(area + diffracted, cell), brightness(rays.image_area + diffracted, cell))
+
+
+def _places(problem: Problem, ends: Rays) -> tuple[np.ndarray, np.ndarray]:
+    """Where light is looked at: the ends of rays, and a diffraction width beside them; drawn into the window."""
+    width = 0.6 * problem.wavelength * problem.distance / problem.radius
+    window = problem.window
+    x = np.concatenate([ends.to_x + step * width for step in (0, 1, 0, -1, 0)])
+    y = np.concatenate([ends.to_y + step * width for step in (0, 0, 1, 0, -1)])
+    return np.clip(x, window.x[0], window.x[-1]), np.clip(y, window.y[0], window.y[-1])

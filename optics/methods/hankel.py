@@ -1,0 +1,137 @@
+"""The angular spectrum of a rotationally symmetric pupil, by two Hankel transforms: the cheapest exact method there is.
+
+    S(f) = 2π ∫ P(r) J₀(2πfr) r dr,   U(x) = 2π ∫ S(f) e^{ikz (cos θ - 1)} J₀(2πfx) f df,   f = sin θ / λ
+
+(Goodman, Introduction to Fourier Optics, §2.1.5 and §3.10). The aperture's edge is where the quadrature in r ends: no
+soft edge is needed. In θ the transfer function is smooth up to grazing incidence.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem, Taper, tapers
+from optics.numerics.bessel import bessel_j0
+from optics.numerics.field import Field
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, opaque, precision
+from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
+from optics.numerics.radial_profile import RadialLine
+
+__all__ = ["HankelSampling", "hankel"]
+
+MOST_NODES = 3000
+# From this tolerance on J₀ need not be right to the last digit.
+LOOSE = 1e-8
+
+
+@dataclass(frozen=True)
+class HankelSampling:
+    """Gauss-Legendre nodes in r and in θ, and the radii of the picture."""
+
+    taper: Taper
+    radii: int
+    angles: int
+    line: RadialLine
+    seconds: float
+    method: str = "hankel"
+    model_error: float = 0.0
+
+    def intensity(self, beam: Beam, problem: Problem) -> Any:
+        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        types = precision(problem.dtype)
+        profile = _hankel(beam, problem, self, types).intensity
+        return self.line.onto(profile, problem.window, types)
+
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light."""
+        return 2 * (self.line.radius + problem.radius)
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        return self.radii, self.angles
+
+    @property
+    def largest(self) -> int:
+        return max(self.radii, self.angles, self.line.points)
+
+
+def hankel(problem: Problem) -> list[HankelSampling]:
+    """Nodes for the turns that each phase goes through; nothing unless the problem is rotationally symmetric."""
+    if not problem.symmetric:
+        return []
+    found = [_sampling(problem, taper) for taper in tapers(problem)]
+    outputs = math.prod(problem.window.shape)
+    return [sampling for sampling in found if sampling.largest <= MOST_NODES and sampling.line.pays(outputs)]
+
+
+def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
+    digits = 0.5 - math.log10(problem.tolerance)
+    radii = gauss_legendre_count(problem.radius * (problem.phase_band_inside + taper.end), digits)
+    outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
+    steepest = math.hypot(problem.distance, problem.radius + outermost) / problem.wavelength
+    angles = gauss_legendre_count(steepest * math.asin(min(1.0, taper.end * problem.wavelength)), digits)
+    band = min(2 * taper.end, 2 * problem.radius / (problem.wavelength * problem.distance) + 2 / taper.blur)
+    line = RadialLine.resolving(outermost, band, problem.distance, problem.ripple)
+    pairs = radii * angles + angles * line.points
+    seconds = 1e-3 + pairs * 1e-8 + line.points * line.table * 1e-9 + math.prod(problem.window.shape) * 1.5e-8
+    return HankelSampling(taper, _round_up(radii), _round_up(angles), line, seconds)
+
+
+def _round_up(n: int) -> int:
+    """Few different numbers of nodes, so that their tables are found again."""
+    step = max(1, 2 ** (n.bit_length() - 4))
+    return -(-n // step) * step
+
+
+def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision) -> Field:
+    """The field on the line's radii, up to a phase that intensity forgets."""
+    import drjit as dr
+
+    nodes, weights = gauss_legendre(how.radii)
+    inner = getattr(problem.aperture, "inner", 0.0)
+    nodes, weights = inner + (1 - inner) * nodes, (1 - inner) * weights
+    r = types.Float64(nodes) * opaque(types, beam.radius)
+    zero = dr.zeros(types.Float64, how.radii)
+    area = types.Float64(2 * np.pi * weights * nodes) * dr.square(opaque(types, beam.radius))
+    pupil = Field.from_waves(area, beam.waves(r, zero, types), Grid((1, how.radii), 1.0), types)
+    edge = math.asin(how.taper.end * problem.wavelength)
+    nodes, weights = gauss_legendre(how.angles)
+    theta = types.Float64(nodes * edge)
+    sine, cosine = types.Float64(np.sin(nodes * edge)), types.Float64(np.cos(nodes * edge))
+    f = sine / opaque(types, problem.wavelength)
+    exactly = problem.tolerance < LOOSE
+    spectrum = _transform(pupil, r, f, types, exactly)
+    fade = how.taper.fade(f, types)
+    ring = types.Float64(2 * np.pi * edge * weights) * f * cosine / opaque(types, problem.wavelength)
+    waves = -opaque(types, beam.distance) / opaque(types, problem.wavelength) * 2 * dr.square(dr.sin(theta / 2))
+    grid = Grid((1, how.angles), 1.0)
+    spectrum = spectrum * Field.from_waves(ring * types.Float64(fade), waves, grid, types)
+    return _transform(spectrum, f, types.Float64(how.line.positions), types, exactly)
+
+
+def _transform(field: Field, at: Any, to: Any, types: Precision, exactly: bool) -> Field:
+    """Σ_j u_j J₀(2π at_j to_k) for every k."""
+    import drjit as dr
+
+    n, m = dr.width(at), dr.width(to)
+    dr.eval(field.re, field.im, at, to)
+    count = dr.opaque(types.Index, n)
+
+    def add(j: Any, re: Any, im: Any) -> tuple[Any, Any, Any]:
+        weight = bessel_j0(dr.gather(types.Float64, at, j) * to, types, exactly)
+        re, im = (
+            so_far + types.Float64(weight * dr.gather(types.Float, part, j))
+            for part, so_far in ((field.re, re), (field.im, im))
+        )
+        return j + 1, re, im
+
+    zero = dr.zeros(types.Float64, m)
+    start = dr.zeros(types.Index, m)
+    _, re, im = dr.while_loop((start, zero, zero), lambda j, re, im: j < count, add, max_iterations=-1)
+    return Field(types.Float(re), types.Float(im), Grid((1, m), 1.0), types)

@@ -1,0 +1,197 @@
+"""The Rayleigh-Sommerfeld integral as one matrix product: Fourier's kernel times a slow rest of low rank."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.chebyshev import chebyshev_points, lagrange
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem
+from optics.methods.pupil_sampling import PupilSamples, samples_of
+from optics.numerics.field import Field
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, opaque, precision, with_room
+
+__all__ = ["LowRankSampling", "low_rank"]
+
+RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
+FLOPS = {"float32": 45e9, "float64": 22e9}
+MOST_ENTRIES = 4_000_000  # of the matrix between pupil and window
+MOST_PIXEL_ENTRIES = 16_000_000  # for them only the direct sum is left
+
+
+@dataclass(frozen=True)
+class LowRankSampling:
+    """Pupil samples; `rank` Chebyshev points per axis of the window, `half_width` [m] about its centre, and the
+    distance c [m] of Fourier's kernel e^{-ik ξ·x/c}."""
+
+    pupil: PupilSamples
+    rank: int
+    half_width: float
+    scale: float
+    seconds: float
+    method: str = "low_rank"
+    model_error: float = 0.0
+
+    def intensity(self, beam: Beam, problem: Problem) -> Any:
+        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        return _low_rank(beam, problem, self, precision(problem.dtype)).intensity
+
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light."""
+        return problem.wavelength * problem.distance / float(np.diff(self.pupil.at).mean())
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        return len(self.pupil.at), len(self.pupil.at)
+
+    @property
+    def largest(self) -> int:
+        return self.rank * len(self.pupil.at)
+
+
+def low_rank(problem: Problem) -> list[LowRankSampling]:
+    """As few pupil samples as the turns of pupil and path together allow, and the rank that the slow rest needs."""
+    pupil = samples_of(problem)
+    if pupil is None:
+        return []
+    half = max(problem.window.own_half_width, problem.window.dx)
+    scale = math.hypot(problem.distance, 0.6 * half, *problem.window.centre)
+    most = math.isqrt(MOST_ENTRIES if problem.pixelated is None else MOST_PIXEL_ENTRIES) // len(pupil.at)
+    rank = _rank(problem, pupil.outermost, half, scale, most)
+    if rank is None:
+        return []
+    inner = rank * len(pupil.at)
+    height, width = problem.window.shape
+    flops = 8 * (inner * inner * width + height * inner * width)
+    seconds = (
+        1.5e-3 + flops / FLOPS[problem.dtype] + inner * inner * 2e-8 + pupil.seconds + inner * (height + width) * 1e-8
+    )
+    return [LowRankSampling(pupil, rank, half, scale, seconds)]
+
+
+def _rank(problem: Problem, outermost: float, half: float, scale: float, most: int) -> int | None:
+    """Chebyshev points along an axis that interpolate the slow rest, tried on the soft aperture's rim."""
+    angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
+    rim = outermost * np.cos(angle), outermost * np.sin(angle)
+    test = half * np.linspace(-1, 1, 41)
+    centre = problem.window.centre
+    # On the axis both directions are alike, and so are both sides.
+    places = [(0, 0.0), (0, half)] if centre == (0.0, 0.0) else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
+    for rank in RANKS:
+        if rank > most:
+            return None
+        points = half * chebyshev_points(rank)
+        weights = lagrange(test, points)
+        worst = 0.0
+        for along, across in places:
+            exact, known = (_rest(problem, scale, rim, _line(centre, along, at, across)) for at in (test, points))
+            worst = max(worst, float(np.abs(exact - known @ weights).max()))
+        if worst < problem.ripple:
+            return rank
+    return None
+
+
+def _line(centre: tuple[float, float], along: int, at: np.ndarray, across: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (x, y) of a line through the window, along x (0) or y (1)."""
+    place = [centre[0] + 0 * at, centre[1] + 0 * at]
+    place[along] = place[along] + at
+    place[1 - along] = place[1 - along] + across
+    return place[0], place[1]
+
+
+def _rest(
+    problem: Problem, scale: float, pupil: tuple[np.ndarray, np.ndarray], window: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """(z/D)² e^{ik(D - ρ + ξ·x/c)} between points of pupil and window."""
+    (xi, eta), (x, y) = pupil, window
+    z = problem.distance
+    rho2 = x * x + y * y + z * z
+    excess = xi**2 + eta**2 - 2 * (x * xi + y * eta)
+    distance = np.sqrt(rho2 + excess)
+    waves = (excess / (distance + np.sqrt(rho2)) + (x * xi + y * eta) / scale) / problem.wavelength
+    return z * z / distance**2 * np.exp(2j * np.pi * waves)
+
+
+def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> Field:
+    """U(x) = Σ_ab L_a(x) L_b(y) Σ_ξ P(ξ) G(ξ; x_a, y_b) e^{-ik ξ·x/c}, up to a phase that intensity forgets:
+
+        G(ξ; x) = z/(λD²) (1/(kD) - i) e^{ik(D - ρ + ξ·x/c)},   D = |(x - ξ, z)|, ρ = |(x, z)|,
+
+    which varies slowly with x. Sums over a and ξ along one axis are one: A_y W A_xᵀ, two matrix products.
+    """
+    window = problem.window
+    inner = _kernel(beam, problem, how, types)
+    across_x, across_y = (
+        _fourier(at, middle, problem, how, types)
+        for at, middle in ((window.x, window.centre[0]), (window.y, window.centre[1]))
+    )
+    re, im = _product(*inner, *across_x, transposed=True)
+    re, im = _product(*across_y, re, im, transposed=False)
+    return Field(re.array, im.array, window, types)
+
+
+def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> tuple[Any, Any]:
+    """W[(b, η), (a, ξ)] = P(ξ, η) G(ξ, η; x_a, y_b) as two tensors."""
+    import drjit as dr
+
+    n, rank = len(how.pupil.at), how.rank
+    u = how.pupil.field(beam, types)
+    dr.eval(u.re, u.im)
+    column, row = Grid.square(n * rank, 1.0).coordinates(types)  # counted from the centre
+    middle = dr.opaque(types.Float64, (n * rank) // 2)
+    (a, i), (b, j) = (_split(place + middle, n, types) for place in (column, row))
+    points = types.Float64(how.half_width * chebyshev_points(rank))
+    x, y = (dr.gather(types.Float64, points, types.Index(index)) for index in (a, b))
+    x, y = x + opaque(types, problem.window.centre[0]), y + opaque(types, problem.window.centre[1])
+    xi, eta = (how.pupil.places(index, beam, types) for index in (i, j))
+    z, wavelength = opaque(types, beam.distance), opaque(types, problem.wavelength)
+    rho2 = x * x + y * y + z * z
+    along = x * xi + y * eta
+    excess = xi * xi + eta * eta - 2 * along
+    distance = dr.sqrt(rho2 + excess)
+    # Fourier's kernel stays where it is while nodes move with the radius; what they move by is the rest's.
+    fixed = x * dr.detach(xi) + y * dr.detach(eta)
+    waves = (excess / (distance + dr.sqrt(rho2)) + fixed * opaque(types, 1 / how.scale)) / wavelength
+    slow = Field.from_waves(z / (wavelength * distance * distance), waves, Grid.square(n * rank, 1.0), types)
+    near = types.Float(wavelength / (2 * math.pi * distance))
+    slow = slow * Field(near, types.Float(-1), slow.grid, types)
+    place = types.Index(j * dr.opaque(types.Float64, n) + i)
+    whole = slow * Field(dr.gather(types.Float, u.re, place), dr.gather(types.Float, u.im, place), slow.grid, types)
+    return types.Tensor(whole.re, slow.grid.shape), types.Tensor(whole.im, slow.grid.shape)
+
+
+def _split(index: Any, n: int, types: Precision) -> tuple[Any, Any]:
+    """Quotient and remainder of float64 indices by n."""
+    import drjit as dr
+
+    by = dr.opaque(types.Float64, n)
+    quotient = dr.floor((index + 0.5) / by)
+    return quotient, dr.fma(-quotient, by, index)
+
+
+def _fourier(
+    at: np.ndarray, middle: float, problem: Problem, how: LowRankSampling, types: Precision
+) -> tuple[Any, Any]:
+    """A[x, (a, ξ)] = L_a(x) e^{-ik ξ x/c} as two tensors."""
+    rank, xi = how.rank, how.pupil.at
+    waves = np.tile(np.outer(at, xi) / (-problem.wavelength * how.scale), rank)
+    weight = np.repeat(lagrange(at - middle, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
+    wheel = weight * np.exp(2j * np.pi * waves)
+    re, im = (with_room(part.astype(types.dtype)) for part in (wheel.real, wheel.imag))
+    return types.Tensor(re, wheel.shape), types.Tensor(im, wheel.shape)
+
+
+def _product(re: Any, im: Any, other_re: Any, other_im: Any, transposed: bool) -> tuple[Any, Any]:
+    """Complex matrix product of tensor pairs."""
+    import drjit as dr
+
+    matmul: Any = dr.matmul
+    return (
+        matmul(re, other_re, Bt=transposed) - matmul(im, other_im, Bt=transposed),
+        matmul(re, other_im, Bt=transposed) + matmul(im, other_re, Bt=transposed),
+    )

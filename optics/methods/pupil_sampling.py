@@ -1,0 +1,123 @@
+"""Where a matrix product samples the pupil: on a grid, its edge softened, or at nodes of pixels between which it jumps.
+
+Both are rows and columns of places, the same along x and y.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from optics.apertures.pixelated import PixelatedAperture
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem, PupilEdge
+from optics.methods.rayleigh_sommerfeld import node_rule
+from optics.numerics.field import Field
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, opaque
+
+__all__ = ["GridSamples", "PixelSamples", "PupilSamples", "pixel_samples", "samples_of"]
+
+
+class PupilSamples(Protocol):
+    """Rows and columns of samples of a pupil."""
+
+    @property
+    def at(self) -> np.ndarray:
+        """Places [m] along either axis."""
+
+    @property
+    def outermost(self) -> float:
+        """Distance from the axis [m] beyond which nothing counts."""
+
+    @property
+    def seconds(self) -> float:
+        """What `field` takes, roughly."""
+
+    def places(self, index: Any, beam: Beam, types: Precision) -> Any:
+        """at[index] for float64 indices, with the derivatives that the beam's radius carries."""
+
+    def field(self, beam: Beam, types: Precision) -> Field:
+        """Behind the pupil, times the samples' areas [m²]."""
+
+
+@dataclass(frozen=True)
+class GridSamples:
+    """A grid that carries a soft aperture."""
+
+    edge: PupilEdge
+    grid: Grid
+
+    @property
+    def at(self) -> np.ndarray:
+        return self.grid.x
+
+    @property
+    def outermost(self) -> float:
+        return self.edge.outermost
+
+    @property
+    def seconds(self) -> float:
+        return self.grid.shape[0] ** 2 * self.edge.seconds_per_point
+
+    def places(self, index: Any, beam: Beam, types: Precision) -> Any:
+        import drjit as dr
+
+        return (index - dr.opaque(types.Float64, self.grid.shape[0] // 2)) * opaque(types, self.grid.dx)
+
+    def field(self, beam: Beam, types: Precision) -> Field:
+        return beam.behind(self.edge.aperture, self.grid, types).scaled(self.grid.dx**2)
+
+
+@dataclass(frozen=True)
+class PixelSamples:
+    """Nodes of an opening in pixels, so many across each; made when they are needed, since plans are kept for long."""
+
+    aperture: PixelatedAperture
+    across: int
+    radius: float
+
+    @property
+    def at(self) -> np.ndarray:
+        return self.aperture.rows(self.across) * self.radius
+
+    @property
+    def outermost(self) -> float:
+        """Cut pixels have nodes beyond the edge, which is itself nowhere further off than the radius."""
+        return self.radius * (1 + math.sqrt(2) * 2 / self.aperture.count)
+
+    @property
+    def seconds(self) -> float:
+        return (self.aperture.count * self.across) ** 2 * 1e-8
+
+    def places(self, index: Any, beam: Beam, types: Precision) -> Any:
+        import drjit as dr
+
+        return dr.gather(types.Float64, types.Float64(self.aperture.rows(self.across)), types.Index(index)) * opaque(
+            types, beam.radius
+        )
+
+    def field(self, beam: Beam, types: Precision) -> Field:
+        radius, at = opaque(types, beam.radius), self.aperture.rows(self.across)
+        x, y = (types.Float64(np.ascontiguousarray(axis.ravel())) for axis in np.meshgrid(at, at))
+        weight = types.Float64(self.aperture.weights(self.across).ravel()) * radius * radius
+        grid = Grid.square(len(at), 2 * self.radius / len(at))
+        return Field.from_waves(weight, beam.waves(x * radius, y * radius, types), grid, types)
+
+
+def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, radius: float) -> PixelSamples | None:
+    """As few as are good to so many digits for so many cycles per radius; None where pixels are too coarse."""
+    across = aperture.nodes_across(cycles, digits)
+    return None if across is None else PixelSamples(aperture, across, radius)
+
+
+def samples_of(problem: Problem) -> PupilSamples | None:
+    """As few as the turns of pupil and path together allow; None where pixels are too coarse for them."""
+    if problem.pixelated is not None:
+        return pixel_samples(problem.pixelated, *node_rule(problem), problem.radius)
+    edge = problem.soft_edge(problem.turning)
+    pitch = 1 / (problem.turning + edge.stopband)
+    return GridSamples(edge, Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch))

@@ -1,0 +1,171 @@
+"""The first Rayleigh-Sommerfeld integral as a direct sum over edge-fitted nodes: the reference."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from optics.apertures.aperture import Aperture, Nodes
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem
+from optics.numerics.field import Field
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, opaque, precision
+from optics.numerics.radial_profile import RadialLine
+
+__all__ = [
+    "MOST_DIGITS",
+    "PAIRS_PER_SECOND",
+    "NodeSampling",
+    "cached_nodes",
+    "direct_sum",
+    "node_count",
+    "node_rule",
+    "nodes",
+    "turns",
+]
+
+PAIRS_PER_SECOND = 2.5e8
+MOST_DIGITS = 14.0  # of float64 sums
+SPARE_DIGITS = 0.5  # the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
+ON_AXIS = 1e-9  # of the radius
+FAR = 0.25  # radius over distance below which the kernel is smooth enough for any nodes
+
+
+Rule = tuple[Aperture, float, float, bool]
+
+
+@dataclass(frozen=True)
+class NodeSampling:
+    """Quadrature nodes fitted to the aperture's edge, good to `digits` for `cycles` turns per radius.
+
+    line: where the picture is rotationally symmetric, the radii it is computed on.
+    """
+
+    aperture: Aperture
+    cycles: float
+    digits: float
+    count: int
+    line: RadialLine | None
+    seconds: float
+    method: str = "rayleigh_sommerfeld"
+    model_error: float = 0.0
+
+    def intensity(self, beam: Beam, problem: Problem) -> Any:
+        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        types = precision(problem.dtype)
+        if self.line is None:
+            x, y = problem.window.coordinates(types)
+            return direct_sum(beam, self.rule, x, y, types).intensity
+        r = types.Float64(self.line.positions)
+        return self.line.onto(direct_sum(beam, self.rule, r, 0 * r, types).intensity, problem.window, types)
+
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light: the focus, times the root of the summands."""
+        return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.count / math.pi)
+
+    @property
+    def rule(self) -> Rule:
+        return self.aperture, self.cycles, self.digits, self.line is not None
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        return self.count, 1
+
+    @property
+    def largest(self) -> int:
+        return math.ceil(math.sqrt(self.count))
+
+
+def nodes(problem: Problem) -> list[NodeSampling]:
+    """Enough nodes for the cycles that pupil and path together turn through."""
+    cycles, digits = node_rule(problem)
+    count = node_count(problem.aperture, cycles, digits)
+    line, outputs = None, math.prod(problem.window.shape)
+    if problem.symmetric:
+        outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
+        line = RadialLine.resolving(outermost, _intensity_band(problem), problem.distance, problem.ripple)
+        line = line if line.pays(outputs) else None
+        outputs = line.points if line else outputs
+        count = count if line is None else math.ceil(count / 2)
+    seconds = 1e-3 + count * outputs / PAIRS_PER_SECOND + count * 4e-9
+    return [NodeSampling(problem.aperture, cycles, digits, count, line, seconds)]
+
+
+def node_rule(problem: Problem) -> tuple[float, float]:
+    """Cycles per radius and digits that nodes must be good for."""
+    digits = min(SPARE_DIGITS - math.log10(problem.tolerance), MOST_DIGITS)
+    return turns(problem, digits), digits
+
+
+def turns(problem: Problem, digits: float) -> float:
+    """Cycles per radius for which the nodes must be enough: the phase's, and near the pupil those that stand for the
+    kernel's poles at height z above the plane: Gauss-Legendre over [0, R] and the trapezoid rule around a ring of
+    radius R converge like e^{-4nz/R} and e^{-nz/R}.
+    """
+    nearness = max(problem.radius / problem.distance - FAR, 0.0)
+    return problem.radius * problem.turning_inside + digits * math.log(10) / (2 * math.pi) * nearness
+
+
+def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
+    """Number of nodes; beyond a hundred cycles it grows like their square, and is not worth counting."""
+    most = 100.0
+    counted = len(cached_nodes(aperture, min(cycles, most), digits).weight)
+    return math.ceil(counted * max(cycles / most, 1.0) ** 2)
+
+
+@lru_cache(maxsize=16)
+def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool = False) -> Nodes:
+    """halved: on one side of the x axis, for sums that are the same on both, at points on that axis."""
+    found = aperture.nodes(cycles, digits)
+    if not halved:
+        return found
+    weight = np.where(np.abs(found.y) < ON_AXIS, 1, 2) * found.weight
+    kept = found.y > -ON_AXIS
+    return Nodes(found.x[kept], found.y[kept], weight[kept])
+
+
+def _intensity_band(problem: Problem) -> float:
+    """Highest frequency [1/m] of the intensity over the window: rays from the disk's rims interfere there."""
+    reach = problem.radius + problem.outermost
+    steepest = reach / math.hypot(reach, problem.distance) / problem.wavelength
+    return min(2 * steepest, 2 * problem.radius / (problem.wavelength * problem.distance))
+
+
+def direct_sum(beam: Beam, rule: Rule, x: Any, y: Any, types: Precision) -> Field:
+    """First Rayleigh-Sommerfeld integral at points (x, y) [m], nodes after rule = (aperture, cycles, digits, halved):
+
+    U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ikD} dξ (Goodman, §3.5). D - z = d²/(D + z) loses its whole waves in float64.
+    """
+    import drjit as dr
+
+    found = cached_nodes(*rule)
+    radius = opaque(types, beam.radius)
+    nodes_x, nodes_y = types.Float64(found.x) * radius, types.Float64(found.y) * radius
+    z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.pupil.medium_n)
+    weight = types.Float64(found.weight) * dr.square(radius) * z / (2 * math.pi)
+    waves = beam.waves(nodes_x, nodes_y, types)
+    dr.eval(nodes_x, nodes_y, weight, waves, x, y)
+    count = dr.opaque(types.Index, len(found.weight))
+    cycles = 1 / wavelength  # per metre: divisions cost most of a node
+    k = 2 * math.pi * cycles
+
+    def add(i: Any, re: Any, im: Any) -> tuple[Any, Any, Any]:
+        dx, dy = x - dr.gather(types.Float64, nodes_x, i), y - dr.gather(types.Float64, nodes_y, i)
+        d2 = dx * dx + dy * dy
+        distance = dr.sqrt(d2 + z * z)
+        phase = d2 / (distance + z) * cycles + dr.gather(types.Float64, waves, i)
+        sin, cos = dr.sincos(types.Float((phase - dr.round(phase)) * (2 * math.pi)))
+        nearness = 1 / distance
+        size = dr.gather(types.Float64, weight, i) * nearness * nearness
+        near, far, sin, cos = size * nearness, size * k, types.Float64(sin), types.Float64(cos)
+        return i + 1, re + near * cos + far * sin, im + near * sin - far * cos
+
+    zero = dr.zeros(types.Float64, dr.width(x))
+    start = dr.zeros(types.Index, dr.width(x))
+    _, re, im = dr.while_loop((start, zero, zero), lambda i, re, im: i < count, add, max_iterations=-1)
+    return Field(types.Float(re), types.Float(im), Grid((1, dr.width(x)), 1.0), types)

@@ -1,0 +1,183 @@
+"""Bad input ends in one line that names the argument, its value and the valid range."""
+
+import difflib
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.autodiff import number
+
+__all__ = [
+    "finite",
+    "in_range",
+    "of_kind",
+    "one_of",
+    "point_2d",
+    "positive",
+    "radiance_cube",
+    "reals",
+    "shape_2d",
+    "shown",
+    "vacuum_wavelength",
+    "vacuum_wavelengths",
+    "whole",
+]
+
+
+# Squares of lengths, and their ratios, must stay within double precision.
+SMALLEST, LARGEST = 1e-15, 1e15
+LONGEST_WAVE = 1.0  # no optics is longer; what is, was meant in nanometres
+UNIT = " (550 nm is 550e-9)"
+LINE = 200  # characters of a message that a value may take
+
+
+def shown(value: Any) -> str:
+    """`value` as a reader would type it, whatever NumPy's print options are (colour-science alters them); by its kind
+    and shape where that takes more than a line."""
+    if isinstance(value, np.generic):
+        return repr(value.item())
+    if isinstance(value, (tuple, list)):
+        ends = "()" if isinstance(value, tuple) else "[]"
+        return f"{ends[0]}{', '.join(map(shown, value))}{',' if ends == '()' and len(value) == 1 else ''}{ends[1]}"
+    text = repr(value)
+    if len(text) <= LINE and "\n" not in text:
+        return text
+    shape = getattr(value, "shape", None)
+    return type(value).__name__ if shape is None else f"{type(value).__name__} of shape {tuple(shape)}"
+
+
+def finite(name: str, value: float) -> float:
+    """`value` as float; ValueError unless it is a finite number."""
+    number = _number(name, value)
+    if not math.isfinite(number):
+        raise ValueError(f"{name} = {shown(value)}: must be finite")
+    return number
+
+
+def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False) -> float:
+    """`value` as float; ValueError unless it is > 0, within what arithmetic can square, or infinite where it may."""
+    number = _number(name, value)
+    if infinite and number == math.inf:
+        return number
+    if not SMALLEST <= number <= LARGEST:
+        size = f" (at least {SMALLEST:g})" if 0 < number < SMALLEST else ""
+        upper = ", or infinite" if infinite else f" and at most {LARGEST:g}"
+        raise ValueError(f"{name} = {shown(value)}: must be greater than 0{size}{upper}, in {unit}")
+    return number
+
+
+def vacuum_wavelength(value: Any) -> float:
+    """`value` [m] as float; ValueError unless it is > 0 and no longer than LONGEST_WAVE, as nanometres would be."""
+    wavelength = _number("wavelength", value)
+    if not SMALLEST <= wavelength <= LONGEST_WAVE:
+        raise ValueError(
+            f"wavelength = {shown(value)}: must be greater than 0 and at most {LONGEST_WAVE:g}, in m{UNIT}"
+        )
+    return wavelength
+
+
+def vacuum_wavelengths(values: Any) -> np.ndarray:
+    """`values` [m] as a float64 array of any shape, each checked as by `vacuum_wavelength`."""
+    wavelengths = reals("wavelengths", values)
+    for end in (wavelengths.min(), wavelengths.max()) if wavelengths.size else ():
+        vacuum_wavelength(end)
+    return wavelengths
+
+
+def in_range(name: str, value: float, low: float, high: float) -> float:
+    """`value` as float; ValueError unless low <= value <= high."""
+    number = _number(name, value)
+    if not low <= number <= high:
+        raise ValueError(f"{name} = {shown(value)}: must lie in [{low:g}, {high:g}]")
+    return number
+
+
+def shape_2d(name: str, value: Any) -> tuple[int, int]:
+    """(height, width) as ints; ValueError unless both are whole and at least 1."""
+    try:
+        height, width = (int(n) for n in value)
+        whole = all(float(n) == int(n) for n in value)
+    except (TypeError, ValueError, OverflowError):
+        height = width = 0
+        whole = False
+    if not whole or height < 1 or width < 1:
+        raise ValueError(f"{name} = {shown(value)}: must be two whole numbers (height, width), each at least 1")
+    return height, width
+
+
+def one_of(name: str, value: Any, options: Iterable[str]) -> str:
+    """`value`; ValueError, with the nearest option, unless it is one of them."""
+    known = tuple(options)
+    if value not in known:
+        plain = {option.lower(): option for option in known}
+        near = difflib.get_close_matches(str(value).lower(), plain, n=1, cutoff=0.5)
+        hint = f"; did you mean {plain[near[0]]!r}?" if near else ""
+        raise ValueError(f"{name} = {shown(value)}: must be one of {', '.join(map(repr, known))}{hint}")
+    return str(value)
+
+
+def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
+    """(x, y) as finite floats."""
+    try:
+        x, y = value
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {shown(value)}: must be two {what}") from None
+    return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
+
+
+def reals(name: str, values: Any) -> np.ndarray:
+    """`values` as a float64 array of any shape; ValueError unless they are real numbers."""
+    try:
+        given = np.asarray(values)
+    except (TypeError, ValueError):
+        given = np.asarray(None)
+    if given.dtype.kind not in "biuf":
+        kind = "complex ones" if given.dtype.kind == "c" else shown(values)
+        raise ValueError(f"{name}: must be real numbers, not {kind}")
+    return given.astype(np.float64)
+
+
+def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
+    """(band, Y, X) float32; ValueError unless it has `bands` bands and at least the shape `least`."""
+    radiance = reals("radiance", value).astype(np.float32)
+    if (
+        radiance.ndim != 3
+        or radiance.shape[0] != bands
+        or any(n < m for n, m in zip(radiance.shape[1:], least, strict=True))
+    ):
+        raise ValueError(
+            f"radiance has shape {radiance.shape}: must be (band, Y, X) with {bands} bands "
+            f"and at least {least[0]} x {least[1]} cells"
+        )
+    if not np.isfinite(radiance).all():
+        raise ValueError("radiance holds NaN or infinity: must be finite")
+    return radiance
+
+
+def whole(name: str, value: Any, low: int, high: int) -> int:
+    """`value` as int; ValueError unless it is whole and in [low, high]."""
+    try:
+        fits = int(value) == value and low <= value <= high
+    except (TypeError, ValueError, OverflowError):
+        fits = False
+    if not fits:
+        raise ValueError(f"{name} = {shown(value)}: must be a whole number in [{low}, {high}]")
+    return int(value)
+
+
+def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
+    """`value`; ValueError, with an example of what would be right, unless it is of the kind."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{name} = {shown(value)}: must be a kind of {kind.__name__}, such as {example}")
+    return value
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        if isinstance(value, (str, bytes)):
+            raise TypeError
+        return number(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {shown(value)}: must be a number") from None

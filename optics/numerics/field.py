@@ -1,0 +1,55 @@
+"""A sampled complex field, and how it takes up phase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, opaque, with_room
+
+__all__ = ["Field"]
+
+
+@dataclass(frozen=True)
+class Field:
+    """Complex amplitude on a grid; re and im are flat Dr.Jit arrays, row by row."""
+
+    re: Any
+    im: Any
+    grid: Grid
+    types: Precision
+
+    @classmethod
+    def from_waves(cls, amplitude: Any, waves: Any, grid: Grid, types: Precision) -> Field:
+        """amplitude · exp(2πi waves), waves in float64; whole waves are dropped before the cast to the field's type."""
+        import drjit as dr
+
+        angle = types.Float(waves - dr.round(waves)) * (2 * pi)
+        sin, cos = dr.sincos(angle)
+        amplitude = types.Float(amplitude)
+        return cls(amplitude * cos, amplitude * sin, grid, types)
+
+    @classmethod
+    def from_numpy(cls, u: np.ndarray, dx: float, types: Precision) -> Field:
+        u = np.asarray(u, dtype=types.complex_dtype)
+        return cls(types.Float(with_room(u.real)), types.Float(with_room(u.imag)), Grid(u.shape, dx), types)
+
+    def __mul__(self, other: Field) -> Field:
+        re = self.re * other.re - self.im * other.im
+        im = self.re * other.im + self.im * other.re
+        return Field(re, im, self.grid, self.types)
+
+    def scaled(self, factor: Any) -> Field:
+        scale = self.types.Float(opaque(self.types, factor))
+        return Field(self.re * scale, self.im * scale, self.grid, self.types)
+
+    @property
+    def intensity(self) -> Any:
+        return self.re * self.re + self.im * self.im
+
+    def numpy(self) -> np.ndarray:
+        return (self.re.numpy() + 1j * self.im.numpy()).reshape(self.grid.shape).astype(self.types.complex_dtype)

@@ -1,0 +1,79 @@
+"""Sample positions: n samples at pitch dx with sample n//2 at the centre."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.arguments import point_2d, positive, shape_2d
+from optics.numerics.precision import Precision, opaque
+
+__all__ = ["Grid", "sample_positions"]
+
+
+def sample_positions(n: int, dx: float) -> np.ndarray:
+    """Positions [m] of n samples at pitch dx, float64; sample n//2 is at 0."""
+    return (np.arange(n) - n // 2) * dx
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A plane's samples: shape (y, x), pitch dx [m] (or [1/m] for spatial frequencies), n//2 at centre (x, y)."""
+
+    shape: tuple[int, int]
+    dx: float
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "shape", shape_2d("shape", self.shape))
+        object.__setattr__(self, "dx", positive("dx", self.dx))  # a NumPy scalar would take a Dr.Jit array for its own
+        object.__setattr__(self, "centre", point_2d("centre", self.centre))
+
+    @classmethod
+    def square(cls, n: int, dx: float) -> Grid:
+        return cls((n, n), dx)
+
+    @property
+    def x(self) -> np.ndarray:
+        return self.centre[0] + sample_positions(self.shape[1], self.dx)
+
+    @property
+    def y(self) -> np.ndarray:
+        return self.centre[1] + sample_positions(self.shape[0], self.dx)
+
+    @property
+    def half_width(self) -> float:
+        """Largest distance of a sample from the origin along an axis."""
+        return max(abs(middle) + n // 2 * self.dx for middle, n in zip(self.centre, self.shape[::-1], strict=True))
+
+    @property
+    def half_diagonal(self) -> float:
+        """Largest distance of a sample from the origin."""
+        x, y = (abs(middle) + n // 2 * self.dx for middle, n in zip(self.centre, self.shape[::-1], strict=True))
+        return float(np.hypot(x, y))
+
+    @property
+    def own_half_width(self) -> float:
+        """Largest distance of a sample from the centre along an axis."""
+        return max(n // 2 for n in self.shape) * self.dx
+
+    @property
+    def own_half_diagonal(self) -> float:
+        """Largest distance of a sample from the centre."""
+        return float(np.hypot(self.shape[0] // 2, self.shape[1] // 2) * self.dx)
+
+    def coordinates(self, precision: Precision) -> tuple[Any, Any]:
+        """x and y of every sample as flat Dr.Jit arrays, float64 (phases need them)."""
+        import drjit as dr
+
+        height, width = self.shape
+        index = precision.Float64(dr.arange(precision.Index, height * width))
+        columns, pitch = opaque(precision, width), opaque(precision, self.dx)
+        row = dr.floor((index + 0.5) / columns)  # integer division would not vectorise
+        column = dr.fma(-row, columns, index)
+        x, y = (column - opaque(precision, width // 2)) * pitch, (row - opaque(precision, height // 2)) * pitch
+        if self.centre == (0.0, 0.0):
+            return x, y
+        return x + opaque(precision, self.centre[0]), y + opaque(precision, self.centre[1])

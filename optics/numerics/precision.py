@@ -1,0 +1,77 @@
+"""Dr.Jit's types for one dtype, on the CUDA device where there is one and LLVM otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.autodiff import is_tracked
+
+__all__ = ["Precision", "opaque", "precision", "with_room"]
+
+ROOM = 64  # elements: more than any processor takes at once
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Float: type of fields; Float64: type of optical paths, which lose their whole waves before they become Float."""
+
+    dtype: str
+    Float: Any
+    Tensor: Any
+    Float64: Any
+    Tensor64: Any
+    Index: Any
+    complex_dtype: type[np.complexfloating]
+
+
+@lru_cache(maxsize=2)
+def precision(dtype: str = "float32") -> Precision:
+    """The types for "float32" or "float64".
+
+    Raises:
+        ValueError: any other dtype.
+        BackendError: no LLVM that Dr.Jit can use.
+    """
+    if dtype not in ("float32", "float64"):
+        raise ValueError(f"dtype = {dtype!r}: must be 'float32' or 'float64'")
+    from optics.numerics.backend import require
+
+    require()
+    import drjit.auto.ad as types
+
+    if dtype == "float32":
+        return Precision(
+            dtype, types.Float, types.TensorXf, types.Float64, types.TensorXf64, types.UInt32, np.complex64
+        )
+    return Precision(
+        dtype, types.Float64, types.TensorXf64, types.Float64, types.TensorXf64, types.UInt32, np.complex128
+    )
+
+
+def with_room(values: np.ndarray) -> np.ndarray:
+    """The same numbers, flat, in memory that may be read some way past their end.
+
+    Dr.Jit works on NumPy's memory itself, without a copy, and its kernels take whole packets of numbers, sixteen with
+    AVX-512: those past the end go nowhere, but reading them ends the process where the page after it is not there,
+    as happens to arrays of some megabytes (seen with Dr.Jit 1.5 and 2087 x 2087 numbers).
+    """
+    room = np.empty(values.size + ROOM, values.dtype)
+    flat = room[: values.size]
+    flat.reshape(values.shape)[...] = values
+    return flat
+
+
+def opaque(types: Precision, value: Any) -> Any:
+    """A float64 scalar that Dr.Jit treats as data: another value does not compile another kernel.
+
+    A Dr.Jit array of one element stays what it is, derivative included.
+    """
+    import drjit as dr
+
+    if is_tracked(value):
+        return types.Float64(dr.ravel(value))
+    return dr.opaque(types.Float64, value)

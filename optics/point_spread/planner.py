@@ -1,0 +1,279 @@
+"""Which method, how many samples: the cheapest choice whose predicted error meets the tolerance.
+
+All methods evaluate the same integral (the angular spectrum of the thin-element field, equal to the first
+Rayleigh-Sommerfeld integral); they differ in where they sample it:
+
+- "hankel": a rotationally symmetric pupil on its axis needs two one-dimensional transforms and no soft edge.
+- "low_rank": Fourier's kernel times a slow rest of low rank, one matrix product. Best for lenses near their focus and
+  for small pupils. The pupil is sampled for the phase that lens and path have together, far less than either.
+- "far_field": one Fourier transform onto direction cosines for each of a few nodes of the window, between which the
+  slow rest of the kernel is interpolated. Best for small pupils and wide windows. Intensity only.
+- "angular_spectrum": pupil -> spectrum -> sensor plane, both planes within one period. Best at short distance.
+- "split_angular_spectrum": exp(ikz cos θ) is split into its paraxial part, whose Fourier transform is known, and the
+  rest, whose spectrum is narrow. Period and samples no longer grow with the distance.
+- "rayleigh_sommerfeld": the direct sum over edge-fitted nodes; needs no grid, costs nodes x outputs. The reference.
+
+The cheap methods approximate it and predict by how much; "auto" takes them only where that fits the tolerance too,
+while by name they run always and their plan tells the error:
+
+- "fresnel": the paraxial integral. "fraunhofer": the paraxial far field.
+- "geometric": density of rays, for shadows and coarse windows. "pinhole": all light in one cell.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Protocol
+
+from optics.elements.beam import Beam
+from optics.methods import pixelated_spectrum
+from optics.methods.angular_spectrum import split, whole
+from optics.methods.far_field import far_field
+from optics.methods.fresnel import fraunhofer, fresnel
+from optics.methods.geometric import geometric, pinhole
+from optics.methods.hankel import hankel
+from optics.methods.low_rank import low_rank
+from optics.methods.problem import Problem
+from optics.methods.rayleigh_sommerfeld import nodes
+
+__all__ = ["APPROXIMATE", "EXACT", "METHODS", "AccuracyError", "Option", "Plan", "Sampling", "choose"]
+
+
+class Sampling(Protocol):
+    """How one method samples a problem; its time is predicted for a warm kernel on two cores."""
+
+    @property
+    def method(self) -> str: ...
+
+    @property
+    def seconds(self) -> float: ...
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        """(y, x) samples of the pupil, or (radial, angular) nodes, or (nodes, 1)."""
+
+    @property
+    def largest(self) -> int:
+        """Side of the largest square array."""
+
+    @property
+    def model_error(self) -> float:
+        """Relative L2 error of the intensity that the method would make with any number of samples: 0 if exact."""
+
+    def intensity(self, beam: Beam, problem: Problem) -> Any:
+        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+
+    def plane(self, problem: Problem) -> float:
+        """Width [m] over which rounding spreads the pupil's light."""
+
+
+# Each maps a problem to the samplings by which it meets the tolerance: none, one or several.
+EXACT: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
+    "hankel": hankel,
+    "low_rank": low_rank,
+    "far_field": far_field,
+    "angular_spectrum": whole,
+    "split_angular_spectrum": split,
+    "rayleigh_sommerfeld": nodes,
+}
+APPROXIMATE: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
+    "fresnel": fresnel,
+    "fraunhofer": fraunhofer,
+    "geometric": geometric,
+    "pinhole": pinhole,
+}
+METHODS = EXACT | APPROXIMATE
+# Have nodes where light jumps from pixel to pixel; no grid has.
+FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
+    "low_rank": low_rank,
+    "angular_spectrum": pixelated_spectrum.whole,
+    "split_angular_spectrum": pixelated_spectrum.split,
+    "rayleigh_sommerfeld": nodes,
+}
+# Largest square array: 4096² complex64 is 134 MB, and a handful of such arrays live at once.
+MOST_SAMPLES = 4096
+FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}  # relative to the field's root mean square, see tests
+
+
+class AccuracyError(ValueError):
+    """Asked for more than any method can give here; the message says what can be had."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """A method that was weighed: what it would take, how wrong it would be, and why it lost (or "chosen")."""
+
+    method: str
+    samples: tuple[int, int]
+    predicted_error: float
+    seconds: float
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What was chosen, and why.
+
+    samples: (y, x) samples of the pupil; for nodes (radial, angular) or (count, 1).
+    padding: period of the pupil's transform over its samples, where there is one.
+    predicted_error: relative L2 error of the intensity over the window.
+    seconds: predicted time of a warm call on two cores.
+    options: every method that was weighed.
+    """
+
+    method: str
+    samples: tuple[int, int]
+    dtype: str
+    predicted_error: float
+    why: str
+    seconds: float = 0.0
+    options: tuple[Option, ...] = ()
+    padding: float = 1.0
+
+    def __str__(self) -> str:
+        rows = {
+            "method": self.method,
+            "samples": _size(self.samples),
+            "padding": f"{self.padding:.2f}",
+            "dtype": self.dtype,
+            "predicted error": f"{self.predicted_error:.1e}",
+            "predicted time": f"{self.seconds:.2g} s",
+            "why": self.why,
+        }
+        head = [f"{name:<17}{value}" for name, value in rows.items()]
+        if not self.options:
+            return "\n".join(head)
+        others = [
+            f"  {option.method:<24}{_size(option.samples):>13}{option.predicted_error:>10.1e}{option.seconds:>9.2g} s"
+            f"  {option.verdict}"
+            for option in self.options
+        ]
+        return "\n".join([*head, "weighed", *others])
+
+
+@lru_cache(maxsize=256)
+def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -> tuple[Plan, Sampling]:
+    """The cheapest sampling that meets the problem's tolerance. Planning takes as long as a small PSF: the same
+    problem is planned once.
+
+    method: "auto" weighs all, "exact" all that approximate nothing; a method's name asks for it alone, and then
+        only its sampling has to meet the tolerance, not its model.
+
+    Raises:
+        ValueError: unknown method.
+        AccuracyError: nothing within the limits on memory and time meets the tolerance.
+    """
+    asked = {"auto": tuple(METHODS), "exact": tuple(EXACT)}.get(method, (method,))
+    if asked[0] not in METHODS:
+        raise ValueError(f"method = {method!r}: must be 'auto', 'exact' or one of {', '.join(METHODS)}")
+    _check_dtype(problem)
+    cheapest = _weigh(problem, asked)
+    allowed = _model_tolerance(problem) if method == "auto" else math.inf
+    fitting = [
+        option
+        for option in cheapest.values()
+        if option is not None and _within(option, most_seconds) and option.model_error <= allowed
+    ]
+    if not fitting:
+        candidates = [option for option in cheapest.values() if option and option.model_error <= allowed]
+        raise AccuracyError(_refusal(problem, candidates, most_seconds))
+    best = min(fitting, key=_seconds)
+    return _plan(problem, best, cheapest, most_seconds), best
+
+
+@lru_cache(maxsize=256)
+def _weigh(problem: Problem, methods: tuple[str, ...]) -> dict[str, Sampling | None]:
+    """The cheapest sampling of each method."""
+    known = METHODS if problem.pixelated is None else FOR_PIXELS
+    found = {name: known[name](problem) for name in methods if name in known}
+    return {name: min(samplings, key=_cost) if samplings else None for name, samplings in found.items()}
+
+
+def _check_dtype(problem: Problem) -> None:
+    floor = 10 * FLOAT_NOISE[problem.dtype]
+    if problem.tolerance < floor:
+        remedy = f"; dtype='float64' carries {10 * FLOAT_NOISE['float64']:g}" if problem.dtype == "float32" else ""
+        raise AccuracyError(f"tolerance = {problem.tolerance:g}: {problem.dtype} carries {floor:g}{remedy}")
+
+
+def _model_tolerance(problem: Problem) -> float:
+    """What sampling and rounding leave of the tolerance."""
+    return problem.tolerance - _sampling_error(problem)
+
+
+def _sampling_error(problem: Problem) -> float:
+    return problem.tolerance / 2 + FLOAT_NOISE[problem.dtype]
+
+
+def _seconds(option: Sampling) -> float:
+    return option.seconds
+
+
+def _cost(option: Sampling) -> tuple[bool, float]:
+    return option.largest > MOST_SAMPLES, option.seconds
+
+
+def _within(option: Sampling, most_seconds: float) -> bool:
+    return option.largest <= MOST_SAMPLES and option.seconds <= most_seconds
+
+
+def _size(samples: tuple[int, int]) -> str:
+    return f"{samples[0]} x {samples[1]}" if samples[1] > 1 else str(samples[0])
+
+
+def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None], most_seconds: float) -> Plan:
+    options = [
+        Option(
+            name,
+            option.samples,
+            _sampling_error(problem) + option.model_error,
+            option.seconds,
+            _verdict(option, best, problem, most_seconds),
+        )
+        for name, option in weighed.items()
+        if option is not None
+    ]
+    why = (
+        f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "
+        f"{problem.band() * problem.wavelength:.2g}; "
+        + ("cheapest of those that meet the tolerance" if len(weighed) > 1 else "asked for")
+    )
+    error = _sampling_error(problem) + best.model_error
+    padding = getattr(best, "padding", 1.0)
+    return Plan(best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), padding)
+
+
+def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:
+    if option is best:
+        return "chosen"
+    if option.largest > MOST_SAMPLES:
+        return f"too large: {option.largest} across, at most {MOST_SAMPLES}"
+    if option.seconds > most_seconds:
+        return f"too slow: at most {most_seconds:g} s"
+    if option.model_error > _model_tolerance(problem):
+        return f"approximates too much: errs by {option.model_error:.1g}"
+    return f"{option.seconds / best.seconds:.1f} times as slow"
+
+
+def _refusal(problem: Problem, found: list[Sampling], most_seconds: float) -> str:
+    width = 2 * problem.window.half_width
+    if not found and problem.pixelated is not None:
+        return (
+            "a relief of pixels jumps, which asks for nodes fitted to them, and not too many: this cannot be; ask for "
+            f"method='auto' or one of {', '.join(FOR_PIXELS)}"
+        )
+    if not found:
+        return (
+            f"tolerance = {problem.tolerance:g} over a window of {width:.3g} m at a distance of "
+            f"{problem.distance:.3g} m reaches rays too close to grazing for a sampled spectrum: shrink the window or "
+            "ask for method='rayleigh_sommerfeld'"
+        )
+    least = min(found, key=_seconds)
+    return (
+        f"tolerance = {problem.tolerance:g} needs {least.largest} samples across and about {least.seconds:.2g} s by "
+        f"{least.method}; the limits are {MOST_SAMPLES} and {most_seconds:g} s: widen the tolerance, shrink the window "
+        f"({width:.3g} m) or flatten the relief"
+    )

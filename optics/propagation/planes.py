@@ -1,0 +1,146 @@
+"""A plane of a stack, sampled for the light that it has to pass on.
+
+A pupil's aperture is softened so that frequencies that can reach the next plane are exact (optics.apertures.aperture), and its
+samples lie so close that what folds back stays beyond them. Sums over samples then converge spectrally.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from optics.apertures.aperture import EDGE_REACH, SoftAperture
+from optics.elements.beam import Beam
+from optics.elements.pupil import Pupil
+from optics.elements.source import PointSource
+from optics.numerics.grid import Grid
+from optics.numerics.precision import precision
+from optics.point_spread.planner import MOST_SAMPLES, AccuracyError
+from optics.propagation.propagate import RIPPLE_PER_TOLERANCE, PropagationResult, propagate
+from optics.propagation.transfer_function import kept_band, kept_square
+
+__all__ = ["Light", "PlaneField", "PupilSampling", "Stop"]
+
+
+@dataclass(frozen=True)
+class PlaneField:
+    """Samples of a plane; band [1/m]: the highest frequency in them."""
+
+    u: np.ndarray
+    dx: float
+    band: float
+
+    @property
+    def half_width(self) -> float:
+        return Grid(self.u.shape, self.dx).half_width
+
+    @property
+    def power(self) -> float:
+        return float(np.sum(np.abs(self.u) ** 2, dtype=np.float64)) * self.dx**2
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A pupil, or the output window (None), `distance` [m] after the stop before, negative backwards."""
+
+    distance: float
+    pupil: Pupil | None
+    half_width: float
+
+
+@dataclass(frozen=True)
+class Light:
+    """What is the same at every plane. tolerance: each step's; wavelength: vacuum [m]."""
+
+    wavelength: float
+    medium_n: float
+    backward: bool
+    tolerance: float
+    dtype: str
+
+    @property
+    def ripple(self) -> float:
+        return RIPPLE_PER_TOLERANCE * self.tolerance
+
+    def reaching(self, half_widths: float, distance: float) -> float:
+        """Highest frequency [1/m] that `propagate` keeps between planes whose half widths add up to so much, its fade
+        included; infinite within one plane. Next to a plane evanescent waves count until they have decayed."""
+        z, wavelength = abs(distance), self.wavelength / self.medium_n
+        if z == 0:
+            return math.inf
+        round_, square = (
+            kept(1.02 * widths, wavelength, z, self.ripple)
+            for kept, widths in ((kept_band, math.sqrt(2) * half_widths), (kept_square, half_widths))
+        )
+        if math.isfinite(round_.kept):
+            return max(round_.end, square.diagonal(wavelength) if math.isfinite(square.kept) else 0)
+        return math.hypot(1 / wavelength, math.log(1 / self.ripple) / (2 * math.pi * z))
+
+    def carried(self, field: PlaneField, distance: float, window: Grid) -> PropagationResult:
+        """Through free space onto a plane's samples."""
+        return propagate(
+            field.u,
+            dx=field.dx,
+            wavelength=self.wavelength,
+            distance=distance,
+            out_dx=window.dx,
+            out_shape=window.shape,
+            medium_n=self.medium_n,
+            tolerance=self.tolerance,
+            dtype=self.dtype,
+        )
+
+
+@dataclass(frozen=True)
+class PupilSampling:
+    """A pupil's samples, its soft aperture, and the band [1/m] that they pass on."""
+
+    pupil: Pupil
+    source: PointSource
+    grid: Grid
+    soft: SoftAperture
+    band: float
+
+    @classmethod
+    def of(cls, stop: Stop, following: Stop, light: Light, source: PointSource, arriving: float) -> PupilSampling:
+        """arriving: the highest frequency [1/m] of the light that arrives.
+
+        That and the pupil's phase turn, and meet the edge's frequencies; what they make together beyond the band may
+        fold back, but not into the band.
+
+        Raises:
+            AccuracyError: more samples than there may be.
+        """
+        pupil = stop.pupil
+        assert pupil is not None
+        if pupil.pixels:
+            raise ValueError(
+                "elements: a PixelRelief jumps, which the grids between planes cannot carry: use psf for one"
+            )
+        slope = 1.02 * pupil.slopes(light.wavelength, source).steepest / light.wavelength
+        turns = arriving + slope + pupil.bandwidth(light.wavelength, light.ripple)
+        band = light.reaching(stop.half_width + following.half_width, following.distance)
+        if math.isinf(band):
+            band = turns  # seen in its own plane: an edge as soft as the light's own detail
+        soft = pupil.aperture.soften((turns + band) * pupil.radius, light.ripple, EDGE_REACH)
+        pitch = 1 / (turns + band + soft.stopband / pupil.radius)
+        across = 2 * math.ceil((1 + soft.reach) * pupil.radius / pitch) + 1
+        if across > MOST_SAMPLES:
+            raise AccuracyError(
+                f"a pupil of radius {pupil.radius:.3g} m needs {across} samples across; the limit is {MOST_SAMPLES}: "
+                "widen the tolerance, flatten its relief, or move the planes beside it further away"
+            )
+        return cls(pupil, source, Grid.square(across, pitch), soft, band)
+
+    def transmitted(self, u: np.ndarray | float, light: Light) -> PlaneField:
+        """The field u on the grid, times the pupil's transmittance (its conjugate backwards)."""
+        import drjit as dr
+
+        beam = Beam(self.pupil, self.source, light.wavelength, math.inf)
+        field = beam.behind(self.soft, self.grid, precision(light.dtype))
+        if dr.grad_enabled(field.re, field.im):
+            raise ValueError("elements: a stack carries no derivatives; use psf for a single pupil")
+        transmittance = field.numpy()
+        return PlaneField(u * (transmittance.conj() if light.backward else transmittance), self.grid.dx, self.band)

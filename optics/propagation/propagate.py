@@ -1,0 +1,251 @@
+"""A sampled field carried from plane to plane by its angular spectrum.
+
+The samples stand for the band-limited function through them, zero outside. Their spectrum is multiplied by the transfer
+function of free space and summed again wherever the result is wanted:
+
+    U(x, y; z) = F⁻¹{F{U₀} H}     (Goodman, §3.10.2; H in optics.propagation.transfer_function)
+
+A finite transform repeats the field every period. The period is chosen so that light aimed anywhere near the window
+lands there once; light aimed farther is faded out before it can wrap around, and what the spectrum holds too near to
+grazing for either is counted into the predicted error.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.arguments import finite, in_range, vacuum_wavelength
+from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum, predicted_seconds
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, precision
+from optics.point_spread.planner import FLOAT_NOISE, AccuracyError, Plan
+from optics.propagation.sampling import Sampling, blur_left, blurred_back, most_spare, sampling
+from optics.propagation.transfer_function import EVERYTHING, Passage, TransferFunction, evanescent
+
+__all__ = ["PROPAGATION_METHODS", "RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
+
+PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
+# Share of faded light that strays into the window: small, because the window may hold far less than is faded.
+RIPPLE_PER_TOLERANCE = 3e-3
+# First room for the blur of light cut at Nyquist's frequency [√(λz)].
+SPARE = 1.0
+# The estimate of that blur is good to a factor of two or three: carried again is only what is clearly too much.
+CLEARLY = 1.5
+# So many times the light that arrives may be missing and cost next to nothing of the tolerance.
+MUCH = 100.0
+
+ONE = np.ones(1)  # the weight of what counts whole
+
+
+@dataclass(frozen=True, eq=False)
+class PropagationResult:
+    """u: complex field (…, y, x) at pitch dx [m], centre sample n//2. plan: how it was computed, and how well."""
+
+    u: np.ndarray
+    dx: float
+    plan: Plan
+    _source: np.ndarray = field(repr=False)  # (plane, y, x)
+    _sampling: Sampling = field(repr=False)
+
+    @cached_property
+    def evanescent_power(self) -> float:
+        """Fraction of the input's power in waves that do not propagate (of several planes, the largest). Forwards they
+        decay; backwards they are dropped, since undoing the decay would amplify noise without bound."""
+        return max(_evanescent_share(plane, self._sampling) for plane in self._source)
+
+
+def propagate(
+    u: np.ndarray,
+    *,
+    dx: float,
+    wavelength: float,
+    distance: float,
+    out_dx: float | None = None,
+    out_shape: tuple[int, int] | None = None,
+    out_centre: tuple[float, float] = (0.0, 0.0),
+    medium_n: float = 1.0,
+    tolerance: float = 1e-3,
+    method: str = "auto",
+    dtype: str = "float32",
+) -> PropagationResult:
+    """Field at `distance` [m] behind (or, negative, before) the plane in which it is u, carrier exp(ikz) included.
+
+    u: complex (…, y, x), pitch dx [m], centre sample n//2. wavelength: vacuum [m].
+    out_dx, out_shape, out_centre: pitch, shape (y, x) and centre (x, y) [m] wanted; default as u's, on the axis.
+    tolerance: relative L2 error of the intensity over the window, beyond that of the sampling of u itself;
+        where what u holds at Nyquist's frequency errs by more, the plan says so.
+    method: "auto" and "angular_spectrum" are exact; "fresnel" is the paraxial approximation, only on request.
+
+    Raises:
+        ValueError: bad argument, named with its value and valid range.
+        AccuracyError: the tolerance cannot be met; says what can.
+    """
+    if method not in ("auto", *PROPAGATION_METHODS):
+        raise ValueError(f"method = {method!r}: must be 'auto' or one of {', '.join(PROPAGATION_METHODS)}")
+    given = _field(u)
+    window = Grid(out_shape or given.shape[-2:], dx if out_dx is None else out_dx, out_centre)
+    lit = _lit(given)
+    source = Grid(lit.shape[-2:], dx)
+    sources = lit.reshape(-1, *source.shape)
+    if np.may_share_memory(sources, u):  # the result keeps them, whatever becomes of u
+        sources = sources.copy()
+    in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5)
+    passage = Passage(
+        vacuum_wavelength(wavelength) / in_range("medium_n", medium_n, 1.0, 10.0),
+        finite("distance", distance),
+        method == "fresnel",
+        EVERYTHING,
+        RIPPLE_PER_TOLERANCE * tolerance,
+        window.centre,
+    )
+    how, planes = _with_room(sources, passage, (source, window), tolerance, precision(dtype))
+    out = np.stack([plane.u for plane in planes]).reshape(*given.shape[:-2], *window.shape)
+    error = max(plane.error for plane in planes)
+    if error > tolerance:
+        raise AccuracyError(
+            f"tolerance = {tolerance:g}: too much of the light leaves so flat, or so little of it meets the window, "
+            f"that the error reaches {error:.1g}; ask for that, or for a larger out_shape"
+        )
+    return PropagationResult(out, window.dx, _plan(how, error, _untold(planes, tolerance), dtype), sources, how)
+
+
+def _field(u: np.ndarray) -> np.ndarray:
+    field = np.asarray(u)
+    if field.ndim < 2 or 0 in field.shape:
+        raise ValueError(f"u has shape {field.shape}: must be (…, y, x), not empty")
+    if not np.isfinite(field).all():
+        raise ValueError("u: must be finite everywhere")
+    return field
+
+
+def _lit(field: np.ndarray) -> np.ndarray:
+    """The smallest part around the centre sample that holds all light: darkness around it would be carried at the same
+    cost."""
+    for axis in (-2, -1):
+        n = field.shape[axis]
+        lit = np.flatnonzero(field.any(axis=tuple(a for a in range(field.ndim) if a != field.ndim + axis)))
+        half = int(np.abs(lit - n // 2).max(initial=0))
+        if 2 * half + 1 < n:
+            field = np.take(field, range(n // 2 - half, n // 2 + half + 1), axis=axis)
+    return field
+
+
+@dataclass(frozen=True)
+class _Carried:
+    """u (y, x): the propagated plane; error: predicted, of its intensity; blur: beyond that, by what the samples
+    hold at Nyquist's frequency."""
+
+    u: np.ndarray
+    error: float
+    blur: float
+
+
+def _with_room(
+    sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
+) -> tuple[Sampling, list[_Carried]]:
+    """The planes, carried with as much room as their light at Nyquist's frequency asks for.
+
+    None is made where even all that is worth making would not do: what blurs so far belongs to the error of the
+    samples themselves, and more room brings them no nearer to what they stand for.
+    """
+    most = most_spare(passage, grids[0])
+    spare = min(SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most)
+    how = sampling(passage, *grids, spare)
+    planes = [_one(plane, how, types) for plane in sources]
+    blur = max(plane.blur for plane in planes)
+    allowed = CLEARLY * (tolerance - max(plane.error for plane in planes))
+    if spare < most and blur > allowed and blur * blur_left(how, sampling(passage, *grids, most)) < allowed:
+        how = sampling(passage, *grids, min(1.2 * CLEARLY * blur / allowed * spare, most))  # it falls like 1 / spare
+        planes = [_one(plane, how, types) for plane in sources]
+    return how, planes
+
+
+def _one(plane: np.ndarray, how: Sampling, types: Precision) -> _Carried:
+    plane = np.ascontiguousarray(plane, dtype=types.complex_dtype)
+    total = _power(plane)
+    if total == 0:
+        return _Carried(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
+    space = _free_space(how, types.dtype)
+    if how.step:
+        spectrum = periodic_spectrum(plane, how.period, how.across)
+    else:
+        spectrum = fourier_sum(plane, how.period, (how.across, how.across), -1)
+    grazing = _power(spectrum, space.grazing) / how.period**2
+    blurred = blurred_back(spectrum, how)
+    spectrum *= space.transfer
+    # Parseval: what does not pass was faded or evanescent. In float32 the difference is rounding, which is little
+    # beside what the fade leaves of it.
+    faded = max(total - _power(spectrum) * how.period**2, 0.0) if how.passage.band.fade else 0.0
+    if how.step:
+        result = periodic_sum(spectrum, how.period, how.step, how.window.shape)
+    else:
+        result = fourier_sum(spectrum, how.period * how.source.dx / how.window.dx, how.window.shape, +1)
+    arrived = _power(result) * (how.window.dx / how.source.dx) ** 2
+    if not arrived:
+        return _Carried(result, math.inf, math.inf)
+    if faded > MUCH * arrived:
+        faded = max(faded - total * _evanescent_share(plane, how), 0.0)
+    rounding = FLOAT_NOISE[types.dtype] * (1 + math.sqrt(total / arrived))
+    error = 2 * math.sqrt(grazing / arrived) + rounding + 2 * how.passage.ripple * math.sqrt(faded / arrived)
+    return _Carried(result, error, 2 * math.sqrt(blurred / arrived))
+
+
+def _evanescent_share(plane: np.ndarray, how: Sampling) -> float:
+    """Of a plane's power."""
+    total = _power(plane)
+    if total == 0 or how.passage.paraxial:
+        return 0.0
+    spectrum = periodic_spectrum(plane, how.period, how.period)
+    weights = evanescent(how.period, how.source.dx, how.passage.wavelength)
+    lost = float(np.sum(weights * (spectrum.real**2 + spectrum.imag**2), dtype=np.float64)) / how.period**2
+    return min(lost / total, 1.0)
+
+
+def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
+    """Σ w |u|², weights of real and imaginary parts; 0 without a weight."""
+    if weight is None:
+        return 0.0
+    if weight is ONE:
+        return float(np.vdot(u, u).real)
+    parts = u.view(weight.dtype)
+    return float(np.dot((parts * parts).ravel(), weight.ravel()))
+
+
+@lru_cache(maxsize=4)
+def _free_space(how: Sampling, dtype: str) -> TransferFunction:
+    """Over the spectrum, with the sums' scale. The same distance is often travelled again; the transfer function costs
+    more than the transforms."""
+    step = 1 / (how.period * how.source.dx)
+    if how.step:  # the spectrum is (fx, fy)
+        fx, fy = (kept_indices(how.period, n) * step for n in (how.across, how.period))
+        space = replace(how.passage, centre=how.passage.centre[::-1]).over(fy, fx, precision(dtype))
+    else:
+        fx = fy = Grid.square(how.across, step).x
+        space = how.passage.over(fx, fy, precision(dtype))
+    space.transfer[:] *= 1 / how.period**2
+    return space
+
+
+def _untold(planes: list[_Carried], tolerance: float) -> str:
+    """What the samples themselves err by, if it is more than the tolerance: that is not in the predicted error."""
+    blur = max(plane.blur for plane in planes)
+    if blur <= tolerance:
+        return ""
+    return f"; u's light at Nyquist's frequency blurs by about {blur:.1g}: sample u more finely, or soften its edges"
+
+
+def _plan(how: Sampling, error: float, untold: str, dtype: str) -> Plan:
+    band = how.passage.band
+    kept = f"band {band.kept * how.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
+    period = how.period * how.source.dx
+    why = f"period {period:.3g} m, {kept}" + ("; paraxial, as asked" if how.passage.paraxial else "") + untold
+    spectrum = how.across, how.across
+    seconds = predicted_seconds(how.source.shape, how.period, spectrum)
+    seconds += predicted_seconds(spectrum, period / how.window.dx, how.window.shape)
+    any_samples: Any = (how.period, how.period)
+    return Plan(how.method, any_samples, dtype, error, why, seconds)

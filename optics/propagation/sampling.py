@@ -1,0 +1,154 @@
+"""The period of a finite transform: long enough that what walks out of it does not come back into the window.
+
+A finite transform repeats the field every period. Light aimed anywhere near the window has to land there once; light
+aimed farther is faded out before it can wrap around. Where nothing can fade, samples with power at Nyquist's frequency
+end as if cut there, and what is cut blurs: beyond its walk it falls only like 1/(2π distance) (the first term of an
+integral's expansion about its end; Bleistein & Handelsman, Asymptotic Expansions of Integrals, §3.2).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from optics.numerics.fourier import fast_length
+from optics.numerics.grid import Grid
+from optics.point_spread.planner import MOST_SAMPLES, AccuracyError
+from optics.propagation.transfer_function import EVERYTHING, STEEPEST_SINE, Passage, kept_band, kept_square, walk
+
+__all__ = ["Sampling", "blur_left", "blurred_back", "most_spare", "sampling"]
+
+# Pitches are one and the same where they differ by less than this share of a sample over the whole window.
+SAME_PITCH = 1e-9
+# How much of the spectrum, and how many of its lines, tell its power about Nyquist's frequency.
+NYQUIST_SHARE, NYQUIST_LINES = 1 / 16, 9
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """period: in samples of the source; across: frequencies kept along each axis; step: the window's pitch in samples
+    of the source where it is a whole number of them, else 0; reach [m]: from one plane's far edge to the other's along
+    the longer axis."""
+
+    passage: Passage
+    source: Grid
+    window: Grid
+    period: int
+    across: int
+    step: int
+    reach: float
+
+    @property
+    def method(self) -> str:
+        return "fresnel" if self.passage.paraxial else "angular_spectrum"
+
+
+@lru_cache(maxsize=64)
+def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Sampling:
+    """The shortest period for a passage (its band is found here). spare [m]: room for the blur of what is cut.
+
+    Raises:
+        AccuracyError: the period takes more samples than there is room for.
+    """
+    wavelength, z, ripple, paraxial = passage.wavelength, abs(passage.z), passage.ripple, passage.paraxial
+    reach = max(
+        (n // 2 + 1) * source.dx + (m // 2) * window.dx + abs(middle)
+        for n, m, middle in zip(source.shape, window.shape, window.centre[::-1], strict=True)
+    )
+    corner = source.half_diagonal + source.dx + window.half_diagonal
+    bands = (
+        kept_square(reach, wavelength, z, ripple, paraxial),
+        kept_band(corner, wavelength, z, ripple, paraxial),
+    )
+    band = min(bands, key=lambda band: band.walk)
+    far, nyquist = band.walk, 0.5 / source.dx
+    # Where nothing can fade, all that the samples hold may matter.
+    if band.end >= (nyquist if band.square else math.sqrt(2) * nyquist):
+        band, far = EVERYTHING, _farthest(nyquist, wavelength, z, paraxial) + spare
+    least = max(reach + far, 2 * (max(source.shape) // 2 + 1) * source.dx)
+    samples = fast_length(least / source.dx)
+    half = band.end * samples * source.dx  # as a float: it may be infinite
+    across = 2 * math.ceil(half) + 1 if band.fade and 2 * half + 2 < samples else samples
+    if max(across, *window.shape) > MOST_SAMPLES:
+        raise AccuracyError(
+            f"distance = {passage.z:g} m over a window of {2 * window.half_width:.3g} m needs {across} samples across; "
+            f"the limit is {MOST_SAMPLES}: shrink the window, or sample u more coarsely if it allows"
+        )
+    step = round(window.dx / source.dx)
+    exactly = abs(window.dx - step * source.dx) <= SAME_PITCH * source.dx / max(window.shape)
+    return Sampling(replace(passage, band=band), source, window, samples, across, step if exactly else 0, reach)
+
+
+def most_spare(passage: Passage, source: Grid) -> float:
+    """Room [m] worth making for what is cut: with it, the corner's light could walk along an axis."""
+    nyquist, z, paraxial = 0.5 / source.dx, abs(passage.z), passage.paraxial
+    end = math.sqrt(2) * nyquist
+    whole = walk(end if paraxial else min(end, STEEPEST_SINE / passage.wavelength), passage.wavelength, z, paraxial)
+    return whole - _farthest(nyquist, passage.wavelength, z, paraxial)
+
+
+def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> float:
+    """How far [m] along an axis anything walks that a square of frequencies holds: what is in its corner."""
+    if paraxial:
+        return walk(nyquist, wavelength, z, paraxial)
+    end = min(math.sqrt(2) * nyquist, STEEPEST_SINE / wavelength)
+    return walk(end, wavelength, z) * min(nyquist / end, 1)
+
+
+def blurred_back(spectrum: np.ndarray, how: Sampling) -> float:
+    """Power (of u's samples) that the end of the spectrum at Nyquist's frequency brings back into the window, if the
+    source holds such light everywhere alike. The spectrum is of the field at the source: (fx, fy) in FFT order where
+    the window's pitch is a number of samples, else centred (fy, fx)."""
+    nyquist = 0.5 / how.source.dx
+    if how.passage.band.fade or not (how.passage.paraxial or nyquist * how.passage.wavelength < STEEPEST_SINE):
+        return 0.0  # what ends by fading, or by decaying, does not end as if cut
+    width = max(round(NYQUIST_SHARE * how.period), 1)
+    lines = np.unique(np.linspace(-width, width, NYQUIST_LINES).round().astype(int))
+    lines = (lines + (how.period // 2 if how.step else 0)) % how.period
+    total = 0.0
+    for axis in (0, 1):  # along which the blur comes back: y, x
+        across = axis if how.step else 1 - axis  # of the spectrum, the axis of the other frequency
+        u = np.take(spectrum, lines, axis=1 - across)
+        power = u.real**2 + u.imag**2
+        total += float(power.mean(axis=1 - across) @ _blur_weights(how, axis))
+    return total
+
+
+def blur_left(how: Sampling, roomier: Sampling) -> float:
+    """What a roomier sampling leaves of the blur's amplitude, if Nyquist's light is even along the other axis."""
+    power, left = (sum(float(_blur_weights(sampling, axis).sum()) for axis in (0, 1)) for sampling in (how, roomier))
+    return math.sqrt(left / power) if power else 1.0
+
+
+@lru_cache(maxsize=8)
+def _blur_weights(how: Sampling, axis: int) -> np.ndarray:
+    """Of the power at Nyquist's frequency along one axis, per frequency along the other: what comes back."""
+    source, window = how.source, how.window
+    ring = (np.arange(how.period) - how.period // 2) / (how.period * source.dx)
+    far, aside = _walks(0.5 / source.dx, np.fft.ifftshift(ring) if how.step else ring, how)
+    lit, seen = (grid.shape[axis] * grid.dx for grid in (source, window))
+    meets = _share_that_meets(aside, how, 1 - axis)
+    room = np.maximum(how.period * source.dx - how.reach - np.where(meets > 0, far, 0), source.dx)
+    falls = np.log1p(lit * seen / (room * (room + lit + seen))) / (4 * math.pi**2 * lit)
+    weights: np.ndarray = 2 * falls * meets * source.dx / how.period  # both ends of the spectrum
+    return weights
+
+
+def _share_that_meets(walks: np.ndarray, how: Sampling, axis: int) -> np.ndarray:
+    """Share of a source's light that walks so far [m] along an axis (0: y) and lands beside the window."""
+    lit, seen = (grid.shape[axis] * grid.dx for grid in (how.source, how.window))
+    missed = np.maximum(walks - abs(how.window.centre[1 - axis]), 0)
+    share: np.ndarray = np.clip((lit + seen) / 2 - missed, 0, min(lit, seen)) / lit
+    return share
+
+
+def _walks(fx: float, fy: np.ndarray, how: Sampling) -> tuple[np.ndarray, np.ndarray]:
+    """How far [m] along x and along y light of (fx, fy) walks; infinite where it is too near grazing."""
+    wavelength, z = how.passage.wavelength, abs(how.passage.z)
+    sine2 = 0 * fy if how.passage.paraxial else (fx**2 + fy**2) * wavelength**2
+    steep = sine2 >= STEEPEST_SINE**2
+    per_sine = np.where(steep, math.inf, z * wavelength / np.sqrt(1 - np.where(steep, 0, sine2)))
+    return fx * per_sine, np.abs(fy) * per_sine

@@ -1,0 +1,186 @@
+"""A field carried plane to plane through pupils and free space, forwards or backwards."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from optics.apertures.aperture import EDGE_REACH
+from optics.elements.pupil import Pupil
+from optics.elements.source import PointSource
+from optics.numerics.arguments import in_range, positive, vacuum_wavelength
+from optics.numerics.grid import Grid
+from optics.numerics.precision import precision
+from optics.point_spread.planner import FLOAT_NOISE, AccuracyError, Plan
+from optics.propagation.planes import Light, PlaneField, PupilSampling, Stop
+
+__all__ = ["FreeSpace", "StackResult", "Step", "propagate_through"]
+
+
+@dataclass(frozen=True)
+class FreeSpace:
+    """`distance` [m] of a medium of index medium_n.
+
+    Raises:
+        ValueError: names argument, value and valid range.
+    """
+
+    distance: float
+    medium_n: float = 1.0
+
+    def __post_init__(self) -> None:
+        positive("distance", self.distance)
+        in_range("medium_n", self.medium_n, 1.0, 10.0)
+
+
+@dataclass(frozen=True)
+class Step:
+    """What happened on the way to one plane.
+
+    distance [m], negative backwards. plan: how it was computed; its error is relative to the light within the window.
+    power_in, power_out [intensity m²]: what set out, and what arrived within the window.
+    evanescent_power: fraction of power_in in waves that do not propagate (see PropagationResult), as far as the samples
+        carry them: what cannot reach the next plane was not sampled.
+    """
+
+    distance: float
+    plan: Plan
+    power_in: float
+    power_out: float
+    evanescent_power: float
+
+
+@dataclass(frozen=True, eq=False)
+class StackResult:
+    """u: complex field (y, x) at pitch dx [m], centre sample n//2. predicted_error: relative L2 of its intensity."""
+
+    u: np.ndarray
+    dx: float
+    steps: tuple[Step, ...]
+    predicted_error: float
+
+
+def propagate_through(
+    elements: Sequence[Pupil | FreeSpace],
+    u: np.ndarray | None = None,
+    *,
+    wavelength: float,
+    dx: float | None = None,
+    source: PointSource | None = None,
+    out_dx: float | None = None,
+    out_shape: tuple[int, int] | None = None,
+    tolerance: float = 1e-3,
+    dtype: str = "float32",
+    backward: bool = False,
+) -> StackResult:
+    """Field behind a stack of pupils and free space, carrier exp(ikz) included.
+
+    elements: in the order in which light meets them when it goes forwards; all in one medium.
+    u: complex (y, x) in the plane before the first element, pitch dx [m], zero outside; or None: the first element is
+        a pupil that `source` shines on (by default a plane wave of unit amplitude).
+    wavelength: vacuum [m]. out_dx, out_shape: pitch and shape (y, x) wanted; default as u's.
+    tolerance: relative L2 error of the intensity over the window, beyond that of the sampling of u itself.
+    backward: u lies behind the last element and is carried back to before the first, undoing distances and phases;
+        what apertures blocked and what decayed does not come back.
+
+    Raises:
+        ValueError: bad argument, named with its value and valid range; or a parameter that carries derivatives.
+        AccuracyError: the tolerance cannot be met; says what can.
+    """
+    field, window = _start(u, dx, out_dx, out_shape)
+    stops = _stops(elements, backward, window)
+    if field is None and (stops[0].pupil is None or stops[0].distance != 0):
+        raise ValueError("u = None: must be given, unless the first element is a Pupil for a source to shine on")
+    if field is not None and source is not None:
+        raise ValueError("source: must not be given with u")
+    each = in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5) / (2 * len(stops))
+    light = Light(vacuum_wavelength(wavelength), _medium(elements), backward, max(each, 10 * FLOAT_NOISE[dtype]), dtype)
+    steps: list[Step] = []
+    for i, stop in enumerate(stops):
+        sampling = None
+        if stop.pupil is not None:
+            at = source or PointSource() if field is None else PointSource()
+            sampling = PupilSampling.of(stop, stops[i + 1], light, at, _arriving(field, stop, light))
+        grid = window if sampling is None else sampling.grid
+        if field is not None:
+            out = light.carried(field, stop.distance, grid)
+            arrived = PlaneField(out.u, out.dx, field.band)
+            steps.append(Step(stop.distance, out.plan, field.power, arrived.power, out.evanescent_power))
+            field = arrived
+        if sampling is not None:
+            field = sampling.transmitted(1.0 if field is None else field.u, light)
+    assert field is not None
+    return StackResult(field.u, window.dx, tuple(steps), _error(steps, tolerance, light))
+
+
+def _start(
+    u: np.ndarray | None, dx: float | None, out_dx: float | None, out_shape: tuple[int, int] | None
+) -> tuple[PlaneField | None, Grid]:
+    """The field before the first stop (None: a source's, on the first pupil), and the output window."""
+    if u is None:
+        if out_dx is None or out_shape is None:
+            raise ValueError("out_dx, out_shape: must be given where u is not")
+        return None, Grid(out_shape, out_dx)
+    samples = np.asarray(u)
+    if samples.ndim != 2 or samples.size == 0 or not np.isfinite(samples).all():
+        raise ValueError(f"u has shape {samples.shape}: must be (y, x), not empty, and finite everywhere")
+    if dx is None:
+        raise ValueError("dx: must be given with u")
+    field = PlaneField(samples, positive("dx", dx), math.sqrt(0.5) / dx)
+    return field, Grid(out_shape or (samples.shape[0], samples.shape[1]), field.dx if out_dx is None else out_dx)
+
+
+def _stops(elements: Sequence[Pupil | FreeSpace], backward: bool, window: Grid) -> list[Stop]:
+    """Pupils with the distances before them, ending with the output window. Free space adds up: that is exact."""
+    if not elements:
+        raise ValueError("elements is empty: must hold at least one Pupil or FreeSpace")
+    stops: list[Stop] = []
+    sign, distance, touching = -1 if backward else 1, 0.0, False
+    for element in reversed(elements) if backward else elements:
+        if isinstance(element, FreeSpace):
+            distance, touching = distance + sign * element.distance, False
+        elif not isinstance(element, Pupil):
+            raise ValueError(f"elements holds {element!r}: must be Pupil or FreeSpace")
+        elif touching:
+            raise ValueError("elements: two pupils touch; put FreeSpace between them, or make them one Pupil")
+        else:
+            stops.append(Stop(distance, element, (1 + EDGE_REACH) * element.radius))
+            distance, touching = 0.0, True
+    return [*stops, Stop(distance, None, window.half_width)]
+
+
+def _medium(elements: Sequence[Pupil | FreeSpace]) -> float:
+    media = sorted({element.medium_n for element in elements})
+    if len(media) > 1:
+        raise ValueError(f"medium_n = {', '.join(f'{n:g}' for n in media)}: must be the same throughout the elements")
+    return media[0]
+
+
+def _arriving(field: PlaneField | None, stop: Stop, light: Light) -> float:
+    """Highest frequency [1/m] of the light that arrives at a stop; a source's counts with the pupil's own phase."""
+    if field is None:
+        return 0.0
+    return min(field.band, light.reaching(field.half_width + stop.half_width, stop.distance))
+
+
+def _error(steps: list[Step], tolerance: float, light: Light) -> float:
+    """Errors of the steps, and of the soft edges between them, each as much larger as the light since has dwindled.
+
+    Raises:
+        AccuracyError: they exceed the tolerance.
+    """
+    last = steps[-1].power_out
+    if last == 0:
+        return 0.0
+    error = sum(step.plan.predicted_error * math.sqrt(max(step.power_out / last, 1)) for step in steps)
+    edges = 8 * light.ripple + 4 * FLOAT_NOISE[light.dtype]
+    error += sum(edges * math.sqrt(max(step.power_in / last, 1)) for step in steps)
+    if error > tolerance:
+        raise AccuracyError(
+            f"tolerance = {tolerance:g}: so little of the light meets the last window that the error reaches "
+            f"{error:.1g}; ask for that, or for a larger out_shape"
+        )
+    return error

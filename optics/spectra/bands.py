@@ -1,0 +1,154 @@
+"""Spectral bands: light as a few numbers, and what each is worth to each type of receptor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.eye.kernel_interpolation import worst_difference
+from optics.numerics.arguments import in_range, whole
+from optics.point_spread.planner import AccuracyError
+from optics.spectra.pigment import pigment_absorptance
+from optics.spectra.receptors import Receptors, receptors_of
+from optics.spectra.spectrum import Spectrum, cie_1931, daylight
+
+__all__ = ["SpectralBands", "cie_1931", "daylight", "pigment_absorptance"]
+
+CANDIDATES, FINEST = (1, 2, 4, 8, 16, 32), 64
+CATCHES_FIRST = 1e4  # how much more than means they weigh in least squares
+
+
+@dataclass(frozen=True)
+class SpectralBands:
+    """Bands of light and what each is worth to each receptor channel.
+
+    wavelengths: (band,) [m], the bands' centres.
+    weights: (channel, band); Σ_b weights[c, b] daylight(wavelengths[b]) = 1 for every channel c, so that a white
+        surface in unit daylight gives 1.
+    white_catch: (channel,) ∫ daylight(λ) λ S_c(λ) dλ [m²], S_c the pigment's quantal sensitivity with peak 1: what a
+        white surface in unit daylight is worth before the weights are normalised.
+    """
+
+    wavelengths: np.ndarray
+    weights: np.ndarray
+    white_catch: np.ndarray
+
+    @classmethod
+    def uniform(cls, bands: int, receptors: Any = "rgb") -> SpectralBands:
+        """Equal bands over the receptors' range; the weights integrate sensitivity x daylight exactly (to 1 nm) for
+        every reflectance that is linear between the bands' centres: error O(bands⁻²) for smooth ones.
+
+        receptors: `Receptors`, or what stands for them (see `receptors_of`).
+        """
+        kinds = receptors_of(receptors)
+        edges = np.linspace(*kinds.limits_nm, whole("bands", bands, 1, FINEST) + 1)
+        centres = (edges[:-1] + edges[1:]) / 2
+        nm, catch = _catch(kinds)
+        weights = (catch @ _hats(nm, centres).T) / catch.sum(axis=1, keepdims=True) / daylight(centres * 1e-9)
+        return cls(centres * 1e-9, weights, catch.sum(axis=1) * 1e-18)
+
+    @classmethod
+    def for_tolerance(
+        cls,
+        tolerance: float,
+        kernels: Callable[[np.ndarray], np.ndarray] | None = None,
+        samples_per_receptor: int = 1,
+        receptors: Any = "rgb",
+    ) -> SpectralBands:
+        """The fewest bands, a power of two, that keep the predicted error of a receptor's signal within the tolerance,
+        in units of white's signal. It is the sum of two:
+
+        - reflectances (1 + cos(2π λ/Λ + φ))/2 of any phase φ, Λ the whole range: what the bands make of them against
+          quadrature to 1 nm;
+        - kernels(wavelengths) (wave, k, k), cells of 1/samples_per_receptor (None: the same for all wavelengths):
+          the worst scene's difference between white light's kernel from n and from 2n bands.
+
+        Raises:
+            AccuracyError: 32 bands do not.
+        """
+        in_range("tolerance", tolerance, 1e-6, 0.5)
+        total, coarse = math.inf, None
+        for bands in CANDIDATES:
+            chosen, finer = (cls.uniform(n, receptors) for n in (bands, 2 * bands))
+            total = _reflectance_error(chosen, cls.uniform(FINEST, receptors), receptors_of(receptors).limits_nm)
+            if total > tolerance:
+                continue
+            if kernels is None:
+                return chosen
+            coarse = chosen.white_light(kernels(chosen.wavelengths)) if coarse is None else coarse
+            fine = finer.white_light(kernels(finer.wavelengths))
+            total += worst_difference([(1, coarse), (-1, fine)], samples_per_receptor)
+            if total <= tolerance:
+                return chosen
+            coarse = fine
+        raise AccuracyError(
+            f"tolerance = {tolerance:g}: {CANDIDATES[-1]} bands leave a predicted error of {total:.1e} of white's "
+            "signal; widen the tolerance or give a number of bands"
+        )
+
+    def of(
+        self, radiance: Spectrum | Callable[[np.ndarray], np.ndarray], receptors: Any, nonnegative: bool = False
+    ) -> np.ndarray:
+        """(band,): a spectral radiance in these bands, in units of daylight's at 560 nm; of any shape, such as a
+        fluorescent lamp's lines, which samples at the bands' centres hit or miss.
+
+        Means over the bands, as far as receptors see them and in parts of daylight, changed by as little as makes
+        Σ_b weights[c, b] radiance[b] what receptor type c catches (quadrature to 1 nm): exactly, if bands are at least
+        as many as types, else as nearly as they can. Lines in few bands may leave one below 0.
+
+        radiance: a Spectrum, or a function of wavelengths [m] (of a surface: reflectance times illuminant).
+        receptors: those that these bands were made for.
+        nonnegative: no band below 0; what is caught is then as near as that allows.
+        """
+        at = radiance.at if isinstance(radiance, Spectrum) else radiance
+        nm, catch = _catch(receptors_of(receptors))
+        catch /= catch.sum(axis=1, keepdims=True)
+        of_daylight = np.broadcast_to(at(nm * 1e-9), nm.shape) / daylight(nm * 1e-9)
+        seen = catch.sum(axis=0)
+        shares = _hats(nm, self.wavelengths * 1e9) * (seen + 1e-6 * seen.max())  # what nobody sees has a mean, too
+        means = daylight(self.wavelengths) * (shares @ of_daylight) / shares.sum(axis=1)
+        caught = catch @ of_daylight
+        found: np.ndarray = means + np.linalg.pinv(self.weights) @ (caught - self.weights @ means)
+        return _nonnegative(self.weights, caught, means) if nonnegative and found.min() < 0 else found
+
+    def white_light(self, kernels: np.ndarray) -> np.ndarray:
+        """(channel, k, k): what a scene without colour in daylight has of kernels (band, k, k)."""
+        return np.tensordot(self.weights * daylight(self.wavelengths), kernels, axes=1)
+
+
+def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> np.ndarray:
+    """x >= 0 with weights @ x as near to what is caught as can be, and of those the nearest to the means."""
+    from scipy.optimize import lsq_linear
+
+    equations = np.concatenate([weights * CATCHES_FIRST, np.eye(len(means))])
+    wanted = np.concatenate([caught * CATCHES_FIRST, means])
+    found: np.ndarray = lsq_linear(equations, wanted, bounds=(0, np.inf), method="bvls").x
+    return found
+
+
+def _catch(kinds: Receptors) -> tuple[np.ndarray, np.ndarray]:
+    """Wavelengths [nm] over the receptors' range, and what each type catches there of daylight, ready to be summed."""
+    low, high = kinds.limits_nm
+    nm = np.arange(low, high + 0.5)
+    catch = kinds.catch(nm)
+    catch[:, [0, -1]] /= 2  # trapezoid rule
+    return nm, catch
+
+
+def _hats(nm: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """(band, wavelength): linear interpolation between the bands' centres, constant beyond."""
+    return np.stack([np.interp(nm, centres, row) for row in np.eye(len(centres))])
+
+
+def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: tuple[float, float]) -> float:
+    """Worst over phases and channels: half of |Σ w d e^{2πiλ/Λ}|'s error."""
+    period = (range_nm[1] - range_nm[0]) * 1e-9
+
+    def catch(bands: SpectralBands) -> np.ndarray:
+        return bands.weights @ (daylight(bands.wavelengths) * np.exp(2j * np.pi * bands.wavelengths / period))
+
+    return float(np.abs(catch(chosen) - catch(exact)).max() / 2)

@@ -1,0 +1,60 @@
+"""Photons that a receptor absorbs: how bright a signal of 1 is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from optics.numerics.arguments import in_range, positive
+from optics.spectra.bands import SpectralBands
+from optics.spectra.spectrum import cie_1931, daylight
+
+__all__ = ["PhotonBudget"]
+
+PLANCK, LIGHT_SPEED = 6.62607015e-34, 299792458.0  # [J s], [m/s], exact in the SI
+LUMENS_PER_WATT = 683.0  # CIE 018: K_m, to 0.002 %
+
+
+@dataclass(frozen=True)
+class PhotonBudget:
+    """Light on the scene, and how long and how well receptors catch it.
+
+    illuminance: E_v [lx] of daylight (CIE D65) on the scene: 1e5 in the sun, 1e4 under an overcast sky, 10 at dusk.
+    integration_time: Δt [s] over which a receptor sums what it catches; 10 to 50 ms in insects and vertebrates.
+    quantum_efficiency: η, the share of photons at its pigment's peak that a receptor absorbs, losses in front included.
+
+    Raises:
+        ValueError: names argument, value and valid range.
+    """
+
+    illuminance: float = 1e4
+    integration_time: float = 0.02
+    quantum_efficiency: float = 0.5
+
+    def __post_init__(self) -> None:
+        in_range("illuminance", self.illuminance, 1e-6, 1e6)
+        in_range("integration_time", self.integration_time, 1e-6, 1e3)
+        in_range("quantum_efficiency", self.quantum_efficiency, 1e-6, 1)
+
+    @property
+    def spectral_irradiance(self) -> float:
+        """Daylight on the scene at 560 nm [W/m³]: E_v = K_m E_560 ∫ daylight(λ) ȳ(λ) dλ."""
+        wavelengths = np.arange(360, 781, 5) * 1e-9
+        visible = daylight(wavelengths) * cie_1931(wavelengths)[:, 1]
+        return self.illuminance / (LUMENS_PER_WATT * float(visible.sum()) * 5e-9)
+
+    def photons(self, bands: SpectralBands, etendue: float) -> np.ndarray:
+        """Photons absorbed per integration time from a white Lambertian surface, (channel,):
+
+            N_c = η Δt G ∫ E_λ/π · λ/(hc) · S_c(λ) dλ
+
+        etendue: G [m² sr], pupil area times the solid angle from which a receptor takes light. With
+        G = (π/4) D² (d/f)² it is Land's sensitivity (Warrant & Nilsson 1998, Vision Research 38:195, eq. 1) with
+        daylight's spectrum instead of one wavelength, for square receptors of side d.
+        """
+        positive("etendue", etendue, "m² sr")
+        radiance = self.spectral_irradiance / math.pi
+        caught = self.quantum_efficiency * self.integration_time * etendue
+        return caught * radiance / (PLANCK * LIGHT_SPEED) * bands.white_catch

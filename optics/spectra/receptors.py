@@ -1,0 +1,159 @@
+"""Receptor types: how sensitive they are to which wavelengths, and which receptor of a retina is of which type."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.arguments import one_of, shown
+from optics.spectra.pigment import Pigment
+from optics.spectra.spectrum import LIMITS_NM, Spectrum, cone_fundamentals, daylight
+
+__all__ = ["RECEPTORS", "Receptors", "receptors_of"]
+
+# Light beyond the range taken into account, on either side, as a share of each type's catch from white in daylight.
+NEGLIGIBLE = 1e-3
+STEP_NM = 10  # the range's ends are multiples of it
+
+
+@dataclass(frozen=True)
+class Receptors:
+    """The receptor types of an eye, one channel of signals each, or a mosaic of them.
+
+    types     of one or more kinds each: a `Pigment`; a number, the λmax [nm] of an A1 pigment; or a `Spectrum`, a
+              quantal sensitivity as measured. Their order is that of the channels.
+    mosaic    None: every receptor has all types, as pixels have: signals are (type, h, w). Or rows of indices into
+              `types`, ((0, 1), (1, 2)), repeated over the retina from its top left corner: every receptor has one type,
+              as in a real retina, and signals are (1, h, w).
+    range_nm  (low, high) [nm], whole numbers within 300-780: light taken into account, divided into bands. None: as
+              wide as it must be to leave out less than 1e-3 of any type's catch from white in daylight at either end.
+
+    Raises:
+        ValueError: names argument, value and what is allowed.
+    """
+
+    types: tuple[Any, ...]
+    mosaic: tuple[tuple[int, ...], ...] | None = None
+    range_nm: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "types", _types(self.types))
+        if self.mosaic is not None:
+            object.__setattr__(self, "mosaic", _mosaic(self.mosaic, len(self.types)))
+        if self.range_nm is not None:
+            object.__setattr__(self, "range_nm", _range(self.range_nm))
+
+    @cached_property
+    def limits_nm(self) -> tuple[float, float]:
+        """Range of the light taken into account [nm]."""
+        return _range_of(self) if self.range_nm is None else self.range_nm
+
+    @property
+    def channels(self) -> int:
+        """Signals at each place of the retina."""
+        return len(self.types) if self.mosaic is None else 1
+
+    def arranged(self, mosaic: Sequence[Sequence[int]] | np.ndarray | None) -> Receptors:
+        """The same types as this mosaic."""
+        return replace(self, mosaic=None if mosaic is None else _mosaic(mosaic, len(self.types)))
+
+    def layout(self, resolution: tuple[int, int]) -> np.ndarray | None:
+        """Type of every receptor, (h, w) int; None without a mosaic."""
+        if self.mosaic is None:
+            return None
+        tile = np.array(self.mosaic)
+        return tile[np.ix_(*(np.arange(n) % m for n, m in zip(resolution, tile.shape, strict=True)))]
+
+    def catch(self, nm: np.ndarray) -> np.ndarray:
+        """What each type catches of unit daylight per wavelength [nm], (type, wavelength), up to a common factor.
+
+        Receptors count photons, radiance is energy: hence the factor λ beside the quantal sensitivity.
+        """
+        light = daylight(nm * 1e-9)
+        return np.stack([kind.at(nm * 1e-9) * nm * light for kind in self.types])
+
+
+def _types(types: Any) -> tuple[Pigment | Spectrum, ...]:
+    if isinstance(types, (Pigment, Spectrum)) or np.ndim(types) == 0:
+        types = (types,)
+    if not len(types):
+        raise ValueError("receptors: there is no type; an eye needs at least one")
+    found = tuple(kind if isinstance(kind, (Pigment, Spectrum)) else _pigment(kind) for kind in types)
+    for i, kind in enumerate(found):
+        if not kind.at(np.arange(*LIMITS_NM) * 1e-9).max() > 0:
+            raise ValueError(f"receptors: type {i} sees nothing between {LIMITS_NM[0]:g} and {LIMITS_NM[1]:g} nm")
+    return found
+
+
+def _pigment(lambda_max_nm: Any) -> Pigment:
+    try:
+        return Pigment(float(lambda_max_nm))
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"receptors hold {shown(lambda_max_nm)}: must be wavelengths of peaks in [330, 700] nm, Pigments or Spectra"
+        ) from None
+
+
+def _mosaic(mosaic: Any, types: int) -> tuple[tuple[int, ...], ...]:
+    try:
+        tile = np.array(mosaic)
+        whole = tile.ndim == 2 and tile.size > 0 and bool(np.all(tile == tile.astype(int)))
+    except (TypeError, ValueError):
+        whole = False
+    if not whole or tile.min() < 0 or tile.max() >= types:
+        raise ValueError(f"mosaic: must be rows, all as long, of indices of types from 0 to {types - 1}")
+    return tuple(tuple(int(kind) for kind in row) for row in tile)
+
+
+def _range(range_nm: Any) -> tuple[float, float]:
+    try:
+        low, high = (float(end) for end in range_nm)
+        fits = LIMITS_NM[0] <= low < high <= LIMITS_NM[1] and low == int(low) and high == int(high)
+    except (TypeError, ValueError, OverflowError):
+        fits = False
+    if not fits:
+        raise ValueError(f"range_nm = {shown(range_nm)}: must be (low, high), whole numbers [nm] within 300-780")
+    return low, high
+
+
+def _range_of(receptors: Receptors) -> tuple[float, float]:
+    """The light that any type catches, but for NEGLIGIBLE of it at either end."""
+    nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1)
+    so_far = np.cumsum(receptors.catch(nm), axis=1)
+    so_far /= so_far[:, -1:]
+    first = nm[np.argmax((so_far > NEGLIGIBLE).any(axis=0))]
+    last = nm[np.argmax((so_far >= 1 - NEGLIGIBLE).all(axis=0))]
+    return float(first // STEP_NM * STEP_NM), float(-(-last // STEP_NM) * STEP_NM)
+
+
+# Red, green and blue, as swallowtail butterflies have them (Arikawa 2003, J. Comp. Physiol. A 189:791): far enough
+# apart to tell colours as three RGB channels do, which human cones (566, 541, 441 nm) are not.
+_RGB_NM = (600.0, 520.0, 460.0)
+
+RECEPTORS: Mapping[str, Callable[[], Receptors]] = {
+    "rgb": lambda: Receptors(_RGB_NM, range_nm=(400.0, 700.0)),
+    "lms": lambda: Receptors(cone_fundamentals()),
+    # Worker bees' green, blue and UV receptors: Peitsch et al. (1992), J. Comp. Physiol. A 170:23.
+    "honeybee": lambda: Receptors((544.0, 436.0, 344.0)),
+    # Cones: Palacios et al. (1998), Vision Research 38:2135.
+    "goldfish": lambda: Receptors(tuple(Pigment(peak, "A2") for peak in (623.0, 537.0, 447.0, 356.0))),
+}
+
+
+def receptors_of(receptors: Any) -> Receptors:
+    """Receptors from whatever may stand for them: themselves, one of RECEPTORS' names, or their types.
+
+    Raises:
+        ValueError: an unknown name, with the nearest; no types, or types that are none.
+    """
+    if isinstance(receptors, Receptors):
+        return receptors
+    if isinstance(receptors, str):
+        return RECEPTORS[one_of("receptors", receptors, RECEPTORS)]()
+    if receptors is None:
+        raise ValueError("receptors = None: must be a name, wavelengths of peaks [nm], or Receptors")
+    return Receptors(receptors)

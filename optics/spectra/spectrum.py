@@ -1,0 +1,167 @@
+"""Spectra as tables: illuminants, reflectances, cone fundamentals, and whatever else was measured.
+
+The tables are frozen from colour-science (its own sources are named with each); tests compare them with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+
+import numpy as np
+
+from optics.numerics.arguments import one_of, vacuum_wavelengths
+
+__all__ = [
+    "ILLUMINANTS",
+    "LIMITS_NM",
+    "REFLECTANCES",
+    "Spectrum",
+    "cie_1931",
+    "cone_fundamentals",
+    "daylight",
+    "illuminant",
+    "reflectance",
+]
+
+LIMITS_NM = (300.0, 780.0)  # CIE D65 is tabulated from here; no eye's receptors reach beyond
+SHORTEST_NM = 1.0  # of a table; what is shorter was meant in metres
+NORMAL_NM = 560.0  # illuminants are 1 here
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """A quantity over wavelength: linear between the table's entries, constant beyond its ends (as CIE 15 advises).
+
+    wavelengths_nm: rising [nm] · values: as many, finite and not negative. Equal tables are equal spectra.
+
+    Raises:
+        ValueError: names argument, value and what is allowed.
+    """
+
+    wavelengths_nm: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        nm, values = (_row(name, getattr(self, name)) for name in ("wavelengths_nm", "values"))
+        if len(nm) != len(values):
+            raise ValueError(f"values: {len(values)} for {len(nm)} wavelengths_nm: must be as many")
+        if not np.all(np.diff(nm) > 0) or not nm[0] >= SHORTEST_NM:
+            raise ValueError(f"wavelengths_nm: must rise from one entry to the next, from {SHORTEST_NM:g} nm on")
+        if min(values) < 0:
+            raise ValueError(f"values hold {min(values):g}: must not be negative")
+        object.__setattr__(self, "wavelengths_nm", nm)
+        object.__setattr__(self, "values", values)
+
+    @property
+    def peak_nm(self) -> float:
+        """Where it is largest [nm]."""
+        return self.wavelengths_nm[int(np.argmax(self.values))]
+
+    def at(self, wavelengths: np.ndarray) -> np.ndarray:
+        """Values at `wavelengths` [m]."""
+        return np.interp(vacuum_wavelengths(wavelengths) * 1e9, self.wavelengths_nm, self.values)
+
+
+def _row(name: str, numbers: Sequence[float]) -> tuple[float, ...]:
+    try:
+        row = np.asarray(numbers, dtype=np.float64)
+    except (TypeError, ValueError):
+        row = np.empty(0)
+    if row.ndim != 1 or not row.size or not np.isfinite(row).all():
+        raise ValueError(f"{name}: must be a row of finite numbers, at least one")
+    return tuple(row.tolist())
+
+
+def _spectrum(nm: np.ndarray, values: np.ndarray) -> Spectrum:
+    return Spectrum(tuple(nm.tolist()), tuple(values.tolist()))
+
+
+@lru_cache(maxsize=4)
+def _table(name: str) -> tuple[tuple[str, ...], np.ndarray]:
+    """Column names and columns (column, wavelength) of a CSV file, the wavelengths [nm] first."""
+    with resources.files("optics.spectra").joinpath("data", name).open() as file:
+        names = tuple(file.readline().strip().split(","))
+        return names[1:], np.loadtxt(file, delimiter=",").T
+
+
+def _columns(name: str) -> dict[str, np.ndarray]:
+    names, columns = _table(name)
+    return dict(zip(names, columns[1:], strict=True))
+
+
+def daylight(wavelengths: np.ndarray) -> np.ndarray:
+    """Relative spectral power of CIE D65, 1 at 560 nm, linear between the 5 nm table's entries.
+
+    Raises:
+        ValueError: a wavelength [m] outside 300-780 nm.
+    """
+    nm, d65 = _table("colour_tables.csv")[1][:2]
+    return np.interp(_nanometres(wavelengths), nm, d65 / np.interp(NORMAL_NM, nm, d65))
+
+
+def cie_1931(wavelengths: np.ndarray) -> np.ndarray:
+    """CIE 1931 2° colour matching functions x̄, ȳ, z̄ -> (wavelength, 3); wavelengths [m] in 300-780 nm, 0 below 360."""
+    table = _table("colour_tables.csv")[1]
+    nm = _nanometres(wavelengths)
+    return np.stack([np.interp(nm, table[0], column) for column in table[2:]], axis=-1)
+
+
+def _nanometres(wavelengths: np.ndarray) -> np.ndarray:
+    nm = np.asarray(wavelengths, dtype=np.float64) * 1e9
+    low, high = LIMITS_NM
+    outside = nm[~((nm > low - 1e-6) & (nm < high + 1e-6))]
+    if outside.size:
+        raise ValueError(f"wavelengths hold {outside[0] * 1e-9:g} m: must lie in [{low:g}e-9, {high:g}e-9]")
+    return nm
+
+
+# CIE 15: incandescent light, phases of daylight, fluorescent lamps and a phosphor-converted white LED (the last three
+# are tabulated from 380 nm and taken as dark below), and equal energy.
+ILLUMINANTS = ("A", "D50", "D55", "D65", "D75", "E", "FL2", "FL11", "LED-B3")
+
+
+def illuminant(name: str) -> Spectrum:
+    """Relative spectral power of a CIE illuminant, 1 at 560 nm, on 300-780 nm.
+
+    Raises:
+        ValueError: an unknown name.
+    """
+    one_of("illuminant", name, ILLUMINANTS)
+    if name == "E":
+        return Spectrum(LIMITS_NM, (1.0, 1.0))
+    if name == "D65":
+        nm = _table("colour_tables.csv")[1][0]
+        return _spectrum(nm, daylight(nm * 1e-9))
+    nm, power = _table("illuminants.csv")[1][0], _columns("illuminants.csv")[name]
+    return _spectrum(nm, power / np.interp(NORMAL_NM, nm, power))
+
+
+# The 24 patches of the ColorChecker as Ohta (1997) measured them, which ISO 17321-1 took over.
+REFLECTANCES = (
+    *("dark skin", "light skin", "blue sky", "foliage", "blue flower", "bluish green"),
+    *("orange", "purplish blue", "moderate red", "purple", "yellow green", "orange yellow"),
+    *("blue", "green", "red", "yellow", "magenta", "cyan"),
+    *("white", "neutral 8", "neutral 6.5", "neutral 5", "neutral 3.5", "black"),
+)
+
+
+def reflectance(name: str) -> Spectrum:
+    """Reflectance of a patch of the ColorChecker, measured on 380-780 nm (below, it stays what it is at 380 nm).
+
+    Raises:
+        ValueError: an unknown name.
+    """
+    one_of("reflectance", name, REFLECTANCES)
+    return _spectrum(_table("reflectances.csv")[1][0], _columns("reflectances.csv")[name])
+
+
+def cone_fundamentals() -> tuple[Spectrum, Spectrum, Spectrum]:
+    """Human L, M and S cones at the cornea, quantal, peaks 1: Stockman & Sharpe (2000), Vision Research 40:1711, for 2°
+    fields; CIE 170-1:2006 took them over. They begin at 390 nm; below, lens and cornea let next to nothing through."""
+    nm = _table("cone_fundamentals.csv")[1][0]
+    cones = (energy / nm for energy in _columns("cone_fundamentals.csv").values())
+    long, middle, short = (Spectrum((nm[0] - 1, *nm), (0.0, *(quantal / quantal.max()))) for quantal in cones)
+    return long, middle, short
