@@ -17,7 +17,7 @@ from evolve.development import Phenotype
 from evolve.files import write_whole
 from evolve.policy import EyePolicy, TrainingDiverged, load_policy
 from evolve.store import Run, RunError
-from sim.state import WorldState, concatenate
+from sim.worlds.state import WorldState, concatenate
 
 __all__ = ["Episode", "record"]
 

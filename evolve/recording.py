@@ -20,8 +20,8 @@ from evolve.episode import Episode
 from evolve.files import UNFINISHED
 from evolve.report.picture import display
 from evolve.report.stage import Stage
-from sim.agent import EYE_HEIGHT, eye_positions, eye_rotations
-from sim.layout import WALL_HEIGHT
+from sim.eyes.eyes import EYE_HEIGHT, eye_positions, eye_rotations
+from sim.worlds.layout import WALL_HEIGHT
 
 __all__ = ["require_rerun", "write_recording"]
 

@@ -24,8 +24,8 @@ def coarse_bands(config: RunConfig) -> list[str]:
     """A line where the bands misjudge the world's measured spectra by more than a receptor's noise."""
     if config.task in GREY_TASKS:
         return []
-    from sim.colours import band_error, measured
-    from sim.world import build_world
+    from sim.render.band_error import band_error, measured
+    from sim.worlds.world import build_world
 
     spectra = measured(build_world(config.task))
     light, counts = _most_light(config), _doublings(config.eye.bands)

@@ -72,7 +72,7 @@ for geom in np.unique(ids[ids >= 0]):
 if options.out:
     from matplotlib.image import imsave
 
-    from sim.color import encode_srgb
+    from sim.scene.color import encode_srgb
 
     imsave(options.out, encode_srgb(np.clip(preview(radiance, wavelengths * 1e9), 0, 1)))
     print(f"drawn to         {options.out}")

@@ -9,7 +9,7 @@ import numpy as np
 
 import optics
 import sim
-from sim.tasks.foraging import ULTRAVIOLET, petal
+from sim.worlds.foraging import ULTRAVIOLET, petal
 
 SHOWN = ("rgb", "lms", "goldfish", "honeybee")
 

@@ -19,7 +19,7 @@ import optics
 from evolve.analysis import polychromatic
 from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
 from experiments.store import DATA, Origin, read_rows, write_rows
-from sim import materials
+from sim.worlds import materials
 
 __all__ = ["Row", "best", "computed", "measures"]
 

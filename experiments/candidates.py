@@ -20,8 +20,8 @@ from evolve.store import Run
 from evolve.vision import vision
 from experiments.best_pupil import contrast_of, measures
 from experiments.glass import power
-from sim.reward import EVALUATION
-from sim.world import build_world
+from sim.tasks.reward import EVALUATION
+from sim.worlds.world import build_world
 
 __all__ = ["NO_NUMBER", "Row", "anatomy", "complete", "parameters", "rows_of"]
 

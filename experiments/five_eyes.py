@@ -21,7 +21,7 @@ from evolve.report.picture import display
 from evolve.vision import ssim
 from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
 from experiments.store import Origin
-from sim.state import WorldState
+from sim.worlds.state import WorldState
 
 __all__ = ["STAGES", "Stage", "View", "scene", "view"]
 

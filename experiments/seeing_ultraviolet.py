@@ -21,7 +21,7 @@ from experiments.drift import SEEDS, shade
 from experiments.evolved import Store, conduct_table, luck, luck_table
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
-from sim.tasks.foraging import ULTRAVIOLET, petal
+from sim.worlds.foraging import ULTRAVIOLET, petal
 
 __all__ = ["contrast", "difference", "page"]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import optics
 from experiments.page import new_figure, save
 from optics.spectra.bands import daylight
-from sim.color import encode_srgb
+from sim.scene.color import encode_srgb
 from sim.exr import preview
 
 __all__ = ["picture", "pupils"]

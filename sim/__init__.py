@@ -15,33 +15,33 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from sim.registration import register as register_environments
+from sim.envs.registration import register as register_environments
 
 if TYPE_CHECKING:
-    from sim.agent import Eyes
-    from sim.env import make_env
+    from sim.eyes.eyes import Eyes
+    from sim.envs.env import make_env
     from sim.exr import View, read_exr, write_exr
-    from sim.fidelity import Fidelity, choose_fidelity
-    from sim.reference import ReferenceRenderer
-    from sim.render import BatchedRenderer
+    from sim.render.fidelity import Fidelity, choose_fidelity
+    from sim.render.reference_renderer import ReferenceRenderer
+    from sim.render.batched_renderer import BatchedRenderer
     from sim.scene.mirror import Mirror, MirrorWarning, mirror
-    from sim.vec_env import make_vec_env
-    from sim.world import TASKS, World, build_world
+    from sim.envs.vec_env import make_vec_env
+    from sim.worlds.world import TASKS, World, build_world
 
 _HOME = {
-    "Eyes": "sim.agent",
-    "TASKS": "sim.world",
-    "World": "sim.world",
-    "build_world": "sim.world",
+    "Eyes": "sim.eyes.eyes",
+    "TASKS": "sim.worlds.world",
+    "World": "sim.worlds.world",
+    "build_world": "sim.worlds.world",
     "Mirror": "sim.scene.mirror",
     "MirrorWarning": "sim.scene.mirror",
     "mirror": "sim.scene.mirror",
-    "BatchedRenderer": "sim.render",
-    "ReferenceRenderer": "sim.reference",
-    "Fidelity": "sim.fidelity",
-    "choose_fidelity": "sim.fidelity",
-    "make_env": "sim.env",
-    "make_vec_env": "sim.vec_env",
+    "BatchedRenderer": "sim.render.batched_renderer",
+    "ReferenceRenderer": "sim.render.reference_renderer",
+    "Fidelity": "sim.render.fidelity",
+    "choose_fidelity": "sim.render.fidelity",
+    "make_env": "sim.envs.env",
+    "make_vec_env": "sim.envs.vec_env",
     "View": "sim.exr",
     "read_exr": "sim.exr",
     "write_exr": "sim.exr",

@@ -29,7 +29,7 @@ import numpy as np
 
 import optics
 import sim
-from sim.state import WorldState
+from sim.worlds.state import WorldState
 from validation.page import Page, parser
 from validation.scenes import SIGMA, lived_through, rms
 from validation.stored import write_table

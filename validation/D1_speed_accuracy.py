@@ -31,8 +31,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import sim
-from sim.depth import DepthLayers
-from sim.state import WorldState
+from sim.eyes.depth_layers import DepthLayers
+from sim.worlds.state import WorldState
 from validation.page import Page, parser
 from validation.scenes import SCENES, SIGMA, Scene, lived_through, rms
 from validation.speed_accuracy import Chart, Point, Setting, draw, rows_of, table

@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 import sim
 from evolve.config import LearningConfig
 from evolve.learner import learner, play
-from sim.reward import EVALUATION, TRAINING
+from sim.tasks.reward import EVALUATION, TRAINING
 
 __all__ = ["Case", "Row", "read_rows", "steps_to", "watched", "wilson", "write_rows"]
 

@@ -8,8 +8,8 @@ import numpy as np
 
 import optics
 import sim
-from sim.simulation import Simulation
-from sim.state import WorldState
+from sim.envs.simulation import Simulation
+from sim.worlds.state import WorldState
 
 __all__ = ["SCENES", "SIGMA", "Scene", "lived_through", "rms"]
 

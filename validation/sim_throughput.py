@@ -38,10 +38,10 @@ import numpy as np
 
 import optics
 import sim
-from sim.picture import pose
-from sim.retinas import Retinas
-from sim.simulation import Simulation
-from sim.streams import Streams
+from sim.envs.follow_camera import pose
+from sim.render.noisy_signals import Retinas
+from sim.envs.simulation import Simulation
+from sim.tasks.random_streams import Streams
 
 
 @dataclass(frozen=True)

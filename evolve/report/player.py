@@ -12,8 +12,8 @@ from evolve.files import write_whole
 from evolve.report.markup import document, exact, json_script, number, text
 from evolve.report.picture import data_uri, display, film_sheet
 from evolve.report.stage import Stage
-from sim.simulation import MAX_TURN
-from sim.world import MAX_SPEED
+from sim.envs.simulation import MAX_TURN
+from sim.worlds.world import MAX_SPEED
 
 __all__ = ["player", "write_player"]
 

@@ -9,8 +9,8 @@ import numpy as np
 
 import sim
 from evolve.episode import Episode
-from sim.agent import BODY_RADIUS
-from sim.physics import SUBSTEPS
+from sim.eyes.eyes import BODY_RADIUS
+from sim.physics.physics import SUBSTEPS
 
 __all__ = ["Stage"]
 

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum
-from sim.color import decode_srgb
+from sim.scene.color import decode_srgb
 from sim.scene import spectra, surfaces
 
 _TYPES = mujoco.mjtGeom

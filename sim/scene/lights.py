@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum, daylight
-from sim.color import decode_srgb
+from sim.scene.color import decode_srgb
 from sim.scene import sky, surfaces
 from sim.scene.spectra import HEADLIGHT, Spectra, described, in_daylight
 

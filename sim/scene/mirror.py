@@ -19,8 +19,8 @@ from optics.spectra.spectrum import Spectrum
 from sim.scene import bsdfs, cameras, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
 from sim.scene.spectra import of_geom, resolve
-from sim.variant import DEFAULT_VARIANT
-from sim.variant import variant as in_variant
+from sim.scene.variant import DEFAULT_VARIANT
+from sim.scene.variant import variant as in_variant
 
 VISIBLE_GROUPS = (0, 1, 2)  # MuJoCo draws these unless told otherwise
 

@@ -9,7 +9,7 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from sim.color import decode_srgb
+from sim.scene.color import decode_srgb
 from sim.scene import cube
 
 # MuJoCo's own sign that a geom's rgba was not set, and its material's counts.

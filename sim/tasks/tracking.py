@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from sim.tasks.detection import add_layout
+from sim.worlds.detection import add_layout
 
 __all__ = ["add_layout"]

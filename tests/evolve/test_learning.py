@@ -13,7 +13,7 @@ import sim
 from evolve.config import LearningConfig
 from evolve.learner import play, train
 from evolve.policy import EyeFeatures, PolicyConfig, build_policy
-from sim.state import WorldState
+from sim.worlds.state import WorldState
 
 SCENES, TRAINING_SCENES, BATCH = 256, 20, 512
 

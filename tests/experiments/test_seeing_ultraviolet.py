@@ -14,7 +14,7 @@ from experiments.candidates import Row
 from experiments.seeing_ultraviolet import contrast, difference, peaks
 from experiments.store import Origin, write_rows
 from optics.spectra.pigment import pigment_absorptance
-from sim.tasks.foraging import ULTRAVIOLET, petal
+from sim.worlds.foraging import ULTRAVIOLET, petal
 
 ROW = Row(*("foraging", 0, 0, 0, 0, 0, 1.0, 0.5, 4, 2, 45.0, 45.0, 6, 8, 0.1, 5, 64, 1000), peaks_nm="600.0 350.0")
 

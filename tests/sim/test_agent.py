@@ -10,7 +10,7 @@ import pytest
 
 import sim
 from optics import PhotonBudget, Pupil, Receptors
-from sim.agent import BODY_RADIUS, camera_rotations, eye_positions, eye_rotations
+from sim.eyes.eyes import BODY_RADIUS, camera_rotations, eye_positions, eye_rotations
 
 
 def test_eyes_spread_evenly_from_left_to_right():

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import sim
-from sim.atlas import bake
-from sim.closed_form import components_of
-from sim.simulation import Simulation
-from sim.stage import build_stage
-from sim.variant import variant
-from sim.world import build_world
+from sim.tracing.reflectance_atlas import bake
+from sim.tracing.closed_form_tracer import components_of
+from sim.envs.simulation import Simulation
+from sim.tracing.static_scene import build_stage
+from sim.scene.variant import variant
+from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=3, resolution=(9, 12), fov_deg=70, placement_range_deg=240, bands=5, noise_sigma=0)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sim.color import decode_srgb, encode_srgb
+from sim.scene.color import decode_srgb, encode_srgb
 
 
 def test_known_values():

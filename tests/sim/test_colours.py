@@ -7,9 +7,9 @@ import pytest
 
 import optics
 import sim
-from sim.colours import band_error, measured
-from sim.simulation import Simulation
-from sim.tasks.foraging import ULTRAVIOLET, petal
+from sim.render.band_error import band_error, measured
+from sim.envs.simulation import Simulation
+from sim.worlds.foraging import ULTRAVIOLET, petal
 
 PETALS = [petal(share) for share in ULTRAVIOLET.values()]
 NM = np.arange(300.0, 781.0)
@@ -91,7 +91,7 @@ class TestLampsWithLines:
         assert few.max() > 0.05
 
     def test_samples_at_the_centres_miss_lines(self, monkeypatch):
-        monkeypatch.setattr("sim.render.lit_in_bands", lambda world, eye: world)
+        monkeypatch.setattr("sim.render.batched_renderer.lit_in_bands", lambda world, eye: world)
         few, many = (self.signals("batched", bands) for bands in (4, 64))
         assert (few > 1.9 * many)[many > 0.1].any()
 

@@ -9,9 +9,9 @@ import pytest
 
 import optics
 import sim
-from sim.depth import DepthLayers
-from sim.simulation import Simulation
-from sim.variant import variant
+from sim.eyes.depth_layers import DepthLayers
+from sim.envs.simulation import Simulation
+from sim.scene.variant import variant
 
 NEAR, FAR = 0.3, 20.0  # [m]
 

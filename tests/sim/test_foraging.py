@@ -9,10 +9,10 @@ import optics
 import sim
 from optics.spectra.bands import SpectralBands
 from optics.spectra.spectrum import ILLUMINANTS, illuminant
-from sim.picture import pose
-from sim.simulation import Simulation
-from sim.tasks.foraging import ULTRAVIOLET, petal
-from sim.world import build_world
+from sim.envs.follow_camera import pose
+from sim.envs.simulation import Simulation
+from sim.worlds.foraging import ULTRAVIOLET, petal
+from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=2, resolution=(9, 13), fov_deg=60, placement_range_deg=60)
 BEES = dataclasses.replace(EYES, receptors="honeybee", bands=8)

@@ -6,7 +6,7 @@ from scipy import stats
 
 import optics
 import sim
-from sim.noise import NoiseModel, Normals
+from sim.render.receptor_noise import NoiseModel, Normals
 
 SHAPE = (2, 3, 5, 7)  # 210 numbers, no multiple of four
 

@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim import physics
-from sim.physics import SUBSTEPS, Physics
-from sim.simulation import Simulation
-from sim.world import SPEED_GAIN, TIME_CONSTANT, build_world
+from sim.physics import physics
+from sim.physics.physics import Physics, SUBSTEPS
+from sim.envs.simulation import Simulation
+from sim.worlds.world import SPEED_GAIN, TIME_CONSTANT, build_world
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,10 @@ import pytest
 
 import optics
 import sim
-from sim import agent, fields, lighting, movers
-from sim.simulation import Simulation
-from sim.variant import variant
+from sim.eyes import eyes, receptive_fields
+from sim.tracing import lighting, spheres
+from sim.envs.simulation import Simulation
+from sim.scene.variant import variant
 
 EYES = sim.Eyes(n_eyes=2, resolution=(5, 7), fov_deg=60, placement_range_deg=70, bands=3, noise_sigma=0)
 BATCHES, SPP = 12, 96  # 1152 samples a receptor by Mitsuba, with their standard error
@@ -111,16 +112,16 @@ def left_out(monkeypatch):
 
 
 def bodies_in_each_others_place(monkeypatch):
-    nearest = movers.nearest
+    nearest = spheres.nearest
 
     def swapped(spheres, centres, ray, t):
         return nearest(spheres, centres[::-1], ray, t)
 
-    monkeypatch.setattr(movers, "nearest", swapped)
+    monkeypatch.setattr(spheres, "nearest", swapped)
 
 
 def lights_without_shadows(monkeypatch):
-    monkeypatch.setattr(movers, "blocks", lambda radii, centres, ray: dr.zeros(mi.Bool))
+    monkeypatch.setattr(spheres, "blocks", lambda radii, centres, ray: dr.zeros(mi.Bool))
 
 
 @pytest.mark.parametrize("seen", ["bounce"], indirect=True)  # the direct light's own are in test_render.py
@@ -174,8 +175,8 @@ def test_signals_behind_a_pupil_are_the_reference_convolutions(through_a_prism):
 
 
 def flipped_field(monkeypatch):
-    of = fields._averaged
-    monkeypatch.setattr(fields, "_averaged", lambda kernel, cells: of(kernel, cells)[:, :, ::-1])
+    of = receptive_fields._averaged
+    monkeypatch.setattr(receptive_fields, "_averaged", lambda kernel, cells: of(kernel, cells)[:, :, ::-1])
 
 
 def misweighted_band(monkeypatch):
@@ -189,8 +190,8 @@ def misweighted_band(monkeypatch):
 
 
 def swapped_eyes(monkeypatch):
-    azimuths = agent.Eyes.azimuths
-    monkeypatch.setattr(agent.Eyes, "azimuths", lambda self: -azimuths(self))
+    azimuths = eyes.Eyes.azimuths
+    monkeypatch.setattr(eyes.Eyes, "azimuths", lambda self: -azimuths(self))
 
 
 @pytest.mark.parametrize("sabotage", [flipped_field, misweighted_band, swapped_eyes])

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import sim
-from sim import lighting, movers
-from sim.picture import pose
-from sim.simulation import Simulation
-from sim.world import build_world
+from sim.tracing import lighting, spheres
+from sim.envs.follow_camera import pose
+from sim.envs.simulation import Simulation
+from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=2, resolution=(9, 15), fov_deg=60, placement_range_deg=50, bands=6, noise_sigma=0)
 BATCHES = 12  # independent renderings by Mitsuba, for their standard error
@@ -161,9 +161,9 @@ def no_mover_shadows(original):
     [
         (lighting, "directional_lights", turned_light),
         (lighting, "directional_lights", misweighted_band),
-        (movers, "normal_and_uv", flipped_uv),
-        (movers, "normal_and_uv", mirrored_uv),
-        (movers, "blocks", no_mover_shadows),
+        (spheres, "normal_and_uv", flipped_uv),
+        (spheres, "normal_and_uv", mirrored_uv),
+        (spheres, "blocks", no_mover_shadows),
     ],
     ids=lambda value: getattr(value, "__name__", None),
 )

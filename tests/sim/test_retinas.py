@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import sim
-from sim.noise import FEW
-from sim.render import BatchedRenderer
-from sim.retinas import Retinas
-from sim.simulation import Simulation
-from sim.world import build_world
+from sim.render.receptor_noise import FEW
+from sim.render.batched_renderer import BatchedRenderer
+from sim.render.noisy_signals import Retinas
+from sim.envs.simulation import Simulation
+from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=2, resolution=(3, 5), fov_deg=60, placement_range_deg=60)
 N = 3 * FEW

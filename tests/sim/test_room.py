@@ -7,8 +7,8 @@ import pytest
 
 import optics
 import sim
-from sim import room
-from sim.room import Demand, check
+from sim.render import memory_budget
+from sim.render.memory_budget import Demand, check
 
 EYES = sim.Eyes(n_eyes=2, resolution=(3, 4))
 SOME = Demand(8, 64, 2, (15, 15), 1, 0)
@@ -24,7 +24,7 @@ def test_a_renderer_says_what_it_has_room_for(pupil):
 
 
 def test_what_it_recommends_fits(monkeypatch):
-    monkeypatch.setattr(room, "available", lambda: 1e9)
+    monkeypatch.setattr(memory_budget, "available", lambda: 1e9)
     check(SOME)
     with pytest.raises(ValueError, match="use at most") as error:
         check(dataclasses.replace(SOME, rays_per_receptor=1e6))
@@ -39,10 +39,10 @@ def test_weights_behind_a_pupil_count():
 
 
 def test_more_than_an_array_can_number_is_refused_whatever_the_memory(monkeypatch):
-    monkeypatch.setattr(room, "available", lambda: math.inf)
+    monkeypatch.setattr(memory_budget, "available", lambda: math.inf)
     with pytest.raises(ValueError, match="use at most"):
         check(dataclasses.replace(SOME, rays_per_receptor=2**20))
 
 
 def test_memory_is_known():
-    assert 1e8 < room.available() < 1e14
+    assert 1e8 < memory_budget.available() < 1e14

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import optics
-from sim.fields import Fields, Unseen, cells_per_receptor, low_discrepancy
-from sim.sensor import BoxSampling, BoxSensor, FieldSampling, ReceptiveFieldSensor, build_sensor, sampling_of
+from sim.eyes.receptive_fields import Fields, Unseen, cells_per_receptor, low_discrepancy
+from sim.eyes.sensor import BoxSampling, BoxSensor, FieldSampling, ReceptiveFieldSensor, build_sensor, sampling_of
 
 L = 200e-6
 

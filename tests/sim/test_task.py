@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sim.placement import CLEARANCE, REACH, SEPARATION, Places
-from sim.reward import EVALUATION, TRAINING
-from sim.simulation import EPISODE_STEPS, MAX_TURN, Simulation
-from sim.task import first_reached, task_of
-from sim.world import build_world
+from sim.tasks.placement import CLEARANCE, Places, REACH, SEPARATION
+from sim.tasks.reward import EVALUATION, TRAINING
+from sim.envs.simulation import EPISODE_STEPS, MAX_TURN, Simulation
+from sim.tasks.task import first_reached, task_of
+from sim.worlds.world import build_world
 
 
 @pytest.fixture(scope="module")

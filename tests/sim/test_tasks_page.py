@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import sim
-from sim.registration import IDS
-from sim.reward import EVALUATION, TERMS, TRAINING
-from sim.simulation import EPISODE_STEPS, NO_ACTION, UNSTABLE
+from sim.envs.registration import IDS
+from sim.tasks.reward import EVALUATION, TERMS, TRAINING
+from sim.envs.simulation import EPISODE_STEPS, NO_ACTION, UNSTABLE
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "tasks.md").read_text()
 EYES = sim.Eyes(n_eyes=3, resolution=(2, 4))

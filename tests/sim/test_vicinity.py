@@ -7,13 +7,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim import rollouts
-from sim.alone import AgentAlone
-from sim.physics import SUBSTEPS, Physics
-from sim.rollouts import POOLED
-from sim.simulation import Simulation
-from sim.vicinity import Vicinity
-from sim.world import _add_agent, _empty_world, build_world
+from sim.physics import mujoco_batch
+from sim.worlds.agent_model import AgentAlone
+from sim.physics.physics import Physics, SUBSTEPS
+from sim.physics.mujoco_batch import POOLED
+from sim.envs.simulation import Simulation
+from sim.physics.local_contacts import Vicinity
+from sim.worlds.world import _add_agent, _empty_world, build_world
 
 
 @pytest.fixture(scope="module")
@@ -154,13 +154,13 @@ def test_mujocos_clock_outlives_physics_in_two_threads(world):
     stepping = [
         threading.Thread(target=step_often, args=(Physics(world, 1, gliding=False), state, command)) for _ in "12"
     ]
-    before = rollouts._clock().value
+    before = mujoco_batch._clock().value
     for thread in stepping:
         thread.start()
     for thread in stepping:
         thread.join()
     assert before is not None
-    assert rollouts._clock().value == before
+    assert mujoco_batch._clock().value == before
 
 
 def step_often(physics, state, command):

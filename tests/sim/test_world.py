@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 
 import sim
-from sim import materials
-from sim.agent import BODY_RADIUS, eye_positions
-from sim.color import decode_srgb
-from sim.layout import CELL
-from sim.physics import Physics
+from sim.worlds import materials
+from sim.eyes.eyes import BODY_RADIUS, eye_positions
+from sim.scene.color import decode_srgb
+from sim.worlds.layout import CELL
+from sim.physics.physics import Physics
 from sim.scene.surfaces import image
-from sim.simulation import Simulation
-from sim.tasks import detection, navigation
-from sim.world import MAX_SPEED
+from sim.envs.simulation import Simulation
+from sim.worlds import detection, navigation
+from sim.worlds.world import MAX_SPEED
 
 ACTION = 10  # substeps
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.tasks.detection import BAND_EDGES_DEG
+from sim.worlds.detection import BAND_EDGES_DEG
 from validation import E1_balance
 from validation.E1_balance import contrast, difference, light_seen
 from validation.page import blanked

@@ -9,7 +9,7 @@ import pytest
 
 import sim
 from optics.spectra.spectrum import daylight
-from sim.color import decode_srgb
+from sim.scene.color import decode_srgb
 from sim.scene.cameras import Viewpoint
 
 NM = 560e-9

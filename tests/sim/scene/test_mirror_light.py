@@ -9,7 +9,7 @@ import pytest
 
 import sim
 from optics.spectra.bands import daylight
-from sim.color import decode_srgb
+from sim.scene.color import decode_srgb
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import MirrorWarning
 

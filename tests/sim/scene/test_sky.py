@@ -12,7 +12,7 @@ import pytest
 
 import sim
 from optics.spectra.spectrum import daylight
-from sim.color import encode_srgb
+from sim.scene.color import encode_srgb
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import MirrorWarning
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import sim
-from sim.color import decode_srgb
+from sim.scene.color import decode_srgb
 
 from . import models
 from .drawn import draw

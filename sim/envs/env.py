@@ -1,0 +1,65 @@
+"""One world as a Gymnasium environment: the batched environment with a batch of one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from sim.eyes.eyes import Eyes
+from sim.envs.follow_camera import RENDER_MODES
+from sim.worlds.state import WorldState
+from sim.envs.vec_env import make_vec_env
+
+
+class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
+    """One agent with eyes in one world. Spaces, rewards, endings and `info` are in docs/tasks.md.
+
+    task, eyes, memory, mode, rays_per_receptor, world_seed, spectra, render_mode as in `sim.make_vec_env`
+
+    Raises ValueError for a bad argument.
+    """
+
+    metadata = {"render_modes": [*RENDER_MODES], "render_fps": 5}  # noqa: RUF012 (Gymnasium's own declaration)
+
+    def __init__(self, task: str, eyes: Eyes | None = None, *, render_mode: str | None = None, **options: Any) -> None:
+        self._batch = make_vec_env(task, eyes, n_envs=1, seed=None, render_mode=render_mode, **options)
+        self.render_mode = render_mode
+        self.observation_space = self._batch.observation_space
+        self.action_space = self._batch.action_space
+
+    @property
+    def state(self) -> WorldState:
+        """The world as it is now, a batch of one."""
+        return self._batch.state
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        super().reset(seed=seed)
+        if seed is not None:
+            self._batch.seed(seed)
+        observation = self._batch.reset()
+        return _only(observation), self._batch.reset_infos[0]
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
+        observation, reward, terminated, truncated, info = self._batch.step_once(np.asarray(action)[None])
+        info[0].pop("episode", None)  # Stable-Baselines3's; a Gymnasium environment leaves that name to its wrappers
+        return _only(observation), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info[0]
+
+    def render(self) -> np.ndarray | None:
+        """A picture (y, x, 3) uint8 as `render_mode` asks. Raises RuntimeError before the first reset."""
+        return None if self.render_mode is None else self._batch.get_images()[0]
+
+    def close(self) -> None:
+        self._batch.close()
+
+
+def make_env(task: str, eyes: Eyes | None = None, **options: Any) -> EyesEnv:
+    """A single environment; see `EyesEnv`."""
+    return EyesEnv(task, eyes, **options)
+
+
+def _only(batch: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {name: array[0] for name, array in batch.items()}

@@ -1,0 +1,54 @@
+"""What eyes report, as pictures for people: receptors as squares, types of receptor as colours."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from optics import Eye
+from optics.spectra.receptors import Receptors
+from sim.scene.color import encode_srgb
+
+SIZE = (240, 960)  # pixels that the pictures of all eyes fill at most, if a receptor needs no more than one
+GAP = 4  # pixels between eyes
+BETWEEN = 200  # grey level of the gaps
+
+
+def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:
+    """sRGB picture (y, x, 3) uint8 of all eyes' signals (eye, channel, h, w), from left to right.
+
+    White in full daylight is white, however small the pupil. Types of receptor are shown as colours in the order of
+    their peaks: the longest as red, the shortest as blue, those between as what lies between; a single one as grey. In
+    a mosaic every receptor has its type's colour.
+    """
+    linear = np.einsum("ecyx,cyxk->eyxk", signals / eye.throughput, _palette(eye))
+    pixels = np.rint(255 * encode_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
+    n, height, width = pixels.shape[:3]
+    scale = max(1, min(SIZE[0] // height, (SIZE[1] - GAP * (n - 1)) // (n * width)))
+    large = pixels.repeat(scale, axis=1).repeat(scale, axis=2)
+    gap = np.full((height * scale, GAP, 3), BETWEEN, np.uint8)
+    return np.concatenate([part for image in large for part in (gap, image)][1:], axis=1)
+
+
+def _palette(eye: Eye) -> np.ndarray:
+    """Linear sRGB of each signal, (channel, h, w, 3)."""
+    height, width = eye.resolution
+    if eye.mosaic is not None:
+        return _hues(eye.receptors)[eye.mosaic][None]
+    shares = _shares(_hues(eye.receptors))
+    return np.broadcast_to(shares[:, None, None], (len(shares), height, width, 3))
+
+
+def _hues(receptors: Receptors) -> np.ndarray:
+    """(type, 3): red to green to blue from the longest peak to the shortest."""
+    types = receptors.types
+    if len(types) == 1:
+        return np.ones((1, 3))
+    rank = np.argsort(np.argsort([-kind.peak_nm for kind in types], kind="stable"))
+    at = rank / (len(types) - 1)
+    return np.stack([np.clip(1 - 2 * at, 0, 1), 1 - np.abs(2 * at - 1), np.clip(2 * at - 1, 0, 1)], axis=-1)
+
+
+def _shares(hues: np.ndarray) -> np.ndarray:
+    """(type, 3): weights that make white of all types' white; a primary that no type has gets a bit of all."""
+    sums = hues.sum(axis=0)
+    return np.where(sums > 0, hues / np.where(sums > 0, sums, 1), 1 / len(hues))

@@ -1,0 +1,157 @@
+"""From rays to receptors: weighted sums as matrix products, one per row of receptors.
+
+Rays come in order of their height in the visual field, so a row of receptors looks at a stretch of them; the narrower
+the receptive fields, the shorter the stretch. Weights are multiplied with the bands' weights beforehand where light
+has few components (`sim.tracing.closed_form_tracer`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+
+# Views of one product, at most. Their number never depends on that of worlds, so that a world's signals are
+# bit-identical whatever the number of its neighbours: BLAS rounds differently for different shapes.
+BLOCK = 32
+# Multiplications of one product that OpenBLAS certainly leaves to one thread. Its threads wait for each other spinning;
+# where Dr.Jit's or another process's want the cores, that has taken a hundred times as long as the product.
+ONE_THREAD = 2**18
+
+
+@dataclass(frozen=True)
+class RowProduct:
+    """signal[view, channel, i, j] = sum over rays of radiance[view, ray] W[channel, receptor (i, j), ray].
+
+    stretches  per row of receptors: the first ray, and weights (ray, channel * width) float32
+    """
+
+    stretches: tuple[tuple[int, np.ndarray], ...]
+    channels: int
+    width: int
+
+    @classmethod
+    def of(cls, weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int]) -> RowProduct:
+        """From one sparse matrix (receptor, ray) per channel."""
+        height, width = resolution
+        stretches = []
+        for row in range(height):
+            mine = [w[row * width : (row + 1) * width] for w in weights]
+            used = np.concatenate([w.indices for w in mine])
+            first, last = (int(used.min()), int(used.max()) + 1) if len(used) else (0, 1)
+            dense = np.concatenate([w[:, first:last].toarray() for w in mine])
+            stretches.append((first, np.ascontiguousarray(dense.T, np.float32)))
+        return cls(tuple(stretches), len(weights), width)
+
+    def __call__(self, radiance: np.ndarray) -> np.ndarray:
+        """(view, ray) -> (view, channel, height, width), float32."""
+        views, rays = radiance.shape
+        n_blocks = -(-views // BLOCK)
+        if views % BLOCK:
+            radiance = np.concatenate([radiance, np.zeros((n_blocks * BLOCK - views, rays), np.float32)])
+        out = np.empty((n_blocks * BLOCK, self.channels, len(self.stretches), self.width), np.float32)
+        for row, (first, weights) in enumerate(self.stretches):
+            blocks = radiance.reshape(-1, _views_at_once(weights), rays)
+            product = blocks[:, :, first : first + len(weights)] @ weights
+            out[:, :, row] = product.reshape(-1, self.channels, self.width)
+        return out[:views]
+
+
+def _views_at_once(weights: np.ndarray) -> int:
+    """As many as one thread may do; where that is next to nothing, the products are large enough for several."""
+    return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights.size <= ONE_THREAD), BLOCK)
+
+
+# What turns components of light, (component, view, ...), into signals, (view, channel, ...), as matrices say:
+# signals_c = sum_b mixing[c, b] sum_k basis[k, b] (light of component k, gathered by the weights of band b).
+# Every sum is in a fixed order: the same rounding for any number of worlds.
+Readout = Callable[[np.ndarray], np.ndarray]
+
+
+def of_receptors(factors: np.ndarray) -> Readout:
+    """From light summed over each receptor already: factors (channel, component)."""
+    factors = factors.astype(np.float32)
+
+    def signals(light: np.ndarray) -> np.ndarray:
+        total: np.ndarray = factors[:, 0, None] * light[0][:, None]
+        for k in range(1, len(light)):
+            total += factors[:, k, None] * light[k][:, None]
+        return total
+
+    return signals
+
+
+def of_components(
+    weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int], mixing: np.ndarray, basis: np.ndarray
+) -> Readout:
+    """From light along rays, bands and channels multiplied into the weights: a product per component and channel."""
+    products = [
+        RowProduct.of([_mixed(weights, channel * component) for channel in mixing], resolution) for component in basis
+    ]
+
+    def signals(light: np.ndarray) -> np.ndarray:
+        total = products[0](light[0])
+        for product, component in zip(products[1:], light[1:], strict=True):
+            total += product(component)
+        return total
+
+    return signals
+
+
+def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarray) -> Readout:
+    """From light along rays, a product per band: cheaper where components are as many as bands."""
+    mixing, basis = mixing.astype(np.float32), basis.astype(np.float32)
+    every = np.array_equal(basis, np.eye(len(basis)))
+
+    def signals(light: np.ndarray) -> np.ndarray:
+        planes = [product(_in_band(light, basis[:, b], every, b)) for b, product in enumerate(products)]
+        total: np.ndarray = mixing[:, 0, None, None] * planes[0]
+        for band in range(1, len(planes)):
+            total += mixing[:, band, None, None] * planes[band]
+        return total
+
+    return signals
+
+
+def _in_band(light: np.ndarray, factors: np.ndarray, is_component: bool, band: int) -> np.ndarray:
+    if is_component:
+        return light[band]
+    total: np.ndarray = factors[0] * light[0]
+    for k in range(1, len(light)):
+        total += factors[k] * light[k]
+    return total
+
+
+def within_stretches(
+    weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int], share: float
+) -> tuple[scipy.sparse.csr_array, ...]:
+    """Weights (receptor, ray) per band without those of the first and last rays: the longest ends that all receptors
+    of a row can spare, `share` of each one's sum at most. The rest is scaled to keep the sum."""
+    height, width = resolution
+    rows: list[list[scipy.sparse.csr_array]] = [[] for _ in weights]
+    for row in range(height):
+        mine = [w[row * width : (row + 1) * width].toarray().astype(np.float64) for w in weights]
+        sums = [w.sum(axis=1, keepdims=True) for w in mine]
+        # Rays up to which no receptor has got more than half of the share; the other half is for the other end.
+        ends = [
+            min(
+                int((np.cumsum(w[:, ::step], axis=1) <= share / 2 * s).sum(axis=1).min())
+                for w, s in zip(mine, sums, strict=True)
+            )
+            for step in (1, -1)
+        ]
+        for band, (w, s) in enumerate(zip(mine, sums, strict=True)):
+            w[:, : ends[0]] = 0
+            w[:, w.shape[1] - ends[1] :] = 0
+            rows[band].append(scipy.sparse.csr_array((w * (s / w.sum(axis=1, keepdims=True))).astype(np.float32)))
+    return tuple(scipy.sparse.vstack(band, format="csr") for band in rows)
+
+
+def _mixed(weights: Sequence[scipy.sparse.csr_array], factors: np.ndarray) -> scipy.sparse.csr_array:
+    """sum_b factors[b] weights_b, in double precision."""
+    total = float(factors[0]) * weights[0].astype(np.float64)
+    for factor, band in zip(factors[1:], weights[1:], strict=True):
+        total = total + float(factor) * band.astype(np.float64)
+    return scipy.sparse.csr_array(total)

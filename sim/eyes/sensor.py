@@ -1,0 +1,218 @@
+"""Where an eye looks and what each receptor makes of the light: ray directions and their weights.
+
+All directions are fixed when the sensor is built, so that rendering is the same kernel every step. Coordinates
+are the visual field's tangent plane, in receptor pitches: x to the right, y *down* as rows run, origin on the
+optical axis; receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse
+
+import optics
+from sim.eyes.depth_layers import DepthLayers, ONE_PSF
+from sim.eyes.receptive_fields import Draw, Fields, Unseen, fields_of, low_discrepancy, places
+from sim.eyes.receptor_sums import Readout, RowProduct, of_bands, of_components, of_receptors, within_stretches
+
+# Weights that together change no signal by more than this share of the receptors' noise are left out.
+NEGLIGIBLE = 0.1
+
+
+@dataclass(frozen=True)
+class BoxSensor:
+    """Perfect lens: a receptor's signal is the mean over the square it covers.
+
+    directions         unit vectors in the eye's frame (x right, y up, z optical axis), (ray, 3) float32;
+                       ray = receptor * rays_per_receptor + sample
+    places             of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
+    rays_per_receptor  samples of one receptor; the renderer sums them in its kernel
+    depth              nothing is blurred, whatever its distance
+    """
+
+    directions: np.ndarray
+    places: np.ndarray
+    rays_per_receptor: int
+    depth: DepthLayers = ONE_PSF
+
+    def receptor_radiance(self, sums: np.ndarray) -> np.ndarray:
+        """Mean radiance of each receptor from the sums over its rays: (band, view, receptor), both ways."""
+        return sums * np.float32(1.0 / self.rays_per_receptor)
+
+    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> Readout:
+        """Signals from sums of components over receptors' rays, see sim.eyes.receptor_sums."""
+        return of_receptors(mixing @ basis.T / self.rays_per_receptor)
+
+
+@dataclass(frozen=True)
+class ReceptiveFieldSensor:
+    """An eye behind a pupil: one set of directions, drawn from the mixture of all receptive fields, serves all
+    receptors and bands; a receptor's signal is a weighted sum (importance sampling, self-normalised):
+
+        signal_r = sum_p W_b[r, p] radiance_b(p),   W_b[r, p] ∝ RF_{r,b}(p) / q(p),   sum_p W_b[r, p] = power_b
+
+    with RF the turned PSF kernel convolved with the receptor's square, q the density that directions were drawn from
+    and power_b the fraction of the pupil's power inside the kernel. With several depth layers there is such a W for
+    each of them, for its share of the light along a ray.
+
+    Weights far above and below a row of receptors are 0 where they are too small to matter: together they are less than
+    the tolerance asked of the PSF, and change no signal of a scene up to white in full daylight by more than
+    NEGLIGIBLE of the receptors' noise.
+
+    directions  unit vectors in the eye's frame, (ray, 3) float32
+    places      of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
+    weights     per plane, a band of a depth layer, sparse (receptor, ray)
+    resolution  receptors (height, width)
+    depth       the layers
+    """
+
+    directions: np.ndarray
+    places: np.ndarray
+    weights: tuple[scipy.sparse.csr_array, ...]
+    resolution: tuple[int, int]
+    depth: DepthLayers = ONE_PSF
+    rays_per_receptor: int = 1  # summed in the kernel: none
+
+    def receptor_radiance(self, radiance: np.ndarray) -> np.ndarray:
+        """(layer * band, view, ray) -> (band, view, receptor)."""
+        planes = [product(plane) for product, plane in zip(self._products, radiance, strict=True)]
+        layers = np.stack([plane.reshape(len(plane), -1) for plane in planes])
+        return layers.reshape(self.depth.count, -1, *layers.shape[1:]).sum(axis=0)
+
+    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> Readout:
+        """Signals from components along rays (layer * component, view, ray), see sim.eyes.receptor_sums."""
+        count, k = self.depth.count, len(basis)
+        bands = len(self.weights) // count
+        readouts = [self._readout(layer * bands, bands, mixing, basis) for layer in range(count)]
+        if count == 1:
+            return readouts[0]
+        return lambda light: np.sum([of_layer(light[i * k :][:k]) for i, of_layer in enumerate(readouts)], axis=0)
+
+    def _readout(self, first: int, bands: int, mixing: np.ndarray, basis: np.ndarray) -> Readout:
+        planes = slice(first, first + bands)
+        if len(mixing) * len(basis) > bands:
+            return of_bands(self._products[planes], mixing, basis)
+        return of_components(self.weights[planes], self.resolution, mixing, basis)
+
+    @cached_property
+    def _products(self) -> list[RowProduct]:
+        return [RowProduct.of([w], self.resolution) for w in self.weights]
+
+    @property
+    def density(self) -> float:
+        """Share of weights that are not zero."""
+        return float(np.mean([w.nnz / np.prod(w.shape) for w in self.weights]))
+
+
+Sensor = BoxSensor | ReceptiveFieldSensor
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Some receptors of a sensor that need not be built: directions (ray, 3) and places (ray, 2) of rays, weights
+    (layer * band, receptor, ray)."""
+
+    directions: np.ndarray
+    places: np.ndarray
+    weights: np.ndarray
+
+
+@dataclass(frozen=True)
+class BoxSampling:
+    """Every receptor's square sampled by the same low-discrepancy points, each receptor's shifted (on the torus)
+    by its own fixed random offset so that the errors of neighbours are independent; a whole number of points each."""
+
+    eye: optics.Eye
+    depth: DepthLayers = ONE_PSF
+
+    def sensor(self, rays_per_receptor: float) -> BoxSensor:
+        """The sensor with so many rays per receptor."""
+        rays = max(1, round(rays_per_receptor))
+        return BoxSensor(*self._rays(rays, np.arange(np.prod(self.eye.resolution))), rays)
+
+    def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
+        """What that sensor has for these receptors (numbered row by row)."""
+        rays = max(1, round(rays_per_receptor))
+        weights = np.kron(np.eye(len(receptors)), np.full((1, rays), 1 / rays))
+        return Trial(*self._rays(rays, receptors), np.broadcast_to(weights, (self.eye.bands, *weights.shape)))
+
+    def _rays(self, rays: int, receptors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Directions and places."""
+        height, width = self.eye.resolution
+        shifts, turns = (np.random.default_rng(seed).random((height * width, 1, 2))[receptors] for seed in (0, 1))
+        row, column = np.divmod(receptors, width)
+        corners = np.stack([column - width / 2, row - height / 2], axis=-1)[:, None]
+        directions = directions_of(self.eye, ((low_discrepancy(rays) + shifts) % 1.0 + corners).reshape(-1, 2))
+        return directions, ((places(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class FieldSampling:
+    """Directions drawn from the mixture of all receptive fields; as many as asked for, or as it takes until every
+    receptor has one."""
+
+    eye: optics.Eye
+    fields: Fields
+    depth: DepthLayers = ONE_PSF
+
+    def sensor(self, rays_per_receptor: float) -> ReceptiveFieldSensor:
+        """The sensor with so many rays per receptor, on average."""
+        rays = self._rays(rays_per_receptor)
+        while True:
+            try:
+                return self._sensor(rays)
+            except Unseen:
+                rays += max(1, rays // 4)
+
+    def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
+        """What that sensor has for these receptors. Raises Unseen where one has no ray."""
+        draw = self.fields.draw(self._rays(rays_per_receptor))
+        weights = self.fields.weights(draw, receptors)
+        return Trial(directions_of(self.eye, draw.points), _places(draw), weights)
+
+    def _rays(self, rays_per_receptor: float) -> int:
+        return max(1, round(rays_per_receptor * np.prod(self.eye.resolution)))
+
+    def _sensor(self, rays: int) -> ReceptiveFieldSensor:
+        draw, (height, width) = self.fields.draw(rays), self.eye.resolution
+        rows: list[list[scipy.sparse.csr_array]] = []
+        for i in range(height):
+            dense = self.fields.weights(draw, i * width + np.arange(width)).astype(np.float32)
+            rows.append([scipy.sparse.csr_array(plane) for plane in dense])
+        weights = tuple(scipy.sparse.vstack(plane, format="csr") for plane in zip(*rows, strict=True))
+        weights = within_stretches(weights, self.eye.resolution, negligible_share(self.eye))
+        directions = directions_of(self.eye, draw.points)
+        return ReceptiveFieldSensor(directions, _places(draw), weights, self.eye.resolution, self.depth)
+
+
+def _places(draw: Draw) -> np.ndarray:
+    return places(len(draw)).astype(np.float32)
+
+
+# Makes sensors of one eye, with any number of rays.
+Sampling = BoxSampling | FieldSampling
+
+
+def sampling_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> Sampling:
+    """How an eye is sampled. Raises optics.AccuracyError for a pupil whose light spreads too far to be computed."""
+    return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, fields_of(eye, depth), depth)
+
+
+def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers = ONE_PSF) -> Sensor:
+    """The sensor of an eye. Raises optics.AccuracyError for a pupil whose light spreads too far to be computed."""
+    return sampling_of(eye, depth).sensor(rays_per_receptor)
+
+
+def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
+    """Unit vectors (ray, 3) in the eye's frame of points (x right, y down) [receptor pitches] on the tangent plane."""
+    pitch = eye.receptor_pitch
+    v = np.stack([plane[:, 0] * pitch, -plane[:, 1] * pitch, np.full(len(plane), eye.sensor_distance)], axis=-1)
+    return (v / np.linalg.norm(v, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def negligible_share(eye: optics.Eye) -> float:
+    """Share of a receptor's weights that can be left out: a share s changes a signal by a² s at most."""
+    return min(NEGLIGIBLE * eye.noise_sigma / eye.throughput, eye.tolerance)

@@ -1,0 +1,273 @@
+"""All eyes of all worlds as one Dr.Jit wavefront: one frozen kernel, one static scene, movers in closed form.
+
+Rays are traced in world-local coordinates, since all worlds share their static geometry. Directions and
+wavelengths are fixed, so a call does nothing but upload poses and launch the kernel that the first call recorded.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+import optics
+from sim.render import memory_budget
+from sim.tracing import lighting
+from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
+from sim.render.band_error import lit_in_bands
+from sim.render.fidelity import Fidelity, chosen
+from sim.render.fidelity_trials import Pilot
+from sim.render.frozen_kernels import aligned, garbage_kept
+from sim.eyes.sensor import sampling_of
+from sim.tracing.static_scene import Stage, build_stage
+from sim.worlds.state import WorldState
+from sim.tracing.tracer import Tracer, Tracers
+from sim.scene.variant import variant
+from sim.worlds.world import World
+
+ROW = 16  # floats: rows of the pose buffer start on 64 bytes
+
+
+class BatchedRenderer:
+    """Sees `n_envs` worlds with the same eyes.
+
+    world              geometry, materials and lights; shared by all worlds
+    eyes               of every agent
+    n_envs             number of worlds in a state
+    rays_per_receptor  samples of each receptor (rounded, perfect lens), or per receptor on average (behind a
+                       pupil); "auto": as few as the receptors' noise allows in this world, see `sim.choose_fidelity`;
+                       or a whole Fidelity. The one in use is in `.fidelity`
+    brightest          signal of a white surface that faced all lights at once
+    tracer             "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto";
+                       the one in use is in `.tracer.name`, why in `.tracer.why`
+
+    Raises ValueError for less than one world or ray, for more rays than there is memory for, for lights other than
+    directional ones, and for a world that has no closed form where that is asked for.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        eyes: Eyes,
+        n_envs: int,
+        rays_per_receptor: float | str | Fidelity = "auto",
+        tracer: str = "auto",
+    ) -> None:
+        asked = _asked(rays_per_receptor, eyes)
+        self.world, self.eyes = world, eyes if asked is None else replace(eyes, bands=asked.bands)
+        self.eye = self.eyes.eye()
+        self.bands: optics.SpectralBands = self.eye.spectral_bands
+        self._stage = build_stage(lit_in_bands(world, self.eye))
+        tracers = Tracers(world, self._stage, self.bands.wavelengths, tracer)
+        with variant(self._stage.variant):
+            white = lighting.white_radiance(self._stage.scene, self.bands.wavelengths)
+        if asked is None:
+            self.fidelity, sampling = chosen(Pilot(world, self._stage, tracers, eyes, self.eye), eyes, self.eye)
+        else:
+            self.fidelity, sampling = asked, sampling_of(self.eye, asked.depth)
+        self.tracer: Tracer = tracers.of(self.fidelity.light)
+        self._check_room(n_envs)
+        self.sensor = sampling.sensor(self.fidelity.rays_per_receptor)
+        if self.eye.pupil is None:  # a whole number of its own for every receptor
+            self.fidelity = replace(self.fidelity, rays_per_receptor=float(self.sensor.rays_per_receptor))
+        mixing = self.eye.throughput * self.bands.weights
+        self.brightest = float((mixing @ white).max())
+        self._readout = self.sensor.readout(mixing, self.tracer.basis)
+        self._set_width(n_envs)
+
+    def resized(self, n_envs: int) -> BatchedRenderer:
+        """The same eyes and scene for another number of worlds; the scene is shared, not loaded again."""
+        other = copy.copy(self)
+        other._check_room(n_envs)
+        other._set_width(n_envs)
+        return other
+
+    def _check_room(self, n_envs: int) -> None:
+        if n_envs < 1:
+            raise ValueError(f"n_envs = {n_envs!r}, must be at least 1")
+        fidelity, layers = self.fidelity, self.fidelity.depth.count
+        planes, weights = layers * len(self.tracer.basis), layers * len(self.bands.wavelengths)
+        memory_budget.check(
+            memory_budget.Demand(
+                fidelity.rays_per_receptor,
+                n_envs,
+                self.eyes.n_eyes,
+                self.eyes.resolution,
+                planes,
+                weights if self.eye.pupil else 0,
+            )
+        )
+
+    def _set_width(self, n_envs: int) -> None:
+        self.n_envs = n_envs
+        stage = self._stage
+        self._poses = _PoseBuffer(n_envs, len(stage.spheres))
+        with variant(self._stage.variant):
+            self._inputs = {
+                "directions": mi.Float(_in_agent_frame(self.eyes, self.sensor.directions)),
+                "origins": mi.Float(_in_fours(eye_positions(self.eyes.azimuths()), 0.0)),
+                "places": mi.Float(self.sensor.places.ravel()),
+                **self.tracer.inputs,
+            }
+            wavefront = _Wavefront(self)
+            # Read lane by lane, so that a replay has the width that was recorded. With tables alone as inputs, Dr.Jit
+            # 1.5 took it from one that changes with what else the process has loaded: 126 lanes replayed out of 128,
+            # the last receptors silently dark (tests/test_parameters.py runs each life twice and has met it).
+            self._inputs["lanes"] = dr.arange(mi.UInt32, wavefront.lanes)
+            dr.eval(self._inputs["lanes"])
+            reduced = self.sensor.rays_per_receptor
+            self._rays: Any = dr.freeze(lambda scene, poses, inputs: wavefront(scene, poses, inputs, 1))
+            self._sums: Any = dr.freeze(lambda scene, poses, inputs: wavefront(scene, poses, inputs, reduced))
+
+    def radiance(self, state: WorldState) -> np.ndarray:
+        """Spectral radiance along every ray, (env, eye, ray, band) float32."""
+        layers = self._components(self._rays, state)
+        rays = np.einsum("lkn,kb->nb", layers, self.tracer.basis.astype(np.float32))
+        return rays.reshape(self.n_envs, self.eyes.n_eyes, -1, len(self.bands.wavelengths))
+
+    def receptor_radiance(self, state: WorldState) -> np.ndarray:
+        """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
+        bands, (height, width) = len(self.bands.wavelengths), self.eye.resolution
+        layers = self._components(self._sums, state)
+        sums = np.einsum("lkn,kb->lbn", layers, self.tracer.basis.astype(np.float32))
+        sums = sums.reshape(len(layers) * bands, self.n_envs * self.eyes.n_eyes, -1)
+        return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, self.eyes.n_eyes, height, width)
+
+    def signals(self, state: WorldState) -> np.ndarray:
+        """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
+        a² sum_b weights[channel, b] radiance_b."""
+        return self.begin(state)()
+
+    def begin(self, state: WorldState) -> Callable[[], np.ndarray]:
+        """Start looking; it runs beside whatever comes next. A call of what is returned waits for the signals, and has
+        to come before the next look."""
+        light = self._launch(self._sums, state)
+        return lambda: self._signals(_waited_for(light))
+
+    def _signals(self, light: np.ndarray) -> np.ndarray:
+        planes = self.sensor.depth.count * len(self.tracer.basis)
+        signals = self._readout(light.reshape(planes, self.n_envs * self.eyes.n_eyes, -1))
+        signals = signals.reshape(self.n_envs, self.eyes.n_eyes, len(self.bands.weights), *self.eye.resolution)
+        mosaic = self.eye.mosaic
+        return signals if mosaic is None else np.take_along_axis(signals, mosaic[None, None, None], axis=2)
+
+    @property
+    def recordings(self) -> int:
+        """How often the kernels were recorded: once per kernel in use."""
+        return int(self._rays.n_recordings + self._sums.n_recordings)
+
+    def _components(self, frozen: Any, state: WorldState) -> np.ndarray:
+        """(layer, component, all rays of all views, or their sums)"""
+        light = _waited_for(self._launch(frozen, state))
+        return light.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)
+
+    def _launch(self, frozen: Any, state: WorldState) -> Any:
+        """The kernel at work on this state; its poses are in a buffer that must not be written before it is done."""
+        if state.n != self.n_envs:
+            raise ValueError(f"state has {state.n} worlds, this renderer was built for n_envs = {self.n_envs}")
+        with variant(self._stage.variant), garbage_kept():
+            poses = mi.Float(self._poses.pack(state, self._stage))  # shares the buffer's memory
+            return frozen(self.tracer.scene, poses, self._inputs)
+
+
+def _waited_for(light: Any) -> np.ndarray:
+    with garbage_kept():
+        return np.array(light.numpy())
+
+
+def _asked(rays_per_receptor: float | str | Fidelity, eyes: Eyes) -> Fidelity | None:
+    """What was asked for; None: to be chosen."""
+    if isinstance(rays_per_receptor, Fidelity):
+        return rays_per_receptor
+    if isinstance(rays_per_receptor, str):
+        if rays_per_receptor != "auto":
+            raise ValueError(f"rays_per_receptor = {rays_per_receptor!r}, must be positive, or 'auto'")
+        return None
+    return Fidelity(rays_per_receptor, eyes.bands)
+
+
+class _PoseBuffer:
+    """The kernel's only changing input: one aligned row of floats per world, (x, y, cos, sin) and, in fours as well,
+    the objects' centres."""
+
+    def __init__(self, n_envs: int, n_spheres: int) -> None:
+        self.n_spheres = n_spheres
+        self.stride = -(-4 * (1 + n_spheres) // ROW) * ROW
+        self._rows = aligned(n_envs * self.stride, np.float32).reshape(n_envs, self.stride)
+
+    def pack(self, state: WorldState, stage: Stage) -> np.ndarray:
+        rows = self._rows
+        rows[:, :2] = state.position
+        rows[:, 2], rows[:, 3] = np.cos(state.heading), np.sin(state.heading)
+        places = rows[:, 4 : 4 * (1 + self.n_spheres)].reshape(len(rows), self.n_spheres, 4)
+        places[..., :3] = state.objects + stage.spheres.offsets
+        return rows.reshape(-1)
+
+
+class _Wavefront:
+    """The kernel's body. Everything here is traced once; only arrays passed as arguments may change."""
+
+    def __init__(self, renderer: BatchedRenderer) -> None:
+        self.n_rays = len(renderer.sensor.directions)
+        self.n_eyes = renderer.eyes.n_eyes
+        self.lanes = renderer.n_envs * self.n_eyes * self.n_rays
+        self.stride = renderer._poses.stride
+        self.n_spheres = renderer._poses.n_spheres
+        self.tracer, self.depth = renderer.tracer, renderer.sensor.depth
+
+    def __call__(self, scene: Any, poses: Any, inputs: dict[str, Any], reduced: int) -> Any:
+        lane = inputs["lanes"]
+        view = lane // self.n_rays
+        world = view // self.n_eyes
+        sample = lane - view * self.n_rays
+        ray, cosine, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, sample)
+        bounces = self.tracer.light == lighting.BOUNCE
+        place = dr.gather(mi.Point2f, inputs["places"], sample) if bounces else None
+        components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs, place)
+        if self.depth.count > 1:
+            shares = self.depth.shares(dr.rcp(distance * cosine))
+            components = [component * share for share in shares for component in components]
+        if len(components) == 1:
+            out = components[0]
+        else:
+            out = dr.zeros(mi.Float, self.lanes * len(components))
+            for k, value in enumerate(components):
+                dr.scatter(out, value, lane + k * self.lanes, mode=dr.ReduceMode.Permute)
+        # One reduction of one array: a reduction per component would trace the rays once per component.
+        return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
+
+    def _ray(
+        self, poses: Any, inputs: dict[str, Any], world: Any, eye: Any, ray: Any
+    ) -> tuple[Any, Any, Any, list[Any]]:
+        """The lane's ray, its cosine with the eye's axis, and the centres of the agent and of its world's spheres."""
+
+        def row(name: str, index: Any) -> Any:
+            return dr.gather(mi.Vector4f, inputs[name] if name else poses, index)
+
+        x, y, cos, sin = row("", world * (self.stride // 4))
+
+        def turned(v: Any) -> Any:
+            return mi.Vector3f(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
+
+        agent = mi.Point3f(x, y, EYE_HEIGHT)
+        origin = agent + turned(row("origins", eye))
+        direction = row("directions", eye * self.n_rays + ray)
+        centres = [mi.Point3f(*list(row("", world * (self.stride // 4) + (1 + k)))[:3]) for k in range(self.n_spheres)]
+        return mi.Ray3f(origin, turned(direction)), direction.w, agent, centres
+
+
+def _in_agent_frame(eyes: Eyes, directions: np.ndarray) -> np.ndarray:
+    """Every eye's directions in the agent's frame, and their cosines with its axis, flat (eye, ray, 4)."""
+    return _in_fours(np.einsum("eij,rj->eri", eye_rotations(eyes.azimuths()), directions), directions[:, 2])
+
+
+def _in_fours(vectors: np.ndarray, fourth: np.ndarray | float) -> np.ndarray:
+    """Vectors (..., 3) flat, each followed by a fourth number: four aligned floats are gathered at once."""
+    rows = np.empty((*vectors.shape[:-1], 4), np.float32)
+    rows[..., :3], rows[..., 3] = vectors, fourth
+    return rows.ravel()

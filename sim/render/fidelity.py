@@ -1,0 +1,221 @@
+"""As little work as the receptors' noise allows: how many rays, bands and depth layers a world needs for given eyes.
+
+An error below half of the noise changes nothing that the brain can tell. Every stage has levels, cheapest first; the
+cheapest whose predicted error fits is taken, and what was chosen is on record with its reason.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import optics
+from sim.eyes.eyes import Eyes
+from sim.render.band_error import band_error, lit_in_bands, measured
+from sim.eyes.depth_layers import DepthLayers, ONE_PSF
+from sim.eyes.receptive_fields import Unseen
+from sim.tracing.lighting import BOUNCE, DIRECT, LEVELS
+from sim.render.fidelity_trials import Pilot
+from sim.eyes.sensor import Sampling, sampling_of
+from sim.tracing.static_scene import build_stage
+from sim.tracing.tracer import Tracers
+from sim.worlds.world import World
+
+SHARE_OF_NOISE = 0.5
+# Errors of less than this share of white's signal never cost rays, however little noise there is.
+LEAST_TOLERANCE = 5e-3
+CAUTION = 1.2  # of an error seen in a few glimpses
+PERFECT_LENS_RUNGS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
+PUPIL_RUNGS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
+# Of the tolerance; errors add up as squares, so at least 0.7 of it is left to the rays.
+SHARE_OF_DEPTH = SHARE_OF_BANDS = 0.35
+SHARE_OF_LIGHT = 0.5
+LAYERS = (1, 3, 5, 9)  # nodes of each are among those of the next
+NEAREST = 0.005  # quantile of the distances that counts as the nearest
+
+
+@dataclass(frozen=True)
+class Level:
+    """What was chosen for one stage, and why. predicted_error: of a signal, root mean square (of the eyes' own bands a
+    bound: the worst measured reflectance and type of receptor, which may exceed any tolerance); None where unknown."""
+
+    stage: str
+    level: str
+    predicted_error: float | None
+    why: str
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """How finely a world is rendered for given eyes; printed, it is a table.
+
+    rays_per_receptor  on average; behind a pupil it may be below 1, since all receptors share all rays
+    bands              spectral bands
+    depth              distances for which the eye has a PSF
+    light              what of it is followed: "direct", or "bounce", which adds light that is reflected twice
+    tolerance          error allowed to a receptor's signal (root mean square); None where nothing was chosen
+    levels             what was chosen for each stage, and why
+
+    Raises ValueError for less than one band, rays_per_receptor that are not positive, or unknown light.
+    """
+
+    rays_per_receptor: float
+    bands: int
+    depth: DepthLayers = ONE_PSF
+    tolerance: float | None = None
+    levels: tuple[Level, ...] = ()
+    light: str = DIRECT
+
+    def __post_init__(self) -> None:
+        if not 0 < self.rays_per_receptor < math.inf:
+            raise ValueError(f"rays_per_receptor = {self.rays_per_receptor!r}, must be positive, or 'auto'")
+        if self.bands < 1:
+            raise ValueError(f"bands = {self.bands!r}, must be at least 1")
+        if self.light not in LEVELS:
+            raise ValueError(f"light = {self.light!r}, must be one of {', '.join(map(repr, LEVELS))}")
+
+    @property
+    def predicted_error(self) -> float | None:
+        """Of a receptor's signal, all stages together (root mean square); None where nothing was predicted."""
+        known = [level.predicted_error for level in self.levels if level.predicted_error is not None]
+        return math.hypot(*known) if known else None
+
+    @property
+    def why(self) -> str:
+        """The reasons, one line per stage."""
+        return "\n".join(f"{level.stage}: {level.why}" for level in self.levels) or "as asked"
+
+    def __str__(self) -> str:
+        levels = self.levels or (
+            Level("bands", f"{self.bands}", None, "as asked"),
+            Level("depth", f"{self.depth}", None, "as asked"),
+            Level("light", self.light, None, "as asked"),
+            Level("rays", f"{self.rays_per_receptor:g} per receptor", None, "as asked"),
+        )
+        rows = [("stage", "level", "error", "why")]
+        for level in levels:
+            error = "" if level.predicted_error is None else f"{level.predicted_error:.1e}"
+            rows.append((level.stage, level.level, error, level.why))
+        widths = [max(len(row[i]) for row in rows) for i in range(3)]
+        return "\n".join("  ".join([*(c.ljust(w) for c, w in zip(r, widths, strict=False)), r[3]]) for r in rows)
+
+
+def choose_fidelity(world: World, eyes: Eyes, tolerance: float | None = None) -> Fidelity:
+    """The cheapest fidelity whose predicted error is within the tolerance, bands included.
+
+    tolerance: of a receptor's signal (root mean square); None: half of the receptors' noise, but no less than
+        LEAST_TOLERANCE of what white is worth behind the eyes' pupil.
+
+    Raises ValueError for a tolerance that is not positive, and what BatchedRenderer raises for such a world.
+    """
+    allowed = _allowed(eyes, eyes.eye(), tolerance)
+    bands, level = _bands(eyes.eye(), SHARE_OF_BANDS * allowed)
+    chosen_eyes = replace(eyes, bands=bands)
+    eye = chosen_eyes.eye()
+    stage = build_stage(lit_in_bands(world, eye))
+    tracers = Tracers(world, stage, eye.spectral_bands.wavelengths)
+    fidelity, _ = chosen(Pilot(world, stage, tracers, chosen_eyes, eye), chosen_eyes, eye, allowed)
+    return replace(fidelity, levels=(level, *fidelity.levels[1:]))
+
+
+def chosen(pilot: Pilot, eyes: Eyes, eye: optics.Eye, tolerance: float | None = None) -> tuple[Fidelity, Sampling]:
+    """What `choose_fidelity` gives, with the eyes' own bands, and how the eye is to be sampled."""
+    allowed = _allowed(eyes, eye, tolerance)
+    depth, depth_level = _depth(pilot, eye, SHARE_OF_DEPTH * allowed)
+    sampling = sampling_of(eye, depth)
+    light_level = _light(pilot, sampling, SHARE_OF_LIGHT * allowed)
+    spent = (
+        SHARE_OF_DEPTH**2 + SHARE_OF_BANDS**2 + min((light_level.predicted_error or 0) / allowed, SHARE_OF_LIGHT) ** 2
+    )
+    rungs = PERFECT_LENS_RUNGS if eye.pupil is None else PUPIL_RUNGS
+    errors = pilot.errors(sampling, light_level.level)
+    rays, rays_level = _fewest(errors, rungs, allowed * math.sqrt(1 - spent))
+    levels = _own_bands(pilot.world, eye), depth_level, light_level, rays_level
+    return Fidelity(rays, eyes.bands, depth, allowed, levels, light_level.level), sampling
+
+
+def _light(pilot: Pilot, sampling: Sampling, allowed: float) -> Level:
+    """Direct light where what is reflected twice is little; else both, and of all that is reflected more often only
+    its size is known: as small beside what is reflected twice as that is beside direct light."""
+    try:
+        twice, direct = pilot.reflected_twice(sampling)
+    except ValueError as error:
+        return Level("light", DIRECT, None, f"of what is reflected twice nothing is known: {error}")
+    if twice <= allowed:
+        return Level("light", DIRECT, twice, f"light that is reflected twice is no more than {allowed:.1e}")
+    rest = twice**2 / max(direct - twice, twice)
+    return Level("light", BOUNCE, rest, f"light that is reflected twice is worth {twice:.1e}, more than {allowed:.1e}")
+
+
+def _allowed(eyes: Eyes, eye: optics.Eye, tolerance: float | None) -> float:
+    allowed = max(SHARE_OF_NOISE * eyes.noise_sigma, LEAST_TOLERANCE * eye.throughput)
+    if tolerance is None:
+        return float(allowed)
+    if not 0 < tolerance < math.inf:
+        raise ValueError(f"tolerance = {tolerance!r}, must be positive")
+    return tolerance
+
+
+def _bands(eye: optics.Eye, allowed: float) -> tuple[int, Level]:
+    """As few bands as `optics.Eye` wants for scenes of any colour."""
+    within = min(max(allowed / eye.throughput, 1e-6), 0.5)
+    try:
+        bands = int(replace(eye, bands="auto", tolerance=within).bands)
+    except optics.AccuracyError as error:
+        return eye.bands, Level("bands", f"{eye.bands}", None, f"the eyes' own: {error}")
+    return bands, Level("bands", f"{bands}", allowed, f"fewest with {allowed:.1e} for any colours up to white")
+
+
+def _own_bands(world: World, eye: optics.Eye) -> Level:
+    """What the eye's own bands make of the world's measured reflectances; of colours given as RGB nothing is known."""
+    if not (spectra := measured(world)):
+        return Level("bands", f"{eye.bands}", None, "the eyes' own")
+    error = float(eye.throughput) * band_error(spectra, eye.receptors, eye.bands)
+    return Level("bands", f"{eye.bands}", error, "the eyes' own; error: of measured reflectances in daylight")
+
+
+def _depth(pilot: Pilot, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
+    """One PSF for infinity where that is certainly enough, else as few layers as glimpses of the world want.
+
+    Light through the pupil's point p lands f p/z further off than from infinity. In the mean over a disk of radius R
+    that is |Δx| + |Δy| = 8/(3π) f R/z; a square receptor's field moves by as much of its width, and no scene up to
+    white makes more of it.
+    """
+    if eye.pupil is None:
+        return ONE_PSF, Level("depth", str(ONE_PSF), 0.0, "a perfect lens blurs nothing")
+    distances = pilot.distances()
+    near, far = float(np.quantile(distances, NEAREST, method="higher")), float(distances[-1])
+    shift = 8 / (3 * math.pi) * eye.sensor_distance * eye.pupil.radius / near / eye.receptor_pitch
+    bound = eye.throughput * shift
+    if bound <= allowed:
+        why = f"blur of {shift:.1e} of a receptor at {near:.2g} m, the nearest that is seen"
+        return ONE_PSF, Level("depth", str(ONE_PSF), bound, why)
+    try:
+        errors = pilot.errors_of_layers(DepthLayers(far, near, LAYERS[-1]), LAYERS)
+    except optics.AccuracyError as error:
+        return DepthLayers(far, near, 1), Level("depth", "one PSF", None, f"at the mean depth: {error}")
+    count = next((n for n, e in errors.items() if CAUTION * e <= allowed), LAYERS[-1])
+    layers = DepthLayers(far, near, count)
+    why = f"fewest of 1 ... {LAYERS[-1]} for {allowed:.1e}"
+    return layers, Level("depth", str(layers), CAUTION * errors[count], why)
+
+
+def _fewest(error: Callable[[float], float], rungs: tuple[float, ...], allowed: float) -> tuple[float, Level]:
+    """The lowest rung whose error fits. Errors fall no faster than 1/n: rungs below that are left out."""
+    at, tried = 0, 0
+    while True:
+        tried += 1
+        try:
+            predicted = CAUTION * error(rungs[at])
+        except Unseen:
+            predicted = math.inf
+        if predicted <= allowed or at == len(rungs) - 1:
+            break
+        least = rungs[at] * (predicted / allowed if math.isfinite(predicted) else 1)
+        at = next((i for i in range(at + 1, len(rungs)) if rungs[i] >= least), len(rungs) - 1)
+    found = "fewest of" if predicted <= allowed else "not enough, but the most of"
+    why = f"{found} {rungs[0]:g} ... {rungs[-1]:g} for {allowed:.1e}, {tried} tried"
+    return rungs[at], Level("rays", f"{rungs[at]:g} per receptor", predicted, why)

@@ -1,0 +1,193 @@
+"""A few glimpses of a world, on which numbers of rays are tried before any kernel is recorded.
+
+A trial looks through some of an eye's receptors, at random places and headings of a world, and compares what it sees
+with what many times as many rays see. All is drawn with fixed seeds: the same world and eyes give the same answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics import Eye
+from sim.tracing import lighting
+from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
+from sim.eyes.depth_layers import DepthLayers
+from sim.tasks.placement import CLEARANCE
+from sim.render.frozen_kernels import aligned
+from sim.eyes.sensor import BoxSampling, Sampling, Trial, sampling_of
+from sim.tracing.static_scene import Stage
+from sim.tracing.tracer import Tracers
+from sim.scene.variant import variant
+from sim.worlds.world import World
+
+RECEPTORS = 24  # looked through, at most
+RAYS = 2**19  # of one trial, at most, unless that leaves too few glimpses
+GLIMPSES = (12, 96)  # at least and at most
+FINER = 8  # times as many rays, at least, for what is taken as the truth
+TRUE = 4096  # rays of it, at least, behind a pupil
+WEIGHTS = 2**23  # of it, at most, unless it would not be finer
+STRAY = 0.75  # [m] from a cell's centre, along either axis
+
+
+@dataclass(frozen=True)
+class Glimpses:
+    """Views of single eyes; first axis: glimpse.
+
+    position  of the agent [m], (n, 2) · heading [rad], (n,) · objects: centres [m], (n, k, 3) · eye: which, (n,)
+    """
+
+    position: np.ndarray
+    heading: np.ndarray
+    objects: np.ndarray
+    eye: np.ndarray
+
+    def take(self, n: int) -> Glimpses:
+        """The first n."""
+        return Glimpses(self.position[:n], self.heading[:n], self.objects[:n], self.eye[:n])
+
+    def __len__(self) -> int:
+        return len(self.heading)
+
+
+def glimpses(world: World, eyes: Eyes, n: int) -> Glimpses:
+    """Agents about the cells where agents or objects may start, looking anywhere; objects on theirs."""
+    rng = np.random.default_rng(0)
+    k = len(world.objects)
+    heights = np.array([world.model.body(name).pos[2] for name in world.objects])
+    everywhere = np.concatenate([world.agent_spawn, world.object_spawn.reshape(-1, 2)])
+    position, objects = np.empty((n, 2)), np.empty((n, k, 3))
+    for i in range(n):
+        if k:
+            places = world.object_spawn[rng.choice(len(world.object_spawn), k, replace=len(world.object_spawn) < k)]
+            objects[i] = np.column_stack([places, heights])
+        position[i] = _clear_of(objects[i, :, :2], everywhere, rng)
+    return Glimpses(position, rng.uniform(-np.pi, np.pi, n), objects, rng.integers(eyes.n_eyes, size=n))
+
+
+def _clear_of(objects: np.ndarray, cells: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    place = np.zeros(2)
+    for _ in range(100):
+        place = cells[rng.integers(len(cells))] + rng.uniform(-STRAY, STRAY, 2)
+        if (np.linalg.norm(objects - place, axis=-1) > CLEARANCE).all():
+            break
+    return place
+
+
+class Pilot:
+    """Tries ways of sampling on one world, as these eyes see it; tracers: of the world at the eye's bands."""
+
+    def __init__(self, world: World, stage: Stage, tracers: Tracers, eyes: Eyes, eye: Eye) -> None:
+        self.world = world
+        self._stage, self._tracers, self._eyes, self._eye = stage, tracers, eyes, eye
+        self._views = glimpses(world, eyes, GLIMPSES[1])
+        self._receptors = np.sort(np.random.default_rng(0).permutation(int(np.prod(eyes.resolution)))[:RECEPTORS])
+
+    def errors(self, sampling: Sampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
+        """Root mean square error of the signals with so many rays per receptor; raises Unseen where a receptor has
+        none."""
+        truths: dict[int, np.ndarray] = {}
+        receptors = np.prod(self._eyes.resolution)
+        least = TRUE / receptors if self._eye.pupil else FINER
+        planes = sampling.depth.count * self._eye.bands * len(self._receptors)
+        most = WEIGHTS / planes / (receptors if self._eye.pupil else len(self._receptors))
+
+        def error(rays_per_receptor: float) -> float:
+            # In powers of 4, so that a truth serves several.
+            finer = max(2 * rays_per_receptor, min(max(FINER * rays_per_receptor, least), most))
+            level = int(np.ceil(np.log(finer) / np.log(4) - 1e-9))
+            if level not in truths:
+                truths[level] = self._signals(sampling.trial(4.0**level, self._receptors), sampling.depth, light)
+            truth = truths[level]
+            found = self._signals(sampling.trial(rays_per_receptor, self._receptors), sampling.depth, light, len(truth))
+            return _rms(found - truth)
+
+        return error
+
+    def reflected_twice(self, sampling: Sampling) -> tuple[float, float]:
+        """Root mean square of what light that is reflected twice adds to the signals, and of direct light's signals.
+        Raises ValueError where it cannot be followed."""
+        trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
+        direct, both = (self._signals(trial, sampling.depth, light) for light in lighting.LEVELS)
+        return _rms(both - direct), _rms(direct)
+
+    def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
+        """Root mean square difference to the signals with the finest layers, all with the same rays; the nodes of
+        each count must be among those of the finest. Raises optics.AccuracyError, see `optics.Eye.kernel`."""
+        sampling = sampling_of(self._eye, finest)
+        trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
+        truth = self._signals(trial, finest, lighting.DIRECT)
+        nodes = trial.weights.reshape(finest.count, -1, *trial.weights.shape[1:])
+        found = {}
+        for n in counts:
+            chosen = np.linspace(0, finest.count - 1, n).astype(int) if n > 1 else [finest.count // 2]
+            weights = nodes[chosen].reshape(-1, *trial.weights.shape[1:])
+            fewer = replace(finest, count=n)
+            signals = self._signals(replace(trial, weights=weights), fewer, lighting.DIRECT)
+            found[n] = _rms(signals - truth)
+        return found
+
+    def distances(self) -> np.ndarray:
+        """Of what the eyes see, along their axes [m], sorted; infinite where they see nothing."""
+        _, z = self._trace(self._views, BoxSampling(self._eye).trial(4, self._receptors), lighting.DIRECT)
+        return np.sort(np.array(z))
+
+    def _signals(self, trial: Trial, depth: DepthLayers, light: str, n: int | None = None) -> np.ndarray:
+        """(view, channel, receptor), of as many views as the rays allow."""
+        rays = len(trial.directions)
+        views = self._views.take(n or int(np.clip(RAYS // rays, *GLIMPSES)))
+        components, z = self._trace(views, trial, light)
+        with variant(self._stage.variant):
+            shared = [np.array(share * c) for share in depth.shares(dr.rcp(z)) for c in components]
+        layers = np.reshape(shared, (depth.count, len(components), len(views), rays))
+        # signals_c = sum_b mixing[c, b] sum_l sum_k basis[k, b] sum_p W_lb[r, p] light_lk[p]
+        basis = self._tracers.of(light).basis
+        factors = self._eye.throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
+        planes = trial.weights.reshape(depth.count, -1, *trial.weights.shape[1:])
+        weights = np.einsum("ckb,lbrp->clkrp", factors, planes, optimize=True).astype(np.float32)
+        return np.einsum("clkrp,lkvp->vcr", weights, layers, optimize=True)
+
+    def _trace(self, views: Glimpses, trial: Trial, light: str) -> tuple[list[Any], Any]:
+        """Components of light along a trial's rays of each view's eye, and from how far along its axis [m]: Dr.Jit,
+        flat (view, ray)."""
+        directions, azimuths = trial.directions, self._eyes.azimuths()
+        in_agent = np.einsum("eij,rj->eir", eye_rotations(azimuths), directions)[views.eye]
+        origins = eye_positions(azimuths)[views.eye]
+        cos, sin = np.cos(views.heading), np.sin(views.heading)
+        zero, one = np.zeros_like(cos), np.ones_like(cos)
+        turn = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
+        world = np.einsum("ijv,vjr->ivr", turn, in_agent)
+        agent = np.column_stack([views.position, np.full(len(views), EYE_HEIGHT)])
+        start = agent + np.einsum("ijv,vj->vi", turn, origins)
+        rays, tracer = len(directions), self._tracers.of(light)
+
+        def lanes(points: np.ndarray) -> Any:
+            """The same for all rays of a view."""
+            return mi.Point3f([_lanes(np.repeat(column, rays)) for column in points.T])
+
+        with variant(self._stage.variant):
+            ray = mi.Ray3f(lanes(start), mi.Vector3f([_lanes(d) for d in world]))
+            centres = [lanes(views.objects[:, k]) for k in range(views.objects.shape[1])]
+            place = None
+            if light == lighting.BOUNCE:
+                place = mi.Point2f([_lanes(np.tile(column, len(views))) for column in trial.places.T])
+            components, t = tracer.radiance(tracer.scene, ray, lanes(agent), centres, tracer.inputs, place)
+            z = t * _lanes(np.tile(directions[:, 2], len(views)))
+            dr.eval(components, z)
+            return components, z
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _lanes(values: np.ndarray) -> Any:
+    """An array of the device's. Aligned, or Dr.Jit would compile the same kernel anew for every alignment."""
+    lanes = aligned(values.size, np.float32)
+    lanes[:] = values.ravel()
+    return mi.Float(lanes)

@@ -1,0 +1,138 @@
+"""Receptor noise for all worlds at once: standard normal numbers by Philox, in one frozen kernel.
+
+A counter-based generator (Salmon et al. 2011) needs no state but a key per world and the number of frames it has drawn,
+so a world's noise depends on its own seed and history alone, whatever its neighbours do.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+import optics
+from sim.render.frozen_kernels import aligned, garbage_kept
+from sim.scene.variant import variant
+
+PER_DRAW = 4  # normal numbers from one evaluation of Philox4x32
+FEW = 8  # worlds of the narrower kernel that serves a few of them
+
+
+class Normals:
+    """Standard normal numbers, `shape` of them per world and frame.
+
+    keys   one per world, (n,) uint64 · shape: of one world's receptors
+    """
+
+    def __init__(self, keys: np.ndarray, shape: tuple[int, ...]) -> None:
+        self._shape = shape
+        self.restart(keys)
+        self._draws = -(-math.prod(shape) // PER_DRAW)
+        self._kernels: dict[int, _Kernel] = {}
+
+    def restart(self, keys: np.ndarray) -> None:
+        """Draw from the first frame on, under these keys (n,)."""
+        self._keys, self._frames = keys, np.zeros(len(keys), np.uint32)
+
+    def begin(self, worlds: np.ndarray) -> Running:
+        """Start drawing the next frame of these worlds; it runs beside whatever comes next, but for more of its kind:
+        wait for one draw of many worlds before the next, and for one of a few."""
+        n = len(self._keys)
+        width = FEW if len(worlds) <= FEW < n else n
+        if width not in self._kernels:
+            self._kernels[width] = _Kernel(width, self._draws)
+        padded = np.resize(worlds, width)
+        running = self._kernels[width](self._keys[padded], self._frames[padded])
+        self._frames[worlds] += 1
+        return Running(running, len(worlds), self._shape)
+
+
+class Running:
+    """A frame that is being drawn."""
+
+    def __init__(self, normals: Any, n: int, shape: tuple[int, ...]) -> None:
+        self._normals, self._n, self._shape = normals, n, shape
+
+    def values(self) -> np.ndarray:
+        """Wait for it: (n, *shape) float32."""
+        drawn = np.empty((self._n, math.prod(self._shape)), np.float32)
+        per_world = -(-drawn.shape[1] // PER_DRAW)
+        for k, part in enumerate(self._normals):
+            mine = drawn[:, k * per_world : (k + 1) * per_world]
+            mine[:] = part.numpy().reshape(-1, per_world)[: self._n, : mine.shape[1]]
+        return drawn.reshape(self._n, *self._shape)
+
+
+class _Kernel:
+    """Recorded once per width; keys and frame numbers come in buffers of its own, always at the same alignment."""
+
+    def __init__(self, worlds: int, draws: int) -> None:
+        self._key_buffer, self._frame_buffer = aligned(worlds, np.uint64), aligned(worlds, np.uint32)
+        with variant():
+            index: Any = dr.uint32_array_t(dr.detached_t(mi.Float))
+            self._lanes = dr.arange(index, worlds * draws)
+            dr.eval(self._lanes)
+
+        def normals(keys: Any, frames: Any, lane: Any) -> Any:
+            module = sys.modules[type(lane).__module__]
+            world = lane // draws
+            random = module.Philox4x32(
+                dr.gather(type(keys), keys, world), dr.gather(type(frames), frames, world), lane - world * draws
+            )
+            return list(random.next_float32x4_normal())
+
+        self._normals: Any = dr.freeze(normals)
+
+    def __call__(self, keys: np.ndarray, frames: np.ndarray) -> Any:
+        self._key_buffer[:], self._frame_buffer[:] = keys, frames
+        module = sys.modules[type(self._lanes).__module__]
+        with variant(), garbage_kept():
+            return self._normals(module.UInt64(self._key_buffer), module.UInt32(self._frame_buffer), self._lanes)
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """How noisy a signal s is: variance V = σ² + s / N, N the photons that a signal of 1 stands for.
+
+    sigma    standard deviation of the Gaussian part
+    photons  N, to be broadcast against signals (..., channel, h, w); None: no shot noise
+    """
+
+    sigma: float
+    photons: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, eye: optics.Eye) -> NoiseModel | None:
+        """An eye's; None without any noise."""
+        photons = eye.photons
+        if photons is None:
+            return cls(eye.noise_sigma) if eye.noise_sigma > 0 else None
+        mosaic = eye.mosaic
+        spread = photons[:, None, None] if mosaic is None else photons[mosaic][None]
+        return cls(eye.noise_sigma, spread.astype(np.float32))
+
+    def largest(self, brightest: float) -> float:
+        """Standard deviation where a signal is twice the brightest."""
+        shot = 0.0 if self.photons is None else 2 * brightest / float(self.photons.min())
+        return math.sqrt(self.sigma**2 + shot)
+
+    def __call__(self, signals: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Noisy signals (n, ...) from standard normal numbers z of the same shape, which are used up.
+
+        Shot noise is Poisson's to its third moment: s + √V z + s/N² (z² - 1) / 6V (Cornish & Fisher 1938), which
+        matters below a hundred photons.
+        """
+        if self.photons is None:
+            normals *= np.float32(self.sigma)
+            normals += signals
+            return normals
+        light = np.maximum(signals, 0) / self.photons
+        variance = np.maximum(light + np.float32(self.sigma**2), np.finfo(np.float32).tiny)
+        skewed: np.ndarray = light / self.photons * (normals * normals - 1) / (6 * variance)
+        noisy: np.ndarray = signals + np.sqrt(variance) * normals + skewed
+        return noisy

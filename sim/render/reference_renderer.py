@@ -1,0 +1,115 @@
+"""The slow way to see, which the fast one is held against: Mitsuba's own integrators and optics' own convolution.
+
+Shares with the batched renderer the world's model and the eyes' places, and nothing of how light is found.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+import optics
+from sim.eyes.eyes import EYE_HEIGHT, Eyes, camera_rotations, eye_positions
+from sim.render.band_error import lit_in_bands
+from sim.envs.follow_camera import pose
+from sim.scene.cameras import Viewpoint
+from sim.scene.mirror import mirror
+from sim.worlds.state import WorldState
+from sim.scene.variant import DEFAULT_VARIANT
+from sim.worlds.world import World
+
+
+class ReferenceRenderer:
+    """Sees worlds one eye at a time: a path-traced picture of the tangent plane, then `Eye.see`.
+
+    world, eyes           as in `sim.BatchedRenderer`
+    integrator            of Mitsuba: "path", "direct", or its description, {"type": "path", "max_depth": 3}
+    spp                   samples per cell of a picture
+    samples_per_receptor  cells along a receptor's side; None: 4 behind a pupil, 1 for the perfect lens (pixels)
+    depths                nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all
+                          light is blurred as if from infinity
+    depth_layers          kernels between them, or "auto"
+    sampler               of Mitsuba: "multijitter" for less noise
+    variant               of Mitsuba, spectral; scalar_spectral runs without LLVM
+    seed                  of the samples; may be changed between pictures
+
+    Raises ValueError for a bad argument, optics.AccuracyError for a pupil whose light spreads too far.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        eyes: Eyes,
+        integrator: str | Mapping[str, Any] = "path",
+        spp: int = 64,
+        *,
+        samples_per_receptor: int | None = None,
+        depths: tuple[float, float] | None = None,
+        depth_layers: int | str = "auto",
+        sampler: str = "independent",
+        variant: str = DEFAULT_VARIANT,
+        seed: int = 0,
+    ) -> None:
+        self.world, self.eyes, self.eye = world, eyes, eyes.eye()
+        self.bands: optics.SpectralBands = self.eye.spectral_bands
+        self.samples_per_receptor = samples_per_receptor or (1 if self.eye.pupil is None else 4)
+        self._integrator, self._spp, self._sampler, self.seed = integrator, spp, sampler, seed
+        self._has_depth = depths is not None
+        z: Any = np.array(depths) if depths else math.inf
+        self.sight = self.eye.sight(self.samples_per_receptor, z, depth_layers, light_from="centres")
+        self._data = mujoco.MjData(world.model)
+        self._mirror = mirror(world.model, variant=variant, spectra=lit_in_bands(world, self.eye).spectra)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Cells (Y, X) of a picture: all that any receptor sees."""
+        reach = max(kernel.shape[-1] // 2 for kernel in self.sight.kernels.values())
+        height, width = (n * self.samples_per_receptor + 2 * reach for n in self.eye.resolution)
+        return height, width
+
+    def pictures(self, state: WorldState) -> np.ndarray:
+        """Spectral radiance on the tangent plane, (env, eye, band, Y, X)."""
+        return np.array([[self._picture(view) for view in self._views(state, i)] for i in range(state.n)])
+
+    def radiance(self, state: WorldState) -> np.ndarray:
+        """The same in the batched renderer's shape, (env, eye, ray, band): a picture's cells, row by row."""
+        pictures = self.pictures(state)
+        return np.moveaxis(pictures.reshape(*pictures.shape[:3], -1), 2, 3)
+
+    def signals(self, state: WorldState) -> np.ndarray:
+        """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32."""
+        return np.array([[self._signals(view) for view in self._views(state, i)] for i in range(state.n)])
+
+    def _signals(self, view: Viewpoint) -> np.ndarray:
+        z: Any = math.inf
+        if self._has_depth:
+            height, width = self.shape
+            z = self._mirror.render_depth(view, width, height)
+        return np.asarray(
+            self.eye.see(self._picture(view), self.samples_per_receptor, z=z, sight=self.sight), np.float32
+        )
+
+    def _picture(self, view: Viewpoint) -> np.ndarray:
+        height, width = self.shape
+        return self._mirror.render(
+            view, width, height, self._integrator, self._spp, self.bands.wavelengths, self.seed, self._sampler
+        )
+
+    def _views(self, state: WorldState, index: int) -> list[Viewpoint]:
+        """Every eye's view of one world, in which everything is put where the state has it."""
+        pose(self._data, self.world, state, index)
+        self._mirror.sync(self._data)
+        azimuths = self.eyes.azimuths()
+        cos, sin = np.cos(state.heading[index]), np.sin(state.heading[index])
+        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        agent = np.array([*state.position[index], EYE_HEIGHT])
+        half = self.shape[0] / 2 * self.eye.receptor_pitch / self.samples_per_receptor
+        fovy_deg = math.degrees(2 * math.atan(half / self.eye.sensor_distance))
+        return [
+            Viewpoint(agent + turn @ position, turn @ rotation, fovy_deg)
+            for position, rotation in zip(eye_positions(azimuths), camera_rotations(azimuths), strict=True)
+        ]

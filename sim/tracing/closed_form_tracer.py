@@ -1,0 +1,251 @@
+"""Worlds of upright walls, a floor and spheres, ray traced in closed form.
+
+A few walls are all solved; many are found by walking through a grid of cells (Amanatides and Woo 1987), which wants
+their faces to lie on one. Colours are Mitsuba's (`sim.tracing.reflectance_atlas`). Where all lights have one spectrum and all materials
+share a few, light is traced in as many components as there are independent spectra, and not once per band. Light that
+is reflected twice has products of the materials' spectra: with it, all bands are traced, unless all materials are grey.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from sim.tracing import lighting, spheres
+from sim.eyes.eyes import EYE_HEIGHT
+from sim.tracing.reflectance_atlas import Atlas, bake
+from sim.tracing.wall_intersection import Footprints, footprints_of
+from sim.tracing.static_scene import Stage
+from sim.tracing.walls import ALIGNED, Unsuited, Walls, walls_of
+from sim.worlds.world import World
+
+# Singular values below this share of the largest are float32 rounding.
+RANK_TOLERANCE = 1e-6
+# Deviation of a grey's reflectances from band to band, in Mitsuba's spectra of grey colours.
+GREY = 1e-4
+ROW = 12  # floats per face: column and row of the texel as affine functions of (x, y, z), then where the texture is
+
+
+@dataclass(frozen=True)
+class Components:
+    """reflectance (texel, component) · levels of the lights (light, component) · basis (component, band), with
+    radiance_b = sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l"""
+
+    reflectance: np.ndarray
+    levels: np.ndarray
+    basis: np.ndarray
+
+
+def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
+    """The fewest components that texels (texel, band) under lights (light, band) need."""
+    n_bands = texels.shape[1]
+    brightest = irradiance[np.argmax(irradiance.sum(axis=1))]
+    level = irradiance @ brightest / (brightest @ brightest)
+    if np.allclose(irradiance, level[:, None] * brightest, rtol=0, atol=RANK_TOLERANCE * irradiance.max()):
+        u, s, vt = np.linalg.svd(texels, full_matrices=False)
+        rank = max(int((s > RANK_TOLERANCE * s[0]).sum()), 1)
+        if rank < n_bands:
+            return Components(u[:, :rank] * s[:rank], np.tile(level[:, None], rank), vt[:rank] * brightest / np.pi)
+    return Components(texels, irradiance, np.eye(n_bands) / np.pi)
+
+
+def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
+    """Those in which what a texel sends on is a product: its reflectance times the component that arrives."""
+    grey = texels.mean(axis=1, keepdims=True)
+    if np.abs(texels - grey).max() <= GREY:
+        few = components_of(np.tile(grey, texels.shape[1]), irradiance)
+        if len(few.basis) == 1:
+            scale = few.reflectance[:, 0] @ grey[:, 0] / (grey[:, 0] @ grey[:, 0])
+            return Components(few.reflectance / scale, few.levels, few.basis * scale)
+    return Components(texels, irradiance, np.eye(texels.shape[1]) / np.pi)
+
+
+@dataclass(frozen=True)
+class _Hit:
+    """Where rays end: lit tells whether light is seen that leaves there; reflectance: one array per component."""
+
+    t: Any
+    point: Any
+    normal: Any
+    lit: Any
+    reflectance: list[Any]
+
+
+class ClosedForm:
+    """Traces rays through one world.
+
+    name, why   of this way of tracing, for reports
+    light       what of it is followed, one of `lighting.LEVELS`
+    basis       (component, band): what each component is worth in each band
+
+    Raises Unsuited for worlds that are not made of upright walls, and, where light that is reflected twice is followed,
+    for walls of several heights or lower than what stands between them.
+    """
+
+    name = "closed_form"
+
+    def __init__(self, world: World, stage: Stage, wavelengths: np.ndarray, light: str = lighting.DIRECT) -> None:
+        walls = walls_of(world.model, stage.geoms)
+        self.light = light
+        if light == lighting.BOUNCE:
+            _check_tops(world, walls, stage)
+        self._footprints: Footprints = footprints_of(walls)
+        self.why = f"{len(walls)} upright walls, {self._footprints.how}"
+        self._bodies, self._walls = stage.bodies, walls
+        self._lights = lighting.directional_lights(stage.scene, wavelengths)
+        if any(source.direction[2] <= 0 for source in self._lights):
+            raise Unsuited("a light shines from below")
+        geoms, place = np.unique(walls.geoms, return_inverse=True)
+        visible = stage.bodies if light == lighting.BOUNCE else stage.spheres
+        bsdfs = [*(stage.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
+        atlas = bake(world.model, [*geoms, *visible.geoms], bsdfs, wavelengths)
+        irradiance = np.array([source.irradiance for source in self._lights]).reshape(-1, len(wavelengths))
+        fewest = reflected_components_of if light == lighting.BOUNCE else components_of
+        self._components = fewest(atlas.texels, irradiance)
+        self.basis = self._components.basis
+        self._faces = _face_rows(walls.uv, atlas, place)
+        self._n_faces = len(walls.geoms)
+        self._one_dimensional = atlas.one_dimensional
+        self._sphere_textures = [
+            (atlas.to_texels[len(geoms) + k], atlas.places[len(geoms) + k]) for k in range(len(visible))
+        ]
+        self._static = self._inputs()
+
+    @property
+    def scene(self) -> None:
+        """No Mitsuba scene takes part."""
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """Arrays that the kernel reads."""
+        return self._static
+
+    def _inputs(self) -> dict[str, Any]:
+        texels = self._components.reflectance.astype(np.float32)
+        tables = {f"texels_{k}": np.ascontiguousarray(column) for k, column in enumerate(texels.T)}
+        tables |= {"faces": self._faces.astype(np.float32).ravel(), **self._footprints.tables}
+        return {name: mi.Float(table) for name, table in tables.items()}
+
+    def radiance(
+        self, scene: None, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any], place: Any = None
+    ) -> tuple[list[Any], Any]:
+        """What comes along each ray, one array per component, and from how far [m]."""
+        bodies = [*centres, agent]
+        hit = self._hit(ray, centres, inputs)
+        light = self._irradiance(hit, bodies, inputs)
+        if self.light == lighting.BOUNCE:
+            there = self._hit(lighting.onwards(hit.point, hit.normal, place), bodies, inputs)
+            second = zip(there.reflectance, self._irradiance(there, bodies, inputs), strict=True)
+            light = [dr.select(hit.lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
+        return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
+
+    def _hit(self, ray: Any, centres: list[Any], inputs: dict[str, Any]) -> _Hit:
+        """Where rays meet walls, floor or bodies first; those without a centre are not there."""
+        t, face, normal = self._footprints.hit(ray, inputs)
+        on_floor, t_floor = self._floor_hit(ray)
+        floor_first = on_floor & (t_floor < t)
+        t = dr.select(floor_first, t_floor, t)
+        face = dr.select(floor_first, self._n_faces - 1, face)
+        normal = dr.select(floor_first, mi.Normal3f(0, 0, 1), normal)
+        seen = dr.isfinite(t)
+        t, which = spheres.nearest(self._bodies, centres, ray, t)
+        on_sphere = which < len(centres)
+        point = ray(dr.select(seen | on_sphere, t, 0))
+        offset, columns, rows, x, y = self._face_texel(face, point, inputs)
+        if centres:
+            sphere_normal, uv = spheres.normal_and_uv(self._bodies, centres, which, point)
+            normal = dr.select(on_sphere, sphere_normal, normal)
+            found = self._sphere_texel(which, uv)
+            offset, columns, rows, x, y = (
+                dr.select(on_sphere, mine, other)
+                for mine, other in zip(found, (offset, columns, rows, x, y), strict=True)
+            )
+        lit = (seen | on_sphere) & (t > 0) & (dr.dot(normal, ray.d) < 0)
+        return _Hit(t, point, normal, lit, self._interpolate(offset, columns, rows, x, y, inputs))
+
+    def _floor_hit(self, ray: Any) -> tuple[Any, Any]:
+        """Whether and where a ray from above meets the floor."""
+        t = (self._walls.floor - ray.o.z) / ray.d.z
+        lower, upper = self._walls.floor_lower, self._walls.floor_upper
+        x, y = ray.o.x + t * ray.d.x, ray.o.y + t * ray.d.y
+        inside = (x >= float(lower[0])) & (x <= float(upper[0])) & (y >= float(lower[1])) & (y <= float(upper[1]))
+        return inside & (ray.d.z < 0) & (t > 0), t
+
+    def _irradiance(self, hit: _Hit, bodies: list[Any], inputs: dict[str, Any]) -> list[Any]:
+        """Per component: sum over the lights of level · cos θ, where nothing is in the way."""
+        levels = self._components.levels
+        start = lighting.clear_of(hit.point, hit.normal)
+        radii = list(map(float, self._bodies.radii))
+        total = [mi.Float(0) for _ in range(levels.shape[1])]
+        for light, level in zip(self._lights, levels, strict=True):
+            towards = mi.Vector3f(*map(float, light.direction))
+            shadow = mi.Ray3f(start, towards)
+            cosine = dr.dot(hit.normal, towards)
+            shines = hit.lit & (cosine > 0) & ~spheres.blocks(radii, bodies, shadow)
+            shines &= ~self._footprints.blocks(start, light.direction, inputs)
+            cosine = dr.select(shines, cosine, 0)
+            total = [dr.fma(cosine, float(factor), sum_so_far) for factor, sum_so_far in zip(level, total, strict=True)]
+        return total
+
+    def _face_texel(self, face: Any, point: Any, inputs: dict[str, Any]) -> tuple[Any, ...]:
+        """Texture of a face and where in it a point is: first texel, columns, rows, column and row."""
+        columns = dr.gather(mi.Vector4f, inputs["faces"], face * 3)
+        place = dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 2)
+        x = _affine(columns, point)
+        y = mi.Float(0)
+        if not self._one_dimensional:
+            y = _affine(dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 1), point)
+        return place.x, place.y, place.z, x, y
+
+    def _sphere_texel(self, which: Any, uv: Any) -> tuple[Any, ...]:
+        found: tuple[Any, ...] = tuple(mi.Float(0) for _ in range(5))
+        for k, (to_texels, place) in enumerate(self._sphere_textures):
+            column, row = (float(a) * uv.x + float(b) * uv.y + float(c) for a, b, c in to_texels)
+            mine = (*(mi.Float(float(p)) for p in place), column, row)
+            found = tuple(dr.select(which == k, a, b) for a, b in zip(mine, found, strict=True))
+        return found
+
+    def _interpolate(self, offset: Any, columns: Any, rows: Any, x: Any, y: Any, inputs: dict[str, Any]) -> list[Any]:
+        """Reflectance per component, interpolated bilinearly in a texture that repeats."""
+        x0, x1, fx = _neighbours(x, columns)
+        n = self._components.reflectance.shape[1]
+        taps = [(offset, x0, 1 - fx), (offset, x1, fx)]
+        if not self._one_dimensional:
+            y0, y1, fy = _neighbours(y, rows)
+            taps = [(first + r * columns, c, wx * wy) for first, c, wx in taps for r, wy in ((y0, 1 - fy), (y1, fy))]
+        index = [(mi.UInt32(first + column), weight) for first, column, weight in taps]
+        return [sum(w * dr.gather(mi.Float, inputs[f"texels_{k}"], i) for i, w in index) for k in range(n)]
+
+
+def _check_tops(world: World, walls: Walls, stage: Stage) -> None:
+    """No top of a wall may be seen from where light is reflected: from any point of walls and movers."""
+    objects = [world.model.body(name).pos[2] for name in world.objects]
+    bodies = np.add(np.add([*objects, EYE_HEIGHT], stage.bodies.radii), stage.bodies.offsets[:, 2])
+    lowest, highest = walls.top.min(initial=np.inf), max(walls.top.max(initial=-np.inf), bodies.max())
+    if highest > lowest + ALIGNED:
+        raise Unsuited(f"light that is reflected twice sees the top of a wall {lowest:.2g} m high")
+
+
+def _face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
+    """Per face (face, ROW): column and row of the texel as affine functions of the point, place of the texture, 0."""
+    rows = np.zeros((len(uv), ROW))
+    for i, (affine, texture) in enumerate(zip(uv, place, strict=True)):
+        to_texel = atlas.to_texels[texture] @ np.vstack([affine, [0, 0, 0, 1]])
+        rows[i] = [*to_texel.ravel(), *atlas.places[texture], 0]
+    return rows
+
+
+def _affine(row: Any, point: Any) -> Any:
+    return dr.fma(row.x, point.x, dr.fma(row.y, point.y, dr.fma(row.z, point.z, row.w)))
+
+
+def _neighbours(x: Any, n: Any) -> tuple[Any, Any, Any]:
+    """The two whole numbers around x, modulo n, and how far x is from the first to the second."""
+    whole = dr.floor(x)
+    first = dr.clip(whole - n * dr.floor(whole / n), 0, n - 1)
+    second = dr.select(first + 1 >= n, 0, first + 1)
+    return first, second, x - whole

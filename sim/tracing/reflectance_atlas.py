@@ -1,0 +1,86 @@
+"""Reflectances of all materials in one table, baked from Mitsuba's own BSDFs.
+
+Every texel is evaluated by Mitsuba at the bands' wavelengths; between texels the table is interpolated bilinearly and
+repeated, as Mitsuba's `bitmap` does it. A texture that does not change along an axis is one texel wide there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from sim.tracing import lighting
+from sim.scene import shapes, surfaces
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """texels       reflectance, (texel, band), all textures one after the other, row by row
+    places       per texture: first texel, columns, rows, (texture, 3)
+    to_texels    per texture: (column, row) = to_texels @ (u, v, 1), (texture, 2, 3); texel centres at whole numbers
+    """
+
+    texels: np.ndarray
+    places: np.ndarray
+    to_texels: np.ndarray
+
+    @property
+    def one_dimensional(self) -> bool:
+        """Whether no texture has more than one row."""
+        return bool((self.places[:, 2] == 1).all())
+
+
+def bake(model: mujoco.MjModel, geoms: Sequence[int], bsdfs: Sequence[Any], wavelengths: np.ndarray) -> Atlas:
+    """The atlas of these geoms' BSDFs at wavelengths [m]: one texture per geom; geoms of one BSDF share its texels."""
+    texels: list[np.ndarray] = []
+    places: dict[int, tuple[tuple[int, int, int], np.ndarray]] = {}
+    for geom, bsdf in zip(geoms, bsdfs, strict=True):
+        if id(bsdf) in places:
+            continue
+        table, to_texels = _bake_one(model, int(geom), bsdf, wavelengths)
+        first = sum(len(t) for t in texels)
+        places[id(bsdf)] = (first, table.shape[1], table.shape[0]), to_texels
+        texels.append(table.reshape(-1, table.shape[2]))
+    found = [places[id(bsdf)] for bsdf in bsdfs]
+    return Atlas(np.concatenate(texels), np.array([p for p, _ in found]), np.array([t for _, t in found]))
+
+
+def _bake_one(model: mujoco.MjModel, geom: int, bsdf: Any, wavelengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Reflectance (row, column, band), and the way there from Mitsuba's (u, v) of the geom, (2, 3)."""
+    width, height = 1, 1
+    if shapes.is_textured(model, geom):
+        height, width = surfaces.image(model, surfaces.texture_id(model, geom)).shape[:2]
+    to_uv = shapes.uv_transform(model, geom)
+    to_uv = np.eye(3) if to_uv is None else to_uv
+    column, row = np.meshgrid(np.arange(width), np.arange(height))
+    centres = np.stack([(column.ravel() + 0.5) / width, (row.ravel() + 0.5) / height, np.ones(column.size)])
+    table = _reflectance(bsdf, np.linalg.solve(to_uv, centres)[:2], wavelengths).reshape(height, width, -1)
+    to_texels = np.array([[width, 0, -0.5], [0, height, -0.5]]) @ to_uv
+    if _constant(table, axis=0):
+        return table[:1], to_texels * [[1], [0]]
+    if _constant(table, axis=1):
+        return table[:, :1].transpose(1, 0, 2), to_texels[::-1] * [[1], [0]]
+    return table, to_texels
+
+
+def _constant(table: np.ndarray, axis: int) -> bool:
+    return bool(np.allclose(table, table.take([0], axis), rtol=1e-6, atol=0))
+
+
+def _reflectance(bsdf: Any, uv: np.ndarray, wavelengths: np.ndarray) -> np.ndarray:
+    """What Mitsuba says, (point, band)."""
+    si = dr.zeros(mi.SurfaceInteraction3f, uv.shape[1])
+    si.uv = mi.Point2f(*(mi.Float(np.ascontiguousarray(c, np.float32)) for c in uv))
+    si.wi = mi.Vector3f(0, 0, 1)
+    values = []
+    for spectrum in lighting.spectra(wavelengths):
+        si.wavelengths = spectrum
+        value = np.array(bsdf.eval_diffuse_reflectance(si, True))
+        values.append(np.broadcast_to(value, (lighting.LANES, uv.shape[1])))
+    return np.concatenate(values)[: len(wavelengths)].T.astype(np.float64)

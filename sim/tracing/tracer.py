@@ -1,0 +1,82 @@
+"""Which way a world is ray traced: in closed form where it has one, by Mitsuba otherwise."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from sim.tracing import lighting
+from sim.tracing.closed_form_tracer import ClosedForm
+from sim.scene import shapes
+from sim.tracing.static_scene import Stage
+from sim.tracing.mitsuba_tracer import Traced
+from sim.scene.variant import variant
+from sim.tracing.walls import Unsuited
+from sim.worlds.world import World
+
+TRACERS = ("auto", ClosedForm.name, Traced.name)
+
+
+class Tracer(Protocol):
+    """name   of the way of tracing, one of TRACERS · why it was taken
+    light  what of it is followed, one of `lighting.LEVELS`
+    scene  what the kernel wants as an argument of its own; inputs: arrays that it reads
+    basis  (component, band): radiance_b = sum_k basis[k, b] component_k
+    """
+
+    name: str
+    why: str
+    light: str
+    basis: np.ndarray
+
+    @property
+    def scene(self) -> Any:
+        """A Mitsuba scene or None."""
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """Arrays, by name."""
+
+    def radiance(
+        self, scene: Any, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any], place: Any = None
+    ) -> tuple[list[Any], Any]:
+        """What comes along each ray, one array per component, and from how far [m]; agent and centres: of the
+        spheres that move; place: each ray's on the unit square (`lighting.onwards`), wanted for light that bounces."""
+
+
+class Tracers:
+    """The tracers of a world, one for every level of light. Raises what `tracer_of` does for direct light."""
+
+    def __init__(self, world: World, stage: Stage, wavelengths: np.ndarray, name: str = "auto") -> None:
+        self._world, self._stage, self._wavelengths, self._name = world, stage, wavelengths, name
+        self._known: dict[str, Tracer] = {}
+        self.of(lighting.DIRECT)
+
+    def of(self, light: str) -> Tracer:
+        """The one that follows this much of the light. Raises ValueError, see `tracer_of`."""
+        if light not in self._known:
+            with variant(self._stage.variant):
+                self._known[light] = tracer_of(self._world, self._stage, self._wavelengths, self._name, light)
+        return self._known[light]
+
+
+def tracer_of(world: World, stage: Stage, wavelengths: np.ndarray, name: str, light: str = lighting.DIRECT) -> Tracer:
+    """The tracer of a world, "auto" being the fastest that can.
+
+    Raises ValueError for an unknown name, for "closed_form" where the world has none, for lights other than
+    directional ones, for surfaces that are not Lambertian, and for light that bounces off an agent with a texture.
+    """
+    if light == lighting.BOUNCE and shapes.is_textured(world.model, stage.bodies.geoms[-1]):
+        raise ValueError("light = 'bounce': the agent's body has a texture, which would have to turn with it")
+    if name not in TRACERS:
+        raise ValueError(f"tracer = {name!r}, must be one of {', '.join(map(repr, TRACERS))}")
+    lighting.check_lambertian([*stage.spheres.bsdfs, *(shape.bsdf() for shape in stage.scene.shapes())])
+    if name == Traced.name:
+        return Traced(stage, wavelengths, "asked for", light)
+    try:
+        return ClosedForm(world, stage, wavelengths, light)
+    except Unsuited as reason:
+        if name == ClosedForm.name:
+            raise ValueError(f"tracer = 'closed_form': this world has no closed form: {reason}") from reason
+        return Traced(stage, wavelengths, f"no closed form: {reason}", light)

@@ -1,0 +1,205 @@
+"""Where rays meet upright walls: each wall solved (few of them), or the cells that they fill walked through (many)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Protocol
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from sim.tracing.walls import ALIGNED, SIDES, Unsuited, Walls
+
+FEW = 8  # walls that are solved one by one; a walk through a grid costs about as much
+CELLS = 1_000_000  # of a grid, at most
+NEVER_ZERO = 1e-9  # components of directions below this are this: no wall is hit beside its end by that
+
+
+class Footprints(Protocol):
+    """how: in words · tables: float32 arrays for the kernel."""
+
+    how: str
+    tables: dict[str, np.ndarray]
+
+    def hit(self, ray: Any, inputs: dict[str, Any]) -> tuple[Any, Any, Any]:
+        """Distance [m] to the nearest wall (inf: none; 0: inside one), its face, and the face's normal."""
+
+    def blocks(self, start: Any, direction: np.ndarray, inputs: dict[str, Any]) -> Any:
+        """Whether a wall stands between a point outside all walls and a light in this direction, upwards."""
+
+
+def footprints_of(walls: Walls) -> Footprints:
+    """The cheaper way for these walls. Raises Unsuited for many walls that do not fit a grid."""
+    return EachWall(walls) if len(walls) <= FEW else Cells(walls)
+
+
+class EachWall:
+    """Every wall's slab test, unrolled."""
+
+    def __init__(self, walls: Walls) -> None:
+        self._walls = walls
+        self.how = "each solved"
+        self.tables: dict[str, np.ndarray] = {}
+
+    def hit(self, ray: Any, inputs: dict[str, Any]) -> tuple[Any, Any, Any]:
+        """See Footprints."""
+        dx, dy = _never_zero(ray.d.x), _never_zero(ray.d.y)
+        ix, iy = 1 / dx, 1 / dy
+        t, face, through_x = mi.Float(math.inf), mi.UInt32(0), mi.Bool(False)
+        for i in range(len(self._walls)):
+            near_x, near_y, far = self._slabs(i, ray.o, ix, iy)
+            near = dr.maximum(near_x, near_y)
+            start = dr.maximum(near, 0)
+            low_enough = dr.fma(ray.d.z, start, ray.o.z) < float(self._walls.top[i])
+            hit = (far > 0) & (near < far) & (start < t) & low_enough
+            t = dr.select(hit, start, t)
+            through_x = dr.select(hit, near_x > near_y, through_x)
+            face = dr.select(hit, SIDES * i, face)
+        return _finished(t, face, through_x, dx, dy)
+
+    def blocks(self, start: Any, direction: np.ndarray, inputs: dict[str, Any]) -> Any:
+        """See Footprints."""
+        dx, dy = (math.copysign(max(abs(float(d)), NEVER_ZERO), float(d)) for d in direction[:2])
+        blocked = mi.Bool(False)
+        for i in range(len(self._walls)):
+            near_x, near_y, far = self._slabs(i, start, 1 / dx, 1 / dy)
+            near = dr.maximum(dr.maximum(near_x, near_y), 0)
+            blocked |= (near < far) & (dr.fma(near, float(direction[2]), start.z) < float(self._walls.top[i]))
+        return blocked
+
+    def _slabs(self, i: int, o: Any, ix: Any, iy: Any) -> tuple[Any, Any, Any]:
+        (lx, ly), (ux, uy) = (map(float, corner[i]) for corner in (self._walls.lower, self._walls.upper))
+        x0, x1 = (lx - o.x) * ix, (ux - o.x) * ix
+        y0, y1 = (ly - o.y) * iy, (uy - o.y) * iy
+        far = dr.minimum(dr.maximum(x0, x1), dr.maximum(y0, y1))
+        return dr.minimum(x0, x1), dr.minimum(y0, y1), far
+
+
+class Cells:
+    """A grid whose cells are filled by one wall each, or empty. Around it lie cells in which rays end."""
+
+    def __init__(self, walls: Walls) -> None:
+        self._side, origin, shape = _grid(walls)
+        cells = np.full(shape, -1)
+        for i, (low, high) in enumerate(zip(walls.lower, walls.upper, strict=True)):
+            first, last = (np.rint((c - origin) / self._side).astype(int) for c in (low, high))
+            if (cells[first[1] : last[1], first[0] : last[0]] >= 0).any():
+                raise Unsuited("walls overlap")
+            cells[first[1] : last[1], first[0] : last[0]] = i
+        self._climb, self._ceiling = float(walls.top.max() - walls.floor), float(walls.top.max())
+        self.how = f"found in a grid of {shape[1]} x {shape[0]} cells"
+        padded = np.pad(cells, 1, constant_values=-1)
+        self._corner = origin - self._side
+        self._rows, self._columns = padded.shape
+        filled = padded >= 0
+        tops = np.where(filled, walls.top[np.maximum(padded, 0)], -np.inf)
+        edge = np.ones_like(filled)
+        edge[1:-1, 1:-1] = False
+        self.tables = {
+            "wall": np.maximum(padded, 0).astype(np.float32).ravel(),
+            "top": tops.astype(np.float32).ravel(),
+            # A ray stops where it leaves the grid, without having hit.
+            "stop": np.where(edge, np.inf, tops).astype(np.float32).ravel(),
+        }
+
+    def hit(self, ray: Any, inputs: dict[str, Any]) -> tuple[Any, Any, Any]:
+        """See Footprints."""
+        dx, dy = _never_zero(ray.d.x), _never_zero(ray.d.y)
+        x, y = self._place(ray.o)
+        column, row = dr.floor(x), dr.floor(y)
+        per_x, per_y = self._side / dr.abs(dx), self._side / dr.abs(dy)
+        next_x = dr.select(dx > 0, column + 1 - x, x - column) * per_x
+        next_y = dr.select(dy > 0, row + 1 - y, y - row) * per_y
+        step_x = dr.select(dx > 0, mi.Int32(1), mi.Int32(-1))
+        step_y = dr.select(dy > 0, mi.Int32(self._columns), mi.Int32(-self._columns))
+        cell = dr.select(self._inside(column, row), mi.Int32(row * self._columns + column), 0)
+        z, dz, stop = ray.o.z, ray.d.z, inputs["stop"]
+
+        def going(t: Any, cell: Any, next_x: Any, next_y: Any, through_x: Any) -> Any:
+            height = dr.fma(dz, t, z)
+            return (height >= dr.gather(mi.Float, stop, cell)) & ((height <= self._ceiling) | (dz <= 0))
+
+        def walk(t: Any, cell: Any, next_x: Any, next_y: Any, through_x: Any) -> tuple[Any, ...]:
+            through_x = next_x < next_y
+            t = dr.minimum(next_x, next_y)
+            cell = cell + dr.select(through_x, step_x, step_y)
+            next_x = dr.select(through_x, next_x + per_x, next_x)
+            next_y = dr.select(through_x, next_y, next_y + per_y)
+            return t, cell, next_x, next_y, through_x
+
+        state = (mi.Float(0), cell, next_x, next_y, mi.Bool(False))
+        t, cell, _, _, through_x = dr.while_loop(state, going, walk, label="cells")
+        hit = dr.fma(dz, t, z) < dr.gather(mi.Float, inputs["top"], cell)
+        face = SIDES * mi.UInt32(dr.gather(mi.Float, inputs["wall"], cell))
+        return _finished(dr.select(hit, t, math.inf), face, through_x, dx, dy)
+
+    def blocks(self, start: Any, direction: np.ndarray, inputs: dict[str, Any]) -> Any:
+        """See Footprints. A shadow ray has left the walls behind after so few cells that the walk is unrolled."""
+        dx, dy, dz = map(float, direction)
+        x, y = self._place(start)
+        column, row = dr.floor(x), dr.floor(y)
+        per_x, per_y = (self._side / max(abs(d), NEVER_ZERO) for d in (dx, dy))
+        next_x = (column + 1 - x if dx > 0 else x - column) * per_x
+        next_y = (row + 1 - y if dy > 0 else y - row) * per_y
+        blocked = mi.Bool(False)
+        for _ in range(self._crossings(direction)):
+            through_x = next_x < next_y
+            t = dr.minimum(next_x, next_y)
+            column = dr.select(through_x, column + math.copysign(1, dx), column)
+            row = dr.select(through_x, row, row + math.copysign(1, dy))
+            next_x = dr.select(through_x, next_x + per_x, next_x)
+            next_y = dr.select(through_x, next_y, next_y + per_y)
+            inside = self._inside(column, row)
+            cell = mi.UInt32(row * self._columns + column)
+            blocked |= inside & (dr.fma(t, dz, start.z) < dr.gather(mi.Float, inputs["top"], cell, inside))
+        return blocked
+
+    def _crossings(self, direction: np.ndarray) -> int:
+        """Cell borders that a ray from the floor crosses, at most, until it is above all walls."""
+        reach = self._climb * np.abs(direction[:2]) / direction[2] / self._side
+        return int(np.ceil(reach).sum())
+
+    def _inside(self, column: Any, row: Any) -> Any:
+        return (column >= 0) & (column < self._columns) & (row >= 0) & (row < self._rows)
+
+    def _place(self, point: Any) -> tuple[Any, Any]:
+        """Coordinates in cells."""
+        return tuple((point[i] - float(self._corner[i])) * (1 / self._side) for i in range(2))
+
+
+def _finished(t: Any, face: Any, through_x: Any, dx: Any, dy: Any) -> tuple[Any, Any, Any]:
+    """A wall's first face is turned into the one that was met: those that face -x, +x, -y, +y."""
+    x, y = dr.select(dx > 0, -1.0, 1.0), dr.select(dy > 0, -1.0, 1.0)
+    side = dr.select(
+        through_x, dr.select(dx > 0, mi.UInt32(0), mi.UInt32(1)), dr.select(dy > 0, mi.UInt32(2), mi.UInt32(3))
+    )
+    normal = mi.Normal3f(dr.select(through_x, x, 0), dr.select(through_x, 0, y), 0)
+    return t, face + side, normal
+
+
+def _never_zero(d: Any) -> Any:
+    return dr.select(dr.abs(d) < NEVER_ZERO, dr.copysign(mi.Float(NEVER_ZERO), d), d)
+
+
+def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
+    """Side of the cells [m], lower corner (2,), rows and columns of the coarsest square grid on which all faces lie."""
+    faces = [np.unique(np.round(np.concatenate([walls.lower[:, a], walls.upper[:, a]]), 6)) for a in range(2)]
+    origin = np.array([f[0] for f in faces])
+    side = 0.0
+    for gap in np.concatenate([f - f[0] for f in faces]):
+        side = _common(side, float(gap))
+    extent = np.array([f[-1] - f[0] for f in faces]) / side
+    columns, rows = np.rint(extent).astype(int)
+    if side < ALIGNED or rows * columns > CELLS:
+        raise Unsuited(f"{len(walls)} walls that lie on no grid")
+    return side, origin, (int(rows), int(columns))
+
+
+def _common(a: float, b: float) -> float:
+    """Greatest common divisor of lengths, to ALIGNED."""
+    while b > ALIGNED:
+        a, b = b, a % b
+        if a - b < ALIGNED:
+            b = 0.0
+    return a

@@ -1,0 +1,128 @@
+"""A static world in closed form: upright walls on a floor, if that is what the model is made of.
+
+Walls are axis-aligned boxes that reach down to the floor and up beyond the eyes: from where eyes are, no top or bottom
+of a wall is ever seen, so a ray meets a wall where it enters the wall's footprint, if it is low enough there.
+Texture coordinates are affine on every face; they are taken from the mirror's own triangles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from sim.eyes.eyes import EYE_HEIGHT
+from sim.scene import shapes, surfaces
+
+SIDES = 4  # of a wall: those that face -x, +x, -y, +y
+FACES = 6  # of a box, of four corners each
+ALIGNED = (
+    1e-6  # largest deviation of a wall's rotation from quarter turns, and of faces from a common height or grid [m]
+)
+
+
+class Unsuited(ValueError):
+    """Why a world has no closed form, in words."""
+
+
+@dataclass(frozen=True)
+class Walls:
+    """Walls and floor of a world.
+
+    lower, upper  corners of the walls' footprints [m], (n, 2) · top of each [m], (n,)
+    floor         height of the floor [m] · floor_lower, floor_upper  its corners (2,)
+    uv            texture coordinates of faces, (SIDES n + 1, 2, 4): (u, v) = uv @ (x, y, z, 1); the floor comes last
+    geoms         the geom of each face, (SIDES n + 1,)
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+    top: np.ndarray
+    floor: float
+    floor_lower: np.ndarray
+    floor_upper: np.ndarray
+    uv: np.ndarray
+    geoms: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.top)
+
+
+def walls_of(model: mujoco.MjModel, geoms: Sequence[int]) -> Walls:
+    """The walls and the floor that these geoms are. Raises Unsuited for any other geom or placement."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    floors = [g for g in geoms if surfaces.geom_type(model, g) == mujoco.mjtGeom.mjGEOM_PLANE]
+    boxes = [g for g in geoms if surfaces.geom_type(model, g) == mujoco.mjtGeom.mjGEOM_BOX]
+    others = set(geoms) - {*floors, *boxes}
+    if others:
+        raise Unsuited(f"geom {model.geom(others.pop()).name!r} is neither a plane nor a box")
+    if len(floors) != 1:
+        raise Unsuited(f"{len(floors)} floors")
+    floor = _rectangle(model, data, floors[0])
+    height = float(floor[0, 2])
+    sides = [_box(model, data, g) for g in boxes]
+    corners = np.array([[low, high] for low, high, _ in sides]).reshape(-1, 2, 3)
+    if (np.abs(corners[:, 0, 2] - height) > ALIGNED).any() or (corners[:, 1, 2] <= EYE_HEIGHT).any():
+        raise Unsuited("a wall does not stand on the floor, or ends below the eyes")
+    floor_lower, floor_upper = floor[:, :2].min(axis=0), floor[:, :2].max(axis=0)
+    if (corners[..., :2] < floor_lower - ALIGNED).any() or (corners[..., :2] > floor_upper + ALIGNED).any():
+        raise Unsuited("a wall stands beside the floor")
+    return Walls(
+        lower=corners[:, 0, :2],
+        upper=corners[:, 1, :2],
+        top=corners[:, 1, 2],
+        floor=height,
+        floor_lower=floor_lower,
+        floor_upper=floor_upper,
+        uv=np.array([*(uv for _, _, faces in sides for uv in faces), _floor_uv(floor)]),
+        geoms=np.array([*(g for g in boxes for _ in range(SIDES)), floors[0]]),
+    )
+
+
+def _rectangle(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:
+    """Mitsuba's rectangle of a plane: the points (u, v) = (0, 0), (1, 0), (0, 1) in the world, (3, 3)."""
+    (part,) = shapes.parts(model, geom)
+    assert part.local is not None
+    corners = np.array([[-1, -1, 0, 1], [1, -1, 0, 1], [-1, 1, 0, 1]], float)
+    pose = shapes.pose(data, geom)
+    points = corners @ (pose @ part.local).T
+    if np.abs(pose[:3, 2] - [0, 0, 1]).max() > ALIGNED or np.abs(np.abs(pose[:2, :2]).max(axis=0) - 1).max() > ALIGNED:
+        raise Unsuited(f"plane {model.geom(geom).name!r} is not level, or turned")
+    return points[:, :3]
+
+
+def _floor_uv(corners: np.ndarray) -> np.ndarray:
+    return _affine(corners, np.array([[0.0, 0], [1, 0], [0, 1]]))
+
+
+def _box(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Lower and upper corner of a box, and the texture coordinates of its sides."""
+    pose = shapes.pose(data, geom)
+    if np.abs(np.abs(pose[:3, :3]).max(axis=0) - 1).max() > ALIGNED:
+        raise Unsuited(f"box {model.geom(geom).name!r} is not aligned with the axes")
+    (part,) = shapes.parts(model, geom)
+    triangles = part.triangles
+    assert triangles is not None
+    if len(triangles.vertices) != 4 * FACES:
+        raise Unsuited(f"box {model.geom(geom).name!r} has a cube texture")
+    vertices = triangles.vertices @ pose[:3, :3].T + pose[:3, 3]
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    uv = np.zeros((len(vertices), 2)) if triangles.uv is None else triangles.uv
+    faces = [(low, 0), (high, 0), (low, 1), (high, 1)]
+    found = []
+    for bound, axis in faces:
+        # The box's corners come face by face, four each.
+        quads = vertices.reshape(-1, 4, 3)
+        face = int(np.argmin(np.abs(quads[:, :, axis] - bound[axis]).max(axis=1)))
+        found.append(_affine(quads[face], uv.reshape(-1, 4, 2)[face]))
+    return low, high, found
+
+
+def _affine(points: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """(2, 4) with uv = affine @ (x, y, z, 1) on the plane of the points (n, 3); it does not change across it."""
+    along = points[1:] - points[0]
+    linear = np.linalg.lstsq(along, uv[1:] - uv[0], rcond=None)[0].T
+    return np.column_stack([linear, uv[0] - linear @ points[0]])

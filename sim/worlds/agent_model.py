@@ -1,0 +1,53 @@
+"""A world's agent by itself, for physics of the few things that are near it (`sim.physics.local_contacts`)."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+ROOM = 4  # geoms about an agent: the corner of two walls, and one or two more in reach
+
+
+@dataclass(frozen=True)
+class AgentAlone:
+    """An agent without its world.
+
+    model  it, among ROOM boxes that touch nothing: no objects, walls, lights, cameras or textures
+    whole  fingerprint of the world's model that it is the agent of
+    """
+
+    model: mujoco.MjModel
+    whole: bytes
+
+    @classmethod
+    def of(cls, spec: mujoco.MjSpec, whole: mujoco.MjModel) -> AgentAlone:
+        """The body "agent" of a spec that has been compiled into `whole`."""
+        return cls(_alone(spec.copy()), _fingerprint(whole))
+
+    def stands_for(self, model: mujoco.MjModel) -> bool:
+        """Whether this is that model's agent: not where any number of it was altered after it had been compiled."""
+        return self.whole == _fingerprint(model)
+
+
+def _alone(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    for body in spec.worldbody.bodies:
+        if body.name != "agent":
+            spec.delete(body)
+    for element in [*spec.worldbody.geoms, *spec.worldbody.sites, *spec.lights, *spec.cameras]:
+        spec.delete(element)
+    for element in [*spec.geoms, *spec.sites]:
+        element.material = ""
+    for element in [*spec.materials, *spec.textures]:
+        spec.delete(element)
+    for _ in range(ROOM):
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[1, 1, 1], contype=0, conaffinity=0)
+    return spec.compile()
+
+
+def _fingerprint(model: mujoco.MjModel) -> bytes:
+    saved = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, saved)
+    return hashlib.blake2b(saved.tobytes()).digest()

@@ -1,0 +1,74 @@
+"""Detection: an open walled field with one goal and two adversaries that differ only in stripe orientation."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from sim.worlds import materials
+from sim.worlds.layout import CELL, Layout, add_floor, add_wall, cell_centers
+
+FIELD = (9, 11)  # free cells (rows, columns)
+OBJECT_RADIUS = 0.5  # [m]
+OBJECTS = ("goal", "adversary_0", "adversary_1")
+STRIPES = 6  # across the visible side of an object
+# Edges between an adversary's bands [deg from the top]: about as far apart as a goal's where eyes see them, and such
+# that light from above brightens either kind as much (validation/E1_balance.py finds them).
+BAND_EDGES_DEG = (23.2, 47.8, 77.1, 107.0, 138.0, 170.0)
+OBJECT_MARGIN = 2  # cells between the wall and the nearest place of an object
+
+
+def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
+    """Add field and objects.
+
+    Goal: stripes along meridians (upright); adversary: along parallels (level), about as wide, turned by 90°.
+
+    12 sectors of 30° around the vertical axis, of which a viewer sees 6, against bands of latitude whose edges make
+    up for the light from above: no single receptor that sees all of an object tells by brightness what it is.
+    """
+    materials.add_texture(spec, "upright_stripes", materials.stripes((8, 1536), 2 * STRIPES, axis=1))
+    materials.add_texture(
+        spec, "level_stripes", materials.stripes((1024, 8), [edge / 180 for edge in BAND_EDGES_DEG], axis=0)
+    )
+    materials.add_textured(spec, "goal", "upright_stripes")
+    materials.add_textured(spec, "adversary", "level_stripes")
+    return furnished_field(spec)
+
+
+def furnished_field(spec: mujoco.MjSpec) -> Layout:
+    """Add the field, and the objects in the materials "goal" and "adversary". The agent starts in the outermost ring of
+    cells, objects in the field's middle."""
+    _add_field(spec)
+    _add_objects(spec)
+    rows, columns = (a.ravel() for a in np.indices(FIELD))
+    to_wall = np.minimum.reduce([rows, columns, FIELD[0] - 1 - rows, FIELD[1] - 1 - columns])
+    centers = cell_centers(columns, rows, FIELD)
+    return Layout(
+        objects=OBJECTS,
+        agent_spawn=centers[to_wall == 0],
+        object_spawn=centers[to_wall >= OBJECT_MARGIN],
+        goal_region=None,
+    )
+
+
+def _add_field(spec: mujoco.MjSpec) -> None:
+    length, width = FIELD[1] * CELL, FIELD[0] * CELL
+    add_floor(spec, (length + 2 * CELL, width + 2 * CELL))
+    x, y = (length + CELL) / 2, (width + CELL) / 2
+    add_wall(spec, "wall_east", np.array([x, 0]), (CELL, width + 2 * CELL), "wall")
+    add_wall(spec, "wall_west", np.array([-x, 0]), (CELL, width + 2 * CELL), "wall")
+    add_wall(spec, "wall_north", np.array([0, y]), (length, CELL), "wall")
+    add_wall(spec, "wall_south", np.array([0, -y]), (length, CELL), "wall")
+
+
+def _add_objects(spec: mujoco.MjSpec) -> None:
+    for name, center in zip(OBJECTS, ((0, 0), (2 * CELL, 0), (-2 * CELL, 0)), strict=True):
+        body = spec.worldbody.add_body(name=name, mocap=True, pos=[*center, OBJECT_RADIUS])
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[OBJECT_RADIUS, 0, 0],
+            material=name.partition("_")[0],
+            contype=0,
+            conaffinity=0,
+        )

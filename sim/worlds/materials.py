@@ -1,0 +1,103 @@
+"""What worlds are made of: reflectances, striped textures and daylight, put into an MjSpec.
+
+MuJoCo's colours are display-referred (sRGB), so reflectances are encoded here and decoded by the mirror
+(`sim.scene.color`). The MjModel is the one source of truth: the textures live in it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from optics.spectra.spectrum import Spectrum, daylight
+from sim.scene.color import encode_srgb
+from sim.exr import preview
+
+WHITE = 0.9  # reflectance of a light stripe
+BLACK = 0.05  # reflectance of a dark stripe
+GREY = 0.5  # reflectance of a plain wall: stripes are as far below as above it
+FLOOR = 0.04  # reflectance of the floor
+BODY = 0.3  # reflectance of the agent's body
+
+# Directional lights from three sides: every wall gets light, no two walls the same, so that a wall's brightness
+# tells its direction; (azimuth [deg] and elevation [deg] of where the light comes from, level). There is no sky:
+# a constant environment would be the main source of noise in a render.
+LIGHTS = ((20.0, 40.0, 0.9), (140.0, 40.0, 0.6), (260.0, 40.0, 0.45))
+
+
+def stripes(shape: tuple[int, int], edges: int | Sequence[float], axis: int) -> np.ndarray:
+    """Image of stripes, alternately light and dark along `axis` (0: rows, 1: columns), (height, width, 3) uint8,
+    display-referred; the first stripe is light.
+
+    edges  between stripes, as parts of the axis in (0, 1); or how many stripes there are, all equally wide. A texel
+           that an edge crosses has the mean reflectance of what it covers.
+    """
+    n = shape[axis]
+    inner = np.arange(1, edges) / edges if isinstance(edges, int) else np.asarray(edges, float)
+    bounds = np.concatenate([[0.0], inner, [1.0]])
+    lit = np.concatenate([[0.0], np.cumsum(np.diff(bounds) * (np.arange(len(bounds) - 1) % 2 == 0))])
+    light = n * np.diff(np.interp(np.arange(n + 1) / n, bounds, lit))
+    values = BLACK + (WHITE - BLACK) * light
+    image = np.broadcast_to(values[:, None] if axis == 0 else values[None, :], shape)
+    return np.repeat(np.rint(255 * encode_srgb(image)).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def add_plain(spec: mujoco.MjSpec, name: str, reflectance: float) -> None:
+    """Add a matte grey material."""
+    value = float(encode_srgb(reflectance))
+    spec.add_material(name=name, rgba=[value, value, value, 1], specular=0, shininess=0)
+
+
+def add_texture(spec: mujoco.MjSpec, name: str, image: np.ndarray) -> None:
+    """Add a 2-D texture from an image (height, width, 3), uint8, display-referred, row 0 on top."""
+    height, width, channels = image.shape
+    texture = spec.add_texture(
+        name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=width, height=height, nchannel=channels
+    )
+    texture.data = np.ascontiguousarray(image).tobytes()
+
+
+def add_textured(
+    spec: mujoco.MjSpec,
+    name: str,
+    texture: str,
+    repeat: tuple[float, float] = (1, 1),
+    uniform: bool = False,
+    color: Sequence[float] = (1.0, 1.0, 1.0),
+) -> None:
+    """Add a matte material with a 2-D texture, repeated over the geom (or, `uniform`, per 2 m of it) and multiplied by
+    a display-referred colour."""
+    material = spec.add_material(
+        name=name, texrepeat=list(repeat), texuniform=uniform, specular=0, shininess=0, rgba=[*color, 1.0]
+    )
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = texture
+
+
+def display_color(reflectance: Spectrum) -> tuple[float, float, float]:
+    """Display-referred colour (sRGB) of a reflectance in daylight, for renderers that know no spectra."""
+    nm = np.arange(380.0, 781.0, 5.0)
+    radiance = reflectance.at(nm * 1e-9) * daylight(nm * 1e-9)
+    r, g, b = encode_srgb(np.clip(preview(radiance[:, None, None], nm)[0, 0], 0, 1)).tolist()
+    return r, g, b
+
+
+def add_daylight(spec: mujoco.MjSpec) -> None:
+    """Add the directional lights and switch the camera's headlight off."""
+    spec.visual.headlight.active = 0
+    for i, (azimuth_deg, elevation_deg, level) in enumerate(LIGHTS):
+        azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
+        towards = np.array(
+            [math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)]
+        )
+        spec.worldbody.add_light(
+            name=f"light_{i}",
+            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+            pos=(20 * towards).tolist(),
+            dir=(-towards).tolist(),
+            diffuse=[level] * 3,
+            ambient=[0, 0, 0],
+            specular=[0, 0, 0],
+        )
