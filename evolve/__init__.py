@@ -9,22 +9,22 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
-    "RunConfig": "evolve.config",
-    "EyeConfig": "evolve.config",
-    "GeneConfig": "evolve.config",
-    "SearchConfig": "evolve.config",
-    "LearningConfig": "evolve.config",
-    "EvaluationConfig": "evolve.config",
-    "ConfigError": "evolve.config",
-    "GENES": "evolve.genes",
-    "Gene": "evolve.genes",
-    "Genotype": "evolve.genotype",
-    "Phenotype": "evolve.development",
-    "develop": "evolve.development",
-    "Run": "evolve.store",
-    "RunError": "evolve.store",
-    "Candidate": "evolve.candidate",
-    "load_policy": "evolve.policy",
+    "RunConfig": "evolve.config.run_config",
+    "EyeConfig": "evolve.config.run_config",
+    "GeneConfig": "evolve.config.run_config",
+    "SearchConfig": "evolve.config.run_config",
+    "LearningConfig": "evolve.config.run_config",
+    "EvaluationConfig": "evolve.config.run_config",
+    "ConfigError": "evolve.config.run_config",
+    "GENES": "evolve.genome.genes",
+    "Gene": "evolve.genome.genes",
+    "Genotype": "evolve.genome.genotype",
+    "Phenotype": "evolve.genome.phenotype",
+    "develop": "evolve.genome.phenotype",
+    "Run": "evolve.store.directory",
+    "RunError": "evolve.store.directory",
+    "Candidate": "evolve.store.candidate",
+    "load_policy": "evolve.learning.policy",
 }
 
 __all__ = sorted(_HOME)

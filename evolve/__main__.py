@@ -2,7 +2,7 @@
 
 import sys
 
-from evolve.cli import main
+from evolve.cli.main import main
 
 if __name__ == "__main__":
     sys.exit(main())

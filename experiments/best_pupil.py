@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import optics
-from evolve.analysis import polychromatic
+from evolve.analysis.statistics import polychromatic
 from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
 from experiments.store import DATA, Origin, read_rows, write_rows
 from sim.worlds import materials

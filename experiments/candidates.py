@@ -11,13 +11,13 @@ import numpy as np
 import torch
 
 import optics
-from evolve.analysis import acuity_cpd, succeeded, white_strehl
-from evolve.candidate import Candidate
-from evolve.config import EyeConfig, RunConfig
-from evolve.development import Phenotype
-from evolve.policy import PolicyConfig, build_policy, learnt
-from evolve.store import Run
-from evolve.vision import vision
+from evolve.analysis.statistics import acuity_cpd, succeeded, white_strehl
+from evolve.store.candidate import Candidate
+from evolve.config.run_config import EyeConfig, RunConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.learning.policy import PolicyConfig, build_policy, learnt
+from evolve.store.directory import Run
+from evolve.analysis.vision import vision
 from experiments.best_pupil import contrast_of, measures
 from experiments.glass import power
 from sim.tasks.reward import EVALUATION

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.config import EyeConfig, RunConfig
-from evolve.development import Phenotype, develop
-from evolve.search import Search
+from evolve.config.run_config import EyeConfig, RunConfig
+from evolve.genome.phenotype import Phenotype, develop
+from evolve.search.search import Search
 from experiments.candidates import NO_NUMBER, Row, anatomy
 from experiments.means import LAST
 

@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from evolve.files import write_whole
-from evolve.store import Run, RunError
-from evolve.versions import commits, recorded
+from evolve.store.atomic_files import write_whole
+from evolve.store.directory import Run, RunError
+from evolve.store.versions import commits, recorded
 from experiments.candidates import Row, complete, rows_of
 from experiments.drift import Drift, drifted, of_the_end
 from experiments.means import last_mean

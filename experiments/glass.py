@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import optics
-from evolve.config import EyeConfig
-from evolve.development import Phenotype
+from evolve.config.run_config import EyeConfig
+from evolve.genome.phenotype import Phenotype
 from evolve.report.eye_figures import relief_heights
 
 __all__ = ["power", "relief_of"]

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import optics
-from evolve.config import SearchConfig
-from evolve.genes import GENES
-from evolve.optimizers import Space, build
+from evolve.config.run_config import SearchConfig
+from evolve.genome.genes import GENES
+from evolve.search.optimizers import Space, build
 from experiments.page import parser
 from experiments.store import Origin, read_rows, write_rows
 

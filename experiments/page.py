@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from evolve.files import write_whole
+from evolve.store.atomic_files import write_whole
 from experiments.store import Origin
 
 __all__ = ["Figure", "Page", "markdown_table", "new_figure", "parser", "save"]

@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
-from evolve.files import write_whole
-from evolve.versions import present
+from evolve.store.atomic_files import write_whole
+from evolve.store.versions import present
 
 __all__ = ["DATA", "Origin", "read_rows", "write_rows"]
 

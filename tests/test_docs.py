@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from evolve.cli import main
-from evolve.config_source import assemble
+from evolve.cli.main import main
+from evolve.config.assemble import assemble
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"

@@ -15,17 +15,17 @@ from unittest import mock
 import numpy as np
 import pytest
 
-import evolve.commands.run
+import evolve.cli.commands.run
 import sim
-from evolve.config import SECTIONS, GeneConfig, RunConfig
-from evolve.config_source import assemble
-from evolve.development import develop
-from evolve.evaluation import Evaluation
-from evolve.fitness import evaluate
-from evolve.genes import LAMBDA_MAX
-from evolve.genotype import GENES, Genotype
-from evolve.loop import evolve as carry
-from evolve.store import Run
+from evolve.config.run_config import GeneConfig, RunConfig, SECTIONS
+from evolve.config.assemble import assemble
+from evolve.genome.phenotype import develop
+from evolve.store.evaluation import Evaluation
+from evolve.learning.fitness import evaluate
+from evolve.genome.genes import LAMBDA_MAX
+from evolve.genome.genotype import GENES, Genotype
+from evolve.search.loop import evolve as carry
+from evolve.store.directory import Run
 from optics.numerics import backend
 
 # One training of two updates and one evaluation episode, through a perfect lens: about a second.
@@ -99,9 +99,9 @@ def ladder(config, animal):
 
 def hired(config, animal):
     """Workers that a run starts."""
-    with TemporaryDirectory() as folder, mock.patch.object(evolve.commands.run, "LocalExecutor") as executor:
+    with TemporaryDirectory() as folder, mock.patch.object(evolve.cli.commands.run, "LocalExecutor") as executor:
         executor.side_effect = KeyboardInterrupt
-        evolve.commands.run._carry(
+        evolve.cli.commands.run._carry(
             Run.create(Path(folder) / "run", config), Namespace(json=False, executor="local", tensorboard=False)
         )
         return executor.call_args.args[1]

@@ -1,7 +1,7 @@
 """E0: what is learnt, how soon, and with which settings
 
 Detection is solved if the goal comes first in 80 % of the episodes; one that reaches objects without telling them
-apart finds it first in a third. Every row is a training with `evolve.learner` in sim's worlds, watched every 50,000
+apart finds it first in a third. Every row is a training with `evolve.learning.ppo` in sim's worlds, watched every 50,000
 steps: 100 episodes of the policy as it is, without exploration, in worlds it never saw. CPU seconds are those of one
 thread, rollouts and updates, without these evaluations; "update" is the optimiser's share of them. In brackets: the
 95 % interval of the last evaluation (Wilson). Returns are undiscounted training returns per episode.
@@ -39,8 +39,8 @@ from pathlib import Path
 from typing import Any
 
 import sim
-from evolve.config import LearningConfig
-from evolve.config_source import assemble
+from evolve.config.run_config import LearningConfig
+from evolve.config.assemble import assemble
 from validation.learning import Case, Row, read_rows, steps_to, watched, wilson, write_rows
 from validation.page import Page, parser
 from validation.workprec import MUTED, OURS, OURS_TOO

@@ -1,6 +1,6 @@
 """E2: does little training tell who will be good?
 
-Budget ladders (`search.rungs`, `evolve.ladder`) train all of a generation a little and only the better part on. That
+Budget ladders (`search.rungs`, `evolve.search.successive_halving`) train all of a generation a little and only the better part on. That
 saves time only if the order after little training is the order after a whole one. Here animals drawn from the genome,
 one to four eyes with 1 x 1 to 15 x 15 receptors behind a perfect lens, learn detection up a ladder of four rungs, none
 held back, as a run would train them; the table compares their order on each rung with that on the last (Spearman's
@@ -40,15 +40,15 @@ import numpy as np
 from scipy.stats import rankdata
 
 import sim
-from evolve.config import RunConfig, SearchConfig
-from evolve.config_source import assemble
-from evolve.development import Phenotype
-from evolve.files import write_whole
-from evolve.fitness import evaluate
-from evolve.ladder import Stretch, budgets, climbers
-from evolve.learner import play
-from evolve.policy import load_policy
-from evolve.worker import prepare_device
+from evolve.config.run_config import RunConfig, SearchConfig
+from evolve.config.assemble import assemble
+from evolve.genome.phenotype import Phenotype
+from evolve.store.atomic_files import write_whole
+from evolve.learning.fitness import evaluate
+from evolve.search.successive_halving import Stretch, budgets, climbers
+from evolve.learning.ppo import play
+from evolve.learning.policy import load_policy
+from evolve.search.worker import prepare_device
 from validation.page import Page, parser
 from validation.workprec import MUTED, OURS, OURS_TOO
 

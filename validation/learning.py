@@ -15,8 +15,8 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
 import sim
-from evolve.config import LearningConfig
-from evolve.learner import learner, play
+from evolve.config.run_config import LearningConfig
+from evolve.learning.ppo import learner, play
 from sim.tasks.reward import EVALUATION, TRAINING
 
 __all__ = ["Case", "Row", "read_rows", "steps_to", "watched", "wilson", "write_rows"]

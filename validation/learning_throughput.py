@@ -20,8 +20,8 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
-from evolve.config_source import assemble
-from evolve.worker import prepare_device
+from evolve.config.assemble import assemble
+from evolve.search.worker import prepare_device
 from validation.sim_throughput import CASES, Case, measure, with_pupil  # chooses OpenGL before MuJoCo is imported
 
 NEURONS = 64
@@ -44,7 +44,7 @@ class Learner:
 def training_rate(learner: Learner, steps: int, seed: int) -> float:
     """Agent-steps per second of one training in this process."""
     import sim
-    from evolve.learner import train
+    from evolve.learning.ppo import train
 
     case = learner.case
     eyes = with_pupil(case.eyes) if learner.lens else case.eyes

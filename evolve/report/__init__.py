@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from evolve.episode import Episode
-    from evolve.store import Run
+    from evolve.analysis.episode import Episode
+    from evolve.store.directory import Run
 
 __all__ = ["write"]
 
@@ -24,8 +24,8 @@ def write(run: Run, episode: Episode | None = None) -> Path:
     The same run gives the same bytes with the same versions of the libraries.
     Raises ValueError where the best candidate's policy is missing or damaged.
     """
-    from evolve.episode import record
-    from evolve.files import write_whole
+    from evolve.analysis.episode import record
+    from evolve.store.atomic_files import write_whole
     from evolve.report.page import render
 
     if episode is None and run.best is not None:

@@ -12,9 +12,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Circle, Rectangle
 
 import optics
-from evolve.analysis import polychromatic
-from evolve.config import EyeConfig
-from evolve.development import Phenotype
+from evolve.analysis.statistics import polychromatic
+from evolve.config.run_config import EyeConfig
+from evolve.genome.phenotype import Phenotype
 from evolve.report.markup import KEY, figure, number
 from evolve.report.svg import drawing, inline
 from evolve.report.theme import ACCENT, INK, MUTED, VERMILLION

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from evolve.analysis import acuity_cpd, champions, gene_values, generation_statistics, trajectory
-from evolve.candidate import Candidate
-from evolve.config import TASKS
-from evolve.episode import Episode
-from evolve.genealogy import descent
-from evolve.genes import CLUSTERS, Gene
+from evolve.analysis.statistics import acuity_cpd, champions, gene_values, generation_statistics, trajectory
+from evolve.store.candidate import Candidate
+from evolve.config.run_config import TASKS
+from evolve.analysis.episode import Episode
+from evolve.analysis.genealogy import descent
+from evolve.genome.genes import CLUSTERS, Gene
 from evolve.report import tables
 from evolve.report.eye_figures import eye_figures
 from evolve.report.figures import (
@@ -23,10 +23,10 @@ from evolve.report.figures import (
 )
 from evolve.report.markup import KEY, document, figure, number, section, text
 from evolve.report.player import player, summary
-from evolve.report.stage import Stage
+from evolve.report.ground_plan import Stage
 from evolve.report.views import views
-from evolve.store import Run
-from evolve.vision import SCENES, vision
+from evolve.store.directory import Run
+from evolve.analysis.vision import SCENES, vision
 
 __all__ = ["render"]
 

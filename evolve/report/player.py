@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from evolve.episode import Episode
-from evolve.files import write_whole
+from evolve.analysis.episode import Episode
+from evolve.store.atomic_files import write_whole
 from evolve.report.markup import document, exact, json_script, number, text
 from evolve.report.picture import data_uri, display, film_sheet
-from evolve.report.stage import Stage
+from evolve.report.ground_plan import Stage
 from sim.envs.simulation import MAX_TURN
 from sim.worlds.world import MAX_SPEED
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from evolve.analysis import acuity_cpd, bootstrap_interval, gene_values, succeeded
-from evolve.candidate import Candidate
-from evolve.config_source import to_toml
-from evolve.development import Phenotype
-from evolve.genes import ALL_GENES
+from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, gene_values, succeeded
+from evolve.store.candidate import Candidate
+from evolve.config.assemble import to_toml
+from evolve.genome.phenotype import Phenotype
+from evolve.genome.genes import ALL_GENES
 from evolve.report.markup import exact, number, table, text
-from evolve.store import Run
-from evolve.versions import recorded
+from evolve.store.directory import Run
+from evolve.store.versions import recorded
 
 __all__ = ["all_candidates", "best_genes", "failures", "headline", "run_facts"]
 

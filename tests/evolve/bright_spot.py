@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv
 
-from evolve.policy import PolicyConfig
+from evolve.learning.policy import PolicyConfig
 
 
 class BrightSpot(VecEnv):

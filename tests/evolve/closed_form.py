@@ -9,8 +9,8 @@ import signal
 import time
 from pathlib import Path
 
-from evolve.config_source import assemble
-from evolve.evaluation import Evaluation
+from evolve.config.assemble import assemble
+from evolve.store.evaluation import Evaluation
 
 TINY = ("search.population=4", "search.generations=3", "genome.optical.open=false", "learning.total_steps=4096")
 BEST_FOV_DEG = 70.0

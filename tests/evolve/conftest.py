@@ -5,11 +5,11 @@ import pytest
 from closed_form import bowl, tiny
 from small_run import small_run
 
-from evolve.cli import main
-from evolve.episode import record
-from evolve.executors import LocalExecutor
-from evolve.loop import evolve as carry_on
-from evolve.store import Run
+from evolve.cli.main import main
+from evolve.analysis.episode import record
+from evolve.search.local_executor import LocalExecutor
+from evolve.search.loop import evolve as carry_on
+from evolve.store.directory import Run
 
 
 @pytest.fixture(scope="session")

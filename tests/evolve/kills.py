@@ -17,11 +17,11 @@ from tempfile import TemporaryDirectory
 from closed_form import tiny
 from remote_form import climbing
 
-from evolve.evaluation import Evaluation
-from evolve.files import write_whole
-from evolve.loop import evolve
-from evolve.search import Search
-from evolve.store import Run
+from evolve.store.evaluation import Evaluation
+from evolve.store.atomic_files import write_whole
+from evolve.search.loop import evolve
+from evolve.search.search import Search
+from evolve.store.directory import Run
 
 LADDER = ("search.rungs=3", "learning.total_steps=16384")
 KINDS = ((), ("search.steady_state=true",), LADDER)  # of runs

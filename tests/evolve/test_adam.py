@@ -5,7 +5,7 @@ import sys
 
 import torch
 
-from evolve.adam import EPSILON, Adam
+from evolve.learning.adam import Adam, EPSILON
 
 
 def trained(optimizer_class, **options):
@@ -32,7 +32,7 @@ def test_steps_are_those_of_torchs_adam():
 def test_a_policy_is_built_without_torchs_compiler():
     """torch._dynamo takes seconds to import; every worker process would pay for it."""
     code = (
-        "import sys; from evolve.policy import PolicyConfig, build_policy\n"
+        "import sys; from evolve.learning.policy import PolicyConfig, build_policy\n"
         "policy = build_policy(PolicyConfig((1, 1, 1, 1, 1), 4)); policy.optimizer.zero_grad()\n"
         "sum(p.sum() for p in policy.parameters()).backward(); policy.optimizer.step()\n"
         "sys.exit('torch._dynamo' in sys.modules)"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import optics
-from evolve.analysis import (
+from evolve.analysis.statistics import (
     acuity_cpd,
     bootstrap_interval,
     gene_values,
@@ -17,9 +17,9 @@ from evolve.analysis import (
     trajectory,
     white_strehl,
 )
-from evolve.candidate import Candidate
-from evolve.config import EyeConfig
-from evolve.development import Phenotype
+from evolve.store.candidate import Candidate
+from evolve.config.run_config import EyeConfig
+from evolve.genome.phenotype import Phenotype
 
 
 def phenotype(**changes):
@@ -121,7 +121,7 @@ def test_gene_values_without_optics():
 
 
 def test_gene_values_know_every_gene():
-    from evolve.genotype import GENES
+    from evolve.genome.genotype import GENES
 
     assert set(gene_values(phenotype(lambda_max_nm=(500.0,)))) == set(GENES)
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evolve.config import ConfigError
-from evolve.config_source import assemble
-from evolve.development import develop, repaired
-from evolve.genotype import Genotype
+from evolve.config.run_config import ConfigError
+from evolve.config.assemble import assemble
+from evolve.genome.phenotype import develop, repaired
+from evolve.genome.genotype import Genotype
 
 CROWDED = assemble(
     "detection",

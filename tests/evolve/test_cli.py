@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from evolve.config import TASKS
-from evolve.genotype import GENES
+from evolve.config.run_config import TASKS
+from evolve.genome.genotype import GENES
 
 ROOT = Path(__file__).parents[2]
 
@@ -59,7 +59,7 @@ def test_tables_name_every_task_and_gene(call):
 def test_help_comes_at_once_and_names_the_commands():
     """Imports decide: 0.1 s without, 1.4 s with any one of the heavy libraries. Seconds differ by machine."""
     code = (
-        "import sys; from evolve.cli import main\n"
+        "import sys; from evolve.cli.main import main\n"
         "try: main(['--help'])\n"
         "except SystemExit: pass\n"
         "print([m for m in ('torch', 'numpy', 'drjit', 'nevergrad', 'rich', 'mitsuba', 'mujoco') if m in sys.modules])"

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from closed_form import tiny
 
-import evolve.commands.run
-from evolve.store import Run
+import evolve.cli.commands.run
+from evolve.store.directory import Run
 
 ROOT = Path(__file__).parents[2]
 
@@ -102,7 +102,7 @@ def test_workers_and_seed_reach_the_run(call, tmp_path, monkeypatch):
         def __exit__(self, *_):
             """Nothing to end."""
 
-    monkeypatch.setattr(evolve.commands.run, "LocalExecutor", Recorder)
+    monkeypatch.setattr(evolve.cli.commands.run, "LocalExecutor", Recorder)
     code, _, _ = call("run", "detection", "--workers", 3, "--seed", 5, "--out", tmp_path / "run")
     assert (code, asked) == (130, [3])
     assert Run.open(tmp_path / "run").config.seed == 5

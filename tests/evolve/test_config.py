@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from evolve.config import TASKS, ConfigError
-from evolve.config_source import assemble, from_toml, preset_names, to_toml
-from evolve.genotype import GENES, group_members
+from evolve.config.run_config import ConfigError, TASKS
+from evolve.config.assemble import assemble, from_toml, preset_names, to_toml
+from evolve.genome.genotype import GENES, group_members
 
 
 @pytest.mark.parametrize("preset", preset_names())
@@ -209,8 +209,8 @@ def test_contradiction_names_every_place_that_made_it(tmp_path):
 
 def test_relief_may_have_more_points_and_keeps_the_presets_surface():
     import optics
-    from evolve.development import develop
-    from evolve.genotype import Genotype
+    from evolve.genome.phenotype import develop
+    from evolve.genome.genotype import Genotype
     from optics.numerics import backend
     from optics.numerics.precision import precision
 
@@ -232,8 +232,8 @@ def test_relief_may_have_more_points_and_keeps_the_presets_surface():
 
 @pytest.mark.parametrize(("points", "count"), [(4, 3), (5, 6), (6, 6), (9, 15)])
 def test_symmetric_reliefs_look_the_same_mirrored_and_turned(points, count):
-    from evolve.development import develop
-    from evolve.genotype import Genotype
+    from evolve.genome.phenotype import develop
+    from evolve.genome.genotype import Genotype
 
     asked = ["eye.relief_symmetric=true", f"eye.relief_points={points}"]
     config = assemble("detection", assignments=asked)
@@ -253,7 +253,7 @@ def test_symmetric_reliefs_have_no_genes_that_would_be_ignored():
 
 def test_a_symmetric_animal_begins_a_run_of_symmetric_reliefs():
     """All sixteen heights of an animal are named; where they say one thing eightfold, they are three genes' starts."""
-    from evolve.config_lines import Source
+    from evolve.config.provenance import Source
 
     heights = {f"doe_{i}{j}": {"start": 0.2 + 0.1 * min(i, 3 - i) * min(j, 3 - j)} for i in range(4) for j in range(4)}
     eye = {"relief_symmetric": True}
@@ -269,8 +269,8 @@ def test_a_symmetric_animal_begins_a_run_of_symmetric_reliefs():
 
 
 def test_heights_of_more_points_become_no_other_number_of_them():
-    from evolve.config_lines import Source
-    from evolve.relief import doe_names
+    from evolve.config.provenance import Source
+    from evolve.genome.relief_genes import doe_names
 
     heights = {name: {"start": 0.3} for name in doe_names(6)}
     with pytest.raises(ConfigError, match="heights of 6 x 6 points cannot become so many; must be 6"):

@@ -15,12 +15,12 @@ from remote_form import bowl, climbing
 from test_executors import jobs
 from test_loop import Onlooker, history
 
-from evolve import remote
-from evolve.dask_executor import DaskExecutor
-from evolve.executors import ExecutorError, LocalExecutor
-from evolve.loop import evolve
-from evolve.store import Run
-from evolve.versions import present
+from evolve.search import dask_worker
+from evolve.search.dask_executor import DaskExecutor
+from evolve.search.local_executor import ExecutorError, LocalExecutor
+from evolve.search.loop import evolve
+from evolve.store.directory import Run
+from evolve.store.versions import present
 
 pytest.importorskip("distributed")
 ROOT = Path(__file__).parents[2]
@@ -75,7 +75,7 @@ class Cluster:
 def _any_commit(monkeypatch):
     """A checkout that is being worked on changes between one process's start and another's."""
     software = {**present(), "commit": ""}
-    monkeypatch.setattr(remote, "_software", lambda: software)
+    monkeypatch.setattr(dask_worker, "_software", lambda: software)
 
 
 @pytest.fixture(scope="module")
@@ -189,7 +189,7 @@ def test_candidate_that_nobody_wants_any_more_is_given_up(tmp_path, cluster):
 
 
 def test_worker_with_other_software_is_refused(tmp_path, cluster, monkeypatch):
-    monkeypatch.setattr(remote, "_software", lambda: {"torch": "0.4", "numpy": ""})
+    monkeypatch.setattr(dask_worker, "_software", lambda: {"torch": "0.4", "numpy": ""})
     with (
         cluster.executor("bowl") as executor,
         pytest.raises(ExecutorError, match=r"other software.*torch .* \(here 0\.4\)"),

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from evolve import doctor
+from evolve.cli import doctor
 from optics.numerics import backend
 
 

@@ -11,12 +11,12 @@ import torch
 
 import evolve
 import sim
-from evolve import export, replay
-from evolve.config import WorldConfig
-from evolve.episode import Episode, _perfect_views, record
-from evolve.policy import PolicyConfig, build_policy, load_policy, save_policy
-from evolve.report.stage import Stage
-from evolve.store import RunError
+from evolve.report import exr_export, replay
+from evolve.config.run_config import WorldConfig
+from evolve.analysis.episode import Episode, _perfect_views, record
+from evolve.learning.policy import PolicyConfig, build_policy, load_policy, save_policy
+from evolve.report.ground_plan import Stage
+from evolve.store.directory import RunError
 
 
 def test_shapes(episode):
@@ -141,7 +141,7 @@ def test_perfect_eyes_are_shown_the_same_light():
 
 
 def test_exr_files_hold_what_the_eyes_saw(episode, tmp_path):
-    files = export.export_episode(episode, tmp_path / "exr")
+    files = exr_export.export_episode(episode, tmp_path / "exr")
     assert [path.name for path in files] == [f"candidate000000_seed3_t{t:04}.exr" for t in (0, 64, 128, 192)]
     left, right = sim.read_exr(files[1])
     assert (left.name, right.name) == ("left", "right")

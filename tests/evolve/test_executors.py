@@ -23,9 +23,9 @@ from closed_form import (
     unfit,
 )
 
-from evolve.development import develop
-from evolve.executors import ExecutorError, Job, LocalExecutor
-from evolve.genotype import Genotype
+from evolve.genome.phenotype import develop
+from evolve.search.local_executor import ExecutorError, Job, LocalExecutor
+from evolve.genome.genotype import Genotype
 
 CONFIG = tiny()
 GENOTYPE = Genotype(CONFIG.genome)
@@ -136,7 +136,7 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[2])
 import numpy as np
 from closed_form import slow_for_some
-from evolve.executors import LocalExecutor
+from evolve.search.local_executor import LocalExecutor
 from test_executors import jobs
 if __name__ == "__main__":
     with LocalExecutor(slow_for_some, 2) as executor:
@@ -171,7 +171,7 @@ def _alive(pid):
 
 CHILDREN = """
 import multiprocessing, time
-from evolve.executors import _interrupts_held
+from evolve.search.local_executor import _interrupts_held
 children = []
 for _ in range(2):
     with _interrupts_held():

@@ -8,10 +8,10 @@ import pytest
 from small_run import LEARNING, PHENOTYPE, small_config
 
 import sim
-from evolve.config import WorldConfig
-from evolve.fitness import evaluate
-from evolve.learner import play
-from evolve.policy import load_policy
+from evolve.config.run_config import WorldConfig
+from evolve.learning.fitness import evaluate
+from evolve.learning.ppo import play
+from evolve.learning.policy import load_policy
 
 pytestmark = pytest.mark.usefixtures("short_episodes")
 

@@ -9,14 +9,14 @@ from remote_form import climbing
 from small_run import PHENOTYPE, small_config
 from test_loop import Onlooker
 
-from evolve.checkpoint import load_checkpoint
-from evolve.config import ConfigError, LearningConfig, SearchConfig
-from evolve.config_source import assemble
-from evolve.executors import LocalExecutor
-from evolve.fitness import evaluate
-from evolve.ladder import Stretch, budgets, climbers, evaluations, sizes, steps, stretches
-from evolve.loop import evolve
-from evolve.store import Run, RunError
+from evolve.learning.checkpoint import load_checkpoint
+from evolve.config.run_config import ConfigError, LearningConfig, SearchConfig
+from evolve.config.assemble import assemble
+from evolve.search.local_executor import LocalExecutor
+from evolve.learning.fitness import evaluate
+from evolve.search.successive_halving import Stretch, budgets, climbers, evaluations, sizes, steps, stretches
+from evolve.search.loop import evolve
+from evolve.store.directory import Run, RunError
 
 THREE = SearchConfig(population=7, generations=5, rungs=3, promoted=0.5)
 LADDER = ("search.population=7", "search.rungs=3", "learning.total_steps=16384")

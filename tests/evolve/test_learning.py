@@ -10,9 +10,9 @@ import torch
 from torch import nn
 
 import sim
-from evolve.config import LearningConfig
-from evolve.learner import play, train
-from evolve.policy import EyeFeatures, PolicyConfig, build_policy
+from evolve.config.run_config import LearningConfig
+from evolve.learning.ppo import play, train
+from evolve.learning.policy import EyeFeatures, PolicyConfig, build_policy
 from sim.worlds.state import WorldState
 
 SCENES, TRAINING_SCENES, BATCH = 256, 20, 512

@@ -7,8 +7,8 @@ import sys
 import pytest
 from closed_form import tiny
 
-from evolve.lock import LockedError, RunLock, holder
-from evolve.store import Run
+from evolve.store.lock import LockedError, RunLock, holder
+from evolve.store.directory import Run
 
 CONFIG = tiny()
 
@@ -20,7 +20,7 @@ def run(tmp_path):
 
 HOLD = """
 import sys, time
-from evolve.lock import RunLock
+from evolve.store.lock import RunLock
 from pathlib import Path
 with RunLock(Path(sys.argv[1])):
     print("held", flush=True)

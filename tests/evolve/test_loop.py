@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from closed_form import bowl, calls, fails_for_some, slow_for_some, tiny
 
-from evolve.ancestor import starts_from
-from evolve.config import ConfigError
-from evolve.config_source import assemble
-from evolve.development import develop
-from evolve.evaluation import Evaluation
-from evolve.executors import LocalExecutor
-from evolve.genotype import Genotype
-from evolve.loop import evolve
-from evolve.search import training_seed
-from evolve.store import Run, RunError
+from evolve.cli.start_from import starts_from
+from evolve.config.run_config import ConfigError
+from evolve.config.assemble import assemble
+from evolve.genome.phenotype import develop
+from evolve.store.evaluation import Evaluation
+from evolve.search.local_executor import LocalExecutor
+from evolve.genome.genotype import Genotype
+from evolve.search.loop import evolve
+from evolve.search.search import training_seed
+from evolve.store.directory import Run, RunError
 
 
 class Onlooker:

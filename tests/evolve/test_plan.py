@@ -6,16 +6,16 @@ from dataclasses import replace
 import pytest
 from small_run import PHENOTYPE, small_config
 
-import evolve.plan
-from evolve.calibration import Pace, calibrate
-from evolve.cli import main
-from evolve.config import ConfigError
-from evolve.config_source import assemble
-from evolve.development import develop
-from evolve.fitness import evaluate
-from evolve.genotype import Genotype
-from evolve.plan import Plan
-from evolve.remarks import idle_genes, idle_starts, remarks
+import evolve.cli.run_plan
+from evolve.cli.pace import Pace, calibrate
+from evolve.cli.main import main
+from evolve.config.run_config import ConfigError
+from evolve.config.assemble import assemble
+from evolve.genome.phenotype import develop
+from evolve.learning.fitness import evaluate
+from evolve.genome.genotype import Genotype
+from evolve.cli.run_plan import Plan
+from evolve.config.lint import idle_genes, idle_starts, remarks
 from optics.numerics import backend
 
 PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
@@ -24,7 +24,7 @@ PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
 @pytest.fixture
 def paced(monkeypatch):
     """A machine of known pace."""
-    monkeypatch.setattr(evolve.plan, "calibrate", lambda config, animals, workers: dict.fromkeys(animals, PACE))
+    monkeypatch.setattr(evolve.cli.run_plan, "calibrate", lambda config, animals, workers: dict.fromkeys(animals, PACE))
 
 
 def test_hours_count_rounds_of_workers_and_all_that_a_candidate_does(tmp_path, paced):

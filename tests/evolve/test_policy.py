@@ -8,7 +8,7 @@ import pytest
 import torch
 from gymnasium import spaces
 
-from evolve.policy import CONTRAST, EyePolicy, PolicyConfig, build_policy, learnt, load_policy, save_policy
+from evolve.learning.policy import CONTRAST, EyePolicy, PolicyConfig, build_policy, learnt, load_policy, save_policy
 
 CONFIG = PolicyConfig(eyes=(3, 2, 3, 2, 4), neurons=8)
 

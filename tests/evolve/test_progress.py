@@ -9,13 +9,13 @@ from dataclasses import replace
 import pytest
 from closed_form import tiny
 
-from evolve import progress
-from evolve.candidate import Candidate
-from evolve.development import develop
-from evolve.evaluation import Evaluation
-from evolve.genotype import Genotype
-from evolve.progress import Bar, Events, Lines, Tally, watcher
-from evolve.store import Run
+from evolve.cli import progress
+from evolve.store.candidate import Candidate
+from evolve.genome.phenotype import develop
+from evolve.store.evaluation import Evaluation
+from evolve.genome.genotype import Genotype
+from evolve.cli.progress import Bar, Events, Lines, Tally, watcher
+from evolve.store.directory import Run
 
 CONFIG = tiny("search.generations=2")  # 2 x 4 candidates
 GENOME = Genotype(CONFIG.genome).start

@@ -6,8 +6,8 @@ import torch
 from bright_spot import BrightSpot
 from stable_baselines3.common.buffers import DictRolloutBuffer
 
-from evolve.policy import build_policy
-from evolve.rollout import FrameRolloutBuffer
+from evolve.learning.policy import build_policy
+from evolve.learning.rollout_buffer import FrameRolloutBuffer
 
 STEPS, WORLDS = 24, 6
 
@@ -57,7 +57,7 @@ def test_samples_are_those_of_the_stacked_buffer(buffers):
 
 
 def build_policy_features(space):
-    from evolve.policy import PolicyConfig
+    from evolve.learning.policy import PolicyConfig
 
     extractor = build_policy(PolicyConfig(space["eyes"].shape, 8)).features_extractor
     with torch.no_grad():

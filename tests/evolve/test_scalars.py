@@ -4,8 +4,8 @@ import shutil
 
 import pytest
 
-from evolve.scalars import Scalars
-from evolve.store import Run
+from evolve.cli.tensorboard import Scalars
+from evolve.store.directory import Run
 
 
 def test_scalars_are_the_records(finished, tmp_path):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from closed_form import tiny
 
-from evolve.config import ConfigError
-from evolve.genotype import Genotype
-from evolve.search import Search, training_seed
+from evolve.config.run_config import ConfigError
+from evolve.genome.genotype import Genotype
+from evolve.search.search import Search, training_seed
 
 
 def sphere(genomes, best=0.7):

@@ -5,11 +5,11 @@ import json
 import pytest
 from closed_form import tiny
 
-from evolve.candidate import Candidate
-from evolve.development import develop
-from evolve.evaluation import Evaluation
-from evolve.genotype import Genotype
-from evolve.store import Run
+from evolve.store.candidate import Candidate
+from evolve.genome.phenotype import develop
+from evolve.store.evaluation import Evaluation
+from evolve.genome.genotype import Genotype
+from evolve.store.directory import Run
 
 
 def test_status_tells_what_the_record_holds(call, finished):

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from closed_form import tiny
 
-from evolve.candidate import Candidate
-from evolve.config import ConfigError
-from evolve.development import develop
-from evolve.evaluation import Evaluation
-from evolve.genotype import Genotype
-from evolve.lock import LockedError
-from evolve.store import Run, RunError, next_directory
-from evolve.versions import altered, present, record_start, recorded
+from evolve.store.candidate import Candidate
+from evolve.config.run_config import ConfigError
+from evolve.genome.phenotype import develop
+from evolve.store.evaluation import Evaluation
+from evolve.genome.genotype import Genotype
+from evolve.store.lock import LockedError
+from evolve.store.directory import Run, RunError, next_directory
+from evolve.store.versions import altered, present, record_start, recorded
 
 CONFIG = tiny()
 DIMENSION = Genotype(CONFIG.genome).dimension
@@ -149,7 +149,7 @@ def test_two_that_create_at_once_do_not_mix(tmp_path, monkeypatch):
             Run.create(tmp_path / "run", tiny("seed=2"))
         record_start(*arguments)
 
-    monkeypatch.setattr("evolve.store.record_start", meanwhile)
+    monkeypatch.setattr("evolve.store.directory.record_start", meanwhile)
     Run.create(tmp_path / "run", CONFIG)
     assert Run.open(tmp_path / "run").config == CONFIG
 

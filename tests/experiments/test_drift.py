@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from evolve.config_source import assemble
+from evolve.config.assemble import assemble
 from experiments.candidates import Row
 from experiments.drift import Drift, drifted, of_the_end
 from experiments.evolved import Conduct, Store, luck_table

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evolve.config import EyeConfig
-from evolve.development import Phenotype
+from evolve.config.run_config import EyeConfig
+from evolve.genome.phenotype import Phenotype
 from experiments.glass import power
 from optics import BSplineRelief
 

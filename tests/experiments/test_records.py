@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from evolve.config_source import to_toml
-from evolve.loop import evolve
-from evolve.store import Run, RunError
+from evolve.config.assemble import to_toml
+from evolve.search.loop import evolve
+from evolve.store.directory import Run, RunError
 from experiments import candidates
 from experiments.candidates import Row, complete, rows_of
 from experiments.evolved import stored

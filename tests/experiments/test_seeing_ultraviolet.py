@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import optics
-from evolve.config_source import assemble
-from evolve.development import develop
-from evolve.genotype import Genotype
+from evolve.config.assemble import assemble
+from evolve.genome.phenotype import develop
+from evolve.genome.genotype import Genotype
 from experiments import seeing_ultraviolet
 from experiments.candidates import Row
 from experiments.seeing_ultraviolet import contrast, difference, peaks

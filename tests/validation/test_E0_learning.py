@@ -10,8 +10,8 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv
 
 import sim
-from evolve.config import LearningConfig
-from evolve.policy import PolicyConfig
+from evolve.config.run_config import LearningConfig
+from evolve.learning.policy import PolicyConfig
 from validation import E0_learning
 from validation.learning import Case, Journey, Row, read_rows, steps_to, watched, wilson, write_rows
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evolve.ladder import budgets
+from evolve.search.successive_halving import budgets
 from validation import E2_ladder
 from validation.E2_ladder import RUNGS, Row, animals, columns, config, correlation, halving, read_rows, write_rows
 

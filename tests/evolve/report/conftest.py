@@ -3,7 +3,7 @@
 import pytest
 from reported import Page, make_run
 
-from evolve.episode import record
+from evolve.analysis.episode import record
 from evolve.report.page import render
 
 

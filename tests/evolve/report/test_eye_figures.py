@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import optics
-from evolve.episode import record
+from evolve.analysis.episode import record
 from evolve.report.eye_figures import Light, diffraction_limit, relief_heights
 from evolve.report.views import through
-from evolve.store import Run
+from evolve.store.directory import Run
 from optics.spectra.bands import daylight
 
 

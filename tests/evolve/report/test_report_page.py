@@ -7,17 +7,17 @@ from collections import Counter
 import pytest
 from reported import BEST, HOSTILE, SEEING, Page, film_of
 
-from evolve.candidate import Candidate
-from evolve.config import RunConfig
-from evolve.config_source import assemble
-from evolve.development import develop
-from evolve.evaluation import Evaluation
-from evolve.genotype import GENES, Genotype
+from evolve.store.candidate import Candidate
+from evolve.config.run_config import RunConfig
+from evolve.config.assemble import assemble
+from evolve.genome.phenotype import develop
+from evolve.store.evaluation import Evaluation
+from evolve.genome.genotype import GENES, Genotype
 from evolve.report import write
 from evolve.report.markup import exact, number
 from evolve.report.page import genes_section, render
 from evolve.report.tables import best_genes
-from evolve.store import Run
+from evolve.store.directory import Run
 
 
 def test_table_holds_every_candidate_with_the_stores_fitness(run, page):

@@ -1,0 +1,88 @@
+"""What the best eyes see, over the generations: image quality, contrast, and their view beside a perfect lens's."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+import optics
+import sim
+from evolve.analysis.statistics import image_quality, polychromatic, psnr
+from evolve.config.run_config import RunConfig, WorldConfig
+from evolve.genome.phenotype import Phenotype
+
+__all__ = ["Vision", "ssim", "vision"]
+
+SCENES = 16  # starts of episodes that all eyes look at
+RAYS = 16  # per receptor
+WINDOW = 7  # receptors, of the structural similarity
+Floats = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Vision:
+    """One eye, by four measures; NaN where one has no meaning.
+
+    image_quality  area of the MTF above the noise, times throughput, in [0, 1]: `optics.image_quality`
+    contrast       MTF in white daylight at half the receptors' Nyquist frequency
+    psnr_db        of the view, brought to the brightness of a perfect lens's, against that view
+    ssim           structural similarity of the same, in [-1, 1]; NaN for retinas narrower than three receptors
+    """
+
+    image_quality: float
+    contrast: float
+    psnr_db: float
+    ssim: float
+
+
+def vision(animal: Phenotype, config: RunConfig) -> Vision:
+    """How well an animal's eyes see the run's task; NaN throughout where their optics cannot be computed."""
+    eyes = animal.eyes(config.eye)
+    try:
+        quality, contrast = image_quality(animal, config.eye), _contrast(eyes.eye())
+        seen, perfect = views(eyes, config.task, config.world)
+    except optics.AccuracyError:
+        return Vision(math.nan, math.nan, math.nan, math.nan)
+    gain = 1 / float(eyes.eye().throughput)
+    return Vision(quality, contrast, psnr(seen, perfect, gain), ssim(gain * seen, perfect))
+
+
+def views(eyes: sim.Eyes, task: str, world: WorldConfig | None = None) -> tuple[Floats, Floats]:
+    """Signals without noise of the eyes, and of the same behind a perfect lens, (scene, eye, channel, height, width);
+    the scenes are the same for all eyes."""
+    perfect = replace(eyes, optics=None)
+    where = (world or WorldConfig()).evaluation
+    worlds = sim.make_vec_env(task, perfect, SCENES, 0, mode="evaluation", **where)
+    try:
+        worlds.reset()
+        built, states = worlds.simulation.world, worlds.state
+    finally:
+        worlds.close()
+    seen, sharp = (sim.BatchedRenderer(built, e, SCENES, RAYS).signals(states) for e in (eyes, perfect))
+    return np.asarray(seen), np.asarray(sharp)
+
+
+def ssim(signals: Floats, reference: Floats) -> float:
+    """Mean structural similarity (Wang et al. 2004, by scikit-image) of pictures (…, height, width) of range 1.
+
+    The window is 7 receptors wide, or as wide as the retina; NaN where that is less than 3.
+    """
+    from skimage.metrics import structural_similarity
+
+    side = min(WINDOW, *signals.shape[-2:])
+    window = side - (side + 1) % 2
+    if window < 3:
+        return math.nan
+    pairs = zip(*(a.reshape(-1, *a.shape[-2:]).astype(np.float64) for a in (signals, reference)), strict=True)
+    return float(np.mean([structural_similarity(a, b, win_size=window, data_range=1.0) for a, b in pairs]))
+
+
+def _contrast(eye: optics.Eye) -> float:
+    """MTF at half the Nyquist frequency; 1 behind a perfect lens."""
+    if eye.pupil is None:
+        return 1.0
+    white = polychromatic(eye, eye.psf())
+    return float(optics.mtf(white).profile(np.array([1 / (4 * eye.receptor_pitch)]))[0, 0])

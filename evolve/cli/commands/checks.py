@@ -1,0 +1,37 @@
+"""`evolve validate` and `evolve doctor`: does it work here?"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+from optics.numerics import backend
+
+__all__ = ["doctor", "validate"]
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+
+
+def doctor(arguments: Namespace) -> int:
+    """Print what is installed and whether it works."""
+    from evolve.cli.doctor import main
+
+    return main(as_json=arguments.json)
+
+
+def validate(arguments: Namespace) -> int:
+    """Run every validation script; each asserts against closed forms and draws. 1 if any fails."""
+    scripts = sorted((CHECKOUT / "validation").glob("[A-Z][0-9]*_*.py"))
+    if not scripts:
+        print("evolve: error: validate needs a checkout of rhabdom: its scripts are not installed", file=sys.stderr)
+        return 2
+    backend.require()
+    failed = []
+    for script in scripts:
+        print(f"{script.stem}", flush=True)
+        child = subprocess.run([sys.executable, "-m", f"validation.{script.stem}"], cwd=CHECKOUT, check=False)
+        failed += [script.stem] if child.returncode else []
+    print(f"failed: {', '.join(failed)}" if failed else f"all {len(scripts)} passed")
+    return 1 if failed else 0

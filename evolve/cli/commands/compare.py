@@ -1,0 +1,26 @@
+"""`evolve compare`: runs side by side."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+
+from evolve.report.comparison import differing_settings, lines, summary, write_page
+from evolve.store.directory import Run
+
+__all__ = ["compare"]
+
+
+def compare(arguments: Namespace) -> int:
+    """Print runs side by side."""
+    runs = [Run.open(directory) for directory in arguments.directories]
+    if arguments.json:
+        found = {"runs": [summary(run) for run in runs], "settings": differing_settings(runs)}
+        print(json.dumps(found, indent=1, allow_nan=False))
+    else:
+        print("\n".join(lines(runs)))
+    if arguments.html:
+        write_page(runs, arguments.html)
+        if not arguments.json:
+            print(f"page: {arguments.html}")
+    return 0

@@ -1,0 +1,179 @@
+"""`evolve run` and `evolve resume`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import Namespace
+from contextlib import nullcontext
+
+from evolve.cli.start_from import starts_from
+from evolve.store.candidate import Candidate
+from evolve.cli.commands import INTERRUPTED
+from evolve.config.run_config import ConfigError, RunConfig
+from evolve.config.assemble import assemble
+from evolve.search.dask_executor import DaskExecutor
+from evolve.genome.phenotype import repaired
+from evolve.search.local_executor import LocalExecutor
+from evolve.search.loop import evolve
+from evolve.cli.run_plan import Plan
+from evolve.cli.progress import Bar, Events, Lines, Watchers, watcher
+from evolve.config.lint import remarks
+from evolve.cli.tensorboard import Scalars
+from evolve.search.search import Search
+from evolve.store.directory import Run, next_directory
+from evolve.store.versions import altered, present, record_start, recorded
+from evolve.search.worker import evaluate_candidate, prepare_device
+from optics.numerics import backend
+
+__all__ = ["resume", "start"]
+
+
+def start(arguments: Namespace) -> int:
+    """Begin a run and carry it to its end."""
+    _require_scheduler(arguments)
+    flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
+    starts = starts_from(arguments.ancestor) if arguments.ancestor else None
+    config = assemble(
+        arguments.task, arguments.preset, arguments.config, [*arguments.set, *flags], starts, arguments.scale
+    )
+    Search(config)  # an unknown optimizer, say, is refused before anything is written
+    backend.require()
+    directory = arguments.out or next_directory(config.task, arguments.preset.removesuffix(f"-{config.task}"))
+    if arguments.dry_run:
+        return _show(Plan.of(config, directory), arguments.json)
+    notes = [] if arguments.json else remarks(config)  # looks at the world, which takes its time: nothing is begun yet
+    run = Run.create(directory, config, starts.name.removeprefix("--from ") if starts else None)
+    if not arguments.json:
+        for note in notes:
+            print(f"note: {note}", file=sys.stderr)
+        print(f"{run.path}: {_plan(config)}", flush=True)
+    with run.lock():
+        return _carry(run, arguments)
+
+
+def resume(arguments: Namespace) -> int:
+    """Carry an interrupted run to its end."""
+    _require_scheduler(arguments)
+    run = Run.open(arguments.directory)
+    backend.require()
+    with run.lock():
+        run.repair()
+        if run.notice:
+            print(f"note: {run.notice}", file=sys.stderr)
+        if run.finished:
+            if not arguments.json:
+                print(f"{run.path}: all {run.config.candidates} candidates have been evaluated")
+            return _finish(run, arguments.json)
+        _note_changes(run)
+        record_start(run.path, len(run.candidates))
+        if not arguments.json:
+            print(f"{run.path}: {len(run.candidates)} of {run.config.candidates} candidates are on record", flush=True)
+        return _carry(run, arguments)
+
+
+def _show(plan: Plan, as_json: bool) -> int:
+    """The plan, with what this machine makes of it; nothing is begun."""
+    if not as_json:
+        print("measuring this machine's pace ...", file=sys.stderr, flush=True)
+    plan = plan.measured()
+    print(json.dumps(plan.record(), indent=1) if as_json else "\n".join(plan.lines()))
+    return 0
+
+
+def _carry(run: Run, arguments: Namespace) -> int:
+    """Carry a run whose lock is held to its end; on Ctrl-C say how to go on. Nothing needs saving: it is on record."""
+    try:
+        with (
+            _executor(run, arguments) as executor,
+            _watcher(run, executor.count, arguments) as watch,
+            Scalars(run) if arguments.tensorboard else nullcontext() as scalars,
+        ):
+            evolve(run, executor, Watchers([watch, *([scalars] if scalars else [])]))
+    except KeyboardInterrupt:
+        print(
+            f"\nevolve: interrupted; {len(run.candidates)} of {run.config.candidates} candidates are on record. "
+            f"Continue with: evolve resume {run.path}",
+            file=sys.stderr,
+        )
+        return INTERRUPTED
+    if not arguments.json:
+        print(watch.tally.closing())
+    return _finish(run, arguments.json)
+
+
+def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lines:
+    return watcher(run, sys.stdout if arguments.json else sys.stderr, workers, arguments.json)
+
+
+def _executor(run: Run, arguments: Namespace) -> DaskExecutor | LocalExecutor:
+    if arguments.executor == "dask":
+        return DaskExecutor(arguments.scheduler)
+    return LocalExecutor(evaluate_candidate, run.config.workers, prepare_device)
+
+
+def _require_scheduler(arguments: Namespace) -> None:
+    """Only Dask has one, and needs one."""
+    if (arguments.executor == "dask") != (arguments.scheduler is not None):
+        raise ConfigError("--executor dask needs --scheduler ADDRESS, and nothing else takes one")
+
+
+def _finish(run: Run, as_json: bool) -> int:
+    """Write report and EXR files, and name them; 1 if no candidate could be evaluated."""
+    failures = [candidate for candidate in run.candidates if candidate.failure]
+    if run.best is None:
+        print(f"evolve: every candidate failed; the last: {failures[-1].failure}", file=sys.stderr)
+        return 1
+    if not as_json:
+        print("\n".join(_outcome(run, run.best, failures)))
+        print("writing report and EXR files ...", flush=True)
+    from evolve import report
+    from evolve.analysis import episode
+    from evolve.report import exr_export
+
+    best = episode.record(run)
+    page, frames = report.write(run, best), exr_export.export_episode(best, run.path / "exr")
+    if as_json:
+        products = {"directory": str(run.path), "report": str(page), "exr": [str(frame) for frame in frames]}
+        print(json.dumps({"event": "finished", "best": run.best.id, "fitness": run.best.fitness, **products}))
+        return 0
+    print(f"run directory: {run.path}")
+    print(f"report: {page}")
+    print(f"EXR files: {len(frames)} in {frames[0].parent}, the first: {frames[0].name}")
+    return 0
+
+
+def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
+    """The best candidate, how many failed, and how many genomes did not fit together as they were."""
+    lines = [f"best: candidate {best.id}, fitness {best.fitness:.4g}, success rate {best.success_rate:.0%}"]
+    if failures:
+        lines.append(f"failed: {len(failures)} of {len(run.candidates)} candidates; the last: {failures[-1].failure}")
+    changed = [names for candidate in run.candidates if (names := repaired(candidate.vector, run.config))]
+    if changed:
+        genes = ", ".join(sorted({name for names in changed for name in names}))
+        lines.append(f"repaired so that nothing overlaps: {len(changed)} of {len(run.candidates)} candidates ({genes})")
+    return lines
+
+
+def _plan(config: RunConfig) -> str:
+    search, steps = config.search, config.learning.total_steps
+    genes = sum(use.open for use in config.genome.values())
+    return (
+        f"{config.task}, {search.generations} generations x {search.population} candidates x {steps:,} steps"
+        f"{f' on a ladder of {search.rungs} rungs' if search.rungs > 1 else ''}, "
+        f"{genes} genes open"
+    )
+
+
+def _note_changes(run: Run) -> None:
+    """Say which software differs from when the run began, and whether settings do; numbers may differ with them."""
+    if altered(run.path):
+        print(
+            f"note: config.toml has changed since the run was last carried on: candidates from {len(run.candidates)} "
+            "on are trained and evaluated by other settings than those before",
+            file=sys.stderr,
+        )
+    then, now = recorded(run.path), present()
+    changed = [f"{name} {now[name]} (was {then[name]})" for name in now if name in then and then[name] != now[name]]
+    if changed:
+        print(f"note: other software than when the run began: {', '.join(changed)}", file=sys.stderr)

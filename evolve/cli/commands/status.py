@@ -1,0 +1,103 @@
+"""`evolve status`: how a run stands, read from its record alone, once or again and again."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import sys
+import time
+from argparse import Namespace
+from typing import Any
+
+from evolve.store.lock import holder
+from evolve.store.directory import Run
+
+__all__ = ["standing", "status"]
+
+WATCH_S = 2.0  # between two looks
+SHOWN = 12  # generations, the latest
+
+
+def status(arguments: Namespace) -> int:
+    """Print how a run stands; with --watch again whenever that has changed, until nobody works on it any more."""
+    now = standing(Run.open(arguments.directory))
+    if not arguments.watch:
+        _show(arguments, now)
+        return 0
+    shown: dict[str, Any] | None = None
+    while True:
+        if now != shown:
+            _show(arguments, now)
+            shown = now
+        if now["state"] != "running":
+            return 0
+        time.sleep(WATCH_S)
+        now = standing(Run.open(arguments.directory))
+
+
+def _show(arguments: Namespace, now: dict[str, Any]) -> None:
+    """As text; as JSON indented, or one line each where it is repeated. A terminal is cleared before each look."""
+    if arguments.json:
+        print(json.dumps(now, indent=None if arguments.watch else 2, allow_nan=False), flush=True)
+        return
+    if now["notice"]:
+        print(f"note: {now['notice']}", file=sys.stderr)
+    clear = "\x1b[H\x1b[2J" if arguments.watch and sys.stdout.isatty() else ""
+    print(clear + "\n".join(_lines(now)), flush=True)
+
+
+def standing(run: Run) -> dict[str, Any]:
+    """How a run stands, as plain values."""
+    worker = holder(run.path)
+    state = "running" if worker else "finished" if run.finished else "interrupted"
+    best = run.best
+    return {
+        "directory": str(run.path),
+        "task": run.config.task,
+        "state": state,
+        "process": worker,
+        "notice": run.notice,
+        "candidates": {
+            "evaluated": len(run.candidates),
+            "failed": sum(candidate.failure is not None for candidate in run.candidates),
+            "planned": run.config.candidates,
+        },
+        "last_failure": next((c.failure for c in reversed(run.in_order_of_finish) if c.failure), None),
+        "steps": sum(candidate.steps for candidate in run.candidates),
+        "best": None
+        if best is None
+        else {"id": best.id, "fitness": best.fitness, "phenotype": best.phenotype.to_json()},
+        "generations": [_generation(run, number) for number in range(run.config.search.generations)],
+    }
+
+
+def _generation(run: Run, number: int) -> dict[str, Any]:
+    members = run.generation(number)
+    fitness = [candidate.fitness for candidate in members if candidate.failure is None]
+    return {
+        "evaluated": len(members),
+        "best": max(fitness, default=None),
+        "median": statistics.median(fitness) if fitness else None,
+    }
+
+
+def _lines(now: dict[str, Any]) -> list[str]:
+    count, best = now["candidates"], now["best"]
+    by = f" by process {now['process']}" if now["process"] else ""
+    failed = f", {count['failed']} failed" if count["failed"] else ""
+    lines = [
+        f"{now['directory']}: {now['task']}, {now['state']}{by}",
+        f"{count['evaluated']} of {count['planned']} candidates evaluated{failed}, {now['steps']:,} steps trained",
+    ]
+    if now["last_failure"]:
+        lines.append(f"last failure: {now['last_failure']}")
+    if best is not None:
+        lines.append(f"best: candidate {best['id']}, fitness {best['fitness']:.4g}")
+    told = [(number, g) for number, g in enumerate(now["generations"]) if g["best"] is not None]
+    if len(told) > SHOWN:
+        lines.append(f"generations 0 to {told[-SHOWN][0] - 1}: best {max(g['best'] for _, g in told[:-SHOWN]):.4g}")
+    for number, generation in told[-SHOWN:]:
+        lines.append(f"generation {number}: best {generation['best']:.4g}, median {generation['median']:.4g}")
+    if now["state"] == "interrupted":
+        lines.append(f"continue: evolve resume {now['directory']}")
+    return lines

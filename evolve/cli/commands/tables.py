@@ -1,0 +1,74 @@
+"""`evolve tasks` and `evolve genes`: what there is."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+
+from evolve.config.run_config import SearchConfig, TASKS
+from evolve.genome.genes import CLUSTERS, GENES, Gene
+
+__all__ = ["genes", "tasks"]
+
+
+def tasks(arguments: Namespace) -> int:
+    """Print the tasks."""
+    print("\n".join(f"{name:<12}{meaning}" for name, meaning in TASKS.items()))
+    return 0
+
+
+def genes(arguments: Namespace) -> int:
+    """Print the genes: range, how far evolution searches and from where unless told otherwise, and what each does."""
+    ordered = [gene for cluster in CLUSTERS for gene in GENES.values() if gene.cluster == cluster]
+    if arguments.json:
+        print(json.dumps([_record(gene) for gene in ordered], indent=1))
+        return 0
+    header = ("gene", "cluster", "kind", "range", "unit", "open", "searched", "start", "mutation", "what it does")
+    rows = [header, *(_row(gene) for gene in ordered)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(header))]
+    for row in rows:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+    print(
+        f"\n{len(GENES)} genes. Open or freeze one, or a cluster: --set genome.NAME.open=true or false\n"
+        "From generation N on: --set genome.NAME.opens_at=N. A relief of N x N genes: --set eye.relief_points=N,\n"
+        "of an eighth of them, that looks the same mirrored and turned: --set eye.relief_symmetric=true\n"
+        "Spectral genes count where --set eye.receptors=genes; else all eyes of a run have the receptors named there.\n"
+        "Mutations are those of search.optimizer=mutation; CMA begins with Gaussian steps of the same size."
+    )
+    return 0
+
+
+def _row(gene: Gene) -> tuple[str, ...]:
+    use = gene.default
+    step = f", σ = {_step(gene):.3g}" if gene.kind == "real" else ""
+    return (
+        gene.name,
+        gene.cluster,
+        gene.kind,
+        str(gene.range),
+        gene.unit,
+        "yes" if use.open else "no",
+        f"[{use.low:g}, {use.high:g}]",
+        f"{use.start:g}",
+        f"{gene.mutation}{step}",
+        gene.meaning,
+    )
+
+
+def _step(gene: Gene) -> float:
+    return SearchConfig().sigma * (gene.default.high - gene.default.low)
+
+
+def _record(gene: Gene) -> dict[str, object]:
+    return {
+        "name": gene.name,
+        "cluster": gene.cluster,
+        "kind": gene.kind,
+        "range": [gene.range.low, gene.range.high],
+        "unit": gene.unit,
+        "open": gene.default.open,
+        "searched": [gene.default.low, gene.default.high],
+        "start": gene.default.start,
+        "mutation": gene.mutation,
+        "meaning": gene.meaning,
+    }

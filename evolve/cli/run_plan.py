@@ -1,0 +1,181 @@
+"""What a run is going to do, before it does any of it: genes, evaluations, steps, hours and disk."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evolve.cli.pace import Pace, calibrate
+from evolve.store.candidate import Candidate
+from evolve.config.run_config import RunConfig
+from evolve.genome.phenotype import Phenotype, develop
+from evolve.store.evaluation import Evaluation
+from evolve.search.local_executor import cores
+from evolve.genome.genes import CLUSTERS
+from evolve.genome.genotype import Genotype
+from evolve.search.successive_halving import budgets, evaluations, sizes, stretches
+from evolve.search.successive_halving import steps as total_steps
+from evolve.config.lint import remarks
+
+__all__ = ["Plan"]
+
+REPORT_BYTES = 5_000_000  # report and replay pages together
+EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60  # of the episode that is exported: see evolve.analysis.episode
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run is going to do. `paces` holds the pace of the start animal and of one in the middle of all ranges,
+    which bracket what evolution will ask for; {} before `measured`."""
+
+    config: RunConfig
+    directory: Path
+    workers: int
+    paces: dict[str, Pace] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, config: RunConfig, directory: Path) -> Plan:
+        return cls(config, directory, config.workers or cores())
+
+    def measured(self) -> Plan:
+        """With the paces of this machine, which takes some ten seconds."""
+        return Plan(self.config, self.directory, self.workers, calibrate(self.config, self.animals, self.workers))
+
+    @property
+    def animals(self) -> dict[str, Phenotype]:
+        """Animals that stand for those to come."""
+        genotype = Genotype(self.config.genome)
+        middle = np.full(genotype.dimension, 0.5)
+        return {"start": develop(genotype.start, self.config), "middle": develop(middle, self.config)}
+
+    @property
+    def hours(self) -> dict[str, float]:
+        """Wall time of the whole run if all candidates were like each of the animals, and trained to the end."""
+        search, learning = self.config.search, self.config.learning
+        if search.steady_state:
+            rounds = -(-self.config.candidates // self.workers)
+            return {name: rounds * pace.candidate_s(self.config) / 3600 for name, pace in self.paces.items()}
+        climb = list(zip(sizes(search), stretches(search, learning), strict=True))
+        return {
+            name: search.generations
+            * sum(-(-size // self.workers) * pace.stretch_s(steps, learning.eval_interval) for size, steps in climb)
+            / 3600
+            for name, pace in self.paces.items()
+        }
+
+    @property
+    def disk_bytes(self) -> int:
+        """Policies, record, report and EXR files; of the larger animal."""
+        policy = max(pace.policy_bytes for pace in self.paces.values())
+        pictures = max(_exr_bytes(animal, self.config.eye.bands) for animal in self.animals.values())
+        lines = evaluations(self.config.search) * self._line_bytes()
+        return self.config.candidates * policy + lines + REPORT_BYTES + pictures
+
+    @property
+    def free_bytes(self) -> int:
+        """Free on the disk that will hold the run."""
+        existing = next(path for path in (self.directory.resolve(), *self.directory.resolve().parents) if path.exists())
+        return shutil.disk_usage(existing).free
+
+    def _ladder(self) -> list[str]:
+        """What a generation does on each rung."""
+        search = self.config.search
+        ends = zip(sizes(search), budgets(search, self.config.learning), strict=True)
+        rungs = ", ".join(f"{size} to {steps:,} steps" for size, steps in ends)
+        return [f"ladder         {rungs}"] if search.rungs > 1 else []
+
+    def _line_bytes(self) -> int:
+        """A candidate's line in the record."""
+        config, genotype = self.config, Genotype(self.config.genome)
+        plays = -(-config.learning.total_steps // config.learning.eval_interval)
+        value = np.pi
+        outcome = Evaluation(value, (value,) * config.evaluation.episodes, 1.0, 1, value, ((1_000_000, value),) * plays)
+        genome = (value / 4,) * genotype.dimension
+        animal = self.animals["middle"]
+        parents = tuple(range(config.search.population // 2))
+        return len(Candidate.of((1, 1, 1), genome, animal, 2**31, outcome, parents).to_line())
+
+    def lines(self) -> list[str]:
+        """The plan as text."""
+        config, learning = self.config, self.config.learning
+        search, genotype = config.search, Genotype(config.genome)
+        order = "steady state" if search.steady_state else "generation by generation"
+        lines = [
+            f"task           {config.task}, seed {config.seed}",
+            f"search         {search.optimizer}, {order}, on {self.workers} workers",
+            f"evaluations    {search.generations} generations x {search.population} candidates = {config.candidates:,}",
+            *self._ladder(),
+            f"steps          up to {learning.total_steps:,} each, {total_steps(config):,} in all",
+            f"genes open     {genotype.dimension} of {len(config.genome)}",
+            *_gene_lines(config),
+        ]
+        for name, pace in self.paces.items():
+            what = {"start": "like the first", "middle": "in the middle of all ranges"}[name]
+            lines.append(
+                f"predicted      {_duration(self.hours[name])} if animals stay {what}: {pace.steps_per_s:,.0f} steps/s "
+                f"per worker, {pace.candidate_s(config):,.0f} s per candidate"
+            )
+        if self.paces:
+            lines.append(f"disk           {_size(self.disk_bytes)} in {self.directory}, {_size(self.free_bytes)} free")
+        return lines + [f"note           {note}" for note in self.notes()]
+
+    def notes(self) -> list[str]:
+        """What one should know before it begins."""
+        short = self.paces and self.disk_bytes > self.free_bytes
+        return [*remarks(self.config), *(["the disk is too small for this run"] if short else [])]
+
+    def record(self) -> dict[str, Any]:
+        """The plan for machines."""
+        config = self.config
+        opening = {g.name: config.genome[g.name].opens_at for g in Genotype(config.genome).open_genes}
+        return {
+            "task": config.task,
+            "directory": str(self.directory),
+            "workers": self.workers,
+            "genes": opening,
+            "evaluations": config.candidates,
+            "steps": total_steps(config),
+            "hours": self.hours,
+            "pace": {name: asdict(pace) for name, pace in self.paces.items()},
+            "disk_bytes": self.disk_bytes if self.paces else None,
+            "free_bytes": self.free_bytes,
+            "notes": self.notes(),
+        }
+
+
+def _gene_lines(config: RunConfig) -> list[str]:
+    """Open genes, cluster by cluster, and from which generation on."""
+    genes = Genotype(config.genome).open_genes
+    lines = []
+    for cluster in CLUSTERS:
+        for opens_at in Genotype(config.genome).phases:
+            names = [g.name for g in genes if g.cluster == cluster and config.genome[g.name].opens_at == opens_at]
+            relief = [name for name in names if name.startswith("doe_")]
+            names = [name for name in names if name not in relief]
+            names += [f"{relief[0]} … {relief[-1]} ({len(relief)})"] if relief else []
+            since = f" from generation {opens_at}" if opens_at else ""
+            lines += [f"  {cluster}{since}: {', '.join(names)}"] if names else []
+    return lines
+
+
+def _exr_bytes(animal: Phenotype, bands: int) -> int:
+    """EXR files of an episode, before compression: bands and a preview in float32."""
+    factor = max(1, -(-EXR_PIXELS // max(animal.resolution)))
+    pixels = animal.n_eyes * animal.resolution[0] * animal.resolution[1] * factor**2
+    return EPISODE_ACTIONS // EXR_EVERY * pixels * (bands + 3) * 4
+
+
+def _duration(hours: float) -> str:
+    return f"{hours:.1f} hours" if hours >= 1 else f"{60 * hours:.0f} minutes"
+
+
+def _size(count: float) -> str:
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:,.1f} TB"

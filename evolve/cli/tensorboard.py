@@ -1,0 +1,88 @@
+"""A run's scalars for TensorBoard: fitness over the generations, learning within a lifetime, genes.
+
+Written by TensorBoard's own writer, into `tensorboard/` of the run directory; they are drawn from the record and say
+nothing that it does not, so a run that is continued writes them anew.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+import time
+from pathlib import Path
+from typing import Any
+
+from evolve.analysis.statistics import acuity_cpd, gene_values, generation_statistics
+from evolve.store.candidate import Candidate
+from evolve.search.job import ExecutorError
+from evolve.store.directory import Run
+
+__all__ = ["Scalars"]
+
+FOLDER = "tensorboard"
+
+
+class Scalars:
+    """Watcher that keeps a run's scalars; a context manager.
+
+    Raises:
+        ExecutorError: TensorBoard is not installed.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._writers: dict[str, Any] = {}
+        self._shown: set[int] = set()  # generations
+        _writer_class()
+        shutil.rmtree(run.path / FOLDER, ignore_errors=True)
+
+    def __enter__(self) -> Scalars:
+        for candidate in self._run.in_order_of_finish:
+            self.evaluated(candidate)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for writer in self._writers.values():
+            writer.close()
+
+    def training(self, candidate_id: int, steps: int, planned: int) -> None:
+        """Nothing: what is not on record is not shown."""
+
+    def evaluated(self, candidate: Candidate) -> None:
+        """The candidate's values over its id (on a ladder again on every rung), its generation's over the generation,
+        its learning over steps."""
+        if candidate.failure is None:
+            values = {"fitness": candidate.fitness, "success_rate": candidate.success_rate}
+            genes = {
+                **gene_values(candidate.phenotype, self._run.config.eye),
+                "acuity_cpd": acuity_cpd(candidate.phenotype),
+            }
+            values |= {f"genes/{name}": value for name, value in genes.items() if math.isfinite(value)}
+            self._add("candidates", values, candidate.id)
+            for steps, value in candidate.curve:
+                self._add(f"learning/{candidate.id:06d}", {"return": value}, steps)
+        if candidate.generation not in self._shown and self._run.complete(candidate.generation):
+            self._shown.add(candidate.generation)
+            rows = {row.generation: row for row in generation_statistics(self._run.candidates)}
+            row = rows[candidate.generation]
+            if row.evaluated > row.failed:
+                values = {"best": row.best, "median": row.median, "best_so_far": row.best_so_far}
+                self._add("generations", {f"fitness/{name}": v for name, v in values.items()}, candidate.generation)
+
+    def _add(self, name: str, values: dict[str, float], step: int) -> None:
+        from tensorboard.compat.proto.event_pb2 import Event
+        from tensorboard.compat.proto.summary_pb2 import Summary
+
+        if name not in self._writers:
+            self._writers[name] = _writer_class()(str(self._run.path / FOLDER / Path(name)))
+        summary = Summary(value=[Summary.Value(tag=tag, simple_value=value) for tag, value in values.items()])
+        self._writers[name].add_event(Event(wall_time=time.time(), step=step, summary=summary))
+        self._writers[name].flush()
+
+
+def _writer_class() -> Any:
+    try:
+        from tensorboard.summary.writer.event_file_writer import EventFileWriter
+    except ImportError:
+        raise ExecutorError("--tensorboard needs TensorBoard: pip install 'rhabdom[tensorboard]'") from None
+    return EventFileWriter

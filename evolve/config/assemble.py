@@ -1,0 +1,266 @@
+"""Where a run's configuration comes from: defaults, preset and its scale, task, TOML file, another run's animal,
+`--set key=value`; later ones win, but a preset made for the task wins over the task's settings."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, fields, replace
+from functools import reduce
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from evolve.config.run_config import ConfigError, EyeConfig, RunConfig, SECTIONS, TASKS
+from evolve.config.provenance import Source
+from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, GeneConfig, group_members
+from evolve.config.relief_starts import no_such_gene, with_relief
+from evolve.config.checks import check_gene_value, check_value
+
+__all__ = ["SCALES", "assemble", "from_toml", "nearest", "parse_assignment", "preset_names", "to_toml"]
+
+Tree = dict[str, Any]
+GENE_FIELDS = tuple(f.name for f in fields(GeneConfig))
+TOP_LEVEL = ("task", "seed", "workers")
+SCALES = ("laptop", "paper")  # of the presets that have scales; the first unless asked otherwise
+SETTINGS = (*TOP_LEVEL, *(f"{section}.{f.name}" for section, cls in SECTIONS.items() for f in fields(cls)))
+# A maze's walls say the same at every height, so navigators' eyes are one row of receptors unless told otherwise.
+# They begin slowly and may touch walls at first: else they learn to stand still before they have learnt to steer.
+# Until contact has its whole price what is to be learnt changes, so the learning rate falls only from then on.
+# A wall's picture is smooth: eyes of four receptors learn from eight rays each what they learn from sixty-four.
+TASK_TREES: Mapping[str, Tree] = {
+    "navigation": {
+        "genome": {"resolution_height": {"open": False, "low": 1, "high": 1, "start": 1}},
+        "learning": {
+            "first_speed": 0.25,
+            "contact_ramp": 200_000,
+            "decay_after": 200_000,
+            "gamma": 0.97,
+            "n_epochs": 8,
+            "rays_per_eye": 32.0,
+        },
+    }
+}
+
+
+def assemble(
+    task: str | None = None,
+    preset: str | None = None,
+    file: Path | None = None,
+    assignments: Iterable[str] = (),
+    starts: Source | None = None,
+    scale: str | None = None,
+) -> RunConfig:
+    """A run's configuration from all its sources; `task` and `assignments` ("search.population=8") win.
+
+    task    may be missing where preset or file names one
+    starts  where the genes start instead, as `evolve.cli.start_from` reads it from another run
+    scale   how much of its work a preset does, where it comes in several: one of SCALES, "laptop" if not given
+
+    Raises:
+        ConfigError: unknown key, wrong type, value out of range, contradiction, unreadable file; one line that names
+            key, value, what is allowed, and where it was set.
+    """
+    asked = [_read(file)] if file is not None else []
+    if starts is not None:
+        asked.append(starts)
+    asked += [Source(f"--set {text.strip()}", parse_assignment(text)) for text in assignments]
+    return _assembled(task, _preset(preset, scale), asked)
+
+
+def _assembled(task: str | None, below: list[Source], asked: list[Source]) -> RunConfig:
+    """From what was asked, later sources winning, over the task's and the preset's settings."""
+    if task is not None:
+        asked.append(Source("", {"task": task}))
+    known_task = [source.tree["task"] for source in (*below, *asked) if "task" in source.tree]
+    if not known_task:
+        raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
+    task_tree = Source("", TASK_TREES.get(str(known_task[-1]), {}))
+    # A preset that is made for this task knows better than the task's own settings; one for any task does not.
+    made_for_it = any(source.tree.get("task") == known_task[-1] for source in below)
+    layers = [task_tree, *below, *asked] if made_for_it else [*below, task_tree, *asked]
+    trees = [_checked(source) for source in layers]
+    try:
+        return _build(trees, layers)
+    except ConfigError as error:
+        raise ConfigError(f"{error}{_blamed(error, layers)}", *error.keys) from None
+
+
+def from_toml(path: Path) -> RunConfig:
+    """Configuration written by `to_toml`, which has every default written out."""
+    return assemble(file=path)
+
+
+def from_text(text: str) -> RunConfig:
+    """As `from_toml`, from the text itself."""
+    return _assembled(None, [], [Source("config.toml", tomllib.loads(text), text)])
+
+
+def to_toml(config: RunConfig) -> str:
+    """TOML text with every setting; `from_toml` reads it back equal."""
+    import tomli_w
+
+    tree = asdict(config)
+    for name, use in tree["genome"].items():
+        if ALL_GENES[name].kind == "integer":
+            use.update({key: int(use[key]) for key in ("low", "high", "start")})
+    return tomli_w.dumps(tree)
+
+
+def parse_assignment(text: str) -> Tree:
+    """{"search": {"population": 8}} from "search.population=8"; the value is TOML, a bare word is text."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    parts = key.split(".")
+    if not equals or not all(parts) or not value:
+        raise ConfigError(f"--set {text!r}: must look like section.key=value")
+    try:
+        leaf: Any = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        leaf = value
+    return reduce(lambda inner, part: {part: inner}, reversed(parts), leaf)
+
+
+def preset_names() -> list[str]:
+    """Names that `preset` takes."""
+    folder = resources.files("evolve") / "presets"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """ "did you mean X?" where a known word, or the last part of one, is near; else the list of them."""
+    known = list(known)
+    whole = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    by_last = {name.rpartition(".")[2]: name for name in known}
+    last = difflib.get_close_matches(word.rpartition(".")[2], by_last, n=1, cutoff=0.75)
+    close = whole or [by_last[name] for name in last]
+    return f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
+
+
+def _read(path: Path) -> Source:
+    """A TOML file; raises ConfigError naming file and, where there is one to name, line."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        return Source(str(path), tomllib.loads(text), text)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 text") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: is not valid TOML: {error}") from error
+
+
+def _preset(name: str | None, scale: str | None) -> list[Source]:
+    """A preset's settings, and over them those of its scale."""
+    if name is None:
+        return []
+    if name not in preset_names():
+        raise ConfigError(f"unknown preset {name!r}; {nearest(name, preset_names())}")
+    text = (resources.files("evolve") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    tree = tomllib.loads(text)
+    scales = tree.pop("scales", {})
+    settings = Source(f"preset {name}", tree, text)
+    if not scales:
+        if scale is not None:
+            raise ConfigError(f"scale {scale!r}: preset {name} comes in one scale only")
+        return [settings]
+    chosen = scale or SCALES[0]
+    if chosen not in scales:
+        raise ConfigError(f"unknown scale {chosen!r} of preset {name}; {nearest(chosen, scales)}")
+    return [settings, Source(f"preset {name} on {chosen} scale", scales[chosen])]
+
+
+def _checked(source: Source) -> Tree:
+    """The source's tree, every key known, every value in range, groups of genes spelled out; else a ConfigError that
+    names the source and line."""
+    try:
+        return {key: _checked_entry(key, value) for key, value in source.tree.items()}
+    except ConfigError as error:
+        places = [place for key in error.keys if (place := source.place(key))] or [source.name]
+        name = "--set" if places[0].startswith("--set") else places[0]
+        raise ConfigError(f"{name}: {error}" if name else str(error), *error.keys) from None
+
+
+def _blamed(error: ConfigError, layers: Iterable[Source]) -> str:
+    """ " (mine.toml, line 3; --set ...)": where the settings that contradict each other were set, the ones that won."""
+    won = [next((at for s in reversed(list(layers)) if (at := s.place(key))), None) for key in error.keys]
+    places = list(dict.fromkeys(place for place in won if place))
+    return f" ({'; '.join(places)})" if places else ""
+
+
+def _checked_entry(key: str, value: Any) -> Any:
+    if key == "task":
+        if not isinstance(value, str) or value not in TASKS:
+            raise ConfigError(f"unknown task {str(value)!r}; {nearest(str(value), TASKS)}", key)
+        return value
+    if key in TOP_LEVEL:
+        return check_value(RunConfig, key, value, key)
+    if key not in (*SECTIONS, "genome"):
+        known = (*TOP_LEVEL, *SECTIONS, "genome") if isinstance(value, dict) else SETTINGS
+        raise ConfigError(f"unknown key {key!r}; {nearest(key, known)}", key)
+    if not isinstance(value, dict):
+        raise ConfigError(f"{key} = {value!r}: is a section; set {key}.NAME", key)
+    if key == "genome":
+        return _checked_genome(value)
+    names = [f.name for f in fields(SECTIONS[key])]
+    for name in value:
+        if name not in names:
+            hint = nearest(name, names)
+            hint = hint if hint.startswith("did") else nearest(name, SETTINGS)
+            raise ConfigError(f"unknown key '{key}.{name}'; {hint}", f"{key}.{name}")
+    return {name: check_value(SECTIONS[key], name, leaf, f"{key}.{name}") for name, leaf in value.items()}
+
+
+def _checked_genome(section: Tree) -> Tree:
+    """Per-gene settings; a cluster's name or a family's stands for its genes, and the narrower name wins."""
+    result: Tree = {}
+    for group in sorted(section, key=lambda name: -len(group_members(name))):
+        key, members, use = f"genome.{group}", group_members(group), section[group]
+        if not members:
+            raise ConfigError(f"unknown gene {group!r}; {nearest(group, (*GENES, *CLUSTERS, *FAMILIES))}", key)
+        if not isinstance(use, dict):
+            raise ConfigError(f"{key} = {use!r}: set {key}.open, .low, .high, .start or .opens_at", key)
+        for name in use:
+            if name not in GENE_FIELDS:
+                raise ConfigError(f"unknown key '{key}.{name}'; {nearest(name, GENE_FIELDS)}", f"{key}.{name}")
+        for gene in members:
+            checked = {k: check_gene_value(ALL_GENES[gene], k, v, f"{key}.{k}") for k, v in use.items()}
+            result[gene] = {**result.get(gene, {}), **checked}
+    return result
+
+
+def _merged(trees: Iterable[Tree]) -> Tree:
+    """All trees as one; later ones win."""
+    empty: Tree = {}
+    return reduce(_merge, trees, empty)
+
+
+def _merge(below: Tree, above: Tree) -> Tree:
+    """Both trees; where they meet, `above` wins."""
+    merged = dict(below)
+    for key, value in above.items():
+        under = merged.get(key)
+        merged[key] = _merge(under, value) if isinstance(under, dict) and isinstance(value, dict) else value
+    return merged
+
+
+def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
+    """RunConfig from checked trees, later ones winning, defaults filled in."""
+    eye = EyeConfig(**_merged(trees).get("eye", {}))
+    table = eye.genes
+    for source in layers:
+        for name in with_relief(source.tree, eye).get("genome", {}):
+            if name in ALL_GENES and name not in table:
+                raise ConfigError(
+                    no_such_gene(name, eye), f"genome.{name}", "eye.relief_points", "eye.relief_symmetric"
+                )
+    tree = _merged([with_relief(tree, eye) for tree in trees])
+    sections = {name: cls(**tree.get(name, {})) for name, cls in SECTIONS.items()}
+    genes = tree.get("genome", {})
+    genome = {}
+    for name, gene in table.items():
+        # With optics off the optical genes are frozen, unless someone asks for the contradiction in so many words.
+        off = gene.cluster == "optical" and not sections["eye"].optics
+        genome[name] = replace(gene.default, **{**({"open": False} if off else {}), **genes.get(name, {})})
+    top = {name: tree[name] for name in TOP_LEVEL if name in tree}
+    return RunConfig(**top, **sections, genome=genome)

@@ -1,0 +1,59 @@
+"""Checking single settings: kind and range, or one line that says what would be right."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+from evolve.genome.genes import Gene
+from evolve.genome.interval import Interval
+
+__all__ = ["AUTO", "ConfigError", "check_gene_value", "check_value"]
+
+AUTO = "auto"  # in place of a number: chosen when it is needed
+
+
+class ConfigError(ValueError):
+    """A setting that cannot be used; the message is one line naming key, value and what is allowed.
+
+    keys  dotted names of the settings to blame, so that whoever knows where they were set can say so
+    """
+
+    def __init__(self, message: str, *keys: str) -> None:
+        super().__init__(message)
+        self.keys = keys
+
+
+def check_value(cls: type, name: str, value: Any, key: str) -> Any:
+    """`value` as field `name` of `cls` takes it; raises ConfigError naming `key`, the value and what is allowed."""
+    definition = next(f for f in fields(cls) if f.name == name)
+    if definition.type == "float | str":
+        if value == AUTO:
+            return value
+        if isinstance(value, str):
+            raise ConfigError(f"{key} = {value!r}: must be a number or {AUTO!r}", key)
+    kind = {"int": int, "float": float, "float | str": float, "bool": bool, "str": str}[str(definition.type)]
+    return _checked(value, kind, definition.metadata.get("valid"), key)
+
+
+def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
+    """`value` as a gene's "open", "low", "high", "start" or "opens_at" takes it; raises ConfigError."""
+    if name == "open":
+        return _checked(value, bool, None, key)
+    if name == "opens_at":
+        return _checked(value, int, Interval(0, 100_000), key)
+    return float(_checked(value, int if gene.kind == "integer" else float, gene.range, key))
+
+
+def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> Any:
+    """`value`, if it is of this kind (a whole number may stand for a number) and in `valid`."""
+    names = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
+    shown = str(value).lower() if isinstance(value, bool) else repr(value)
+    if kind is float and type(value) is int:
+        value = float(value)
+    allowed = names[kind] if valid is None else f"{names[kind]} in {valid}"
+    if type(value) is not kind:
+        raise ConfigError(f"{key} = {shown}: must be {allowed}", key)
+    if valid is not None and value not in valid:
+        raise ConfigError(f"{key} = {shown}: must be in {valid}", key)
+    return value

@@ -1,0 +1,105 @@
+"""What is odd about a run's settings, though nothing forbids it: what changes nothing, and colours seen wrongly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from evolve.config.run_config import INHERITED, RunConfig
+from evolve.genome.genes import LAMBDA_MAX
+
+__all__ = ["coarse_bands", "idle_genes", "idle_starts", "remarks"]
+
+GREY_TASKS = ("navigation", "detection", "tracking")
+PEAKS = 17  # of an open gene's range, at which its pigment is tried
+SHOWN = 4  # names in a line, at most
+LEAST_ERROR = 1e-3  # of white's signal: what the 64 bands that others are held against may be wrong by themselves
+
+
+def remarks(config: RunConfig) -> list[str]:
+    """One line each."""
+    return [*idle_genes(config), *idle_starts(config), *coarse_bands(config)]
+
+
+def coarse_bands(config: RunConfig) -> list[str]:
+    """A line where the bands misjudge the world's measured spectra by more than a receptor's noise."""
+    if config.task in GREY_TASKS:
+        return []
+    from sim.render.band_error import band_error, measured
+    from sim.worlds.world import build_world
+
+    spectra = measured(build_world(config.task))
+    light, counts = _most_light(config), _doublings(config.eye.bands)
+    errors = {n: light * max(band_error(spectra, types, n) for types in _types(config)) for n in counts}
+    error, allowed = errors[config.eye.bands], max(config.eye.noise_sigma, LEAST_ERROR)
+    if error <= allowed:
+        return []
+    enough = next((f"{n} do not" for n, left in errors.items() if left <= allowed), f"even {max(errors)} do")
+    return [
+        f"eye.bands = {config.eye.bands} misjudge what {config.task}'s objects reflect by up to {error:.2g} of white's "
+        f"signal, more than a receptor's noise, {allowed:g}; {enough}"
+    ]
+
+
+def _most_light(config: RunConfig) -> float:
+    """What white is worth behind the widest pupil that animals may have, 1 in full light."""
+    use = config.genome["relative_aperture"]
+    return float(use.high if use.open else use.start) ** 2 if config.eye.optics else 1.0
+
+
+def _doublings(bands: int) -> list[int]:
+    """So many bands, and twice as many, and so on; 64 are what they are held against."""
+    return [bands * 2**k for k in range(6) if k == 0 or bands * 2**k < 64]
+
+
+def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
+    """Receptors of the run; where they are inherited, each open gene's range in turn, the others at their start. (All
+    ranges together would be more, by a third in the preset `ultraviolet`, where peaks lie far apart.)"""
+    if config.eye.receptors != INHERITED:
+        return [config.eye.receptors]
+    uses = [config.genome[name] for name in LAMBDA_MAX]
+    count = config.genome["receptor_types"]
+    start = [use.start for use in uses][: int(count.high if count.open else count.start)]
+    tried = [tuple(start)]
+    for place in range(len(start)):
+        if uses[place].open:
+            peaks = np.linspace(uses[place].low, uses[place].high, PEAKS)
+            tried += [(*start[:place], float(peak), *start[place + 1 :]) for peak in peaks]
+    return list(tried)
+
+
+def idle_genes(config: RunConfig) -> list[str]:
+    """Open genes that cannot change anything as the others are held, one line each."""
+    uses, table = config.genome, config.eye.genes
+    notes = []
+    if uses["placement_range_deg"].open and not uses["n_eyes"].open and uses["n_eyes"].start == 1:
+        notes.append("genome.placement_range_deg is open but changes nothing: genome.n_eyes is held at 1")
+    relief = [name for name in table if name.startswith("doe_")]
+    index = uses["refractive_index"]
+    if not index.open and index.start == 1 and any(uses[name].open for name in (*relief, "dispersion")):
+        notes.append("the relief's open genes change nothing: genome.refractive_index is held at 1")
+    flat = not any(uses[name].open for name in relief) and len({uses[name].start for name in relief}) == 1
+    for name in ("refractive_index", "dispersion"):
+        if flat and uses[name].open:
+            notes.append(f"genome.{name} is open but changes nothing: the relief is held flat")
+    if config.task in GREY_TASKS and any(uses[name].open for name in LAMBDA_MAX):
+        notes.append(f"genes of lambda_max are open but change nothing: the world of {config.task} is grey")
+    types = uses["receptor_types"]
+    most = int(types.high if types.open else types.start)
+    for name in [name for name in list(LAMBDA_MAX)[most:] if uses[name].open]:
+        notes.append(f"genome.{name} is open but changes nothing: genome.receptor_types is at most {most}")
+    return notes
+
+
+def idle_starts(config: RunConfig) -> list[str]:
+    """Genes that were given a start though nothing reads them, one line per reason."""
+    unread = {"optical": f"eye.optics = {config.eye.optics}".lower()} if not config.eye.optics else {}
+    if config.eye.receptors != INHERITED:
+        unread["spectral"] = f"eye.receptors = {config.eye.receptors}, not {INHERITED}"
+    notes = []
+    for cluster, why in unread.items():
+        genes = [gene for gene in config.eye.genes.values() if gene.cluster == cluster]
+        given = [g.name for g in genes if config.genome[g.name].start != g.default.start]
+        if given:
+            names = ", ".join(given if len(given) < SHOWN else [*given[: SHOWN - 1], "..."])
+            notes.append(f"what {names} start{'s' * (len(given) == 1)} with changes nothing: {why}")
+    return notes

@@ -1,0 +1,68 @@
+"""Where the genes of a relief start: what was spelled out for one number of them, for the eyes that a run has."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from evolve.config.run_config import EyeConfig
+from evolve.genome.genes import RELIEF_POINTS
+from evolve.genome.relief_genes import PATCH, doe_names, doe_own_names, refined
+from evolve.config.checks import ConfigError
+
+__all__ = ["no_such_gene", "with_relief"]
+
+Tree = dict[str, Any]
+
+
+def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
+    """`tree`, whose starts for a relief of 4 x 4 genes, if it spells them out, become the same surface's for more, and
+    if they say one thing eightfold, an eighth of them where reliefs are symmetric.
+
+    Raises:
+        ConfigError: they are spelled out for more than 4 x 4, but not for as many as there are.
+    """
+    genes, names = tree.get("genome", {}), doe_names(eye.relief_points)
+    side = _spelled_out(genes)
+    if PATCH < side < eye.relief_points:
+        raise ConfigError(
+            f"eye.relief_points = {eye.relief_points}: heights of {side} x {side} points cannot become so many; "
+            f"must be {side}",
+            "eye.relief_points",
+        )
+    if side == PATCH < eye.relief_points:
+        finer = refined(np.array([genes[name]["start"] for name in doe_names(PATCH)]), eye.relief_points)
+        starts = {name: {**genes.get(name, {}), "start": float(u)} for name, u in zip(names, finer, strict=True)}
+        genes = {**genes, **starts}
+    if eye.relief_symmetric and all("start" in genes.get(name, {}) for name in names):
+        own = dict(zip(names, doe_own_names(eye.relief_points, True), strict=True))
+        images = {name for name in names if own[name] != name and _same(genes[name], genes[own[name]])}
+        genes = {name: use for name, use in genes.items() if name not in images}
+    return {**tree, "genome": genes} if genes else tree
+
+
+def _spelled_out(genes: Tree) -> int:
+    """The side of the square of relief genes that have a start, each and no others; 0 where they are no square."""
+    given = {name for name, use in genes.items() if name.startswith("doe_") and "start" in use}
+    return next((side for side in range(PATCH, int(RELIEF_POINTS.high) + 1) if given == set(doe_names(side))), 0)
+
+
+def _same(one: Tree, other: Tree) -> bool:
+    """The same settings of a gene, its start up to rounding."""
+    rest, others = ({key: value for key, value in use.items() if key != "start"} for use in (one, other))
+    return rest == others and math.isclose(one["start"], other["start"], abs_tol=1e-9)
+
+
+def no_such_gene(name: str, eye: EyeConfig) -> str:
+    """Why these eyes have no such relief gene."""
+    points = eye.relief_points
+    if eye.relief_symmetric and name in doe_names(points):
+        own = ", ".join(_relief_genes(eye))
+        return f"genome.{name}: a symmetric relief has other genes ({own}); set eye.relief_symmetric = false for any"
+    return f"genome.{name}: the relief has {points} x {points} genes; set eye.relief_points for more"
+
+
+def _relief_genes(eye: EyeConfig) -> list[str]:
+    return [name for name in eye.genes if name.startswith("doe_")]

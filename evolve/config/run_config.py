@@ -1,0 +1,187 @@
+"""Configuration of a run: what is asked for, checked value by value, frozen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from evolve.genome import anatomy
+from evolve.genome.genes import CLUSTERS, GENES, Gene, GeneConfig
+from evolve.genome.interval import Interval
+from evolve.config.sections import (
+    EvaluationConfig,
+    EyeConfig,
+    LearningConfig,
+    SECTIONS,
+    SearchConfig,
+    WorldConfig,
+    setting,
+)
+from evolve.config.checks import ConfigError
+from optics.spectra.receptors import RECEPTORS
+
+__all__ = [
+    "INHERITED",
+    "SECTIONS",
+    "TASKS",
+    "ConfigError",
+    "EvaluationConfig",
+    "EyeConfig",
+    "GeneConfig",
+    "LearningConfig",
+    "RunConfig",
+    "SearchConfig",
+    "WorldConfig",
+]
+
+TASKS: Mapping[str, str] = {
+    "navigation": "get as far as possible through a maze of striped corridors",
+    "detection": "reach the goal sphere, avoid two adversaries that differ in stripe orientation only",
+    "tracking": "detection with goal and adversaries that move",
+    "foraging": "reach the goal sphere, avoid an adversary that differs below 400 nm only",
+}
+
+
+LEAST_EXPOSURE = 2e-4  # [lx s]: of some 30 photons from white at a = 1; of few, noise is not what it is taken for
+INHERITED = "genes"  # in place of receptors' name: each animal's are as its spectral genes say
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """Everything that decides a run's outcome, and how many processes work on it.
+
+    Raises:
+        ConfigError: settings that contradict each other.
+    """
+
+    task: str
+    seed: int = setting(0, Interval(0, 2**63 - 1), "seed of search, training and evaluation")
+    workers: int = setting(0, Interval(0, 1024), "worker processes; 0: one per core")
+    eye: EyeConfig = field(default_factory=EyeConfig)
+    world: WorldConfig = field(default_factory=WorldConfig)
+    genome: Mapping[str, GeneConfig] = field(default_factory=lambda: {name: g.default for name, g in GENES.items()})
+    search: SearchConfig = field(default_factory=SearchConfig)
+    learning: LearningConfig = field(default_factory=LearningConfig)
+    evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+
+    def __post_init__(self) -> None:
+        if self.task not in TASKS:
+            raise ConfigError(f"task = {self.task!r}: must be one of {', '.join(TASKS)}", "task")
+        if self.eye.receptors not in (known := (*RECEPTORS, INHERITED)):
+            raise ConfigError(
+                f"eye.receptors = {self.eye.receptors!r}: must be one of {', '.join(known)}", "eye.receptors"
+            )
+        self._check_light()
+        if self.task != "navigation" and self.world != WorldConfig():
+            raise ConfigError(
+                f"world.mazes, world.unseen: {self.task} has no mazes, only navigation has",
+                "world.mazes",
+                "world.unseen",
+            )
+        for name, gene in self.eye.genes.items():
+            _check_gene_use(gene, self.genome[name])
+        self._check_clusters()
+        self._check_phases()
+        rollout = self.learning.n_envs * self.learning.n_steps
+        if self.learning.batch_size > rollout:
+            raise ConfigError(
+                f"learning.batch_size = {self.learning.batch_size}: must be at most n_envs x n_steps = {rollout}",
+                *("learning.batch_size", "learning.n_envs", "learning.n_steps"),
+            )
+        self._check_ladder(rollout)
+        if (cramped := anatomy.contradiction(self.genome, self.eye)) is not None:
+            message, keys = cramped
+            raise ConfigError(message, *keys)
+
+    def _check_light(self) -> None:
+        """So little light that it must be a mistake, or a time to count photons in where none are counted."""
+        light, default = self.eye.illuminance, EyeConfig.integration_time
+        if 0 < light * self.eye.integration_time < LEAST_EXPOSURE:
+            raise ConfigError(
+                f"eye.illuminance = {light:g}, eye.integration_time = {self.eye.integration_time:g}: too few photons; "
+                f"must be at least {LEAST_EXPOSURE:g} lx s together, or eye.illuminance 0, no shot noise",
+                *("eye.illuminance", "eye.integration_time"),
+            )
+        if light == 0 and self.eye.integration_time != default:
+            raise ConfigError(
+                f"eye.integration_time = {self.eye.integration_time:g}: counts photons, and there are none: set "
+                f"eye.illuminance, or leave it at {default:g}",
+                *("eye.integration_time", "eye.illuminance"),
+            )
+
+    def _check_clusters(self) -> None:
+        """Something must be open, and nothing that the run leaves out."""
+        genes = [gene for name, gene in self.eye.genes.items() if self.genome[name].open]
+        opened = {
+            cluster: [f"genome.{gene.name}.open" for gene in genes if gene.cluster == cluster] for cluster in CLUSTERS
+        }
+        if not self.eye.optics and opened["optical"]:
+            raise ConfigError(
+                "eye.optics = false leaves no optical gene to evolve: set genome.optical.open = false",
+                *("eye.optics", *opened["optical"]),
+            )
+        if self.eye.receptors != INHERITED and opened["spectral"]:
+            raise ConfigError(
+                f"eye.receptors = {self.eye.receptors!r} leaves no spectral gene to evolve: set eye.receptors = "
+                f"{INHERITED!r}, or genome.spectral.open = false",
+                *("eye.receptors", *opened["spectral"]),
+            )
+        if not any(use.open for use in self.genome.values()):
+            keys = [f"genome.{name}.open" for name in self.genome]
+            raise ConfigError("genome: every gene is frozen; open at least one (genome.NAME.open = true)", *keys)
+
+    def _check_ladder(self, rollout: int) -> None:
+        """A ladder is climbed by whole generations, and its first rung must teach something."""
+        search = self.search
+        if search.rungs == 1:
+            return
+        if search.steady_state:
+            raise ConfigError(
+                f"search.rungs = {search.rungs}: a ladder needs generations; set search.steady_state = false",
+                *("search.rungs", "search.steady_state"),
+            )
+        first = self.learning.total_steps * search.promoted ** (search.rungs - 1)
+        if first < rollout:
+            raise ConfigError(
+                f"search.rungs = {search.rungs}: the first rung's budget, {first:.0f} steps, is less than one rollout "
+                f"of {rollout} (learning.n_envs x n_steps)",
+                *("search.rungs", "search.promoted", "learning.total_steps"),
+            )
+
+    def _check_phases(self) -> None:
+        """Every open gene must open within the run, and one of them at its beginning."""
+        opening = {name: use.opens_at for name, use in self.genome.items() if use.open}
+        for name, generation in opening.items():
+            if generation >= self.search.generations:
+                raise ConfigError(
+                    f"genome.{name}.opens_at = {generation}: must be below search.generations = "
+                    f"{self.search.generations}, else the gene never opens",
+                    *(f"genome.{name}.opens_at", "search.generations"),
+                )
+        if min(opening.values()) > 0:
+            raise ConfigError(
+                f"genome: no gene opens before generation {min(opening.values())}; one must open at 0",
+                *(f"genome.{name}.opens_at" for name in opening),
+            )
+
+    @property
+    def candidates(self) -> int:
+        """Evaluations in the whole run."""
+        return self.search.population * self.search.generations
+
+
+def _check_gene_use(gene: Gene, use: GeneConfig) -> None:
+    """A gene's search range must be one, and hold its start."""
+    key = f"genome.{gene.name}"
+    if use.start not in gene.range or math.isnan(use.start):
+        raise ConfigError(f"{key}.start = {use.start:g}: must be in {gene.range}", f"{key}.start")
+    if not use.open:
+        return
+    keys = (f"{key}.low", f"{key}.high", f"{key}.start")
+    if not use.low < use.high:
+        raise ConfigError(f"{key}: open, but low = {use.low:g} is not below high = {use.high:g}", *keys[:2])
+    if not use.low <= use.start <= use.high:
+        raise ConfigError(
+            f"{key}.start = {use.start:g}: must be in the searched range [{use.low:g}, {use.high:g}]", *keys
+        )

@@ -1,0 +1,189 @@
+"""The genes: what evolution may change, in which units and ranges, and how a run uses each unless told otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from itertools import product
+from typing import Literal
+
+import numpy as np
+
+from evolve.genome.interval import Interval
+from evolve.genome.relief_genes import doe_own_names
+
+__all__ = [
+    "ALL_GENES",
+    "APERTURE_SHAPES",
+    "CLUSTERS",
+    "FAMILIES",
+    "GENES",
+    "LAMBDA_MAX",
+    "RELIEF_POINTS",
+    "Gene",
+    "GeneConfig",
+    "gene_table",
+    "group_members",
+    "groups_of",
+]
+
+Cluster = Literal["morphological", "optical", "neural", "spectral"]
+CLUSTERS: tuple[Cluster, ...] = ("morphological", "optical", "neural", "spectral")
+FAMILIES = ("doe", "lambda_max")  # genes of one kind: what their names begin with
+RELIEF_POINTS = Interval(4, 9)  # of a relief along one side; names of its genes have a digit for each side
+REAL: Literal["real"] = "real"
+INTEGER: Literal["integer"] = "integer"
+APERTURE_SHAPES = ("circle", "annulus", "slit", "triangle", "square", "pentagon", "hexagon")
+# Where the peaks of the types of receptor start [nm]: red, green and blue as of "rgb", then one in the ultraviolet.
+LAMBDA_MAX: Mapping[str, float] = {f"lambda_max_{i}_nm": peak for i, peak in enumerate((600, 520, 460, 360))}
+
+
+@dataclass(frozen=True)
+class GeneConfig:
+    """How a run uses one gene: evolved over [low, high] from `start` where open, else held at `start`.
+
+    opens_at  the first generation that varies it; until then it is held at its start
+    """
+
+    open: bool
+    low: float
+    high: float
+    start: float
+    opens_at: int = 0
+
+
+@dataclass(frozen=True)
+class Gene:
+    """One gene: the values that make sense at all (`range`) and how a run uses it unless told otherwise (`default`)."""
+
+    name: str
+    cluster: Cluster
+    kind: Literal["real", "integer"]
+    range: Interval
+    default: GeneConfig
+    unit: str
+    meaning: str
+
+    @property
+    def mutation(self) -> str:
+        """How the optimizer "mutation" varies it; any other draws from the distribution it has learnt."""
+        return "Gaussian" if self.kind == "real" else "±1"
+
+    def decode(self, u: float, use: GeneConfig) -> float:
+        """Gene's value at u in [0, 1]. Integers share [0, 1] in equal parts, so the ends are as likely as the rest."""
+        if self.kind == "real":
+            return use.low + u * (use.high - use.low)
+        return min(use.low + float(np.floor(u * (use.high - use.low + 1))), use.high)
+
+    def encode(self, value: float, use: GeneConfig) -> float:
+        """Inverse of `decode`: for integers the middle of the value's part of [0, 1]."""
+        if self.kind == "real":
+            return (value - use.low) / (use.high - use.low)
+        return (value - use.low + 0.5) / (use.high - use.low + 1)
+
+    def mutated(self, u: float, sigma: float, normal: float, step: int, use: GeneConfig) -> float:
+        """u after one mutation: a real gene by `normal` σ's, reflected at the ends; an integer by `step`, kept in."""
+        if self.kind == "integer":
+            value = self.decode(u, use) + step
+            return self.encode(min(max(value, use.low), use.high), use)
+        moved = (u + sigma * normal) % 2.0
+        return min(moved, 2.0 - moved)
+
+
+@lru_cache
+def gene_table(relief_points: int = 4, relief_symmetric: bool = False) -> Mapping[str, Gene]:
+    """Every gene by name, in the order in which they stand in a genome; the relief has relief_points² of them, or those
+    of an eighth of it."""
+    relief = set(doe_own_names(relief_points, relief_symmetric))
+    genes = [*_body(), *_optics(relief_points), *_brain(), *_spectra()]
+    genes = [gene for gene in genes if gene.name in relief or not gene.name.startswith("doe_")]
+    return {gene.name: gene for gene in genes}
+
+
+def _body() -> list[Gene]:
+    gene = partial(_gene, "morphological")
+    return [
+        gene("n_eyes", INTEGER, (1, 16), (1, 16, 1), "", "eyes around the body"),
+        gene("placement_range_deg", REAL, (0, 180), (0, 180, 90), "deg", "arc over which the eyes are spread"),
+        gene("fov_deg", REAL, (1, 100), (1, 100, 45), "deg", "an eye's horizontal field of view"),
+        gene("resolution_height", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, top to bottom"),
+        gene("resolution_width", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, left to right"),
+    ]
+
+
+def _optics(relief_points: int) -> list[Gene]:
+    gene = partial(_gene, "optical")
+    places = list(product(range(relief_points), repeat=2))
+    shapes = ", ".join(f"{number} {name}" for number, name in enumerate(APERTURE_SHAPES))
+    last = len(APERTURE_SHAPES) - 1
+    return [
+        # Below a hundredth (a radius of 1 µm in a 200 µm eye) the pupil is no wider than the wavelengths it admits.
+        gene("relative_aperture", REAL, (0.01, 1), (0.01, 1, 0.5), "", "pupil diameter / retina width"),
+        *(
+            gene(f"doe_{i}{j}", REAL, (0, 1), (0, 1, 0.5), "relief height", f"relief control point ({i}, {j})")
+            for i, j in places
+        ),
+        gene("refractive_index", REAL, (1, 2), (1, 2, 1.5), "", "index of the relief's material, at 588 nm"),
+        # Glasses reach from 1/90 to 1/20; 0 is a material that does not disperse.
+        _held(gene("dispersion", REAL, (0, 0.1), (0, 0.05, 0), "1 / Abbe number", "fall of the index with wavelength")),
+        _held(gene("aperture_shape", INTEGER, (0, last), (0, last, 0), "", f"pupil: {shapes}")),
+    ]
+
+
+def _brain() -> list[Gene]:
+    gene = partial(_gene, "neural")
+    return [
+        gene("memory_frames", INTEGER, (1, 32), (1, 10, 5), "frames", "past frames that the brain sees"),
+        gene("neurons", INTEGER, (1, 512), (1, 512, 64), "", "neurons in each hidden layer"),
+        _held(gene("layers", INTEGER, (1, 4), (1, 4, 2), "", "hidden layers of actor and critic")),
+    ]
+
+
+def _spectra() -> list[Gene]:
+    """Types of receptor, and what each is most sensitive to. Pigments are known from 357 to 620 nm; the template's
+    limits, 330 and 700 nm, are optics'."""
+    gene, most = partial(_gene, "spectral"), len(LAMBDA_MAX)
+    return [
+        _held(gene("receptor_types", INTEGER, (1, most), (1, most, 3), "", "types of receptor, one channel each")),
+        *(
+            _held(gene(name, REAL, (330, 700), (330, 650, start), "nm", f"peak of receptor type {i}'s pigment"))
+            for i, (name, start) in enumerate(LAMBDA_MAX.items())
+        ),
+    ]
+
+
+def _gene(
+    cluster: Cluster,
+    name: str,
+    kind: Literal["real", "integer"],
+    valid: tuple[float, float],
+    search: tuple[float, float, float],
+    unit: str,
+    meaning: str,
+) -> Gene:
+    """A gene, open unless told otherwise; `search` is (low, high, start)."""
+    low, high, start = map(float, search)
+    return Gene(name, cluster, kind, Interval(*valid), GeneConfig(True, low, high, start), unit, meaning)
+
+
+def _held(gene: Gene) -> Gene:
+    """The same gene, frozen unless told otherwise."""
+    return replace(gene, default=replace(gene.default, open=False))
+
+
+GENES: Mapping[str, Gene] = gene_table()
+ALL_GENES: Mapping[str, Gene] = gene_table(int(RELIEF_POINTS.high))
+
+
+def group_members(name: str) -> tuple[str, ...]:
+    """Genes that a cluster's name, a family's or a gene's own stands for; () if it is none of them."""
+    return tuple(gene for gene in ALL_GENES if name in (gene, *groups_of(gene)))
+
+
+def groups_of(name: str) -> tuple[str, ...]:
+    """Groups that a gene belongs to, the narrowest first; () for what is no gene."""
+    if name not in ALL_GENES:
+        return ()
+    families = tuple(family for family in FAMILIES if name.startswith(f"{family}_"))
+    return (*families, ALL_GENES[name].cluster)

@@ -1,0 +1,69 @@
+"""The encoding: how a genome, a vector in [0, 1]^d, stands for the values of the open genes (`evolve.genome.genes`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evolve.genome.genes import ALL_GENES, CLUSTERS, GENES, Gene, GeneConfig, group_members
+
+__all__ = ["CLUSTERS", "GENES", "Gene", "GeneConfig", "Genotype", "group_members"]
+
+
+@dataclass(frozen=True)
+class Genotype:
+    """The encoding of one run: which genes are open, in which order they stand in the genome, and over what range.
+
+    A gene that opens in a later generation has its place in the genome from the first, and holds its start there.
+    """
+
+    uses: Mapping[str, GeneConfig]
+
+    @cached_property
+    def open_genes(self) -> tuple[Gene, ...]:
+        return tuple(gene for name, gene in ALL_GENES.items() if name in self.uses and self.uses[name].open)
+
+    @property
+    def dimension(self) -> int:
+        return len(self.open_genes)
+
+    @property
+    def start(self) -> NDArray[np.float64]:
+        """Genome of the start phenotype, (dimension,)."""
+        uses = self.uses
+        return np.array([gene.encode(uses[gene.name].start, uses[gene.name]) for gene in self.open_genes])
+
+    @cached_property
+    def phases(self) -> tuple[int, ...]:
+        """Generations in which a gene opens, ascending."""
+        return tuple(sorted({self.uses[gene.name].opens_at for gene in self.open_genes}))
+
+    def varied(self, generation: int) -> NDArray[np.intp]:
+        """Places in the genome of the genes that are varied in a generation."""
+        return np.array([i for i, g in enumerate(self.open_genes) if self.uses[g.name].opens_at <= generation], np.intp)
+
+    def decode(self, genome: NDArray[np.float64]) -> dict[str, float]:
+        """Value of every gene, open or not. Total: coordinates outside [0, 1] are clipped.
+
+        Raises:
+            ValueError: `genome` has another length than `dimension`, or is not finite.
+        """
+        genome = np.asarray(genome, dtype=np.float64)
+        if genome.shape != (self.dimension,) or not np.all(np.isfinite(genome)):
+            raise ValueError(f"genome must be {self.dimension} finite numbers, got an array of shape {genome.shape}")
+        values = {name: use.start for name, use in self.uses.items()}
+        for gene, u in zip(self.open_genes, np.clip(genome, 0.0, 1.0), strict=True):
+            values[gene.name] = gene.decode(float(u), self.uses[gene.name])
+        return values
+
+    def count(self, steps: int) -> float:
+        """Genotypes there are if a real gene has `steps` values that differ."""
+        sizes = [
+            self.uses[g.name].high - self.uses[g.name].low + 1 if g.kind == "integer" else steps
+            for g in self.open_genes
+        ]
+        return float(np.prod(np.array(sizes, dtype=np.float64)))

@@ -1,0 +1,140 @@
+"""Development: from gene values to the animal that is simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isqrt
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evolve.genome.anatomy import fitted
+from evolve.config.run_config import EyeConfig, INHERITED, RunConfig
+from evolve.genome.genes import APERTURE_SHAPES, LAMBDA_MAX
+from evolve.genome.genotype import Genotype
+from evolve.genome.relief_genes import doe_own_names
+
+if TYPE_CHECKING:
+    import optics
+    import sim
+
+__all__ = ["Phenotype", "develop", "repaired"]
+
+ANNULUS_INNER = 0.5  # radius of what an annulus leaves out, in pupil radii
+SLIT_ASPECT = 4.0  # height of an upright slit / its width
+
+
+@dataclass(frozen=True)
+class Phenotype:
+    """An animal: its eyes and its brain.
+
+    `relative_aperture`, `relief` and `refractive_index` are None together: optics off, a perfect lens.
+    `relief` holds N x N heights in [0, 1], row-major (y, x): for N = 4 control points of a bicubic B-spline patch, for
+    more the heights at cell centres that a cubic spline goes through.
+    `aperture_shape` is a place in APERTURE_SHAPES, `dispersion` the inverse of the relief's Abbe number.
+    `lambda_max_nm` are the peaks of its receptor types' pigments; None: the receptors that all eyes of the run have.
+    """
+
+    n_eyes: int
+    placement_range_deg: float
+    fov_deg: float
+    resolution: tuple[int, int]
+    relative_aperture: float | None
+    relief: tuple[float, ...] | None
+    refractive_index: float | None
+    memory_frames: int
+    neurons: int
+    aperture_shape: int = 0
+    dispersion: float = 0.0
+    layers: int = 2
+    lambda_max_nm: tuple[float, ...] | None = None
+
+    def pupil(self, eye: EyeConfig) -> optics.Pupil | None:
+        """Pupil of each of the eyes; None for the perfect lens."""
+        import optics
+
+        if self.relative_aperture is None or self.relief is None or self.refractive_index is None:
+            return None
+        side = isqrt(len(self.relief))
+        heights = eye.relief_height * np.reshape(self.relief, (side, side))
+        abbe_number = np.inf if self.dispersion == 0 else 1 / self.dispersion
+        return optics.Pupil(
+            aperture_radius=0.5 * self.relative_aperture * eye.sensor_width,
+            height=optics.BSplineRelief(heights) if side == 4 else heights,
+            n=optics.RefractiveIndex.from_abbe(self.refractive_index, abbe_number),
+            aperture=_aperture(APERTURE_SHAPES[self.aperture_shape]),
+        )
+
+    def eyes(self, eye: EyeConfig) -> sim.Eyes:
+        """The eyes as the simulation wants them."""
+        import optics
+        import sim
+
+        return sim.Eyes(
+            n_eyes=self.n_eyes,
+            resolution=self.resolution,
+            fov_deg=self.fov_deg,
+            placement_range_deg=self.placement_range_deg,
+            optics=self.pupil(eye),
+            sensor_width=eye.sensor_width,
+            noise_sigma=eye.noise_sigma,
+            photon_budget=optics.PhotonBudget(eye.illuminance, eye.integration_time) if eye.illuminance else None,
+            bands=eye.bands,
+            receptors=eye.receptors if self.lambda_max_nm is None else self.lambda_max_nm,
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values for a run file."""
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> Phenotype:
+        """Inverse of `to_json`; raises TypeError where a field is missing or unknown."""
+        values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in record.items()}
+        return cls(**values)
+
+
+def develop(genome: NDArray[np.float64], config: RunConfig) -> Phenotype:
+    """Phenotype of a genome under a run's config; every genome of the right length has one, and its eyes fit."""
+    values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
+    seen_through = config.eye.optics
+    relief = tuple(values[name] for name in doe_own_names(config.eye.relief_points, config.eye.relief_symmetric))
+    peaks = tuple(values[name] for name in LAMBDA_MAX)[: int(values["receptor_types"])]
+    return Phenotype(
+        n_eyes=int(values["n_eyes"]),
+        placement_range_deg=values["placement_range_deg"],
+        fov_deg=values["fov_deg"],
+        resolution=(int(values["resolution_height"]), int(values["resolution_width"])),
+        relative_aperture=values["relative_aperture"] if seen_through else None,
+        relief=relief if seen_through else None,
+        refractive_index=values["refractive_index"] if seen_through else None,
+        memory_frames=int(values["memory_frames"]),
+        neurons=int(values["neurons"]),
+        aperture_shape=int(values["aperture_shape"]) if seen_through else 0,
+        dispersion=values["dispersion"] if seen_through else 0.0,
+        layers=int(values["layers"]),
+        lambda_max_nm=peaks if config.eye.receptors == INHERITED else None,
+    )
+
+
+def repaired(genome: NDArray[np.float64], config: RunConfig) -> tuple[str, ...]:
+    """Genes whose values had to change so that nothing overlaps; () for a genome that develops as it says."""
+    asked = Genotype(config.genome).decode(genome)
+    fits = fitted(asked, config.genome, config.eye)
+    return tuple(name for name, value in asked.items() if fits[name] != value)
+
+
+def _aperture(shape: str) -> Any:
+    """The pupil's shape, in units of its radius."""
+    import optics
+
+    if shape == "circle":
+        return optics.Circle()
+    if shape == "annulus":
+        return optics.Annulus(ANNULUS_INNER)
+    if shape == "slit":
+        width = 2 / np.hypot(1, SLIT_ASPECT)
+        return optics.Slit(width, SLIT_ASPECT * width)
+    return optics.Polygon.regular(3 + APERTURE_SHAPES.index(shape) - APERTURE_SHAPES.index("triangle"), 90.0)

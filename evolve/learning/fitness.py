@@ -1,0 +1,122 @@
+"""Fitness: a candidate's life. It learns, then plays the evaluation episodes, whose mean return is its fitness."""
+
+from __future__ import annotations
+
+import math
+import time
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import sim
+from evolve.learning.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from evolve.config.run_config import RunConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.store.evaluation import Evaluation
+from evolve.search.successive_halving import Stretch
+from evolve.learning.ppo import Episodes, Progress, Training, play, train
+from evolve.learning.policy import TrainingDiverged, save_policy
+
+__all__ = ["evaluate"]
+
+
+def evaluate(
+    phenotype: Phenotype,
+    config: RunConfig,
+    seed: int,
+    policy_path: Path,
+    progress: Progress | None = None,
+    stretch: Stretch | None = None,
+) -> Evaluation:
+    """Train one candidate, write its policy, and measure its fitness; same arguments, same outcome on one machine.
+
+    seed         of the policy's first weights, of all worlds and of all chance in learning
+    policy_path  where the trained policy is written (safetensors); nothing is written if learning diverged
+    progress     told (steps trained, steps planned) after every rollout
+    stretch      how far to train, and from where (`evolve.search.successive_halving`); None: a whole training
+
+    A training that diverges is a failed Evaluation, not an exception.
+    """
+    began = time.perf_counter()
+    try:
+        if stretch is None:
+            training, episodes = _live(phenotype, config, seed, progress)
+        else:
+            training, episodes = _climb(phenotype, config, seed, progress, stretch)
+    except TrainingDiverged as error:
+        return Evaluation.failed(str(error), time.perf_counter() - began)
+    save_policy(training.policy, policy_path)
+    return Evaluation(
+        fitness=float(episodes.returns.mean()),
+        returns=tuple(episodes.returns.tolist()),
+        success_rate=float(episodes.successes.mean()),
+        steps=training.steps,
+        seconds=time.perf_counter() - began,
+        curve=training.curve,
+    )
+
+
+def _climb(
+    phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress | None, stretch: Stretch
+) -> tuple[Training, Episodes]:
+    """Up to the stretch's last rung, from the highest one below whose checkpoint there is."""
+    begun, first = None, 0
+    for rung in reversed(range(stretch.rung)):
+        if begun is None and (begun := load_checkpoint(stretch.checkpoints[rung])) is not None:
+            first = rung + 1
+    for rung in range(first, stretch.rung + 1):
+        learning = replace(config.learning, total_steps=stretch.budgets[rung])
+        # No ladder in a rung: a little budget, divided once more, may be too little for one.
+        life = replace(config, learning=learning, search=replace(config.search, rungs=1))
+        entropy = [seed, rung] if rung else seed  # the first rung begins as a whole training does
+        training, episodes = _live(phenotype, life, entropy, progress, begun)
+        begun = training.end
+        save_checkpoint(begun, stretch.checkpoints[rung])
+    return training, episodes
+
+
+def _live(
+    phenotype: Phenotype,
+    config: RunConfig,
+    entropy: int | list[int],
+    progress: Progress | None,
+    begun: Checkpoint | None = None,
+) -> tuple[Training, Episodes]:
+    """Training, and the evaluation episodes after it, from starts and objects' places never seen before. Mazes are
+    the same for all of a run, and of all runs."""
+    weights, worlds, evaluation = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
+    eyes = phenotype.eyes(config.eye)
+    common: dict[str, Any] = {"eyes": eyes, "memory": phenotype.memory_frames}
+    closely: dict[str, Any] = {"rays_per_receptor": config.eye.rays_per_receptor}
+    evaluation_worlds = sim.make_vec_env(
+        config.task,
+        n_envs=config.evaluation.episodes,
+        seed=evaluation,
+        mode="evaluation",
+        **{**common, **closely, **config.world.evaluation},
+    )
+    coarse = _coarser(evaluation_worlds.renderer.fidelity, eyes, config.learning.rays_per_eye)
+    coarsely: dict[str, Any] = {"rays_per_receptor": coarse}
+    training_worlds = sim.make_vec_env(
+        config.task,
+        n_envs=config.learning.n_envs,
+        seed=worlds,
+        mode="training",
+        **{**common, **coarsely, **config.world.training},
+    )
+    with closing(training_worlds), closing(evaluation_worlds):
+        brain: dict[str, Any] = {"neurons": phenotype.neurons, "layers": phenotype.layers, "begun": begun}
+        training = train(
+            training_worlds, evaluation_worlds, config=config.learning, seed=weights, progress=progress, **brain
+        )
+        return training, play(training.policy, evaluation_worlds, evaluation)
+
+
+def _coarser(fidelity: sim.Fidelity, eyes: sim.Eyes, rays_per_eye: float) -> sim.Fidelity:
+    """With so many rays at most, but one per receptor: what to learn from. Noise of the signals averages out over a
+    training, and errors of so few rays are the same at every look."""
+    most = max(1.0, rays_per_eye / math.prod(eyes.resolution))
+    return replace(fidelity, rays_per_receptor=min(fidelity.rays_per_receptor, most))

@@ -1,0 +1,262 @@
+"""Learning within a lifetime: PPO (stable-baselines3) on batched worlds, until it is solved, stuck or out of steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.buffers import RolloutBuffer
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
+
+from evolve.learning.adam import Adam
+from evolve.learning.checkpoint import Checkpoint
+from evolve.config.run_config import LearningConfig
+from evolve.learning.policy import EyePolicy, TrainingDiverged, learnt, set_learnt
+from evolve.learning.rollout_buffer import FrameRolloutBuffer
+
+CONTACT_FIRST = 0.1  # of what contact costs in the end; with a third, agents turned on the spot
+UNIT_RATE = 0.2  # of the way to the spread of the last returns, per rollout
+FLAT = 1e-6  # spread of returns that all are the same
+
+Progress = Callable[[int, int], None]  # (steps trained, steps planned)
+
+
+@dataclass(frozen=True)
+class Training:
+    """What became of a training.
+
+    policy  as it was at the best evaluation
+    steps   environment steps taken, in whole rollouts
+    curve   (steps, mean return of the evaluation episodes), every `eval_interval` steps
+    end     as it stands at its end, for a training that goes on from there
+    """
+
+    policy: EyePolicy
+    steps: int
+    curve: tuple[tuple[int, float], ...]
+    end: Checkpoint
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """One whole episode of each world.
+
+    returns (world,) · first_events (world,): what was reached first, +1 the goal, -1 an adversary, 0 nothing
+    """
+
+    returns: np.ndarray
+    first_events: np.ndarray
+
+    @property
+    def successes(self) -> np.ndarray:
+        """Where the goal was reached, and before any adversary, (world,) bool."""
+        return self.first_events > 0
+
+
+class RewardsInUnits(VecEnvWrapper):
+    """Worlds whose rewards come in units that the learner sets, and in which contact costs a share of its price."""
+
+    def __init__(self, worlds: VecEnv) -> None:
+        super().__init__(worlds)
+        self.unit = self.contact_share = 1.0
+
+    def reset(self) -> dict[str, np.ndarray]:
+        observation: dict[str, np.ndarray] = self.venv.reset()
+        return observation
+
+    def step_wait(self) -> VecEnvStepReturn:
+        observation, reward, done, infos = self.venv.step_wait()
+        if self.contact_share < 1:
+            price = np.array([terms["contact"] for terms in map(_terms, infos)], np.float32)
+            reward = reward - np.float32(1 - self.contact_share) * price
+        return observation, reward / np.float32(self.unit), done, infos
+
+
+class AdaptingPPO(PPO):
+    """PPO whose policy adapts to the signals it meets, and which stops at the first rollout or update that is not
+    finite, instead of learning nonsense from it."""
+
+    rollout_buffer: FrameRolloutBuffer
+    policy: EyePolicy
+    contact_ramp = 0  # steps
+    decay_after = 1  # steps
+
+    def _update_learning_rate(self, optimizers: Adam) -> None:
+        """Not by the part of a plan that is done, as SB3 does: a training goes the same way whatever is planned."""
+        optimizers.param_groups[0]["lr"] = self.learning_rate * min(1.0, self.decay_after / self.num_timesteps)
+
+    def collect_rollouts(
+        self, env: VecEnv, callback: BaseCallback, rollout_buffer: RolloutBuffer, n_rollout_steps: int
+    ) -> bool:
+        if self.num_timesteps == 0:
+            self.policy.features_extractor.adapt(torch.from_numpy(self._last_obs["eyes"][:, -1]))
+        self.env.contact_share = contact_share(self.num_timesteps, self.contact_ramp)
+        return super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps)
+
+    def train(self) -> None:
+        for name in ("rewards", "values", "log_probs"):
+            _require_finite(name, getattr(self.rollout_buffer, name), self.num_timesteps)
+        super().train()
+        # A loss that overflows leaves the weights alone (SB3 clips its gradient to zero), and nothing is learnt.
+        _require_finite("loss", np.asarray(self.logger.name_to_value["train/value_loss"]), self.num_timesteps)
+        for name, parameter in self.policy.named_parameters():
+            _require_finite(f"policy's {name}", parameter.detach().numpy(), self.num_timesteps)
+        # Not before: the update compares the policy with what it was when it acted. Neighbouring frames are alike.
+        self.policy.features_extractor.adapt(torch.from_numpy(self.rollout_buffer.new_frames[:, ::8]))
+        self._adapt_unit()
+
+    @torch.no_grad()
+    def _adapt_unit(self) -> None:
+        """Measure rewards in units of the spread of returns; what the critic says of the worlds stays the same
+        (Pop-Art: van Hasselt et al. 2016, eq. 5)."""
+        change = max(float(self.rollout_buffer.returns.std()), FLAT)
+        if self.num_timesteps > self.rollout_buffer.rewards.size:  # not the first rollout: forget gradually
+            change **= UNIT_RATE
+        self.env.unit *= change
+        for parameter in self.policy.value_net.parameters():
+            parameter.div_(change)
+
+    def checkpoint(self, curve: list[tuple[int, float]], best: dict[str, torch.Tensor]) -> Checkpoint:
+        """The training as it stands; curve and best are kept outside."""
+        now = {name: tensor.detach().clone() for name, tensor in learnt(self.policy).items()}
+        adam = self.policy.optimizer.state_dict()
+        return Checkpoint(self.num_timesteps, tuple(curve), float(self.env.unit), now, best, adam)
+
+    def restore(self, begun: Checkpoint) -> None:
+        """Go on from there; worlds and chance are this learner's own."""
+        self.num_timesteps = begun.steps
+        self.env.unit = begun.unit
+        set_learnt(self.policy, begun.now)
+        self.policy.optimizer.load_state_dict(begun.adam)
+
+
+def contact_share(steps: int, ramp: int) -> float:
+    """Of its whole price, what contact costs after so many steps: CONTACT_FIRST for a third of the ramp, then more by
+    the same factor each step.
+
+    Agents that pay for contact before they can steer learn to stand still, which costs nothing, and never steer.
+    """
+    if steps >= ramp:
+        return 1.0
+    return float(CONTACT_FIRST ** min(1.0, 1.5 * (1 - steps / ramp)))
+
+
+def _require_finite(name: str, values: np.ndarray, steps: int) -> None:
+    if not np.isfinite(values).all():
+        raise TrainingDiverged(f"{name} not finite after {steps} steps")
+
+
+class _Report(BaseCallback):
+    """Tells how far the training is, after every rollout."""
+
+    def __init__(self, progress: Progress, planned: int) -> None:
+        super().__init__()
+        self.progress, self.planned = progress, planned
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        self.progress(self.num_timesteps, self.planned)
+
+
+def learner(worlds: VecEnv, neurons: int, config: LearningConfig, seed: int, layers: int = 2) -> AdaptingPPO:
+    """A learner that has learnt nothing yet. It sees rewards in units of the spread of its discounted returns, so
+    that an agent's first minutes at a wall, a hundred times as bad as anything later, do not swamp the critic."""
+    torch.set_num_threads(1)
+    seed = int(np.random.SeedSequence(seed).generate_state(1)[0])  # SB3 takes 32 bits
+    model = AdaptingPPO(
+        EyePolicy,
+        RewardsInUnits(worlds),
+        n_steps=config.n_steps,
+        batch_size=config.batch_size,
+        n_epochs=config.n_epochs,
+        learning_rate=config.learning_rate,
+        gamma=config.gamma,
+        gae_lambda=config.gae_lambda,
+        vf_coef=config.value_weight,
+        seed=seed,
+        device="cpu",
+        policy_kwargs={"neurons": neurons, "layers": layers, "first_speed": config.first_speed},
+        rollout_buffer_class=FrameRolloutBuffer,
+        rollout_buffer_kwargs={"seed": seed},
+    )
+    model.contact_ramp, model.decay_after = config.contact_ramp, config.decay_after
+    model.set_logger(Logger(None, []))
+    return model
+
+
+def train(
+    worlds: VecEnv,
+    evaluation_worlds: VecEnv,
+    neurons: int,
+    config: LearningConfig,
+    seed: int,
+    progress: Progress | None = None,
+    layers: int = 2,
+    begun: Checkpoint | None = None,
+) -> Training:
+    """Learn to act in `worlds`: same arguments, same policy, bit for bit (on one machine). A training `begun` goes on
+    from there, its steps counted.
+
+    After every `eval_interval` steps the policy plays one episode in each of the evaluation worlds; learning ends
+    after `patience` such evaluations without a better mean return, or after `total_steps`. The policy returned
+    is the one with the best mean return (the earliest of them).
+
+    Raises TrainingDiverged where rewards, loss, weights or actions stop being finite.
+    """
+    model = learner(worlds, neurons, config, seed, layers)
+    report = _Report(progress, config.total_steps) if progress else None
+    curve: list[tuple[int, float]] = []
+    best: dict[str, torch.Tensor] = {}
+    if begun is not None:
+        curve, best = list(begun.curve), dict(begun.best)
+        model.restore(begun)
+    while model.num_timesteps < config.total_steps and not stuck(curve, config.patience):
+        stretch = min(config.eval_interval, config.total_steps - model.num_timesteps)
+        model.learn(stretch, callback=report, reset_num_timesteps=False)
+        mean_return = float(play(model.policy, evaluation_worlds, seed).returns.mean())
+        if not curve or mean_return > max(value for _, value in curve):
+            best = {name: tensor.detach().clone() for name, tensor in learnt(model.policy).items()}
+        curve.append((model.num_timesteps, mean_return))
+    end = model.checkpoint(curve, best)
+    set_learnt(model.policy, best)
+    return Training(model.policy, model.num_timesteps, tuple(curve), end)
+
+
+def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
+    """Whether the last `patience` evaluations all failed to better the best one before them."""
+    returns = [value for _, value in curve]
+    return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
+
+
+def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
+    """One episode in each world, from a reset with this seed, the policy acting without exploration."""
+    worlds.seed(seed)
+    observation = worlds.reset()
+    returns = np.zeros(worlds.num_envs)
+    playing = np.ones(worlds.num_envs, bool)
+    first_event = np.zeros(worlds.num_envs)
+    while playing.any():
+        action, _ = policy.predict(observation, deterministic=True)
+        observation, reward, done, infos = worlds.step(action)
+        returns[playing] += reward[playing]
+        events = np.array([np.sign(terms["goal"] + terms["adversary"]) for terms in map(_terms, infos)])
+        first_event = np.where(playing & (first_event == 0), events, first_event)
+        playing &= ~done
+    if not math.isfinite(returns.sum()):
+        raise TrainingDiverged("returns of the evaluation episodes not finite")
+    return Episodes(returns, first_event)
+
+
+def _terms(info: dict[str, Any]) -> dict[str, float]:
+    terms: dict[str, float] = info["reward_terms"]
+    return terms

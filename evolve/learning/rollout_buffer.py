@@ -1,0 +1,113 @@
+"""The rollout buffer of a learner with memory: every frame is kept once, and encoded once per mini-batch.
+
+SB3's own buffer keeps the stacked observation, `memory` copies of each frame (221 MB at 64 worlds x 64 steps of
+2 x 15 x 15 receptors with 10 frames), and PPO then encodes every copy. Here a mini-batch is a set of segments:
+stretches of consecutive steps of one world, whose windows of remembered frames overlap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.buffers import RolloutBuffer
+from stable_baselines3.common.type_aliases import DictRolloutBufferSamples
+from torch import Tensor
+
+SEGMENT_STEPS = 8  # at most: longer ones share more frames, shorter ones mix better (docs/design.md has 8 beside 32)
+
+
+class FrameRolloutBuffer(RolloutBuffer):
+    """Rollout buffer that yields unstacked observations, as `evolve.learning.policy.EyeFeatures` understands them.
+
+    Frames before an episode's first repeat it, in the environment's stack as here.
+    """
+
+    observation_space: spaces.Dict
+
+    def __init__(self, *args: Any, seed: int = 0, **kwargs: Any) -> None:
+        self.random = np.random.default_rng(seed)
+        super().__init__(*args, **kwargs)
+        self.memory, *frame = self.observation_space["eyes"].shape
+        self.segment_steps = max(n for n in range(1, SEGMENT_STEPS + 1) if self.buffer_size % n == 0)
+        worlds, steps = self.n_envs, self.buffer_size
+        self.frames = np.zeros((worlds, self.memory - 1 + steps, *frame), np.float32)
+        self.age = np.zeros((worlds, steps), np.int64)
+        self.contact = np.zeros((worlds, steps, 1), np.float32)
+        self.previous_action = np.zeros((worlds, steps, 2), np.float32)
+
+    def reset(self) -> None:
+        shape = (self.buffer_size, self.n_envs)
+        self.actions = np.zeros((*shape, self.action_dim), np.float32)
+        self.rewards, self.returns, self.episode_starts, self.values, self.log_probs, self.advantages = (
+            np.zeros(shape, np.float32) for _ in range(6)
+        )
+        self.pos, self.full = 0, False
+
+    def add(
+        self,
+        obs: dict[str, np.ndarray],
+        action: np.ndarray,
+        reward: np.ndarray,
+        episode_start: np.ndarray,
+        value: Tensor,
+        log_prob: Tensor,
+    ) -> None:
+        step, remembered = self.pos, self.memory - 1
+        if step == 0:
+            # What came before the rollout is kept as it was stacked, repetitions included: older than any window.
+            self.frames[:, :remembered] = obs["eyes"][:, :-1]
+            self.age[:, 0] = remembered
+        else:
+            self.age[:, step] = np.where(episode_start, 0, self.age[:, step - 1] + 1)
+        self.frames[:, remembered + step] = obs["eyes"][:, -1]
+        self.contact[:, step] = obs["contact"]
+        self.previous_action[:, step] = obs["previous_action"]
+        self.actions[step] = action.reshape(self.n_envs, self.action_dim)
+        self.rewards[step] = reward
+        self.episode_starts[step] = episode_start
+        self.values[step] = value.numpy().ravel()
+        self.log_probs[step] = log_prob.numpy()
+        self.pos += 1
+        self.full = self.pos == self.buffer_size
+
+    @property
+    def new_frames(self) -> np.ndarray:
+        """The frames of this rollout's steps, (world, step, eye, channel, height, width)."""
+        return self.frames[:, self.memory - 1 :]
+
+    def get(self, batch_size: int | None = None) -> Iterator[DictRolloutBufferSamples]:
+        """Mini-batches of whole segments, about `batch_size` samples each, every sample once per call."""
+        assert self.full
+        starts = np.arange(0, self.buffer_size, self.segment_steps)
+        worlds, starts = (a.ravel() for a in np.meshgrid(np.arange(self.n_envs), starts, indexing="ij"))
+        order = self.random.permutation(len(worlds))
+        per_batch = max(1, (batch_size or self.buffer_size * self.n_envs) // self.segment_steps)
+        for first in range(0, len(order), per_batch):
+            chosen = order[first : first + per_batch]
+            yield self._segments(worlds[chosen, None], starts[chosen, None])
+
+    def _segments(self, worlds: np.ndarray, starts: np.ndarray) -> DictRolloutBufferSamples:
+        """The samples of segments, (segment, step) flattened; worlds and starts (segment, 1)."""
+        steps = starts + np.arange(self.segment_steps)
+        frames = starts + np.arange(self.memory - 1 + self.segment_steps)
+
+        def samples(array: np.ndarray) -> Tensor:
+            return torch.from_numpy(array[steps, worlds].reshape(-1, *array.shape[2:]))
+
+        return DictRolloutBufferSamples(
+            observations={
+                "frames": torch.from_numpy(self.frames[worlds, frames]),
+                "age": torch.from_numpy(self.age[worlds, steps]),
+                "contact": torch.from_numpy(self.contact[worlds, steps].reshape(-1, 1)),
+                "previous_action": torch.from_numpy(self.previous_action[worlds, steps].reshape(-1, 2)),
+            },
+            actions=samples(self.actions),
+            old_values=samples(self.values),
+            old_log_prob=samples(self.log_probs),
+            advantages=samples(self.advantages),
+            returns=samples(self.returns),
+        )

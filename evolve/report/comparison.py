@@ -1,0 +1,111 @@
+"""Runs side by side: how far each came, at what cost, and in which settings they differ."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, generation_statistics
+from evolve.store.atomic_files import write_whole
+from evolve.report.figures import comparison_figure
+from evolve.report.markup import document, figure, section, table, text
+from evolve.store.directory import Run
+
+__all__ = ["differing_settings", "lines", "summary", "write_page"]
+
+OF_THE_BEST = ("best candidate", "fitness", "95 % interval", "success rate", "acuity [cpd]")
+
+
+def summary(run: Run) -> dict[str, Any]:
+    """One run as plain values, such as JSON has; those of the best candidate are None before one has succeeded, its
+    interval also after a single episode."""
+    best = run.best
+    interval = None if best is None else bootstrap_interval(best.returns)
+    return {
+        "run": str(run.path),
+        "task": run.config.task,
+        "evaluated": len(run.candidates),
+        "planned": run.config.candidates,
+        "failed": sum(candidate.failure is not None for candidate in run.candidates),
+        "best": None if best is None else best.id,
+        "generation": None if best is None else best.generation,
+        "fitness": None if best is None else best.fitness,
+        "fitness_interval": None if interval is None or math.isnan(interval[0]) else interval,
+        "success_rate": None if best is None else best.success_rate,
+        "acuity_cpd": None if best is None else acuity_cpd(best.phenotype),
+        "steps": sum(candidate.steps for candidate in run.candidates),
+        "hours": sum(candidate.seconds for candidate in run.candidates) / 3600,
+        "best_so_far": [
+            None if math.isnan(row.best_so_far) else row.best_so_far for row in generation_statistics(run.candidates)
+        ],
+    }
+
+
+def differing_settings(runs: Sequence[Run]) -> dict[str, list[Any]]:
+    """Dotted settings in which the runs' configs differ, a value for each run; None where one has no such setting."""
+    flat = [dict(_flat(asdict(run.config))) for run in runs]
+    names = list(dict.fromkeys(name for settings in flat for name in settings))
+    values = {name: [settings.get(name) for settings in flat] for name in names}
+    return {name: row for name, row in values.items() if any(value != row[0] for value in row)}
+
+
+def lines(runs: Sequence[Run]) -> list[str]:
+    """The comparison as a table for a terminal: a row per quantity, a column per run."""
+    columns = [_column(summary(run)) for run in runs]
+    rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
+    settings = [(name, *(_shown(value) for value in row)) for name, row in differing_settings(runs).items()]
+    rows += [("settings that differ", *("" for _ in runs)), *settings] if settings else []
+    widths = [max(len(row[place]) for row in rows) for place in range(len(runs) + 1)]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def write_page(runs: Sequence[Run], path: Path) -> None:
+    """An HTML page of best fitness over the generations and the table, whole or not at all."""
+    columns = [_column(summary(run)) for run in runs]
+    rows = [[text(name), *(text(column[name]) for column in columns)] for name in list(columns[0])[1:]]
+    rows += [[text(name), *(text(_shown(v)) for v in row)] for name, row in differing_settings(runs).items()]
+    curves = {str(run.path): generation_statistics(run.candidates) for run in runs}
+    caption = "<b>Best fitness so far</b> over the generations, a line per run."
+    drawn = figure(comparison_figure({name: rows for name, rows in curves.items() if rows}), caption)
+    header = ["", *(text(column["run"]) for column in columns)]
+    body = f"<header><h1>{len(runs)} runs</h1></header>\n" + section(
+        "runs", "Side by side", f'<div class="figures">{drawn}</div>\n{table(header, rows, "comparison")}'
+    )
+    write_whole(path, document("runs side by side", body))
+
+
+def _column(one: Mapping[str, Any]) -> dict[str, str]:
+    """A summary's values as text, under the names of their rows."""
+    column = {
+        "run": one["run"],
+        "task": one["task"],
+        "evaluated": f"{one['evaluated']} of {one['planned']}" + (f", {one['failed']} failed" * bool(one["failed"])),
+        "steps trained": f"{one['steps']:,}",
+        "hours, all workers": f"{one['hours']:.2f}",
+    }
+    if one["best"] is None:
+        return column | dict.fromkeys(OF_THE_BEST, "-")
+    interval = one["fitness_interval"]
+    values = (
+        f"{one['best']}, generation {one['generation']}",
+        f"{one['fitness']:.4g}",
+        "-" if interval is None else f"{interval[0]:.4g} to {interval[1]:.4g}",
+        f"{one['success_rate']:.0%}",
+        f"{one['acuity_cpd']:.3g}",
+    )
+    return column | dict(zip(OF_THE_BEST, values, strict=True))
+
+
+def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _shown(value: Any) -> str:
+    return "-" if value is None else f"{value:g}" if isinstance(value, float) else str(value).lower()

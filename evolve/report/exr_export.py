@@ -1,0 +1,66 @@
+"""What an agent saw, as a sequence of spectral EXR files for any tool that reads them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import sim
+from evolve.analysis.episode import Episode, record
+from evolve.store.directory import Run
+
+__all__ = ["export_episode", "main"]
+
+
+def main(run: Run, candidate_id: int | None = None, seed: int = 0) -> list[Path]:
+    """Record an episode (default: of the best candidate) and write it under the run's `exr/`; returns the files.
+
+    Raises RunError where there is no such candidate, or no policy of it.
+    """
+    return export_episode(record(run, candidate_id, seed), run.path / "exr")
+
+
+def export_episode(episode: Episode, directory: Path) -> list[Path]:
+    """One file per time at which radiance was kept; in it, per eye, one part with the spectral radiance before it
+    and one with what its receptors signalled (`left.spectral`, `left.receptors`, ...).
+
+    Files are named after candidate, episode seed and time, so that another export doesn't overwrite this one.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    files = []
+    for frame, t in enumerate(episode.radiance_frames):
+        path = directory / f"candidate{episode.candidate_id:06d}_seed{episode.seed}_t{t:04d}.exr"
+        sim.write_exr(path, _views(episode, frame))
+        files.append(path)
+    return files
+
+
+def _views(episode: Episode, frame: int) -> list[sim.View]:
+    """What each eye saw at one kept time."""
+    t = int(episode.radiance_frames[frame])
+    return [
+        sim.View(
+            name=name,
+            wavelengths_nm=episode.wavelengths_nm,
+            radiance=episode.radiance[frame, eye],
+            receptors=episode.signals[t, eye],
+            attributes=_attributes(episode, t, eye),
+        )
+        for eye, name in enumerate(episode.eyes.names())
+    ]
+
+
+def _attributes(episode: Episode, t: int, eye: int) -> dict[str, Any]:
+    """Where and when a view was seen."""
+    return {
+        "task": episode.task,
+        "candidate": episode.candidate_id,
+        "seed": episode.seed,
+        "time": t,
+        "position_m": episode.position[t].tolist(),
+        "heading_rad": float(episode.heading[t]),
+        "eye_azimuth_deg": float(np.degrees(episode.eyes.azimuths()[eye])),
+        "fov_deg": episode.eyes.fov_deg,
+    }

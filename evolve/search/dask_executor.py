@@ -1,0 +1,196 @@
+"""Candidates evaluated by a Dask cluster: from processes on this machine to SLURM and Kubernetes (docs/cluster.md)."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+import uuid
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import Any
+
+from evolve.search import dask_worker
+from evolve.config.assemble import to_toml
+from evolve.store.evaluation import Evaluation
+from evolve.store.atomic_files import write_whole
+from evolve.search.job import ATTEMPTS, ExecutorError, Job, Progress
+
+__all__ = ["DaskExecutor"]
+
+CONNECT_S = 30.0
+LISTEN_S = 0.5  # between looks at progress
+REPLY_S = 10.0  # for a worker to send what it has
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A job on its way."""
+
+    job: Job
+    counter: Any
+    order: dask_worker.Order
+
+
+@dataclass
+class DaskExecutor:
+    """Workers of a Dask scheduler, one candidate each at a time; a context manager that takes back what it asked for.
+
+    scheduler   address, "tcp://host:8786"
+    function    "module:name" of what evaluates, with the arguments of `evolve.learning.fitness.evaluate`
+    patience_s  how long to wait for workers, and for a scheduler that is gone to come back
+
+    A worker that dies takes nobody with it: its candidate is evaluated again, `ATTEMPTS` times in all. When the
+    scheduler comes back, whatever was under way is asked for again.
+
+    Raises:
+        ExecutorError: Dask is not installed, nobody answers, or no worker can do the work.
+    """
+
+    scheduler: str
+    function: str = "evolve.search.worker:evaluate_candidate"
+    patience_s: float = 600.0
+    count: int = 0
+    _name: str = field(default_factory=lambda: f"rhabdom-{uuid.uuid4().hex[:12]}")
+    _client: Any = None
+    _told: SimpleQueue[list[int]] = field(default_factory=SimpleQueue)
+
+    def __enter__(self) -> DaskExecutor:
+        self._client = self._connected(min(CONNECT_S, self.patience_s))
+        try:
+            self._client.wait_for_workers(1, timeout=self.patience_s)
+        except TimeoutError:
+            self._client.close()
+            raise ExecutorError(f"{self.scheduler}: no worker has come within {self.patience_s:g} s") from None
+        self.count = len(self._client.scheduler_info(n_workers=-1)["workers"])
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with contextlib.suppress(Exception):  # nothing is lost with a connection that is gone already
+            self._client.close()
+
+    def run(self, jobs: Iterable[Job], progress: Progress | None = None) -> Iterator[tuple[Job, Evaluation]]:
+        """Evaluate all jobs; each comes out as soon as it is done, in any order. A deque may be added to meanwhile.
+
+        Raises:
+            ExecutorError: no worker can do the work, a worker's machine refuses something (its disk is full), or the
+                scheduler is gone for good.
+        """
+        waiting = jobs if isinstance(jobs, deque) else deque(jobs)
+        under_way: dict[Any, _Trial] = {}
+        try:
+            while waiting or under_way:
+                if self._client.status != "running":
+                    self._reconnect()
+                    waiting.extendleft(trial.job for trial in reversed(under_way.values()))
+                    under_way.clear()
+                while waiting:
+                    trial = self._trial(waiting.popleft())
+                    under_way[self._submit(trial)] = trial
+                for future in self._done(under_way):
+                    trial = under_way.pop(future)
+                    if future.status in ("cancelled", "lost"):
+                        waiting.append(trial.job)
+                    elif self._died_too_few_times(trial, future):
+                        under_way[self._submit(trial)] = trial
+                    elif (outcome := self._outcome(trial, future)) is not None:
+                        yield trial.job, outcome
+                    else:
+                        under_way[future] = trial
+                self._tell(progress)
+        finally:
+            self._withdraw(under_way)
+
+    def _trial(self, job: Job) -> _Trial:
+        """A job with a counter of its attempts, which lives with the scheduler: workers die, and tell nobody."""
+        from distributed import Variable
+
+        name = f"{self._name}-{job.id}-{uuid.uuid4().hex[:6]}"
+        counter = Variable(name, client=self._client)
+        counter.set(0)
+        return _Trial(job, counter, dask_worker.encode(job, to_toml(job.config), self.function, name, self._name))
+
+    def _submit(self, trial: _Trial) -> Any:
+        key = f"{trial.order.counter}-{uuid.uuid4().hex[:6]}"
+        return self._client.submit(dask_worker.evaluate, trial.order, key=key, pure=False, retries=0)
+
+    def _died_too_few_times(self, trial: _Trial, future: Any) -> bool:
+        """Whether the scheduler has given a candidate up before we do."""
+        from distributed import KilledWorker
+
+        killed = future.status == "error" and isinstance(future.exception(), KilledWorker)
+        return killed and int(trial.counter.get()) < ATTEMPTS
+
+    def _done(self, under_way: dict[Any, _Trial]) -> list[Any]:
+        """Futures that came to an end; waits a moment for the first."""
+        from distributed import wait
+
+        with contextlib.suppress(Exception):  # none yet, or the connection is gone, which `run` sees
+            wait(list(under_way), timeout=LISTEN_S, return_when="FIRST_COMPLETED")
+        return [future for future in under_way if future.status != "pending"]
+
+    def _outcome(self, trial: _Trial, future: Any) -> Evaluation | None:
+        """What became of a candidate, its policy written where it belongs; None if the worker that knew has died."""
+        from distributed import KilledWorker
+
+        if future.status == "error":
+            error = future.exception()
+            if isinstance(error, KilledWorker):
+                return Evaluation.failed(f"its worker process died {ATTEMPTS} times")
+            if isinstance(error, dask_worker.UnfitWorker):
+                raise ExecutorError(f"{self.scheduler}: {error}")
+            return Evaluation.failed(f"{type(error).__name__}: {error}")
+        try:
+            outcome, policy, checkpoint = dask_worker.decode(future.result(timeout=REPLY_S))
+        except TimeoutError:
+            return None
+        future.release()  # else its worker's death would have it evaluated again
+        trial.counter.delete()
+        if policy:
+            write_whole(trial.job.policy_path, policy)
+        if checkpoint and trial.job.stretch is not None:
+            write_whole(trial.job.stretch.checkpoints[-1], checkpoint)
+        return outcome
+
+    def _tell(self, progress: Progress | None) -> None:
+        with contextlib.suppress(Empty):
+            while True:
+                report = self._told.get_nowait()
+                if progress is not None:
+                    progress(*report)
+
+    def _connected(self, timeout: float) -> Any:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise ExecutorError("--executor dask needs Dask: pip install 'rhabdom[dask]'") from None
+        try:
+            client = Client(self.scheduler, timeout=timeout, set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            reason = str(error).splitlines()[0]
+            raise ExecutorError(f"no Dask scheduler answers at {self.scheduler}: {reason}") from None
+        client.subscribe_topic(self._name, lambda event: self._told.put(event[1]))
+        return client
+
+    def _reconnect(self) -> None:
+        """Wait for a scheduler that is gone."""
+        deadline = time.monotonic() + self.patience_s
+        while self._client.status != "running":
+            if self._client.status == "connecting":  # it is trying by itself
+                time.sleep(LISTEN_S)
+            else:
+                try:
+                    self._client = self._connected(min(CONNECT_S, self.patience_s))
+                except ExecutorError:
+                    time.sleep(LISTEN_S)
+            if time.monotonic() > deadline:
+                raise ExecutorError(f"{self.scheduler}: the scheduler has been gone for {self.patience_s:g} s")
+
+    def _withdraw(self, under_way: dict[Any, _Trial]) -> None:
+        """Nobody will ask for these any more; workers stop at the next progress report."""
+        with contextlib.suppress(Exception):  # with the scheduler gone there is nothing to withdraw
+            self._client.cancel(list(under_way), force=True)

@@ -1,0 +1,158 @@
+"""What a Dask worker does: evaluate one candidate, given and returned as plain text and bytes.
+
+Nothing is shared with the process that sends candidates but the scheduler: no files, no state. A worker evaluates one
+candidate at a time, however many threads it has, so that it sums as a local worker does.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from evolve.config.assemble import from_text
+from evolve.genome.phenotype import Phenotype
+from evolve.store.evaluation import Evaluation
+from evolve.search.job import ATTEMPTS, Job
+from evolve.search.successive_halving import Stretch
+from evolve.store.versions import present
+from evolve.search.worker import evaluated, prepare_device
+
+__all__ = ["Order", "UnfitWorker", "decode", "encode", "evaluate"]
+
+COUNTER_S = 20.0  # for the scheduler to answer
+Reply = tuple[str, bytes, bytes]
+_one_at_a_time = threading.Lock()
+_prepared = False
+
+
+class UnfitWorker(RuntimeError):
+    """A worker cannot evaluate anything, or not as the others do; the message is one line that says why."""
+
+
+class _Unwanted(Exception):
+    """Whoever asked for this candidate is gone."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """A job as text.
+
+    function  "module:name" of what evaluates it
+    counter   name of the scheduler's variable that counts its attempts
+    topic     under which it tells its progress
+    budgets   on the rungs of a ladder up to where it trains; () without one
+    begun     (rung, checkpoint): where its training stands, if it has begun
+    software  that the sender runs
+    """
+
+    function: str
+    id: int
+    phenotype: str
+    config: str
+    seed: int
+    counter: str
+    topic: str
+    software: Mapping[str, str]
+    budgets: tuple[int, ...] = ()
+    begun: tuple[int, bytes] | None = None
+
+
+def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Order:
+    """A job whose config is `toml`; `counter` and `topic` are names on the scheduler."""
+    phenotype = json.dumps(job.phenotype.to_json())
+    order = Order(function, job.id, phenotype, toml, job.seed, counter, topic, _software())
+    if job.stretch is None:
+        return order
+    kept = [(rung, path.read_bytes()) for rung, path in enumerate(job.stretch.checkpoints[:-1]) if path.exists()]
+    return replace(order, budgets=job.stretch.budgets, begun=kept[-1] if kept else None)
+
+
+def evaluate(order: Order) -> Reply:
+    """Evaluate a candidate: its Evaluation as JSON, its policy and its training's checkpoint, empty where there is
+    none."""
+    from distributed import Variable, get_worker
+
+    worker = get_worker()
+    attempts = Variable(order.counter, client=worker._get_client())
+    begun = int(attempts.get(timeout=COUNTER_S)) + 1
+    if begun > ATTEMPTS:
+        return _text(Evaluation.failed(f"its worker process died {ATTEMPTS} times")), b"", b""
+    attempts.set(begun)
+    key = worker.get_current_task()
+
+    def progress(steps: int, planned: int) -> None:
+        task = worker.state.tasks.get(key)
+        if task is None or task.state in ("cancelled", "released", "forgotten"):
+            raise _Unwanted
+        worker.log_event(order.topic, [order.id, steps, planned])
+
+    with _one_at_a_time:
+        _prepare(order)
+        module, name = order.function.split(":")
+        try:
+            return _evaluate(getattr(import_module(module), name), order, progress)
+        except OSError as error:
+            raise UnfitWorker(
+                f"a worker's machine refuses: {error}; mend that, and go on with evolve resume"
+            ) from error
+
+
+def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:
+    """Inverse of what `evaluate` makes of an Evaluation."""
+    text, policy, checkpoint = reply
+    record = json.loads(text)
+    record["returns"] = tuple(record["returns"])
+    record["curve"] = tuple((int(steps), float(value)) for steps, value in record["curve"])
+    return Evaluation(**record), policy, checkpoint
+
+
+def _evaluate(function: Callable[..., Evaluation], order: Order, progress: Callable[[int, int], None]) -> Reply:
+    config = from_text(order.config)
+    phenotype = Phenotype.from_json(json.loads(order.phenotype))
+    with TemporaryDirectory() as folder:
+        policy = Path(folder) / f"{order.id:06d}"
+        checkpoints = tuple(policy.with_name(f"{policy.name}-{rung}") for rung in range(len(order.budgets)))
+        if order.begun is not None:
+            rung, content = order.begun
+            checkpoints[rung].write_bytes(content)
+        ladder = (Stretch(order.budgets, checkpoints),) if checkpoints else ()
+        outcome = evaluated(function, (phenotype, config, order.seed, policy, *ladder), progress)
+        return _text(outcome), _content(policy), _content(checkpoints[-1]) if checkpoints else b""
+
+
+def _content(path: Path) -> bytes:
+    return path.read_bytes() if path.exists() else b""
+
+
+def _prepare(order: Order) -> None:
+    """Once in each process: the same software as the sender's, and a device that works."""
+    global _prepared
+    here = _software()
+    differing = [name for name, there in order.software.items() if there and here[name] and here[name] != there]
+    if differing:
+        names = ", ".join(f"{name} {here[name]} (here {order.software[name]})" for name in differing)
+        raise UnfitWorker(f"a worker has other software, and numbers would differ: {names}")
+    if not _prepared:
+        try:
+            prepare_device()
+        except Exception as error:
+            raise UnfitWorker(" ".join(str(error).split())) from error
+        _prepared = True
+
+
+@lru_cache
+def _software() -> Mapping[str, str]:
+    """As it is when first asked for: git answers in milliseconds, but for every candidate."""
+    return present()
+
+
+def _text(outcome: Evaluation) -> str:
+    record: dict[str, Any] = asdict(outcome)
+    return json.dumps(record)

@@ -1,0 +1,132 @@
+"""The loop: propose candidates, evaluate what the record lacks, write each down, tell, repeat.
+
+A run that is continued goes through the same loop from its beginning: candidates on record are not evaluated again,
+only told again, which brings the search to where it was. Generation by generation, the history follows from the seed
+alone. In the steady state, fitness is told in the order in which candidates finish, so it follows from the record's
+order too.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Protocol
+
+from evolve.store.candidate import Candidate
+from evolve.genome.phenotype import develop
+from evolve.store.evaluation import Evaluation
+from evolve.search.job import Job, Progress
+from evolve.search.successive_halving import Stretch, budgets
+from evolve.search.search import Proposal, Search, training_seed
+from evolve.store.directory import Run, RunError
+from evolve.store.versions import present, recorded
+
+__all__ = ["Executor", "Watcher", "evolve"]
+
+
+class Executor(Protocol):
+    """Someone who evaluates candidates."""
+
+    def run(self, jobs: deque[Job], progress: Progress | None = None) -> Iterator[tuple[Job, Evaluation]]:
+        """Evaluate all jobs, handed out in their order; each comes out once, as soon as it is done. Whoever receives
+        one may add to `jobs` before asking for the next."""
+
+
+class Watcher(Protocol):
+    """Someone who looks on."""
+
+    def training(self, candidate_id: int, steps: int, planned: int) -> None:
+        """A candidate has been trained for `steps` of `planned` steps."""
+
+    def evaluated(self, candidate: Candidate) -> None:
+        """A candidate has been evaluated and is on record."""
+
+
+def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
+    """Carry a run (whose lock is held) to its end.
+
+    Raises:
+        RunError: the record cannot be written, or this search does not propose what is on record.
+        ConfigError: the search cannot be begun.
+        ExecutorError: no candidate can be evaluated.
+    """
+    search = Search(run.config)
+    if run.config.search.steady_state:
+        _steadily(run, search, executor, watcher)
+    else:
+        _by_generations(run, search, executor, watcher)
+
+
+def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
+    """Tell a generation, in the order of its candidates, once all of it is known: rung by rung, on a ladder."""
+    for generation in range(run.config.search.generations):
+        proposals = {proposal.id: proposal for proposal in search.propose_generation()}
+        for candidate in run.generation(generation):
+            _require_same(run, proposals[candidate.id], candidate)
+        for rung in range(run.config.search.rungs):
+            missing = sorted(run.climbers(generation, rung) - run.on_rung(rung))
+            jobs = deque(_job(run, proposals[identity], rung) for identity in missing)
+            for job, outcome in executor.run(jobs, watcher.training):
+                _write_down(run, proposals[job.id], job, outcome, watcher)
+        run.forget_trainings(generation)
+        search.tell([(candidate.id, candidate.fitness) for candidate in run.generation(generation)])
+
+
+def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
+    """Keep one population on its way: whenever a candidate is done, tell it and propose the next one."""
+    under_way: dict[int, Proposal] = {}
+
+    def refill() -> list[Proposal]:
+        room = min(run.config.search.population - len(under_way), run.config.candidates - search.proposed)
+        proposals = [search.propose() for _ in range(room)]
+        under_way.update((proposal.id, proposal) for proposal in proposals)
+        return proposals
+
+    refill()
+    for candidate in run.in_order_of_finish:
+        _require_same(run, under_way.pop(candidate.id, None), candidate)
+        search.tell([(candidate.id, candidate.fitness)])
+        refill()
+    jobs = deque(_job(run, proposal) for proposal in under_way.values())
+    for job, outcome in executor.run(jobs, watcher.training):
+        candidate = _write_down(run, under_way.pop(job.id), job, outcome, watcher)
+        search.tell([(candidate.id, candidate.fitness)])
+        jobs.extend(_job(run, proposal) for proposal in refill())
+
+
+def _job(run: Run, proposal: Proposal, rung: int = 0) -> Job:
+    phenotype = develop(proposal.vector, run.config)
+    seed = training_seed(run.config.seed, proposal.id)
+    stretch = None
+    if run.config.search.rungs > 1:
+        ends = budgets(run.config.search, run.config.learning)[: rung + 1]
+        stretch = Stretch(ends, tuple(run.checkpoint_path(proposal.id, i) for i in range(rung + 1)))
+    return Job(proposal.id, phenotype, run.config, seed, run.policy_path(proposal.id), stretch)
+
+
+def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, watcher: Watcher) -> Candidate:
+    place = (proposal.id, proposal.generation, proposal.index)
+    candidate = Candidate.of(place, proposal.genome, job.phenotype, job.seed, outcome, proposal.parents)
+    if job.stretch is not None:
+        candidate = replace(candidate, rung=job.stretch.rung)
+        if (before := run.before(candidate)) is not None:
+            candidate = replace(candidate, seconds=before.seconds + candidate.seconds)
+    run.append(candidate)
+    watcher.evaluated(candidate)
+    return candidate
+
+
+def _require_same(run: Run, proposal: Proposal | None, candidate: Candidate) -> None:
+    """The search must propose, bit for bit, what is on record; else it is another search than the one that began."""
+    if proposal is not None and candidate.genome == proposal.genome:
+        return
+    then, now = recorded(run.path), present()
+    names = ("nevergrad", "cma", "numpy")
+    before = ", ".join(f"{name} {then.get(name, '?')}" for name in names)
+    after = ", ".join(f"{name} {now[name]}" for name in names)
+    raise RunError(
+        f"{run.path} cannot be continued: candidate {candidate.id} is not what the search proposes here "
+        f"(started with {before}; here {after}). Continue it with the versions that began it, and an unchanged "
+        f"config.toml"
+    )

@@ -1,0 +1,125 @@
+"""What a worker process does: evaluate one candidate after another, until its pipe closes or its parent is gone."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import multiprocessing
+import os
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any, Literal
+
+from evolve.config.run_config import RunConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.store.evaluation import Evaluation
+from evolve.search.successive_halving import Stretch
+
+__all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "work"]
+
+
+@dataclass(frozen=True)
+class Message:
+    """From a worker to its executor: steps trained, an evaluation, why it cannot work here; "died" says the pipe."""
+
+    kind: Literal["progress", "done", "unfit", "died"]
+    content: Any = None
+
+
+def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: Callable[[], None] | None) -> None:
+    """Body of a worker process."""
+    threading.Thread(target=_die_with_parent, daemon=True).start()
+    try:
+        if prepare is not None:
+            prepare()
+    except Exception as error:
+        connection.send(Message("unfit", " ".join(str(error).split())))
+        return
+    while True:
+        try:
+            arguments = connection.recv()
+        except EOFError:
+            return
+        try:
+            outcome = evaluated(evaluate, arguments, lambda *steps: connection.send(Message("progress", steps)))
+        except OSError as error:
+            connection.send(Message("unfit", f"{error}; mend that, and go on with evolve resume"))
+            return
+        connection.send(Message("done", outcome))
+
+
+def prepare_device() -> None:
+    """Make Dr.Jit ready for work beside other workers: a proven LLVM library, one thread.
+
+    Raises:
+        BackendError: Dr.Jit cannot work here.
+    """
+    from optics.numerics import backend
+
+    backend.require()
+    import drjit
+
+    drjit.set_thread_count(1)
+
+
+def evaluate_candidate(
+    phenotype: Phenotype,
+    config: RunConfig,
+    seed: int,
+    policy_path: Path,
+    stretch: Stretch | None = None,
+    *,
+    progress: Callable[[int, int], None],
+) -> Evaluation:
+    """`evolve.learning.fitness.evaluate`, whose libraries are loaded in workers alone."""
+    from evolve.learning.fitness import evaluate
+
+    return evaluate(phenotype, config, seed, policy_path, progress, stretch)
+
+
+def evaluated(
+    evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], progress: Callable[[int, int], None]
+) -> Evaluation:
+    """The candidate's evaluation; whatever goes wrong in it becomes its failure, but what the machine refuses: a disk
+    that is full says nothing about an animal.
+
+    Raises:
+        OSError: its policy cannot be written, say.
+    """
+    began = time.perf_counter()
+    try:
+        return evaluate(*arguments, progress=progress)
+    except OSError:
+        raise
+    except Exception as error:
+        return Evaluation.failed(_one_line(error), time.perf_counter() - began)
+    finally:
+        _give_back_memory()
+
+
+def _give_back_memory() -> None:
+    """To the system, what the last candidate's arrays have left free between what is still in use: glibc keeps it, some
+    10 MB a candidate, and arrays of other sizes do not fill it."""
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
+    if trim is not None:
+        trim(0)
+
+
+def _one_line(error: Exception) -> str:
+    """ "ValueError: what it says (file.py:12)"."""
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
+
+
+def _die_with_parent() -> None:
+    """A parent that is killed cannot end its workers, and nobody would want what they are working on."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
