@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 
 import sim
-from sim.exr import preview
 from sim.scene.cameras import Viewpoint
+from sim.scene.color import preview
 from sim.scene.mirror import MirrorWarning
 
 MODEL = """

@@ -12,12 +12,12 @@ import torch
 
 import optics
 from evolve.analysis.statistics import acuity_cpd, succeeded, white_strehl
-from evolve.store.candidate import Candidate
+from evolve.analysis.vision import vision
 from evolve.config.run_config import EyeConfig, RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.policy import PolicyConfig, build_policy, learnt
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
-from evolve.analysis.vision import vision
 from experiments.best_pupil import contrast_of, measures
 from experiments.glass import power
 from sim.tasks.reward import EVALUATION

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 import optics
 import sim
 from evolve.analysis.statistics import psnr, white_strehl
-from evolve.report.picture import display
 from evolve.analysis.vision import ssim
+from evolve.report.picture import display
 from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
 from experiments.store import Origin
 from sim.worlds.state import WorldState

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 import optics
 from experiments.page import new_figure, save
 from optics.spectra.bands import daylight
-from sim.scene.color import encode_srgb
-from sim.exr import preview
+from sim.scene.color import encode_srgb, preview
 
 __all__ = ["picture", "pupils"]
 

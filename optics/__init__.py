@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import Any
 
 _CONTENTS = {
-    "AccuracyError": "point_spread.planner",
+    "AccuracyError": "numerics.accuracy",
     "BSplineRelief": "elements.relief",
     "BackendError": "numerics.backend",
     "Annulus": "apertures.circular",
@@ -18,7 +18,7 @@ _CONTENTS = {
     "PhotonBudget": "spectra.photon_budget",
     "Pigment": "spectra.pigment",
     "PixelRelief": "elements.pixel_relief",
-    "Plan": "point_spread.planner",
+    "Plan": "numerics.accuracy",
     "PointSource": "elements.source",
     "Polygon": "apertures.polygonal",
     "PropagationResult": "propagation.propagate",

@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING, Any
 from sim.envs.registration import register as register_environments
 
 if TYPE_CHECKING:
-    from sim.eyes.eyes import Eyes
     from sim.envs.env import make_env
+    from sim.envs.vec_env import make_vec_env
     from sim.exr import View, read_exr, write_exr
+    from sim.eyes.eyes import Eyes
+    from sim.render.batched_renderer import BatchedRenderer
     from sim.render.fidelity import Fidelity, choose_fidelity
     from sim.render.reference_renderer import ReferenceRenderer
-    from sim.render.batched_renderer import BatchedRenderer
     from sim.scene.mirror import Mirror, MirrorWarning, mirror
-    from sim.envs.vec_env import make_vec_env
     from sim.worlds.world import TASKS, World, build_world
 
 _HOME = {

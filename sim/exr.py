@@ -21,6 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from sim.scene.color import preview
+
 LAYOUT_VERSION = "1.0"
 UNITS = "W.m^-2.sr^-1"
 SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 at 560 nm"
@@ -117,28 +119,6 @@ def read_exr(path: str | os.PathLike[str]) -> list[View]:
     if len(parts) != expected:
         raise ExrError(f"{path}: truncated ({len(parts)} of {expected} parts are whole)")
     return _views(held)
-
-
-def preview(radiance: np.ndarray, wavelengths_nm: np.ndarray) -> np.ndarray:
-    """Linear sRGB (y, x, 3) of spectral radiance (band, y, x): CIE 1931, scaled such that radiance D65 is white.
-
-    A band counts for the wavelengths nearer to it than to the next; with few bands the colours are rough.
-    """
-    from optics.spectra.bands import cie_1931, daylight
-
-    order = np.argsort(wavelengths_nm)
-    nm = np.clip(np.asarray(wavelengths_nm, float)[order], 360.0, 780.0)
-    matching = cie_1931(nm * 1e-9)  # (band, 3)
-    weights = matching * (np.gradient(nm)[:, None] if len(nm) > 1 else 1.0)
-    light = daylight(nm * 1e-9)
-    rgb_weights = weights @ _XYZ_TO_SRGB.T
-    white = light @ rgb_weights
-    balanced = rgb_weights / np.where(np.abs(white) > 1e-9, white, np.inf)
-    return np.einsum("byx,bc->yxc", np.asarray(radiance, float)[order], balanced).astype(np.float32)
-
-
-# IEC 61966-2-1
-_XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 
 
 def _channel(nm: float) -> str:

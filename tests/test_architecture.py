@@ -46,7 +46,9 @@ def test_importing_a_package_loads_nothing_heavy(package):
 
 def test_no_variant_is_set_at_import():
     """A library that sets Mitsuba's variant when imported changes its user's program."""
-    code = "import mitsuba as mi, optics, sim, evolve, sim.scene.mirror, sim.render.batched_renderer; print(mi.variant())"
+    code = (
+        "import mitsuba as mi, optics, sim, evolve, sim.scene.mirror, sim.render.batched_renderer; print(mi.variant())"
+    )
     child = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert child.stdout.strip() == "None"
 

@@ -17,15 +17,15 @@ import pytest
 
 import evolve.cli.commands.run
 import sim
-from evolve.config.run_config import GeneConfig, RunConfig, SECTIONS
 from evolve.config.assemble import assemble
-from evolve.genome.phenotype import develop
-from evolve.store.evaluation import Evaluation
-from evolve.learning.fitness import evaluate
+from evolve.config.run_config import SECTIONS, GeneConfig, RunConfig
 from evolve.genome.genes import LAMBDA_MAX
 from evolve.genome.genotype import GENES, Genotype
+from evolve.genome.phenotype import develop
+from evolve.learning.fitness import evaluate
 from evolve.search.loop import evolve as carry
 from evolve.store.directory import Run
+from evolve.store.evaluation import Evaluation
 from optics.numerics import backend
 
 # One training of two updates and one evaluation episode, through a perfect lens: about a second.

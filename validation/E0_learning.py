@@ -39,8 +39,8 @@ from pathlib import Path
 from typing import Any
 
 import sim
-from evolve.config.run_config import LearningConfig
 from evolve.config.assemble import assemble
+from evolve.config.run_config import LearningConfig
 from validation.learning import Case, Row, read_rows, steps_to, watched, wilson, write_rows
 from validation.page import Page, parser
 from validation.workprec import MUTED, OURS, OURS_TOO

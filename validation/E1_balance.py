@@ -28,8 +28,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from sim.worlds import materials
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes
+from sim.worlds import materials
 from sim.worlds.detection import BAND_EDGES_DEG, OBJECT_RADIUS, STRIPES
 from validation.page import Page, parser
 from validation.workprec import MUTED, OURS, OURS_TOO

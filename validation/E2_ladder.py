@@ -40,15 +40,16 @@ import numpy as np
 from scipy.stats import rankdata
 
 import sim
-from evolve.config.run_config import RunConfig, SearchConfig
 from evolve.config.assemble import assemble
+from evolve.config.run_config import RunConfig, SearchConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.store.atomic_files import write_whole
 from evolve.learning.fitness import evaluate
-from evolve.search.successive_halving import Stretch, budgets, climbers
-from evolve.learning.ppo import play
 from evolve.learning.policy import load_policy
+from evolve.learning.ppo import play
+from evolve.learning.training_stage import Stretch
+from evolve.search.successive_halving import budgets
 from evolve.search.worker import prepare_device
+from evolve.store.atomic_files import write_whole
 from validation.page import Page, parser
 from validation.workprec import MUTED, OURS, OURS_TOO
 
@@ -212,7 +213,7 @@ def halving(rows: Sequence[Row], rungs: int, promoted: float, by: str = "fitness
         total += spent[sorted(reached), below : place + 1].sum()
         below = place + 1
         told = [(number, float(fitness[number, place])) for number in sorted(reached)]
-        reached = climbers(search, rung, told) or reached
+        reached = promoted(search, rung, told) or reached
     best = max(reached, key=lambda number: (fitness[number, -1], -number))
     place = 1 + int((many[:, -1] > many[best, -1]).sum())
     return Halving(rungs, promoted, total / spent.sum(), place)

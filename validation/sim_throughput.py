@@ -38,10 +38,10 @@ import numpy as np
 
 import optics
 import sim
-from sim.envs.follow_camera import pose
-from sim.render.noisy_signals import Retinas
 from sim.envs.simulation import Simulation
+from sim.render.noisy_signals import Retinas
 from sim.tasks.random_streams import Streams
+from sim.worlds.state import pose
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ import numpy as np
 import sim
 from evolve.config.run_config import EyeConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.store.atomic_files import write_whole
 from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
+from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run, RunError
 from sim.worlds.state import WorldState, concatenate
 

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.genome.phenotype import Phenotype
 from evolve.genome.genes import LAMBDA_MAX
+from evolve.genome.phenotype import Phenotype
 
 if TYPE_CHECKING:
     import optics
-    from evolve.store.candidate import Candidate
     from evolve.config.run_config import EyeConfig
+    from evolve.store.candidate import Candidate
 
 __all__ = [
     "GenerationStatistics",

@@ -60,8 +60,8 @@ def _is_users(error: Exception) -> bool:
     """Errors whose message is one line for the user; anything else is a bug of ours and keeps its traceback."""
     from evolve.config.run_config import ConfigError
     from evolve.search.local_executor import ExecutorError
-    from evolve.store.lock import LockedError
     from evolve.store.directory import RunError
+    from evolve.store.lock import LockedError
     from optics.numerics.backend import BackendError
 
     return isinstance(error, ConfigError | RunError | LockedError | ExecutorError | BackendError | OSError)

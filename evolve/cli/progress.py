@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, TextIO
 
-from evolve.store.candidate import Candidate
 from evolve.search.successive_halving import evaluations
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 
 __all__ = ["Bar", "Events", "Lines", "Tally", "Watchers", "clock", "watcher"]

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from evolve.cli.pace import Pace, calibrate
-from evolve.store.candidate import Candidate
+from evolve.config.lint import remarks
 from evolve.config.run_config import RunConfig
-from evolve.genome.phenotype import Phenotype, develop
-from evolve.store.evaluation import Evaluation
-from evolve.search.local_executor import cores
 from evolve.genome.genes import CLUSTERS
 from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import Phenotype, develop
+from evolve.search.local_executor import cores
 from evolve.search.successive_halving import budgets, evaluations, sizes, stretches
 from evolve.search.successive_halving import steps as total_steps
-from evolve.config.lint import remarks
+from evolve.store.candidate import Candidate
+from evolve.store.evaluation import Evaluation
 
 __all__ = ["Plan"]
 

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis.statistics import gene_values
-from evolve.config.run_config import INHERITED
 from evolve.config.provenance import Source
-from evolve.genome.genes import ALL_GENES
+from evolve.genome.genes import ALL_GENES, INHERITED
 from evolve.store.directory import Run
 
 __all__ = ["starts_from"]

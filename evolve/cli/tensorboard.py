@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis.statistics import acuity_cpd, gene_values, generation_statistics
-from evolve.store.candidate import Candidate
 from evolve.search.job import ExecutorError
+from evolve.search.successive_halving import complete
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 
 __all__ = ["Scalars"]
@@ -61,7 +62,7 @@ class Scalars:
             self._add("candidates", values, candidate.id)
             for steps, value in candidate.curve:
                 self._add(f"learning/{candidate.id:06d}", {"return": value}, steps)
-        if candidate.generation not in self._shown and self._run.complete(candidate.generation):
+        if candidate.generation not in self._shown and complete(self._run, candidate.generation):
             self._shown.add(candidate.generation)
             rows = {row.generation: row for row in generation_statistics(self._run.candidates)}
             row = rows[candidate.generation]

@@ -12,11 +12,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from evolve.config.run_config import ConfigError, EyeConfig, RunConfig, SECTIONS, TASKS
-from evolve.config.provenance import Source
-from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, GeneConfig, group_members
-from evolve.config.relief_starts import no_such_gene, with_relief
 from evolve.config.checks import check_gene_value, check_value
+from evolve.config.provenance import Source
+from evolve.config.relief_starts import no_such_gene, with_relief
+from evolve.config.run_config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
+from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, GeneConfig, group_members
 
 __all__ = ["SCALES", "assemble", "from_toml", "nearest", "parse_assignment", "preset_names", "to_toml"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from evolve.config.run_config import INHERITED, RunConfig
-from evolve.genome.genes import LAMBDA_MAX
+from evolve.config.run_config import RunConfig
+from evolve.genome.genes import INHERITED, LAMBDA_MAX
 
 __all__ = ["coarse_bands", "idle_genes", "idle_starts", "remarks"]
 

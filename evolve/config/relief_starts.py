@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from evolve.config.checks import ConfigError
 from evolve.config.run_config import EyeConfig
 from evolve.genome.genes import RELIEF_POINTS
 from evolve.genome.relief_genes import PATCH, doe_names, doe_own_names, refined
-from evolve.config.checks import ConfigError
 
 __all__ = ["no_such_gene", "with_relief"]
 

@@ -6,23 +6,22 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from evolve.genome import anatomy
-from evolve.genome.genes import CLUSTERS, GENES, Gene, GeneConfig
-from evolve.genome.interval import Interval
+from evolve.config.checks import ConfigError
 from evolve.config.sections import (
+    SECTIONS,
     EvaluationConfig,
     EyeConfig,
     LearningConfig,
-    SECTIONS,
     SearchConfig,
     WorldConfig,
     setting,
 )
-from evolve.config.checks import ConfigError
+from evolve.genome import anatomy
+from evolve.genome.genes import CLUSTERS, GENES, INHERITED, Gene, GeneConfig
+from evolve.genome.interval import Interval
 from optics.spectra.receptors import RECEPTORS
 
 __all__ = [
-    "INHERITED",
     "SECTIONS",
     "TASKS",
     "ConfigError",
@@ -44,7 +43,6 @@ TASKS: Mapping[str, str] = {
 
 
 LEAST_EXPOSURE = 2e-4  # [lx s]: of some 30 photons from white at a = 1; of few, noise is not what it is taken for
-INHERITED = "genes"  # in place of receptors' name: each animal's are as its spectral genes say
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from evolve.genome.genes import Gene, RELIEF_POINTS, gene_table
-from evolve.genome.interval import Interval
 from evolve.config.checks import AUTO
+from evolve.genome.genes import RELIEF_POINTS, Gene, gene_table
+from evolve.genome.interval import Interval
 
 __all__ = [
     "SECTIONS",

@@ -19,6 +19,7 @@ __all__ = [
     "CLUSTERS",
     "FAMILIES",
     "GENES",
+    "INHERITED",
     "LAMBDA_MAX",
     "RELIEF_POINTS",
     "Gene",
@@ -187,3 +188,6 @@ def groups_of(name: str) -> tuple[str, ...]:
         return ()
     families = tuple(family for family in FAMILIES if name.startswith(f"{family}_"))
     return (*families, ALL_GENES[name].cluster)
+
+
+INHERITED = "genes"  # in place of receptors' name: each animal's are as its spectral genes say

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.genome.anatomy import fitted
-from evolve.config.run_config import EyeConfig, INHERITED, RunConfig
-from evolve.genome.genes import APERTURE_SHAPES, LAMBDA_MAX
+from evolve.genome.anatomy import Sizes, fitted
+from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, GeneConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.relief_genes import doe_own_names
 
@@ -24,6 +23,38 @@ __all__ = ["Phenotype", "develop", "repaired"]
 
 ANNULUS_INNER = 0.5  # radius of what an annulus leaves out, in pupil radii
 SLIT_ASPECT = 4.0  # height of an upright slit / its width
+
+
+class EyeSettings(Sizes, Protocol):
+    """What a run's eyes have in common, whatever their genes: see `evolve.EyeConfig`."""
+
+    @property
+    def optics(self) -> bool: ...
+    @property
+    def noise_sigma(self) -> float: ...
+    @property
+    def illuminance(self) -> float: ...
+    @property
+    def integration_time(self) -> float: ...
+    @property
+    def bands(self) -> int: ...
+    @property
+    def receptors(self) -> str: ...
+    @property
+    def relief_height(self) -> float: ...
+    @property
+    def relief_points(self) -> int: ...
+    @property
+    def relief_symmetric(self) -> bool: ...
+
+
+class Settings(Protocol):
+    """Of a run's settings, those that shape its animals."""
+
+    @property
+    def genome(self) -> Mapping[str, GeneConfig]: ...
+    @property
+    def eye(self) -> EyeSettings: ...
 
 
 @dataclass(frozen=True)
@@ -51,7 +82,7 @@ class Phenotype:
     layers: int = 2
     lambda_max_nm: tuple[float, ...] | None = None
 
-    def pupil(self, eye: EyeConfig) -> optics.Pupil | None:
+    def pupil(self, eye: EyeSettings) -> optics.Pupil | None:
         """Pupil of each of the eyes; None for the perfect lens."""
         import optics
 
@@ -67,7 +98,7 @@ class Phenotype:
             aperture=_aperture(APERTURE_SHAPES[self.aperture_shape]),
         )
 
-    def eyes(self, eye: EyeConfig) -> sim.Eyes:
+    def eyes(self, eye: EyeSettings) -> sim.Eyes:
         """The eyes as the simulation wants them."""
         import optics
         import sim
@@ -96,7 +127,7 @@ class Phenotype:
         return cls(**values)
 
 
-def develop(genome: NDArray[np.float64], config: RunConfig) -> Phenotype:
+def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
     """Phenotype of a genome under a run's config; every genome of the right length has one, and its eyes fit."""
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
     seen_through = config.eye.optics
@@ -119,7 +150,7 @@ def develop(genome: NDArray[np.float64], config: RunConfig) -> Phenotype:
     )
 
 
-def repaired(genome: NDArray[np.float64], config: RunConfig) -> tuple[str, ...]:
+def repaired(genome: NDArray[np.float64], config: Settings) -> tuple[str, ...]:
     """Genes whose values had to change so that nothing overlaps; () for a genome that develops as it says."""
     asked = Genotype(config.genome).decode(genome)
     fits = fitted(asked, config.genome, config.eye)

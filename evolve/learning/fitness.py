@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 import sim
-from evolve.learning.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.store.evaluation import Evaluation
-from evolve.search.successive_halving import Stretch
-from evolve.learning.ppo import Episodes, Progress, Training, play, train
+from evolve.learning.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from evolve.learning.policy import TrainingDiverged, save_policy
+from evolve.learning.ppo import Episodes, Progress, Training, play, train
+from evolve.learning.training_stage import Stretch
+from evolve.store.evaluation import Evaluation
 
 __all__ = ["evaluate"]
 

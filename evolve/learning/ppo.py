@@ -16,9 +16,9 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
+from evolve.config.run_config import LearningConfig
 from evolve.learning.adam import Adam
 from evolve.learning.checkpoint import Checkpoint
-from evolve.config.run_config import LearningConfig
 from evolve.learning.policy import EyePolicy, TrainingDiverged, learnt, set_learnt
 from evolve.learning.rollout_buffer import FrameRolloutBuffer
 

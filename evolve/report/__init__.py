@@ -25,8 +25,8 @@ def write(run: Run, episode: Episode | None = None) -> Path:
     Raises ValueError where the best candidate's policy is missing or damaged.
     """
     from evolve.analysis.episode import record
-    from evolve.store.atomic_files import write_whole
     from evolve.report.page import render
+    from evolve.store.atomic_files import write_whole
 
     if episode is None and run.best is not None:
         episode = record(run)

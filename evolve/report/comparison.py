@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, generation_statistics
-from evolve.store.atomic_files import write_whole
 from evolve.report.figures import comparison_figure
 from evolve.report.markup import document, figure, section, table, text
+from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run
 
 __all__ = ["differing_settings", "lines", "summary", "write_page"]

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
-from evolve.analysis.statistics import GenerationStatistics, Trajectory, bootstrap_interval, champions, succeeded
-from evolve.store.candidate import Candidate
 from evolve.analysis.genealogy import descent, nearest_parent
+from evolve.analysis.statistics import GenerationStatistics, Trajectory, bootstrap_interval, champions, succeeded
 from evolve.report.svg import drawing, inline
 from evolve.report.theme import ACCENT, LINE, MUTED, VERMILLION
+from evolve.store.candidate import Candidate
 
 __all__ = [
     "comparison_figure",

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from evolve.analysis.statistics import acuity_cpd, champions, gene_values, generation_statistics, trajectory
-from evolve.store.candidate import Candidate
-from evolve.config.run_config import TASKS
 from evolve.analysis.episode import Episode
 from evolve.analysis.genealogy import descent
+from evolve.analysis.statistics import acuity_cpd, champions, gene_values, generation_statistics, trajectory
+from evolve.analysis.vision import SCENES, vision
+from evolve.config.run_config import TASKS
 from evolve.genome.genes import CLUSTERS, Gene
 from evolve.report import tables
 from evolve.report.eye_figures import eye_figures
@@ -21,12 +21,12 @@ from evolve.report.figures import (
     success_figure,
     vision_figure,
 )
+from evolve.report.ground_plan import Stage
 from evolve.report.markup import KEY, document, figure, number, section, text
 from evolve.report.player import player, summary
-from evolve.report.ground_plan import Stage
 from evolve.report.views import views
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
-from evolve.analysis.vision import SCENES, vision
 
 __all__ = ["render"]
 

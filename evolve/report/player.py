@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from evolve.analysis.episode import Episode
-from evolve.store.atomic_files import write_whole
+from evolve.report.ground_plan import Stage
 from evolve.report.markup import document, exact, json_script, number, text
 from evolve.report.picture import data_uri, display, film_sheet
-from evolve.report.ground_plan import Stage
+from evolve.store.atomic_files import write_whole
 from sim.envs.simulation import MAX_TURN
 from sim.worlds.world import MAX_SPEED
 

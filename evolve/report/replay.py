@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from evolve.analysis.episode import Episode, record
-from evolve.report.rerun_recording import require_rerun, write_recording
 from evolve.report.player import write_player
+from evolve.report.rerun_recording import require_rerun, write_recording
 from evolve.store.directory import Run
 
 __all__ = ["main", "summary"]

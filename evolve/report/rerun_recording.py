@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from evolve.config.run_config import ConfigError
 from evolve.analysis.episode import Episode
-from evolve.store.atomic_files import UNFINISHED
-from evolve.report.picture import display
+from evolve.config.run_config import ConfigError
 from evolve.report.ground_plan import Stage
+from evolve.report.picture import display
+from evolve.store.atomic_files import UNFINISHED
 from sim.eyes.eyes import EYE_HEIGHT, eye_positions, eye_rotations
 from sim.worlds.layout import WALL_HEIGHT
 

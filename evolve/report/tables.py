@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, gene_values, succeeded
-from evolve.store.candidate import Candidate
 from evolve.config.assemble import to_toml
-from evolve.genome.phenotype import Phenotype
 from evolve.genome.genes import ALL_GENES
+from evolve.genome.phenotype import Phenotype
 from evolve.report.markup import exact, number, table, text
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.versions import recorded
 

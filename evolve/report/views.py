@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 import optics
-from evolve.analysis.statistics import psnr
 from evolve.analysis.episode import Episode
+from evolve.analysis.statistics import psnr
+from evolve.report.ground_plan import Stage
 from evolve.report.markup import number, text
 from evolve.report.picture import data_uri, display
-from evolve.report.ground_plan import Stage
 
 __all__ = ["through", "views"]
 

@@ -12,11 +12,11 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any
 
-from evolve.search import dask_worker
 from evolve.config.assemble import to_toml
-from evolve.store.evaluation import Evaluation
-from evolve.store.atomic_files import write_whole
+from evolve.search import dask_worker
 from evolve.search.job import ATTEMPTS, ExecutorError, Job, Progress
+from evolve.store.atomic_files import write_whole
+from evolve.store.evaluation import Evaluation
 
 __all__ = ["DaskExecutor"]
 

@@ -18,11 +18,11 @@ from typing import Any
 
 from evolve.config.assemble import from_text
 from evolve.genome.phenotype import Phenotype
-from evolve.store.evaluation import Evaluation
+from evolve.learning.training_stage import Stretch
 from evolve.search.job import ATTEMPTS, Job
-from evolve.search.successive_halving import Stretch
-from evolve.store.versions import present
 from evolve.search.worker import evaluated, prepare_device
+from evolve.store.evaluation import Evaluation
+from evolve.store.versions import present
 
 __all__ = ["Order", "UnfitWorker", "decode", "encode", "evaluate"]
 

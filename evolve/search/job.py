@@ -9,7 +9,7 @@ from typing import Any
 
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.search.successive_halving import Stretch
+from evolve.learning.training_stage import Stretch
 
 __all__ = ["ATTEMPTS", "ExecutorError", "Job", "Progress"]
 

@@ -14,9 +14,9 @@ from multiprocessing.connection import Connection, wait
 from types import TracebackType
 from typing import Any
 
-from evolve.store.evaluation import Evaluation
 from evolve.search.job import ATTEMPTS, ExecutorError, Job, Progress
 from evolve.search.worker import Message, work
+from evolve.store.evaluation import Evaluation
 
 __all__ = ["ExecutorError", "Job", "LocalExecutor", "Progress", "cores"]
 

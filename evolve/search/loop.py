@@ -13,13 +13,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Protocol
 
-from evolve.store.candidate import Candidate
 from evolve.genome.phenotype import develop
-from evolve.store.evaluation import Evaluation
+from evolve.learning.training_stage import Stretch
 from evolve.search.job import Job, Progress
-from evolve.search.successive_halving import Stretch, budgets
 from evolve.search.search import Proposal, Search, training_seed
+from evolve.search.successive_halving import budgets, reaching
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, RunError
+from evolve.store.evaluation import Evaluation
 from evolve.store.versions import present, recorded
 
 __all__ = ["Executor", "Watcher", "evolve"]
@@ -65,7 +66,7 @@ def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watch
         for candidate in run.generation(generation):
             _require_same(run, proposals[candidate.id], candidate)
         for rung in range(run.config.search.rungs):
-            missing = sorted(run.climbers(generation, rung) - run.on_rung(rung))
+            missing = sorted(reaching(run, generation, rung) - run.on_rung(rung))
             jobs = deque(_job(run, proposals[identity], rung) for identity in missing)
             for job, outcome in executor.run(jobs, watcher.training):
                 _write_down(run, proposals[job.id], job, outcome, watcher)
@@ -110,7 +111,7 @@ def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, wat
     candidate = Candidate.of(place, proposal.genome, job.phenotype, job.seed, outcome, proposal.parents)
     if job.stretch is not None:
         candidate = replace(candidate, rung=job.stretch.rung)
-        if (before := run.before(candidate)) is not None:
+        if (before := run.on_record(candidate.id, candidate.rung - 1)) is not None:
             candidate = replace(candidate, seconds=before.seconds + candidate.seconds)
     run.append(candidate)
     watcher.evaluated(candidate)

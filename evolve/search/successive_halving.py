@@ -10,29 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 from evolve.config.run_config import LearningConfig, RunConfig, SearchConfig
+from evolve.store.directory import Run
 
-__all__ = ["Stretch", "budgets", "climbers", "evaluations", "sizes", "steps", "stretches"]
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """A training from its beginning to one of its rungs.
-
-    budgets      steps trained at the end of this rung, and of each below it, ascending
-    checkpoints  where the training is kept as it stands at each of them; those that are missing are trained again
-    """
-
-    budgets: tuple[int, ...]
-    checkpoints: tuple[Path, ...]
-
-    @property
-    def rung(self) -> int:
-        return len(self.budgets) - 1
+__all__ = ["budgets", "complete", "evaluations", "finished", "promoted", "reaching", "sizes", "steps", "stretches"]
 
 
 def budgets(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
@@ -61,10 +44,33 @@ def evaluations(search: SearchConfig) -> int:
     return search.generations * sum(sizes(search))
 
 
-def climbers(search: SearchConfig, rung: int, fitness: Sequence[tuple[int, float]]) -> set[int]:
+def promoted(search: SearchConfig, rung: int, fitness: Sequence[tuple[int, float]]) -> set[int]:
     """Ids that go on from a rung, given (id, fitness) of all that reached it: the fittest, the first of equals; none
     that failed (-inf)."""
     if rung + 1 >= search.rungs:
         return set()
     able = sorted((told for told in fitness if math.isfinite(told[1])), key=lambda told: (-told[1], told[0]))
     return {identity for identity, _ in able[: sizes(search)[rung + 1]]}
+
+
+def reaching(run: Run, generation: int, rung: int) -> set[int]:
+    """Ids of a generation that reach a rung; all of it the first, {} any other before the one below is done."""
+    population = run.config.search.population
+    ids = set(range(generation * population, (generation + 1) * population))
+    for below in range(rung):
+        told = [(identity, run.on_record(identity, below)) for identity in ids]
+        known = [(identity, candidate.fitness) for identity, candidate in told if candidate is not None]
+        if len(known) < len(ids):
+            return set()
+        ids = promoted(run.config.search, below, known)
+    return ids
+
+
+def complete(run: Run, generation: int) -> bool:
+    """Whether all of a generation has been evaluated, on every rung that it reaches."""
+    return all(reaching(run, generation, rung) <= run.on_rung(rung) for rung in range(run.config.search.rungs))
+
+
+def finished(run: Run) -> bool:
+    """Whether all of a run has been evaluated."""
+    return all(complete(run, generation) for generation in range(run.config.search.generations))

@@ -17,8 +17,8 @@ from typing import Any, Literal
 
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
+from evolve.learning.training_stage import Stretch
 from evolve.store.evaluation import Evaluation
-from evolve.search.successive_halving import Stretch
 
 __all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "work"]
 

@@ -14,12 +14,11 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from evolve.search import successive_halving
-from evolve.store.candidate import Candidate
-from evolve.config.run_config import RunConfig
 from evolve.config.assemble import from_toml, to_toml
-from evolve.store.atomic_files import UNFINISHED, sweep, write_whole
+from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import Genotype
+from evolve.store.atomic_files import UNFINISHED, sweep, write_whole
+from evolve.store.candidate import Candidate
 from evolve.store.lock import RunLock
 from evolve.store.versions import FILE as VERSIONS
 from evolve.store.versions import fingerprint, record_start
@@ -173,40 +172,17 @@ class Run:
         """Candidates in the order in which they were evaluated and written down, on a ladder once for each rung."""
         return list(self._lines.values())
 
-    def before(self, candidate: Candidate) -> Candidate | None:
-        """The candidate as it was one rung below."""
-        return self._lines.get((candidate.id, candidate.rung - 1))
+    def on_record(self, candidate_id: int, rung: int) -> Candidate | None:
+        """The candidate as it was on a rung; None where it has not been evaluated there."""
+        return self._lines.get((candidate_id, rung))
 
     def steps_of(self, candidate_id: int) -> int:
         """Steps that a candidate has been trained so far, as far as is on record."""
         return max((line.steps for (identity, _), line in self._lines.items() if identity == candidate_id), default=0)
 
-    def climbers(self, generation: int, rung: int) -> set[int]:
-        """Ids of a generation that reach a rung; all of it the first, {} any other before the one below is done."""
-        population = self.config.search.population
-        ids = set(range(generation * population, (generation + 1) * population))
-        for below in range(rung):
-            if not all((identity, below) in self._lines for identity in ids):
-                return set()
-            told = [(identity, self._lines[identity, below].fitness) for identity in ids]
-            ids = successive_halving.climbers(self.config.search, below, told)
-        return ids
-
     def on_rung(self, rung: int) -> set[int]:
         """Ids of all candidates that have been evaluated on a rung."""
         return {identity for identity, reached in self._lines if reached == rung}
-
-    def complete(self, generation: int) -> bool:
-        """Whether all of a generation has been evaluated, on every rung that it reaches."""
-        return all(
-            (identity, rung) in self._lines
-            for rung in range(self.config.search.rungs)
-            for identity in self.climbers(generation, rung)
-        )
-
-    @property
-    def finished(self) -> bool:
-        return all(self.complete(generation) for generation in range(self.config.search.generations))
 
     def _read(self) -> None:
         file = self.path / CANDIDATES

@@ -19,7 +19,7 @@ import numpy as np
 from optics.apertures.aperture import Aperture, Nodes, SoftAperture
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
-from optics.chebyshev import lagrange
+from optics.numerics.interpolation import lagrange
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
 
 __all__ = ["PixelatedAperture"]

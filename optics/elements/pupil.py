@@ -14,12 +14,13 @@ from optics.elements.pixel_relief import PixelRelief
 from optics.elements.refractive_index import RefractiveIndex
 from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
+from optics.elements.wavefront_slopes import Slopes, _derivative
 from optics.numerics.arguments import finite, in_range, of_kind, positive, reals
 from optics.numerics.autodiff import is_tracked, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
 
-__all__ = ["Pupil", "Slopes"]
+__all__ = ["Pupil"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,64 +139,3 @@ def _slopes(pupil: Pupil, wavelength: float, distance: float, angle: tuple[float
     x, y = grid.coordinates(types)
     path = pupil.path(x, y, wavelength, PointSource(distance, angle), types).numpy().reshape(grid.shape)
     return Slopes(grid, _derivative(path.T, grid.dx).T, _derivative(path, grid.dx), pupil.radius)
-
-
-def _derivative(values: np.ndarray, step: float) -> np.ndarray:
-    """Along axis 0, by central differences of fourth order (second order near the ends)."""
-    slope = np.gradient(values, step, axis=0)
-    slope[2:-2] = (8 * (values[3:-1] - values[1:-3]) - values[4:] + values[:-4]) / (12 * step)
-    return slope
-
-
-@dataclass(frozen=True, eq=False)
-class Slopes:
-    """Gradient of the optical path on a grid that covers the disk and its soft edge."""
-
-    grid: Grid
-    along_x: np.ndarray
-    along_y: np.ndarray
-    radius: float
-
-    @cached_property
-    def distance_from_axis(self) -> np.ndarray:
-        return np.hypot(self.grid.x[None, :], self.grid.y[:, None])
-
-    @cached_property
-    def steepest(self) -> float:
-        """Largest slope over the disk and its soft edge."""
-        inside = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
-        return float(np.hypot(self.along_x, self.along_y)[inside].max())
-
-    @cached_property
-    def steepest_inside(self) -> float:
-        """Largest slope over the disk alone."""
-        return float(np.hypot(self.along_x, self.along_y)[self.distance_from_axis <= self.radius].max())
-
-    def turning(self, distance: float, window: Grid, medium_n: float) -> tuple[float, float]:
-        """Largest slope of the path through the pupil and on to any point of the window in a plane at `distance` [m],
-        |∇L + n (ξ - x) / D|: over the disk and its soft edge, and over the disk alone."""
-        soft = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
-        x = np.broadcast_to(self.grid.x[None, :], soft.shape)[soft]
-        y = np.broadcast_to(self.grid.y[:, None], soft.shape)[soft]
-        angle = np.linspace(0, 2 * np.pi, 16, endpoint=False)
-        (cx, cy), outermost = window.centre, window.own_half_diagonal
-        targets = [(cx, cy), *zip(cx + outermost * np.cos(angle), cy + outermost * np.sin(angle), strict=True)]
-        worst = np.zeros(x.size)
-        for tx, ty in targets:
-            scale = medium_n / np.sqrt((x - tx) ** 2 + (y - ty) ** 2 + distance**2)
-            slope = np.hypot(self.along_x[soft] + (x - tx) * scale, self.along_y[soft] + (y - ty) * scale)
-            worst = np.maximum(worst, slope)
-        # A cell more than the disk, so that its rim is not missed.
-        inside = self.distance_from_axis[soft] <= self.radius + self.grid.dx
-        return float(worst.max()), float(worst[inside].max())
-
-    def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
-        """Where rays from the disk's points meet a plane at `distance` [m]; evanescent ones end at infinity."""
-        inside = self.distance_from_axis <= self.radius
-        px, py = self.along_x[inside] / medium_n, self.along_y[inside] / medium_n
-        axial = np.sqrt(np.maximum(1 - px**2 - py**2, 0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x, y = (np.where(axial > 0, distance * p / axial, np.inf * np.sign(p)) for p in (px, py))
-        here = np.broadcast_to(self.grid.x[None, :], inside.shape)[inside]
-        there = np.broadcast_to(self.grid.y[:, None], inside.shape)[inside]
-        return here + x, there + y

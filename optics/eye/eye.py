@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from optics.elements.pupil import Pupil
+from optics.eye.band_choice import choose_bands
 from optics.eye.kernel_bank import Sight, prepare
 from optics.eye.photoreceptor import gaussian_noise, own_type, photon_noise, quantum_catch, throughput
 from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
@@ -177,13 +178,13 @@ class Eye:
     def _chosen_bands(self) -> SpectralBands:
         pupil, cell = self.pupil, self.receptor_pitch / CELLS_FOR_BANDS
         if pupil is None:
-            return SpectralBands.for_tolerance(self.tolerance, receptors=self.receptors)
+            return choose_bands(self.tolerance, self.receptors)
 
         def kernels(wavelengths: np.ndarray) -> np.ndarray:
             retina = Retina(self.sensor_distance, wavelengths, cell, self.tolerance, self.dtype)
             return plain(visual_kernel(pupil, retina, math.inf))
 
-        return SpectralBands.for_tolerance(self.tolerance, kernels, CELLS_FOR_BANDS, self.receptors)
+        return choose_bands(self.tolerance, self.receptors, kernels, CELLS_FOR_BANDS)
 
     def sight(
         self,

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.accuracy import AccuracyError
 from optics.numerics.autodiff import plain
-from optics.point_spread.planner import AccuracyError
 
 __all__ = ["Choice", "Ladder", "hats", "nodes", "worst_difference"]
 

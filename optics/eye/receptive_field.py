@@ -12,11 +12,12 @@ import numpy as np
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
+from optics.methods.problem import Problem
+from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import is_tracked, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.point_spread.planner import AccuracyError, Plan
-from optics.point_spread.psf import PSFResult, problem, spread
+from optics.point_spread.psf import PSFResult, spread
 
 __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 
@@ -123,7 +124,7 @@ def _spot(beams: list[Beam], retina: Retina) -> _Spot:
 def _spread(beams: list[Beam], spot: _Spot, retina: Retina) -> PSFResult:
     reach = spot.half + math.hypot(*spot.centre)
     tasks = [
-        replace(problem(beam, spot.window, retina.tolerance, retina.dtype), widest_band=view.band, reach=reach)
+        replace(Problem.of(beam, spot.window, retina.tolerance, retina.dtype), widest_band=view.band, reach=reach)
         for beam, view in zip(beams, spot.views, strict=True)
     ]
     return spread(beams, tasks, most_seconds=MOST_SECONDS)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from optics.numerics.accuracy import Plan
 from optics.numerics.autodiff import number, plain
 from optics.point_spread.image_quality import image_quality, mtf, strehl_ratio
-from optics.point_spread.planner import Plan
 from optics.point_spread.psf import PSFResult
 from optics.spectra.spectrum import daylight
 

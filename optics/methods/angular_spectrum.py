@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from optics.elements.beam import Beam
-from optics.methods.problem import Problem, PupilEdge, Taper, tapers
+from optics.methods.fresnel import paraxial_integral
+from optics.methods.problem import Problem, PupilEdge
+from optics.methods.spectral_taper import Taper, tapers
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
-from optics.paraxial import paraxial_integral
 
 __all__ = ["GridSampling", "SpectrumSampling", "arrived", "split", "whole"]
 

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from optics.chebyshev import chebyshev_points, lagrange
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
+from optics.numerics.interpolation import TAPS, chebyshev_points, lagrange, lagrange_weights
 from optics.numerics.precision import Precision, opaque, precision, with_room
-from optics.numerics.radial_profile import TAPS, lagrange_weights
 
 __all__ = ["FarFieldSampling", "far_field"]
 

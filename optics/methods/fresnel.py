@@ -12,12 +12,13 @@ from optics.apertures.aperture import EDGE_REACH
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.rays import MARGIN, Rays, brightness, disk_area, mismatch
-from optics.numerics.fourier import predicted_seconds
+from optics.numerics.autodiff import is_tracked, number
+from optics.numerics.field import Field
+from optics.numerics.fourier import dft2, predicted_seconds
 from optics.numerics.grid import Grid
-from optics.numerics.precision import precision
-from optics.paraxial import paraxial_integral
+from optics.numerics.precision import opaque, precision
 
-__all__ = ["ParaxialSampling", "fraunhofer", "fresnel"]
+__all__ = ["ParaxialSampling", "fraunhofer", "fresnel", "paraxial_integral"]
 
 RAYS, ENDS = 48, 24  # from whose origins, and at whose ends, the neglected phase is looked at
 # Of a ray's first Fresnel zone: how far from its origin light still adds up coherently at its end.
@@ -134,3 +135,22 @@ def _places(problem: Problem, ends: Rays) -> tuple[np.ndarray, np.ndarray]:
     x = np.concatenate([ends.to_x + step * width for step in (0, 1, 0, -1, 0)])
     y = np.concatenate([ends.to_y + step * width for step in (0, 0, 1, 0, -1)])
     return np.clip(x, window.x[0], window.x[-1]), np.clip(y, window.y[0], window.y[-1])
+
+
+def paraxial_integral(u: Field, distance: Any, wavelength: float, window: Grid, curved: bool = True) -> Field:
+    """Field over the window at `distance`, up to a phase that intensity forgets:
+
+    U(x) = 1/(iλz) ∫ u(ξ) e^{iπξ²/λz} e^{-2πi x·ξ/λz} dξ   (Goodman, Introduction to Fourier Optics, eq. 4-17);
+
+    with curved=False the quadratic phase is 1 (eq. 4-25). wavelength [m] in the medium. One Fourier sum of free output
+    pitch.
+    """
+    types, grid = u.types, u.grid
+    scale = opaque(types, distance) * opaque(types, wavelength)
+    if curved:
+        x, y = grid.coordinates(types)
+        u = u * Field.from_waves(1.0, (x * x + y * y) * (0.5 / scale), grid, types)
+    period = scale if is_tracked(distance) else wavelength * number(distance)
+    return dft2(u, period / (grid.dx * window.dx), window.shape, -1, window.dx, window.centre).scaled(
+        grid.dx**2 / scale
+    )

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.methods.problem import Problem, Taper, tapers
+from optics.methods.problem import Problem
+from optics.methods.spectral_taper import Taper, tapers
 from optics.numerics.bessel import bessel_j0
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid

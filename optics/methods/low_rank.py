@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from optics.chebyshev import chebyshev_points, lagrange
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples, samples_of
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
+from optics.numerics.interpolation import chebyshev_points, lagrange
 from optics.numerics.precision import Precision, opaque, precision, with_room
 
 __all__ = ["LowRankSampling", "low_rank"]

@@ -12,9 +12,10 @@ from typing import Any
 from optics.elements.beam import Beam
 from optics.methods.angular_spectrum import SpectrumSampling, arrived
 from optics.methods.low_rank import FLOPS
-from optics.methods.problem import Problem, Taper, tapers
+from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PixelSamples, pixel_samples
 from optics.methods.rayleigh_sommerfeld import node_rule
+from optics.methods.spectral_taper import Taper, tapers
 from optics.numerics.field import Field
 from optics.numerics.fourier import fast_length, predicted_seconds
 from optics.numerics.grid import Grid

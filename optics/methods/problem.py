@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
 
 from optics.apertures.aperture import EDGE_REACH, Aperture, SoftAperture
 from optics.apertures.pixelated import PixelatedAperture
+from optics.elements.beam import Beam
+from optics.elements.source import PointSource
 from optics.methods.rays import Rays
+from optics.numerics.arguments import in_range, positive
+from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
-from optics.numerics.precision import Precision, opaque
+from optics.numerics.precision import precision
 
-__all__ = ["FADES", "STEEPEST_SINE", "Problem", "PupilEdge", "Taper", "tapers"]
+__all__ = ["Problem", "PupilEdge"]
 
 # Amplitude ripple of the soft aperture and of the spectral taper against the tolerance on intensity. Edge-diffracted
 # light errs by several ripples, its intensity by twice that, and a window may hold no other light: half the tolerance.
 RIPPLE_PER_TOLERANCE = 0.1
 BRIGHT_RIPPLE_PER_TOLERANCE = 0.3
-# The taper must end this far from grazing incidence, where z tan θ has no bound.
-STEEPEST_SINE = 0.9995
-FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)  # blurs to try, in units of the problem's size
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,19 @@ class Problem:
     widest_band: float = math.inf
     reach: float | None = None
     rays: Rays | None = None
+
+    @classmethod
+    def of(cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
+        """The problem of light that goes through a pupil to a window.
+
+        Raises:
+            ValueError: the distance is not positive, tolerance not in [1e-12, 0.5], or there is no such dtype.
+        """
+        distance = positive("sensor_distance", beam.distance)
+        in_range("tolerance", tolerance, 1e-12, 0.5)
+        precision(dtype)
+        source = PointSource(number(beam.source.distance), beam.source.angle)
+        return _problem(Beam(beam.pupil, source, beam.wavelength, distance), window, tolerance, dtype)
 
     @property
     def pixelated(self) -> PixelatedAperture | None:
@@ -111,41 +125,25 @@ class PupilEdge:
         return self.aperture.seconds_per_point
 
 
-@dataclass(frozen=True)
-class Taper:
-    """Where the spectrum fades out: from `band` over `width` [1/m], which blurs the field by `blur` [m].
-
-    The fading is an error function whose derivative's transform falls to the ripple within the blur. What it removes
-    must therefore land at least that far outside the window.
-    """
-
-    band: float
-    width: float
-    blur: float
-    sine: float
-    tangent: float
-
-    @classmethod
-    def of(cls, problem: Problem, blur: float) -> Taper:
-        band, width = problem.band(blur), 2 * math.log(1 / problem.fade_ripple) / (math.pi * blur)
-        sine = (band + width) * problem.wavelength
-        return cls(band, width, blur, sine, sine / math.sqrt(max(1 - sine * sine, 1e-12)))
-
-    @property
-    def end(self) -> float:
-        return self.band + self.width
-
-    def fade(self, f: Any, types: Precision) -> Any:
-        """1 below the band, 0 beyond its end: the error function falls to the ripple in √ln(1/ripple)."""
-        import drjit as dr
-
-        steepness = 2 / self.width * math.sqrt(math.pi * self.width * self.blur / 2)
-        middle = opaque(types, self.band + self.width / 2)
-        return (1 - dr.erf(types.Float((f - middle) * opaque(types, steepness)))) / 2
-
-
-def tapers(problem: Problem) -> list[Taper]:
-    """Tapers that end before grazing incidence."""
-    size = problem.radius + problem.outermost
-    found = [Taper.of(problem, share * size) for share in FADES]
-    return [taper for taper in found if taper.sine < STEEPEST_SINE]
+@lru_cache(maxsize=256)
+def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
+    pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
+    slopes = pupil.slopes(wavelength, beam.source)
+    pixels = pupil.pixels if pupil.bends(wavelength) else 0
+    detail = 0.0 if pixels else pupil.bandwidth(wavelength, tolerance / 10)
+    turning, inside = slopes.turning(distance, window, pupil.medium_n)
+    return Problem(
+        aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
+        radius=pupil.radius,
+        wavelength=wavelength / pupil.medium_n,
+        distance=distance,
+        window=window,
+        phase_band=1.02 * slopes.steepest / wavelength + detail,
+        phase_band_inside=1.02 * slopes.steepest_inside / wavelength + detail,
+        turning=1.02 * turning / wavelength + detail,
+        turning_inside=1.02 * inside / wavelength + detail,
+        symmetric=pupil.rotationally_symmetric(wavelength) and beam.source.angle == (0.0, 0.0),
+        tolerance=tolerance,
+        dtype=dtype,
+        rays=None if pixels else Rays.of(slopes, pupil.aperture, distance, pupil.medium_n),
+    )

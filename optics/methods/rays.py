@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from optics.apertures.aperture import Aperture
-from optics.elements.pupil import Slopes
+from optics.elements.wavefront_slopes import Slopes
 
 __all__ = ["MARGIN", "Rays", "brightness", "disk_area", "mismatch"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
@@ -11,7 +12,7 @@ import numpy as np
 
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["Table"]
+__all__ = ["TAPS", "Table", "chebyshev_points", "lagrange", "lagrange_weights"]
 
 # Samples beyond either end that six-point interpolation reads.
 MARGIN = 2
@@ -71,3 +72,31 @@ def _lagrange6(t: Any) -> list[Any]:
         ab * cd * f / -24,
         ab * cd * e / 120,
     ]
+
+
+TAPS = 8
+
+
+def lagrange_weights(t: Any) -> list[Any]:
+    """Eight-point Lagrange interpolation at nodes -3 ... 4, t in [0, 1]."""
+    steps = [t + (TAPS // 2 - 1 - i) for i in range(TAPS)]
+    before, after = [1.0], [1.0]
+    for i in range(TAPS - 1):
+        before.append(before[-1] * steps[i])
+        after.append(after[-1] * steps[TAPS - 1 - i])
+    sign = [(-1) ** (TAPS - 1 - i) / (math.factorial(i) * math.factorial(TAPS - 1 - i)) for i in range(TAPS)]
+    return [before[i] * after[TAPS - 1 - i] * sign[i] for i in range(TAPS)]
+
+
+def chebyshev_points(n: int) -> np.ndarray:
+    """Chebyshev points of the first kind on [-1, 1]."""
+    return np.cos(np.pi * (np.arange(n) + 0.5) / n)
+
+
+def lagrange(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """(node, *x.shape): the Lagrange polynomials of the nodes at x."""
+    basis = np.ones((len(nodes), *np.shape(x)))
+    for i, node in enumerate(nodes):
+        for other in np.delete(nodes, i):
+            basis[i] *= (x - other) / (node - other)
+    return basis

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.grid import Grid
+from optics.numerics.interpolation import TAPS, lagrange_weights
 from optics.numerics.precision import Precision
 from optics.numerics.quadrature import harmonics
 
-__all__ = ["TAPS", "RadialLine", "lagrange_weights"]
+__all__ = ["RadialLine"]
 
-TAPS = 8
 # Entries of the matrix from points to table: 128 MB in float64.
 LARGEST_MATRIX = 2**24
 
@@ -90,14 +90,3 @@ def _refinement(points: int, table: int, rim: float, dtype: str) -> np.ndarray:
     matrix = np.cos(np.arccos(np.minimum(np.abs(radius), 1))[:, None] * degrees[None, :]) @ transform
     matrix.setflags(write=False)
     return np.ascontiguousarray(matrix, dtype=dtype)
-
-
-def lagrange_weights(t: Any) -> list[Any]:
-    """Eight-point Lagrange interpolation at nodes -3 ... 4, t in [0, 1]."""
-    steps = [t + (TAPS // 2 - 1 - i) for i in range(TAPS)]
-    before, after = [1.0], [1.0]
-    for i in range(TAPS - 1):
-        before.append(before[-1] * steps[i])
-        after.append(after[-1] * steps[TAPS - 1 - i])
-    sign = [(-1) ** (TAPS - 1 - i) / (math.factorial(i) * math.factorial(TAPS - 1 - i)) for i in range(TAPS)]
-    return [before[i] * after[TAPS - 1 - i] * sign[i] for i in range(TAPS)]

@@ -13,11 +13,12 @@ import numpy as np
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
+from optics.methods.problem import Problem
+from optics.numerics.accuracy import Plan
 from optics.numerics.arguments import shown, vacuum_wavelength
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.point_spread.planner import Plan
-from optics.point_spread.psf import pictures, problem
+from optics.point_spread.psf import pictures
 
 __all__ = ["PSFBatch", "psf_batch"]
 
@@ -76,7 +77,7 @@ def psf_batch(
     ]
     window = Grid(shape, dx)
     flat, plans = zip(
-        *pictures(beams, [problem(beam, window, tolerance, dtype) for beam in beams], method), strict=True
+        *pictures(beams, [Problem.of(beam, window, tolerance, dtype) for beam in beams], method), strict=True
     )
     whole = flat[0] if len(flat) == 1 else dr.concat(flat)
     sizes = len(pupils), len(source_distances), len(wavelengths), *window.shape

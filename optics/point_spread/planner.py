@@ -24,11 +24,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol
 
-from optics.elements.beam import Beam
 from optics.methods import pixelated_spectrum
 from optics.methods.angular_spectrum import split, whole
 from optics.methods.far_field import far_field
@@ -38,36 +35,10 @@ from optics.methods.hankel import hankel
 from optics.methods.low_rank import low_rank
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
+from optics.methods.sampling import Sampling
+from optics.numerics.accuracy import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Option, Plan
 
-__all__ = ["APPROXIMATE", "EXACT", "METHODS", "AccuracyError", "Option", "Plan", "Sampling", "choose"]
-
-
-class Sampling(Protocol):
-    """How one method samples a problem; its time is predicted for a warm kernel on two cores."""
-
-    @property
-    def method(self) -> str: ...
-
-    @property
-    def seconds(self) -> float: ...
-
-    @property
-    def samples(self) -> tuple[int, int]:
-        """(y, x) samples of the pupil, or (radial, angular) nodes, or (nodes, 1)."""
-
-    @property
-    def largest(self) -> int:
-        """Side of the largest square array."""
-
-    @property
-    def model_error(self) -> float:
-        """Relative L2 error of the intensity that the method would make with any number of samples: 0 if exact."""
-
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
-        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
-
-    def plane(self, problem: Problem) -> float:
-        """Width [m] over which rounding spreads the pupil's light."""
+__all__ = ["APPROXIMATE", "EXACT", "METHODS", "choose"]
 
 
 # Each maps a problem to the samplings by which it meets the tolerance: none, one or several.
@@ -93,65 +64,6 @@ FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "split_angular_spectrum": pixelated_spectrum.split,
     "rayleigh_sommerfeld": nodes,
 }
-# Largest square array: 4096² complex64 is 134 MB, and a handful of such arrays live at once.
-MOST_SAMPLES = 4096
-FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}  # relative to the field's root mean square, see tests
-
-
-class AccuracyError(ValueError):
-    """Asked for more than any method can give here; the message says what can be had."""
-
-
-@dataclass(frozen=True)
-class Option:
-    """A method that was weighed: what it would take, how wrong it would be, and why it lost (or "chosen")."""
-
-    method: str
-    samples: tuple[int, int]
-    predicted_error: float
-    seconds: float
-    verdict: str
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What was chosen, and why.
-
-    samples: (y, x) samples of the pupil; for nodes (radial, angular) or (count, 1).
-    padding: period of the pupil's transform over its samples, where there is one.
-    predicted_error: relative L2 error of the intensity over the window.
-    seconds: predicted time of a warm call on two cores.
-    options: every method that was weighed.
-    """
-
-    method: str
-    samples: tuple[int, int]
-    dtype: str
-    predicted_error: float
-    why: str
-    seconds: float = 0.0
-    options: tuple[Option, ...] = ()
-    padding: float = 1.0
-
-    def __str__(self) -> str:
-        rows = {
-            "method": self.method,
-            "samples": _size(self.samples),
-            "padding": f"{self.padding:.2f}",
-            "dtype": self.dtype,
-            "predicted error": f"{self.predicted_error:.1e}",
-            "predicted time": f"{self.seconds:.2g} s",
-            "why": self.why,
-        }
-        head = [f"{name:<17}{value}" for name, value in rows.items()]
-        if not self.options:
-            return "\n".join(head)
-        others = [
-            f"  {option.method:<24}{_size(option.samples):>13}{option.predicted_error:>10.1e}{option.seconds:>9.2g} s"
-            f"  {option.verdict}"
-            for option in self.options
-        ]
-        return "\n".join([*head, "weighed", *others])
 
 
 @lru_cache(maxsize=256)
@@ -218,10 +130,6 @@ def _cost(option: Sampling) -> tuple[bool, float]:
 
 def _within(option: Sampling, most_seconds: float) -> bool:
     return option.largest <= MOST_SAMPLES and option.seconds <= most_seconds
-
-
-def _size(samples: tuple[int, int]) -> str:
-    return f"{samples[0]} x {samples[1]}" if samples[1] > 1 else str(samples[0])
 
 
 def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None], most_seconds: float) -> Plan:

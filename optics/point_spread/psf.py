@@ -5,25 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.methods.problem import Problem
-from optics.methods.rays import Rays
-from optics.numerics.arguments import in_range, positive, vacuum_wavelength, vacuum_wavelengths
-from optics.numerics.autodiff import number
+from optics.methods.sampling import Sampling
+from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
+from optics.numerics.arguments import vacuum_wavelength, vacuum_wavelengths
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
-from optics.point_spread.planner import FLOAT_NOISE, AccuracyError, Plan, Sampling, choose
+from optics.point_spread.planner import choose
 from optics.point_spread.spot_check import spot_check
 
-__all__ = ["PSFResult", "pictures", "plan", "problem", "psf", "spread"]
+__all__ = ["PSFResult", "pictures", "plan", "psf", "spread"]
 
 TRIES = 3
 
@@ -102,7 +101,7 @@ def psf(
     if lambdas.ndim > 1:
         raise ValueError(f"wavelengths has shape {lambdas.shape}: must be one wavelength [m], or a row of them")
     beams = [Beam(pupil, source, float(at), sensor_distance) for at in lambdas]
-    tasks = [problem(beam, window, tolerance, dtype) for beam in beams]
+    tasks = [Problem.of(beam, window, tolerance, dtype) for beam in beams]
     return spread(beams, tasks, method)
 
 
@@ -121,40 +120,7 @@ def plan(
 ) -> Plan:
     """What `psf` would do at one wavelength, without doing it: see there for arguments and errors."""
     beam = Beam(pupil, PointSource(source_distance, source_angle), vacuum_wavelength(wavelength), sensor_distance)
-    return choose(problem(beam, Grid(shape, dx, centre), tolerance, dtype), method)[0]
-
-
-def problem(beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
-    """The numbers that decide the sampling."""
-    distance = positive("sensor_distance", beam.distance)
-    in_range("tolerance", tolerance, 1e-12, 0.5)
-    precision(dtype)
-    source = PointSource(number(beam.source.distance), beam.source.angle)
-    return _problem(Beam(beam.pupil, source, beam.wavelength, distance), window, tolerance, dtype)
-
-
-@lru_cache(maxsize=256)
-def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
-    pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
-    slopes = pupil.slopes(wavelength, beam.source)
-    pixels = pupil.pixels if pupil.bends(wavelength) else 0
-    detail = 0.0 if pixels else pupil.bandwidth(wavelength, tolerance / 10)
-    turning, inside = slopes.turning(distance, window, pupil.medium_n)
-    return Problem(
-        aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
-        radius=pupil.radius,
-        wavelength=wavelength / pupil.medium_n,
-        distance=distance,
-        window=window,
-        phase_band=1.02 * slopes.steepest / wavelength + detail,
-        phase_band_inside=1.02 * slopes.steepest_inside / wavelength + detail,
-        turning=1.02 * turning / wavelength + detail,
-        turning_inside=1.02 * inside / wavelength + detail,
-        symmetric=pupil.rotationally_symmetric(wavelength) and beam.source.angle == (0.0, 0.0),
-        tolerance=tolerance,
-        dtype=dtype,
-        rays=None if pixels else Rays.of(slopes, pupil.aperture, distance, pupil.medium_n),
-    )
+    return choose(Problem.of(beam, Grid(shape, dx, centre), tolerance, dtype), method)[0]
 
 
 def spread(beams: list[Beam], tasks: list[Problem], method: str = "auto", most_seconds: float = 60.0) -> PSFResult:
@@ -222,7 +188,7 @@ def _checked(
             least = max(0.3 * sampled.tolerance * task.tolerance / seen, 10 * FLOAT_NOISE[task.dtype])
             if least >= sampled.tolerance:
                 break
-            sampled = problem(beam, task.window, least, task.dtype)  # fine detail counts for more, too
+            sampled = Problem.of(beam, task.window, least, task.dtype)  # fine detail counts for more, too
         chosen = choose(sampled, *asked)
         image = _picture(beam, sampled, chosen[1])
     raise AccuracyError(

@@ -10,9 +10,9 @@ import numpy as np
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import MOST_DIGITS, PAIRS_PER_SECOND, direct_sum, node_count, turns
+from optics.numerics.accuracy import FLOAT_NOISE
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.point_spread.planner import FLOAT_NOISE
 
 __all__ = ["CAUTION", "spot_check"]
 

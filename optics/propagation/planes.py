@@ -15,9 +15,9 @@ from optics.apertures.aperture import EDGE_REACH, SoftAperture
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
+from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.point_spread.planner import MOST_SAMPLES, AccuracyError
 from optics.propagation.propagate import RIPPLE_PER_TOLERANCE, PropagationResult, propagate
 from optics.propagation.transfer_function import kept_band, kept_square
 

@@ -19,11 +19,11 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
 from optics.numerics.arguments import finite, in_range, vacuum_wavelength
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum, predicted_seconds
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, precision
-from optics.point_spread.planner import FLOAT_NOISE, AccuracyError, Plan
 from optics.propagation.sampling import Sampling, blur_left, blurred_back, most_spare, sampling
 from optics.propagation.transfer_function import EVERYTHING, Passage, TransferFunction, evanescent
 

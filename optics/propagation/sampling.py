@@ -14,9 +14,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.fourier import fast_length
 from optics.numerics.grid import Grid
-from optics.point_spread.planner import MOST_SAMPLES, AccuracyError
 from optics.propagation.transfer_function import EVERYTHING, STEEPEST_SINE, Passage, kept_band, kept_square, walk
 
 __all__ = ["Sampling", "blur_left", "blurred_back", "most_spare", "sampling"]

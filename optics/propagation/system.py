@@ -11,10 +11,10 @@ import numpy as np
 from optics.apertures.aperture import EDGE_REACH
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
+from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
 from optics.numerics.arguments import in_range, positive, vacuum_wavelength
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.point_spread.planner import FLOAT_NOISE, AccuracyError, Plan
 from optics.propagation.planes import Light, PlaneField, PupilSampling, Stop
 
 __all__ = ["FreeSpace", "StackResult", "Step", "propagate_through"]

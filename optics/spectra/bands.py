@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from optics.eye.kernel_interpolation import worst_difference
-from optics.numerics.arguments import in_range, whole
-from optics.point_spread.planner import AccuracyError
+from optics.numerics.arguments import whole
 from optics.spectra.pigment import pigment_absorptance
 from optics.spectra.receptors import Receptors, receptors_of
 from optics.spectra.spectrum import Spectrum, cie_1931, daylight
 
 __all__ = ["SpectralBands", "cie_1931", "daylight", "pigment_absorptance"]
 
-CANDIDATES, FINEST = (1, 2, 4, 8, 16, 32), 64
+FINEST = 64
 CATCHES_FIRST = 1e4  # how much more than means they weigh in least squares
 
 
@@ -50,45 +47,6 @@ class SpectralBands:
         nm, catch = _catch(kinds)
         weights = (catch @ _hats(nm, centres).T) / catch.sum(axis=1, keepdims=True) / daylight(centres * 1e-9)
         return cls(centres * 1e-9, weights, catch.sum(axis=1) * 1e-18)
-
-    @classmethod
-    def for_tolerance(
-        cls,
-        tolerance: float,
-        kernels: Callable[[np.ndarray], np.ndarray] | None = None,
-        samples_per_receptor: int = 1,
-        receptors: Any = "rgb",
-    ) -> SpectralBands:
-        """The fewest bands, a power of two, that keep the predicted error of a receptor's signal within the tolerance,
-        in units of white's signal. It is the sum of two:
-
-        - reflectances (1 + cos(2π λ/Λ + φ))/2 of any phase φ, Λ the whole range: what the bands make of them against
-          quadrature to 1 nm;
-        - kernels(wavelengths) (wave, k, k), cells of 1/samples_per_receptor (None: the same for all wavelengths):
-          the worst scene's difference between white light's kernel from n and from 2n bands.
-
-        Raises:
-            AccuracyError: 32 bands do not.
-        """
-        in_range("tolerance", tolerance, 1e-6, 0.5)
-        total, coarse = math.inf, None
-        for bands in CANDIDATES:
-            chosen, finer = (cls.uniform(n, receptors) for n in (bands, 2 * bands))
-            total = _reflectance_error(chosen, cls.uniform(FINEST, receptors), receptors_of(receptors).limits_nm)
-            if total > tolerance:
-                continue
-            if kernels is None:
-                return chosen
-            coarse = chosen.white_light(kernels(chosen.wavelengths)) if coarse is None else coarse
-            fine = finer.white_light(kernels(finer.wavelengths))
-            total += worst_difference([(1, coarse), (-1, fine)], samples_per_receptor)
-            if total <= tolerance:
-                return chosen
-            coarse = fine
-        raise AccuracyError(
-            f"tolerance = {tolerance:g}: {CANDIDATES[-1]} bands leave a predicted error of {total:.1e} of white's "
-            "signal; widen the tolerance or give a number of bands"
-        )
 
     def of(
         self, radiance: Spectrum | Callable[[np.ndarray], np.ndarray], receptors: Any, nonnegative: bool = False
@@ -142,13 +100,3 @@ def _catch(kinds: Receptors) -> tuple[np.ndarray, np.ndarray]:
 def _hats(nm: np.ndarray, centres: np.ndarray) -> np.ndarray:
     """(band, wavelength): linear interpolation between the bands' centres, constant beyond."""
     return np.stack([np.interp(nm, centres, row) for row in np.eye(len(centres))])
-
-
-def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: tuple[float, float]) -> float:
-    """Worst over phases and channels: half of |Σ w d e^{2πiλ/Λ}|'s error."""
-    period = (range_nm[1] - range_nm[0]) * 1e-9
-
-    def catch(bands: SpectralBands) -> np.ndarray:
-        return bands.weights @ (daylight(bands.wavelengths) * np.exp(2j * np.pi * bands.wavelengths / period))
-
-    return float(np.abs(catch(chosen) - catch(exact)).max() / 2)

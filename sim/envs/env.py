@@ -7,10 +7,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from sim.eyes.eyes import Eyes
 from sim.envs.follow_camera import RENDER_MODES
-from sim.worlds.state import WorldState
 from sim.envs.vec_env import make_vec_env
+from sim.eyes.eyes import Eyes
+from sim.worlds.state import WorldState
 
 
 class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):

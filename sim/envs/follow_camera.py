@@ -5,13 +5,12 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from sim.eyes.eyes import Eyes
-from sim.scene.color import encode_srgb
-from sim.exr import preview
 from sim.envs.field_of_view_overlay import draw_fields
+from sim.eyes.eyes import Eyes
 from sim.scene.cameras import Viewpoint
+from sim.scene.color import encode_srgb, preview
 from sim.scene.mirror import mirror
-from sim.worlds.state import WorldState
+from sim.worlds.state import WorldState, pose
 from sim.worlds.world import World
 
 # [m] of the camera from the agent, and of its target ahead of it; steep enough to look over a wall behind.
@@ -56,15 +55,6 @@ class Onlooker:
             return picture
         depth = self._mirror.render_depth(view, width, height)
         return draw_fields(picture, view, depth, self.eyes, self.world.model, self._data)
-
-
-def pose(data: mujoco.MjData, world: World, state: WorldState, index: int = 0) -> None:
-    """Put MuJoCo's data where one world of a state is."""
-    data.joint("agent_x").qpos[0], data.joint("agent_y").qpos[0] = state.position[index]
-    data.joint("agent_heading").qpos[0] = state.heading[index]
-    for name, centre in zip(world.objects, state.objects[index], strict=True):
-        data.mocap_pos[world.model.body(name).mocapid[0]] = centre
-    mujoco.mj_forward(world.model, data)
 
 
 def _follow(state: WorldState, index: int) -> Viewpoint:

@@ -8,10 +8,10 @@ import numpy as np
 
 from sim.envs.observation import STANDING
 from sim.physics.physics import Agents, Motion, Physics
-from sim.tasks.reward import MODES, TERMS, reward_terms
-from sim.worlds.state import WorldState, wrap_angle
 from sim.tasks.random_streams import Streams
+from sim.tasks.reward import MODES, TERMS, reward_terms
 from sim.tasks.task import respawned, task_of
+from sim.worlds.state import WorldState, wrap_angle
 from sim.worlds.world import MAX_SPEED, World
 
 EPISODE_STEPS = 256  # actions, then the episode is truncated

@@ -11,15 +11,15 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
 from optics.spectra.spectrum import Spectrum
-from sim.eyes.eyes import Eyes
-from sim.envs.retina_images import side_by_side
-from sim.render.fidelity import Fidelity
-from sim.envs.info import first_infos, infos_of
-from sim.envs.observation import Memory, STANDING, action_space, observation_space
 from sim.envs.follow_camera import Onlooker, check_render_mode
-from sim.render.batched_renderer import BatchedRenderer
-from sim.render.noisy_signals import Pending, Retinas
+from sim.envs.info import first_infos, infos_of
+from sim.envs.observation import STANDING, Memory, action_space, observation_space
+from sim.envs.retina_images import side_by_side
 from sim.envs.simulation import NOWHERE, Simulation, Step
+from sim.eyes.eyes import Eyes
+from sim.render.batched_renderer import BatchedRenderer
+from sim.render.fidelity import Fidelity
+from sim.render.noisy_signals import Pending, Retinas
 from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
 

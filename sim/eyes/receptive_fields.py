@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import optics
-from sim.eyes.depth_layers import DepthLayers, ONE_PSF
+from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 
 # Cells across the eye, at least, on which receptive fields are tabulated.
 MIN_CELLS = 32

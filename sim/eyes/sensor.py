@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse
 
 import optics
-from sim.eyes.depth_layers import DepthLayers, ONE_PSF
+from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.receptive_fields import Draw, Fields, Unseen, fields_of, low_discrepancy, places
 from sim.eyes.receptor_sums import Readout, RowProduct, of_bands, of_components, of_receptors, within_stretches
 

@@ -15,9 +15,9 @@ import mujoco
 import numpy as np
 
 from sim.physics.free_motion import glide_of
+from sim.physics.local_contacts import vicinity_of
 from sim.physics.mujoco_batch import Rollouts
 from sim.worlds.state import WorldState
-from sim.physics.local_contacts import vicinity_of
 from sim.worlds.world import MAX_SPEED, World
 
 SUBSTEPS = 10  # of the model's timestep per action

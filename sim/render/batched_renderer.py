@@ -16,18 +16,18 @@ import mitsuba as mi
 import numpy as np
 
 import optics
-from sim.render import memory_budget
-from sim.tracing import lighting
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
+from sim.eyes.sensor import sampling_of
+from sim.render import memory_budget
 from sim.render.band_error import lit_in_bands
 from sim.render.fidelity import Fidelity, chosen
 from sim.render.fidelity_trials import Pilot
 from sim.render.frozen_kernels import aligned, garbage_kept
-from sim.eyes.sensor import sampling_of
-from sim.tracing.static_scene import Stage, build_stage
-from sim.worlds.state import WorldState
-from sim.tracing.tracer import Tracer, Tracers
 from sim.scene.variant import variant
+from sim.tracing import lighting
+from sim.tracing.static_scene import Stage, build_stage
+from sim.tracing.tracer import Tracer, Tracers
+from sim.worlds.state import WorldState
 from sim.worlds.world import World
 
 ROW = 16  # floats: rows of the pose buffer start on 64 bytes

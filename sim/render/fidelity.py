@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import optics
+from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.eyes import Eyes
-from sim.render.band_error import band_error, lit_in_bands, measured
-from sim.eyes.depth_layers import DepthLayers, ONE_PSF
 from sim.eyes.receptive_fields import Unseen
-from sim.tracing.lighting import BOUNCE, DIRECT, LEVELS
-from sim.render.fidelity_trials import Pilot
 from sim.eyes.sensor import Sampling, sampling_of
+from sim.render.band_error import band_error, lit_in_bands, measured
+from sim.render.fidelity_trials import Pilot
+from sim.tracing.lighting import BOUNCE, DIRECT, LEVELS
 from sim.tracing.static_scene import build_stage
 from sim.tracing.tracer import Tracers
 from sim.worlds.world import World

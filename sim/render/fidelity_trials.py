@@ -15,15 +15,15 @@ import mitsuba as mi
 import numpy as np
 
 from optics import Eye
-from sim.tracing import lighting
-from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.eyes.depth_layers import DepthLayers
-from sim.tasks.placement import CLEARANCE
-from sim.render.frozen_kernels import aligned
+from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.eyes.sensor import BoxSampling, Sampling, Trial, sampling_of
+from sim.render.frozen_kernels import aligned
+from sim.scene.variant import variant
+from sim.tasks.placement import CLEARANCE
+from sim.tracing import lighting
 from sim.tracing.static_scene import Stage
 from sim.tracing.tracer import Tracers
-from sim.scene.variant import variant
 from sim.worlds.world import World
 
 RECEPTORS = 24  # looked through, at most

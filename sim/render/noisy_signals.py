@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from sim.render.receptor_noise import FEW, NoiseModel, Normals
 from sim.render.batched_renderer import BatchedRenderer
+from sim.render.receptor_noise import FEW, NoiseModel, Normals
 from sim.worlds.state import WorldState
 
 Pending = Callable[[], np.ndarray]  # waits for signals (env, eye, channel, height, width) float32

@@ -15,11 +15,10 @@ import numpy as np
 import optics
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.render.band_error import lit_in_bands
-from sim.envs.follow_camera import pose
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import mirror
-from sim.worlds.state import WorldState
 from sim.scene.variant import DEFAULT_VARIANT
+from sim.worlds.state import WorldState, pose
 from sim.worlds.world import World
 
 

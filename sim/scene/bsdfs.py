@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum
-from sim.scene.color import decode_srgb
 from sim.scene import spectra, surfaces
+from sim.scene.color import decode_srgb
 
 _TYPES = mujoco.mjtGeom
 _UNSET_GLOSS = (0.5, 0.5)  # specular, shininess

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+# IEC 61966-2-1
+_XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+
 
 def encode_srgb(linear: np.ndarray | float) -> np.ndarray:
     """Linear value in [0, 1] -> sRGB display value in [0, 1]."""
@@ -15,3 +18,21 @@ def decode_srgb(display: np.ndarray | float) -> np.ndarray:
     """sRGB display value in [0, 1] -> linear value."""
     x = np.asarray(display, dtype=float)
     return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0.04045) + 0.055) / 1.055) ** 2.4)
+
+
+def preview(radiance: np.ndarray, wavelengths_nm: np.ndarray) -> np.ndarray:
+    """Linear sRGB (y, x, 3) of spectral radiance (band, y, x): CIE 1931, scaled such that radiance D65 is white.
+
+    A band counts for the wavelengths nearer to it than to the next; with few bands the colours are rough.
+    """
+    from optics.spectra.bands import cie_1931, daylight
+
+    order = np.argsort(wavelengths_nm)
+    nm = np.clip(np.asarray(wavelengths_nm, float)[order], 360.0, 780.0)
+    matching = cie_1931(nm * 1e-9)  # (band, 3)
+    weights = matching * (np.gradient(nm)[:, None] if len(nm) > 1 else 1.0)
+    light = daylight(nm * 1e-9)
+    rgb_weights = weights @ _XYZ_TO_SRGB.T
+    white = light @ rgb_weights
+    balanced = rgb_weights / np.where(np.abs(white) > 1e-9, white, np.inf)
+    return np.einsum("byx,bc->yxc", np.asarray(radiance, float)[order], balanced).astype(np.float32)

@@ -20,8 +20,8 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum, daylight
-from sim.scene.color import decode_srgb
 from sim.scene import sky, surfaces
+from sim.scene.color import decode_srgb
 from sim.scene.spectra import HEADLIGHT, Spectra, described, in_daylight
 
 WAVELENGTHS_NM = np.arange(300.0, 781.0, 5.0)

@@ -9,8 +9,8 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from sim.scene.color import decode_srgb
 from sim.scene import cube
+from sim.scene.color import decode_srgb
 
 # MuJoCo's own sign that a geom's rgba was not set, and its material's counts.
 _UNSET_RGBA = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)

@@ -1,1 +1,8 @@
-"""One module per task: its world's geometry (`add_layout`)."""
+"""What is asked of an agent.
+
+task            what counts as progress, what ends an episode
+reward          the reward's named terms and their weights
+placement       where an episode starts
+object_motion   how the objects of tracking move
+random_streams  one random stream per world and purpose
+"""

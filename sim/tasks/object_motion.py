@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from sim.tasks.placement import SEPARATION
-from sim.worlds.state import WorldState, wrap_angle
 from sim.tasks.random_streams import Chance
+from sim.worlds.state import WorldState, wrap_angle
 
 SPEED = 0.5  # [m/s]
 TURN = 0.4  # standard deviation of the change of heading per action [rad]

@@ -13,9 +13,9 @@ from typing import Protocol
 import numpy as np
 
 from sim.tasks.object_motion import wander
-from sim.tasks.placement import Places, REACH, free_spot
-from sim.worlds.state import WorldState
+from sim.tasks.placement import REACH, Places, free_spot
 from sim.tasks.random_streams import Chance
+from sim.worlds.state import WorldState
 from sim.worlds.world import TASKS, World
 
 

@@ -15,11 +15,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from sim.tracing import lighting, spheres
 from sim.eyes.eyes import EYE_HEIGHT
+from sim.tracing import lighting, spheres
 from sim.tracing.reflectance_atlas import Atlas, bake
-from sim.tracing.wall_intersection import Footprints, footprints_of
 from sim.tracing.static_scene import Stage
+from sim.tracing.wall_intersection import Footprints, footprints_of
 from sim.tracing.walls import ALIGNED, Unsuited, Walls, walls_of
 from sim.worlds.world import World
 

@@ -15,8 +15,8 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from sim.tracing import lighting
 from sim.scene import shapes, surfaces
+from sim.tracing import lighting
 
 
 @dataclass(frozen=True)

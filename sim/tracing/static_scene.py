@@ -15,12 +15,12 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from sim.tracing.spheres import Spheres
 from sim.scene import lights, shapes, tessellation
 from sim.scene.mirror import Mirror, mirror
 from sim.scene.shapes import Part
 from sim.scene.tessellation import Triangles
 from sim.scene.variant import variant as in_variant
+from sim.tracing.spheres import Spheres
 from sim.worlds.world import World
 
 

@@ -6,12 +6,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from sim.scene import shapes
+from sim.scene.variant import variant
 from sim.tracing import lighting
 from sim.tracing.closed_form_tracer import ClosedForm
-from sim.scene import shapes
-from sim.tracing.static_scene import Stage
 from sim.tracing.mitsuba_tracer import Traced
-from sim.scene.variant import variant
+from sim.tracing.static_scene import Stage
 from sim.tracing.walls import Unsuited
 from sim.worlds.world import World
 

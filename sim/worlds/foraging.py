@@ -14,8 +14,8 @@ import numpy as np
 
 from optics.spectra.spectrum import LIMITS_NM, Spectrum
 from sim.worlds import materials
-from sim.worlds.layout import Layout
 from sim.worlds.detection import STRIPES, furnished_field
+from sim.worlds.layout import Layout
 
 DARK, BRIGHT = 0.05, 0.8  # reflectance of yellow at either end of the visible range
 EDGE_NM, WIDTH_NM = 510.0, 15.0  # where and how fast it rises

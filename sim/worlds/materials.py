@@ -13,8 +13,7 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum, daylight
-from sim.scene.color import encode_srgb
-from sim.exr import preview
+from sim.scene.color import encode_srgb, preview
 
 WHITE = 0.9  # reflectance of a light stripe
 BLACK = 0.05  # reflectance of a dark stripe

@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
+
+from sim.worlds.world import World
 
 
 @dataclass(frozen=True)
@@ -78,3 +81,12 @@ def concatenate(states: list[WorldState]) -> WorldState:
 def wrap_angle(angle: np.ndarray) -> np.ndarray:
     """The same angle in [-π, π)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def pose(data: mujoco.MjData, world: World, state: WorldState, index: int = 0) -> None:
+    """Put MuJoCo's data where one world of a state is."""
+    data.joint("agent_x").qpos[0], data.joint("agent_y").qpos[0] = state.position[index]
+    data.joint("agent_heading").qpos[0] = state.heading[index]
+    for name, centre in zip(world.objects, state.objects[index], strict=True):
+        data.mocap_pos[world.model.body(name).mocapid[0]] = centre
+    mujoco.mj_forward(world.model, data)

@@ -1,7 +1,7 @@
 """A task's world: what stands where, as a MuJoCo model, and where agent and objects may start.
 
 `build_world` compiles one. What all worlds have in common is added here; what is special about one is in
-the modules of `sim.tasks`.
+`sim.worlds.detection`, `.foraging` and `.navigation`.
 """
 
 from __future__ import annotations
@@ -14,19 +14,17 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum
-from sim.worlds import materials
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
+from sim.scene.spectra import resolve
+from sim.worlds import detection, foraging, materials, navigation
 from sim.worlds.agent_model import AgentAlone
 from sim.worlds.layout import WALL_CONAFFINITY
-from sim.scene.spectra import resolve
-from sim.tasks import tracking
-from sim.worlds import detection, foraging, navigation
 
 _LAYOUTS = {
     "detection": detection.add_layout,
     "foraging": foraging.add_layout,
     "navigation": navigation.add_layout,
-    "tracking": tracking.add_layout,
+    "tracking": detection.add_layout,
 }
 TASKS = tuple(_LAYOUTS)
 

@@ -5,8 +5,8 @@ import pytest
 from closed_form import bowl, tiny
 from small_run import small_run
 
-from evolve.cli.main import main
 from evolve.analysis.episode import record
+from evolve.cli.main import main
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve as carry_on
 from evolve.store.directory import Run

@@ -17,11 +17,11 @@ from tempfile import TemporaryDirectory
 from closed_form import tiny
 from remote_form import climbing
 
-from evolve.store.evaluation import Evaluation
-from evolve.store.atomic_files import write_whole
 from evolve.search.loop import evolve
 from evolve.search.search import Search
+from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run
+from evolve.store.evaluation import Evaluation
 
 LADDER = ("search.rungs=3", "learning.total_steps=16384")
 KINDS = ((), ("search.steady_state=true",), LADDER)  # of runs
@@ -117,7 +117,7 @@ def endure(kills, seed, folder):
             assert complete.startswith(kept), "something written was lost"
             kept = complete
         run = Run.open(path)
-        assert run.finished
+        assert finished(run)
         assert history(run) == history(Run.open(whole)), "another history than that of a run that nobody killed"
         again = {name: count - 1 for name, count in begun(folder / f"{path.name}.log").items() if count > 1}
         assert sum(again.values()) <= deaths, "a completed candidate was evaluated again"

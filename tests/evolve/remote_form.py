@@ -7,8 +7,8 @@ import signal
 import time
 from pathlib import Path
 
-from evolve.store.evaluation import Evaluation
 from evolve.store.atomic_files import write_whole
+from evolve.store.evaluation import Evaluation
 
 
 def bowl(phenotype, config, seed, policy_path, progress):

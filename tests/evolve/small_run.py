@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from evolve.store.candidate import Candidate
 from evolve.config.run_config import EvaluationConfig, EyeConfig, LearningConfig, RunConfig
+from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.fitness import evaluate
-from evolve.genome.genotype import GENES, Genotype
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 
 LEARNING = LearningConfig(total_steps=512, n_envs=16, n_steps=16, batch_size=128, eval_interval=512)

@@ -5,7 +5,7 @@ import sys
 
 import torch
 
-from evolve.learning.adam import Adam, EPSILON
+from evolve.learning.adam import EPSILON, Adam
 
 
 def trained(optimizer_class, **options):

@@ -17,9 +17,9 @@ from evolve.analysis.statistics import (
     trajectory,
     white_strehl,
 )
-from evolve.store.candidate import Candidate
 from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
+from evolve.store.candidate import Candidate
 
 
 def phenotype(**changes):

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evolve.config.run_config import ConfigError
 from evolve.config.assemble import assemble
-from evolve.genome.phenotype import develop, repaired
+from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop, repaired
 
 CROWDED = assemble(
     "detection",

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from evolve.config.run_config import ConfigError, TASKS
 from evolve.config.assemble import assemble, from_toml, preset_names, to_toml
+from evolve.config.run_config import TASKS, ConfigError
 from evolve.genome.genotype import GENES, group_members
 
 
@@ -209,8 +209,8 @@ def test_contradiction_names_every_place_that_made_it(tmp_path):
 
 def test_relief_may_have_more_points_and_keeps_the_presets_surface():
     import optics
-    from evolve.genome.phenotype import develop
     from evolve.genome.genotype import Genotype
+    from evolve.genome.phenotype import develop
     from optics.numerics import backend
     from optics.numerics.precision import precision
 
@@ -232,8 +232,8 @@ def test_relief_may_have_more_points_and_keeps_the_presets_surface():
 
 @pytest.mark.parametrize(("points", "count"), [(4, 3), (5, 6), (6, 6), (9, 15)])
 def test_symmetric_reliefs_look_the_same_mirrored_and_turned(points, count):
-    from evolve.genome.phenotype import develop
     from evolve.genome.genotype import Genotype
+    from evolve.genome.phenotype import develop
 
     asked = ["eye.relief_symmetric=true", f"eye.relief_points={points}"]
     config = assemble("detection", assignments=asked)

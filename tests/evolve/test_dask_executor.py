@@ -19,6 +19,7 @@ from evolve.search import dask_worker
 from evolve.search.dask_executor import DaskExecutor
 from evolve.search.local_executor import ExecutorError, LocalExecutor
 from evolve.search.loop import evolve
+from evolve.search.successive_halving import finished
 from evolve.store.directory import Run
 from evolve.store.versions import present
 
@@ -113,7 +114,7 @@ def test_history_on_a_ladder_is_the_local_one(tmp_path, cluster, monkeypatch):
     far, _ = carried(tmp_path / "dask", config, cluster.executor("climbing"))
     local, _ = carried(tmp_path / "local", config, LocalExecutor(climbing, 2))
     assert history(far) == history(local)
-    assert far.finished
+    assert finished(far)
     whole = [candidate for candidate in local.candidates if candidate.rung == 2]
     assert len(whole) == 3
     for candidate in whole:

@@ -11,10 +11,10 @@ import torch
 
 import evolve
 import sim
-from evolve.report import exr_export, replay
-from evolve.config.run_config import WorldConfig
 from evolve.analysis.episode import Episode, _perfect_views, record
+from evolve.config.run_config import WorldConfig
 from evolve.learning.policy import PolicyConfig, build_policy, load_policy, save_policy
+from evolve.report import exr_export, replay
 from evolve.report.ground_plan import Stage
 from evolve.store.directory import RunError
 

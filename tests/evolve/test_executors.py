@@ -23,9 +23,9 @@ from closed_form import (
     unfit,
 )
 
+from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.search.local_executor import ExecutorError, Job, LocalExecutor
-from evolve.genome.genotype import Genotype
 
 CONFIG = tiny()
 GENOTYPE = Genotype(CONFIG.genome)

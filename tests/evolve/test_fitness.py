@@ -10,8 +10,8 @@ from small_run import LEARNING, PHENOTYPE, small_config
 import sim
 from evolve.config.run_config import WorldConfig
 from evolve.learning.fitness import evaluate
-from evolve.learning.ppo import play
 from evolve.learning.policy import load_policy
+from evolve.learning.ppo import play
 
 pytestmark = pytest.mark.usefixtures("short_episodes")
 
@@ -79,7 +79,9 @@ def test_training_looks_less_closely_than_evaluation(rays_per_eye, expected, tmp
 
 def test_a_training_that_diverges_is_a_failure_with_a_reason(tmp_path, monkeypatch):
     """Signals that are no numbers: no exception leaves, no policy is written."""
-    monkeypatch.setattr("sim.render.receptor_noise.NoiseModel.__call__", lambda _, signals, *__: np.full_like(signals, np.nan))
+    monkeypatch.setattr(
+        "sim.render.receptor_noise.NoiseModel.__call__", lambda _, signals, *__: np.full_like(signals, np.nan)
+    )
     evaluation = evaluate(PHENOTYPE, small_config(), 5, tmp_path / "0.safetensors")
     assert evaluation.fitness == -math.inf
     assert evaluation.failure is not None

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 from small_run import PHENOTYPE
 
+from evolve.analysis.genealogy import descent, nearest_parent
 from evolve.analysis.statistics import champions
 from evolve.store.candidate import Candidate
-from evolve.analysis.genealogy import descent, nearest_parent
 
 
 def candidate(identity, genome, parents=(), fitness=0.0, failure=None):

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import sim
-from evolve.config.run_config import TASKS
 from evolve.config.assemble import assemble
-from evolve.genome.phenotype import Phenotype, develop
+from evolve.config.run_config import TASKS
 from evolve.genome.genes import ALL_GENES, APERTURE_SHAPES, LAMBDA_MAX
 from evolve.genome.genotype import CLUSTERS, GENES, Genotype, group_members
+from evolve.genome.phenotype import Phenotype, develop
 from optics import BSplineRelief
 
 CONFIG = assemble("detection")

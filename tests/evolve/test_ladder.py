@@ -9,13 +9,14 @@ from remote_form import climbing
 from small_run import PHENOTYPE, small_config
 from test_loop import Onlooker
 
-from evolve.learning.checkpoint import load_checkpoint
-from evolve.config.run_config import ConfigError, LearningConfig, SearchConfig
 from evolve.config.assemble import assemble
-from evolve.search.local_executor import LocalExecutor
+from evolve.config.run_config import ConfigError, LearningConfig, SearchConfig
+from evolve.learning.checkpoint import load_checkpoint
 from evolve.learning.fitness import evaluate
-from evolve.search.successive_halving import Stretch, budgets, climbers, evaluations, sizes, steps, stretches
+from evolve.learning.training_stage import Stretch
+from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
+from evolve.search.successive_halving import budgets, evaluations, finished, promoted, sizes, steps, stretches
 from evolve.store.directory import Run, RunError
 
 THREE = SearchConfig(population=7, generations=5, rungs=3, promoted=0.5)
@@ -44,11 +45,11 @@ def test_steps_are_those_of_all_rungs():
 
 def test_the_better_half_climbs_and_nobody_who_failed():
     fitness = [(0, 1.0), (1, 5.0), (2, 3.0), (3, 3.0), (4, -9.0), (5, 3.0), (6, 2.0)]
-    assert climbers(THREE, 0, fitness) == {1, 2, 3, 5}
-    assert climbers(THREE, 1, [(identity, told) for identity, told in fitness if identity in (1, 2, 3, 5)]) == {1, 2}
-    assert climbers(THREE, 2, fitness) == set()
+    assert promoted(THREE, 0, fitness) == {1, 2, 3, 5}
+    assert promoted(THREE, 1, [(identity, told) for identity, told in fitness if identity in (1, 2, 3, 5)]) == {1, 2}
+    assert promoted(THREE, 2, fitness) == set()
     failed = float("-inf")
-    assert climbers(THREE, 0, [(identity, failed if identity else 1.0) for identity, _ in fitness]) == {0}
+    assert promoted(THREE, 0, [(identity, failed if identity else 1.0) for identity, _ in fitness]) == {0}
 
 
 def carry(path, config, monkeypatch, evaluate=climbing, until=None):
@@ -68,7 +69,7 @@ def lines(run):
 
 def test_a_generation_climbs_and_the_search_is_told_how_far_each_came(tmp_path, monkeypatch):
     run, onlooker = carry(tmp_path / "run", tiny(*LADDER), monkeypatch)
-    assert run.finished
+    assert finished(run)
     assert len(onlooker.seen) == 3 * 13
     for generation in range(3):
         rungs = [c.rung for c in run.generation(generation)]

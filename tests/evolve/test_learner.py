@@ -8,8 +8,8 @@ import torch
 from bright_spot import BrightSpot
 
 from evolve.config.run_config import LearningConfig
-from evolve.learning.ppo import contact_share, learner, play, stuck, train
 from evolve.learning.policy import TrainingDiverged, learnt
+from evolve.learning.ppo import contact_share, learner, play, stuck, train
 
 QUICK = LearningConfig(total_steps=8192, n_envs=16, n_steps=32, batch_size=128, eval_interval=2048, patience=100)
 

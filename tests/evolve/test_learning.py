@@ -11,8 +11,8 @@ from torch import nn
 
 import sim
 from evolve.config.run_config import LearningConfig
-from evolve.learning.ppo import play, train
 from evolve.learning.policy import EyeFeatures, PolicyConfig, build_policy
+from evolve.learning.ppo import play, train
 from sim.worlds.state import WorldState
 
 SCENES, TRAINING_SCENES, BATCH = 256, 20, 512

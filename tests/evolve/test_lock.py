@@ -7,8 +7,8 @@ import sys
 import pytest
 from closed_form import tiny
 
-from evolve.store.lock import LockedError, RunLock, holder
 from evolve.store.directory import Run
+from evolve.store.lock import LockedError, RunLock, holder
 
 CONFIG = tiny()
 

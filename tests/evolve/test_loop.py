@@ -7,15 +7,16 @@ import pytest
 from closed_form import bowl, calls, fails_for_some, slow_for_some, tiny
 
 from evolve.cli.start_from import starts_from
-from evolve.config.run_config import ConfigError
 from evolve.config.assemble import assemble
-from evolve.genome.phenotype import develop
-from evolve.store.evaluation import Evaluation
-from evolve.search.local_executor import LocalExecutor
+from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop
+from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
 from evolve.search.search import training_seed
+from evolve.search.successive_halving import finished
 from evolve.store.directory import Run, RunError
+from evolve.store.evaluation import Evaluation
 
 
 class Onlooker:
@@ -55,7 +56,7 @@ def whole(tmp_path_factory):
 
 
 def test_run_holds_every_candidate_with_its_seed(whole):
-    assert whole.finished
+    assert finished(whole)
     assert [c.seed for c in whole.candidates] == [training_seed(0, i) for i in range(12)]
     assert calls(whole.path) == dict.fromkeys(range(12), 1)
 
@@ -79,7 +80,7 @@ def test_history_does_not_depend_on_workers_or_order(tmp_path, whole):
 
 def test_failures_do_not_end_a_run(tmp_path):
     run, _ = carry(tmp_path / "run", tiny(), fails_for_some)
-    assert run.finished
+    assert finished(run)
     assert sum(c.failure is not None for c in run.candidates) == 6
     assert run.best.id % 2 == 0
 
@@ -169,7 +170,7 @@ def test_steady_state_keeps_workers_busy_that_would_wait_for_a_generation(tmp_pa
         )
         executor = Imagined(workers)
         evolve(run, executor, Onlooker())
-        assert run.finished
+        assert finished(run)
         found[steady] = executor.utilisation
     assert found == pytest.approx(UTILISATION[workers], abs=0.005)
 

@@ -7,15 +7,15 @@ import pytest
 from small_run import PHENOTYPE, small_config
 
 import evolve.cli.run_plan
-from evolve.cli.pace import Pace, calibrate
 from evolve.cli.main import main
-from evolve.config.run_config import ConfigError
+from evolve.cli.pace import Pace, calibrate
+from evolve.cli.run_plan import Plan
 from evolve.config.assemble import assemble
+from evolve.config.lint import idle_genes, idle_starts, remarks
+from evolve.config.run_config import ConfigError
+from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.fitness import evaluate
-from evolve.genome.genotype import Genotype
-from evolve.cli.run_plan import Plan
-from evolve.config.lint import idle_genes, idle_starts, remarks
 from optics.numerics import backend
 
 PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)

@@ -8,14 +8,14 @@ import pytest
 
 import evolve.cli.run_plan
 import optics
-from evolve.cli.pace import Pace
 from evolve.cli.main import main
-from evolve.config.run_config import ConfigError
-from evolve.config.provenance import Source
+from evolve.cli.pace import Pace
 from evolve.config.assemble import SCALES, assemble, preset_names
-from evolve.genome.phenotype import develop
-from evolve.genome.genotype import Genotype
 from evolve.config.lint import remarks
+from evolve.config.provenance import Source
+from evolve.config.run_config import ConfigError
+from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop
 from evolve.search.search import Search
 
 EXPERIMENTS = ("bifurcation-detection", "bifurcation-navigation", "lens", "pupil", "scaling", "ultraviolet")

@@ -10,12 +10,12 @@ import pytest
 from closed_form import tiny
 
 from evolve.cli import progress
-from evolve.store.candidate import Candidate
-from evolve.genome.phenotype import develop
-from evolve.store.evaluation import Evaluation
-from evolve.genome.genotype import Genotype
 from evolve.cli.progress import Bar, Events, Lines, Tally, watcher
+from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
+from evolve.store.evaluation import Evaluation
 
 CONFIG = tiny("search.generations=2")  # 2 x 4 candidates
 GENOME = Genotype(CONFIG.genome).start

@@ -5,10 +5,10 @@ import sys
 import numpy as np
 import pytest
 
-from evolve.report import replay
 from evolve.cli.main import main
-from evolve.report.rerun_recording import write_recording
+from evolve.report import replay
 from evolve.report.ground_plan import Stage
+from evolve.report.rerun_recording import write_recording
 
 
 @pytest.fixture(scope="module")

@@ -5,11 +5,11 @@ import json
 import pytest
 from closed_form import tiny
 
-from evolve.store.candidate import Candidate
-from evolve.genome.phenotype import develop
-from evolve.store.evaluation import Evaluation
 from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
+from evolve.store.evaluation import Evaluation
 
 
 def test_status_tells_what_the_record_holds(call, finished):

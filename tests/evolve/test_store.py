@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from closed_form import tiny
 
-from evolve.store.candidate import Candidate
 from evolve.config.run_config import ConfigError
-from evolve.genome.phenotype import develop
-from evolve.store.evaluation import Evaluation
 from evolve.genome.genotype import Genotype
-from evolve.store.lock import LockedError
+from evolve.genome.phenotype import develop
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, RunError, next_directory
+from evolve.store.evaluation import Evaluation
+from evolve.store.lock import LockedError
 from evolve.store.versions import altered, present, record_start, recorded
 
 CONFIG = tiny()

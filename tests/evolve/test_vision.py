@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evolve.config.assemble import assemble
-from evolve.genome.phenotype import develop
-from evolve.genome.genotype import Genotype
 from evolve.analysis.vision import ssim, vision
+from evolve.config.assemble import assemble
+from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop
 from optics.numerics import backend
 
 CONFIG = assemble("detection", "quick")

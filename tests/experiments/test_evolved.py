@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import safetensors.numpy
 
-from evolve.store.candidate import Candidate
 from evolve.config.assemble import assemble
-from evolve.genome.phenotype import develop
-from evolve.store.evaluation import Evaluation
 from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop
 from evolve.learning.policy import PolicyConfig, build_policy, save_policy
 from evolve.report.eye_figures import relief_heights
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
+from evolve.store.evaluation import Evaluation
 from experiments import bending_light, brains_and_acuity, goals_shape_eyes, learning_through_holes
 from experiments.candidates import Row, full_return, parameters, rows_of
 from experiments.evolved import Conduct, Store, main

@@ -10,6 +10,7 @@ import pytest
 
 from evolve.config.assemble import to_toml
 from evolve.search.loop import evolve
+from evolve.search.successive_halving import finished
 from evolve.store.directory import Run, RunError
 from experiments import candidates
 from experiments.candidates import Row, complete, rows_of
@@ -62,7 +63,7 @@ class Nobody:
 def test_search_still_proposes_what_is_on_record(record, tmp_path):
     """So that a record goes on where it ends: the loop asks for the first animal that is missing, and for no other."""
     run = Run.open(shutil.copytree(record, tmp_path / "run"))
-    if run.finished:
+    if finished(run):
         evolve(run, Nobody(), Nobody())
     else:
         with pytest.raises(NobodyThere):

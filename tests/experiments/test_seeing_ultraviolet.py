@@ -7,8 +7,8 @@ import pytest
 
 import optics
 from evolve.config.assemble import assemble
-from evolve.genome.phenotype import develop
 from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop
 from experiments import seeing_ultraviolet
 from experiments.candidates import Row
 from experiments.seeing_ultraviolet import contrast, difference, peaks

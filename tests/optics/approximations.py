@@ -5,8 +5,8 @@ import numpy as np
 import optics
 from optics import BSplineRelief, Grid, PointSource, Pupil
 from optics.elements.beam import Beam
+from optics.methods.problem import Problem
 from optics.point_spread.planner import choose
-from optics.point_spread.psf import problem
 from validation.reference import relative_l2
 
 KINDS = ("flat", "lens", "defocus", "relief")
@@ -34,7 +34,7 @@ def random_case(rng, fresnel_numbers=(0.01, 30.0)):
 def predicted_and_actual(case, method):
     """What the planner says of a method asked for by name, and its error against the exact integral."""
     pupil, wavelength, z, window = case
-    task = problem(Beam(pupil, PointSource(), wavelength, z), window, 1e-3)
+    task = Problem.of(Beam(pupil, PointSource(), wavelength, z), window, 1e-3)
     settings = {"dx": window.dx, "shape": window.shape}
     found = optics.psf(pupil, [wavelength], z, **settings, method=method)
     exact = optics.psf(pupil, [wavelength], z, **settings, method="exact", tolerance=1e-4)

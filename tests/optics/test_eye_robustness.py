@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from optics import Eye, PhotonBudget, Pupil
-from optics.spectra.bands import SpectralBands
+from optics.eye.band_choice import choose_bands
 
 QUIETLY = settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 ODD = [0, -1, 0.5, math.nan, math.inf, -math.inf, 1e-300, 1e300, "auto", "much", None, (1, 2), [], b"x"]
@@ -100,7 +100,7 @@ def test_any_kernel_or_a_refusal(samples, z, right, up):
 @given(tolerance=numbers, illuminance=numbers, time=numbers, efficiency=numbers)
 def test_any_light_or_a_refusal(tolerance, illuminance, time, efficiency):
     try:
-        photons = PhotonBudget(illuminance, time, efficiency).photons(SpectralBands.for_tolerance(tolerance), 1e-10)
+        photons = PhotonBudget(illuminance, time, efficiency).photons(choose_bands(tolerance), 1e-10)
     except ValueError as error:
         refused(error)
         return

@@ -8,12 +8,12 @@ import pytest
 
 from optics import AccuracyError, BSplineRelief, Grid, PointSource, Pupil
 from optics.elements.beam import Beam
+from optics.methods.problem import Problem
 from optics.point_spread.planner import APPROXIMATE, EXACT, METHODS, choose
-from optics.point_spread.psf import problem
 
 
 def problem_of(pupil, distance, window, tolerance, **more):
-    return problem(Beam(pupil, PointSource(), 550e-9, distance), window, tolerance, **more)
+    return Problem.of(Beam(pupil, PointSource(), 550e-9, distance), window, tolerance, **more)
 
 
 # A prism of no slope to speak of: not symmetric, so that all methods can compete.

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from optics import Eye, illuminant, reflectance
+from optics.eye.band_choice import choose_bands
 from optics.spectra.bands import SpectralBands, cie_1931, daylight, pigment_absorptance
 from optics.spectra.receptors import receptors_of
 
@@ -79,7 +80,7 @@ def scene_signal(bands, reflectance):
 @pytest.mark.parametrize("tolerance", [0.1, 0.02, 0.005, 0.002])
 def test_bands_for_a_tolerance_against_64(tolerance):
     """Reflectances of one cycle over the visible range, all phases: within the tolerance, and half as many are not."""
-    chosen = SpectralBands.for_tolerance(tolerance)
+    chosen = choose_bands(tolerance)
     count, fine = len(chosen.wavelengths), SpectralBands.uniform(64)
 
     def worst(bands):
@@ -92,7 +93,7 @@ def test_bands_for_a_tolerance_against_64(tolerance):
 
 
 def test_more_bands_for_a_smaller_tolerance():
-    counts = [len(SpectralBands.for_tolerance(tolerance).wavelengths) for tolerance in (0.3, 0.05, 0.01, 0.003)]
+    counts = [len(choose_bands(tolerance).wavelengths) for tolerance in (0.3, 0.05, 0.01, 0.003)]
     assert counts == sorted(counts)
     assert counts[0] < counts[-1]
 
@@ -108,7 +109,7 @@ def test_coloured_blur_needs_more_bands():
         kernels[np.arange(len(place)), 0, cell + 1] = place - cell
         return np.repeat(kernels, 41, axis=1) / 41
 
-    plain, coloured = SpectralBands.for_tolerance(0.1), SpectralBands.for_tolerance(0.1, hopping)
+    plain, coloured = choose_bands(0.1), choose_bands(0.1, kernels=hopping)
     assert len(coloured.wavelengths) > len(plain.wavelengths)
     mine, fine = (b.white_light(hopping(b.wavelengths)) for b in (coloured, SpectralBands.uniform(64)))
     difference = mine - fine
@@ -118,9 +119,9 @@ def test_coloured_blur_needs_more_bands():
 
 def test_tolerances_that_no_bands_meet():
     with pytest.raises(ValueError, match="32 bands leave a predicted error of"):
-        SpectralBands.for_tolerance(1e-6)
+        choose_bands(1e-6)
     with pytest.raises(ValueError, match="tolerance = 0"):
-        SpectralBands.for_tolerance(0)
+        choose_bands(0)
 
 
 class TestLightInBands:

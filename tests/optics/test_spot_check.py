@@ -6,16 +6,16 @@ import pytest
 import optics
 from optics import Grid, PointSource, Pupil
 from optics.elements.beam import Beam
+from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import cached_nodes
 from optics.point_spread.planner import choose
-from optics.point_spread.psf import problem
 from optics.point_spread.spot_check import CAUTION, spot_check
 
 
 def picture(shape, dx, tolerance=1e-4):
     """Beam, problem and PSF of a lens at its focus, and of a window of this shape."""
     beam = Beam(Pupil(50e-6, thin_lens_focal_length=250e-6), PointSource(), 550e-9, 250e-6)
-    task = problem(beam, Grid(shape, dx), tolerance, "float64")
+    task = Problem.of(beam, Grid(shape, dx), tolerance, "float64")
     image = choose(task, "rayleigh_sommerfeld")[1].intensity(beam, task).numpy() / beam.pupil.area
     return beam, task, image
 
@@ -42,7 +42,7 @@ def test_in_a_small_window_every_sample_is_looked_at(sample):
 
 def test_single_precision_is_never_promised_more_than_it_carries():
     beam, task, image = picture((9, 9), 1e-6, 1e-10)
-    single = problem(beam, task.window, 1e-4, "float32")
+    single = Problem.of(beam, task.window, 1e-4, "float32")
     assert spot_check(beam, single, image, 1.0) >= np.finfo(np.float32).eps
     assert spot_check(beam, task, image, 1.0) < 1e-9
 

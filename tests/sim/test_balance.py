@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import sim
-from sim.worlds.state import WorldState
 from sim.worlds import detection
+from sim.worlds.state import WorldState
 
 DISTANCES = (2.0, 2.4, 3.0, 4.0, 6.0)  # [m] from the agent's centre; nearer, an eye of 45° sees less and less of it
 DIRECTIONS = np.arange(24) * 2 * np.pi / 24

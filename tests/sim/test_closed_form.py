@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import sim
-from sim.tracing.reflectance_atlas import bake
-from sim.tracing.closed_form_tracer import components_of
 from sim.envs.simulation import Simulation
-from sim.tracing.static_scene import build_stage
 from sim.scene.variant import variant
+from sim.tracing.closed_form_tracer import components_of
+from sim.tracing.reflectance_atlas import bake
+from sim.tracing.static_scene import build_stage
 from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=3, resolution=(9, 12), fov_deg=70, placement_range_deg=240, bands=5, noise_sigma=0)

@@ -7,8 +7,8 @@ import pytest
 
 import optics
 import sim
-from sim.render.band_error import band_error, measured
 from sim.envs.simulation import Simulation
+from sim.render.band_error import band_error, measured
 from sim.worlds.foraging import ULTRAVIOLET, petal
 
 PETALS = [petal(share) for share in ULTRAVIOLET.values()]

@@ -9,8 +9,8 @@ import pytest
 
 import optics
 import sim
-from sim.eyes.depth_layers import DepthLayers
 from sim.envs.simulation import Simulation
+from sim.eyes.depth_layers import DepthLayers
 from sim.scene.variant import variant
 
 NEAR, FAR = 0.3, 20.0  # [m]

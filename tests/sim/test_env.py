@@ -15,11 +15,11 @@ from stable_baselines3.common.env_checker import check_env as sb3_check
 
 import optics
 import sim
-from sim.eyes.eyes import EYE_HEIGHT
-from sim.scene.color import encode_srgb
-from sim.envs.retina_images import GAP
 from sim.envs.follow_camera import Onlooker, _follow
 from sim.envs.registration import IDS
+from sim.envs.retina_images import GAP
+from sim.eyes.eyes import EYE_HEIGHT
+from sim.scene.color import encode_srgb
 
 EYES = sim.Eyes(n_eyes=2, resolution=(3, 4), fov_deg=60)
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from optics.spectra.bands import daylight
-from sim.exr import ExrError, View, preview, read_exr, write_exr
+from sim.exr import ExrError, View, read_exr, write_exr
+from sim.scene.color import preview
 
 NM = np.array([410.0, 450.125, 1640 / 3, 690.0])
 

@@ -9,8 +9,8 @@ import pytest
 
 import optics
 import sim
-from sim.render.fidelity import PERFECT_LENS_RUNGS, PUPIL_RUNGS
 from sim.envs.simulation import Simulation
+from sim.render.fidelity import PERFECT_LENS_RUNGS, PUPIL_RUNGS
 
 DETECTION = sim.Eyes(n_eyes=2, resolution=(9, 11))
 FEW = sim.Eyes(n_eyes=2, resolution=(5, 6))

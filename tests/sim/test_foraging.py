@@ -9,9 +9,9 @@ import optics
 import sim
 from optics.spectra.bands import SpectralBands
 from optics.spectra.spectrum import ILLUMINANTS, illuminant
-from sim.envs.follow_camera import pose
 from sim.envs.simulation import Simulation
 from sim.worlds.foraging import ULTRAVIOLET, petal
+from sim.worlds.state import pose
 from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=2, resolution=(9, 13), fov_deg=60, placement_range_deg=60)

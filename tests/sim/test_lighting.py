@@ -4,9 +4,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from sim.tracing import lighting
 from sim.eyes.receptive_fields import places
 from sim.scene.variant import variant
+from sim.tracing import lighting
 
 
 @pytest.mark.parametrize(

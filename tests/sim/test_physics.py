@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.physics import physics
-from sim.physics.physics import Physics, SUBSTEPS
 from sim.envs.simulation import Simulation
+from sim.physics import physics
+from sim.physics.physics import SUBSTEPS, Physics
 from sim.worlds.world import SPEED_GAIN, TIME_CONSTANT, build_world
 
 

@@ -9,10 +9,10 @@ import pytest
 
 import optics
 import sim
-from sim.eyes import eyes, receptive_fields
-from sim.tracing import lighting, spheres
 from sim.envs.simulation import Simulation
+from sim.eyes import eyes, receptive_fields
 from sim.scene.variant import variant
+from sim.tracing import lighting, spheres
 
 EYES = sim.Eyes(n_eyes=2, resolution=(5, 7), fov_deg=60, placement_range_deg=70, bands=3, noise_sigma=0)
 BATCHES, SPP = 12, 96  # 1152 samples a receptor by Mitsuba, with their standard error

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import sim
-from sim.tracing import lighting, spheres
-from sim.envs.follow_camera import pose
 from sim.envs.simulation import Simulation
+from sim.tracing import lighting, spheres
+from sim.worlds.state import pose
 from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=2, resolution=(9, 15), fov_deg=60, placement_range_deg=50, bands=6, noise_sigma=0)

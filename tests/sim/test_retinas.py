@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import sim
-from sim.render.receptor_noise import FEW
+from sim.envs.simulation import Simulation
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.noisy_signals import Retinas
-from sim.envs.simulation import Simulation
+from sim.render.receptor_noise import FEW
 from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=2, resolution=(3, 5), fov_deg=60, placement_range_deg=60)

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sim.tasks.placement import CLEARANCE, Places, REACH, SEPARATION
-from sim.tasks.reward import EVALUATION, TRAINING
 from sim.envs.simulation import EPISODE_STEPS, MAX_TURN, Simulation
+from sim.tasks.placement import CLEARANCE, REACH, SEPARATION, Places
+from sim.tasks.reward import EVALUATION, TRAINING
 from sim.tasks.task import first_reached, task_of
 from sim.worlds.world import build_world
 

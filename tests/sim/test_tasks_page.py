@@ -9,8 +9,8 @@ import pytest
 
 import sim
 from sim.envs.registration import IDS
-from sim.tasks.reward import EVALUATION, TERMS, TRAINING
 from sim.envs.simulation import EPISODE_STEPS, NO_ACTION, UNSTABLE
+from sim.tasks.reward import EVALUATION, TERMS, TRAINING
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "tasks.md").read_text()
 EYES = sim.Eyes(n_eyes=3, resolution=(2, 4))

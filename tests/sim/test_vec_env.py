@@ -7,9 +7,9 @@ import pytest
 
 import optics
 import sim
-from sim.render.receptor_noise import FEW
 from sim.envs.observation import Memory
 from sim.envs.simulation import EPISODE_STEPS, MAX_TURN
+from sim.render.receptor_noise import FEW
 
 EYES = sim.Eyes(n_eyes=2, resolution=(4, 5), fov_deg=60, noise_sigma=0.05)
 QUIET = dataclasses.replace(EYES, noise_sigma=0.0)

@@ -7,12 +7,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.physics import mujoco_batch
-from sim.worlds.agent_model import AgentAlone
-from sim.physics.physics import Physics, SUBSTEPS
-from sim.physics.mujoco_batch import POOLED
 from sim.envs.simulation import Simulation
+from sim.physics import mujoco_batch
 from sim.physics.local_contacts import Vicinity
+from sim.physics.mujoco_batch import POOLED
+from sim.physics.physics import SUBSTEPS, Physics
+from sim.worlds.agent_model import AgentAlone
 from sim.worlds.world import _add_agent, _empty_world, build_world
 
 

@@ -5,14 +5,13 @@ import numpy as np
 import pytest
 
 import sim
-from sim.worlds import materials
-from sim.eyes.eyes import BODY_RADIUS, eye_positions
-from sim.scene.color import decode_srgb
-from sim.worlds.layout import CELL
-from sim.physics.physics import Physics
-from sim.scene.surfaces import image
 from sim.envs.simulation import Simulation
-from sim.worlds import detection, navigation
+from sim.eyes.eyes import BODY_RADIUS, eye_positions
+from sim.physics.physics import Physics
+from sim.scene.color import decode_srgb
+from sim.scene.surfaces import image
+from sim.worlds import detection, materials, navigation
+from sim.worlds.layout import CELL
 from sim.worlds.world import MAX_SPEED
 
 ACTION = 10  # substeps

@@ -7,23 +7,24 @@ import sys
 from argparse import Namespace
 from contextlib import nullcontext
 
-from evolve.cli.start_from import starts_from
-from evolve.store.candidate import Candidate
 from evolve.cli.commands import INTERRUPTED
-from evolve.config.run_config import ConfigError, RunConfig
+from evolve.cli.progress import Bar, Events, Lines, Watchers, watcher
+from evolve.cli.run_plan import Plan
+from evolve.cli.start_from import starts_from
+from evolve.cli.tensorboard import Scalars
 from evolve.config.assemble import assemble
-from evolve.search.dask_executor import DaskExecutor
+from evolve.config.lint import remarks
+from evolve.config.run_config import ConfigError, RunConfig
 from evolve.genome.phenotype import repaired
+from evolve.search.dask_executor import DaskExecutor
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
-from evolve.cli.run_plan import Plan
-from evolve.cli.progress import Bar, Events, Lines, Watchers, watcher
-from evolve.config.lint import remarks
-from evolve.cli.tensorboard import Scalars
 from evolve.search.search import Search
+from evolve.search.successive_halving import finished
+from evolve.search.worker import evaluate_candidate, prepare_device
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, next_directory
 from evolve.store.versions import altered, present, record_start, recorded
-from evolve.search.worker import evaluate_candidate, prepare_device
 from optics.numerics import backend
 
 __all__ = ["resume", "start"]
@@ -61,7 +62,7 @@ def resume(arguments: Namespace) -> int:
         run.repair()
         if run.notice:
             print(f"note: {run.notice}", file=sys.stderr)
-        if run.finished:
+        if finished(run):
             if not arguments.json:
                 print(f"{run.path}: all {run.config.candidates} candidates have been evaluated")
             return _finish(run, arguments.json)

@@ -9,8 +9,9 @@ import time
 from argparse import Namespace
 from typing import Any
 
-from evolve.store.lock import holder
+from evolve.search.successive_halving import finished
 from evolve.store.directory import Run
+from evolve.store.lock import holder
 
 __all__ = ["standing", "status"]
 
@@ -49,7 +50,7 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
 def standing(run: Run) -> dict[str, Any]:
     """How a run stands, as plain values."""
     worker = holder(run.path)
-    state = "running" if worker else "finished" if run.finished else "interrupted"
+    state = "running" if worker else "finished" if finished(run) else "interrupted"
     best = run.best
     return {
         "directory": str(run.path),

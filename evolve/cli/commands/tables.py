@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from argparse import Namespace
 
-from evolve.config.run_config import SearchConfig, TASKS
+from evolve.config.run_config import TASKS, SearchConfig
 from evolve.genome.genes import CLUSTERS, GENES, Gene
 
 __all__ = ["genes", "tasks"]

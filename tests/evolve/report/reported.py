@@ -12,12 +12,12 @@ import numpy as np
 from matplotlib.image import imread
 from small_run import LEARNING, PHENOTYPE
 
-from evolve.store.candidate import Candidate
 from evolve.config.run_config import EyeConfig, RunConfig, SearchConfig
-from evolve.store.evaluation import Evaluation
-from evolve.learning.fitness import evaluate
 from evolve.genome.genotype import Genotype
+from evolve.learning.fitness import evaluate
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
+from evolve.store.evaluation import Evaluation
 
 HOSTILE = "</td></table><script>alert('x')</script><img src=http://evil.example/x> & \"quoted\""
 SEEING = replace(

@@ -8,9 +8,9 @@ import pytest
 from reported import Page, film_of, picture
 
 import sim
+from evolve.report.ground_plan import Stage
 from evolve.report.picture import display
 from evolve.report.player import write_player
-from evolve.report.ground_plan import Stage
 
 
 def test_film_is_the_episode(run, episode, content):

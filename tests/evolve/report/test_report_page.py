@@ -7,17 +7,17 @@ from collections import Counter
 import pytest
 from reported import BEST, HOSTILE, SEEING, Page, film_of
 
-from evolve.store.candidate import Candidate
-from evolve.config.run_config import RunConfig
 from evolve.config.assemble import assemble
-from evolve.genome.phenotype import develop
-from evolve.store.evaluation import Evaluation
+from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import GENES, Genotype
+from evolve.genome.phenotype import develop
 from evolve.report import write
 from evolve.report.markup import exact, number
 from evolve.report.page import genes_section, render
 from evolve.report.tables import best_genes
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
+from evolve.store.evaluation import Evaluation
 
 
 def test_table_holds_every_candidate_with_the_stores_fitness(run, page):

@@ -9,8 +9,8 @@ import pytest
 
 import sim
 from optics.spectra.spectrum import daylight
-from sim.scene.color import decode_srgb
 from sim.scene.cameras import Viewpoint
+from sim.scene.color import decode_srgb
 
 NM = 560e-9
 SUN = '<light type="directional" dir="0 0 -1" diffuse="1 1 1"/>'

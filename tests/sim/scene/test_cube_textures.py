@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import sim
-from sim.scene.color import decode_srgb
 from sim.scene import cube
+from sim.scene.color import decode_srgb
 from sim.scene.tessellation import ellipsoid
 
 from . import models

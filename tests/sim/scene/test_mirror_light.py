@@ -9,8 +9,8 @@ import pytest
 
 import sim
 from optics.spectra.bands import daylight
-from sim.scene.color import decode_srgb
 from sim.scene.cameras import Viewpoint
+from sim.scene.color import decode_srgb
 from sim.scene.mirror import MirrorWarning
 
 from .lit import LIGHT, NM, WHITE, radiance, xml_of
@@ -78,7 +78,7 @@ def test_material_color_counts_where_the_geom_has_none():
 
 def test_colored_light():
     """White under a light of linear RGB (1, 0.3, 0.3) looks like that light."""
-    from sim.exr import preview
+    from sim.scene.color import preview
 
     red = LIGHT.replace("1 1 1", "1 0.3 0.3")
     mirror = sim.mirror(mujoco.MjModel.from_xml_string(xml_of(red, WHITE)))

@@ -12,8 +12,8 @@ import pytest
 
 import sim
 from optics.spectra.spectrum import daylight
-from sim.scene.color import encode_srgb
 from sim.scene.cameras import Viewpoint
+from sim.scene.color import encode_srgb
 from sim.scene.mirror import MirrorWarning
 
 from .drawn import draw

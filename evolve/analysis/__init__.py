@@ -1,0 +1,7 @@
+"""What a run's record and its animals say.
+
+statistics  per generation; acuity, confidence
+genealogy   who came from whom
+vision      what the best eyes see
+episode     Episode: one episode, recorded
+"""

@@ -1,0 +1,11 @@
+"""The command `evolve`.
+
+main         arguments, exit codes
+commands     what each command does
+progress     how a run is going
+run_plan     what a run is going to do
+pace         how fast this machine is
+start_from   starting from an animal of another run
+tensorboard  scalars
+doctor       does it work here?
+"""

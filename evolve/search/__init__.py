@@ -1,0 +1,12 @@
+"""The search over generations.
+
+loop                propose, evaluate, write down, tell
+search              Search: proposals, phases, seeds
+optimizers          CMA-ES and others
+successive_halving  who is trained further
+job                 what executors are given
+local_executor      processes on this machine
+worker              what such a process does
+dask_executor       many machines
+dask_worker         what one of them does
+"""

@@ -1,0 +1,9 @@
+"""The run directory: it stores, and decides nothing.
+
+directory     Run
+candidate     Candidate: one line of the record
+evaluation    Evaluation: what became of a candidate
+lock          one process at a time
+atomic_files  files that are written whole or not at all
+versions      with which software a run was made
+"""

@@ -1,0 +1,11 @@
+"""Openings of a pupil: their shape, softened for grids or as nodes of a quadrature.
+
+aperture       Aperture: what every shape offers
+circular       Circle, Annulus
+polygonal      Polygon, Slit
+pixelated      any shape, tiled by square pixels
+outline        where lines cross an edge
+soft_edge      the kernel that softens an edge
+soft_polygon   a polygon convolved with it
+triangulation  polygons as triangles
+"""

@@ -1,0 +1,10 @@
+"""What light passes: a source, a pupil, and the relief on it.
+
+source            PointSource
+pupil             Pupil: aperture, relief, ideal lens
+relief            Relief, HeightMap, BSplineRelief
+pixel_relief      PixelRelief: steps
+refractive_index  RefractiveIndex: constant, or after Cauchy
+wavefront_slopes  where the rays of a wavefront go
+beam              light of one wavelength on its way to a plane
+"""

@@ -1,0 +1,11 @@
+"""Eyes: a pupil before a retina.
+
+eye                   Eye
+receptive_field       which directions a receptor sees
+kernel_interpolation  how few kernels stand for a range of them
+kernel_bank           the kernels of an eye for a scene
+band_choice           how few spectral bands will do
+retinal_image         a scene convolved with a kernel
+photoreceptor         throughput, spectral weighting, noise
+summary               what limits an eye, in one table
+"""

@@ -1,0 +1,12 @@
+"""Environments: worlds, tasks and eyes put together.
+
+vec_env                make_vec_env, EyesVecEnv: stable-baselines3
+env                    make_env, EyesEnv: Gymnasium
+registration           Gymnasium's ids
+simulation             worlds in motion, unseen
+observation            what an agent knows
+info                   what every step says
+follow_camera          the agent seen from behind
+field_of_view_overlay  what its eyes look at
+retina_images          what they report
+"""

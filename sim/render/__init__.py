@@ -1,0 +1,12 @@
+"""What all eyes of all worlds see.
+
+batched_renderer    BatchedRenderer: one wavefront
+reference_renderer  ReferenceRenderer: Mitsuba's integrators, slowly
+fidelity            choose_fidelity, Fidelity: as little work as noise allows
+fidelity_trials     a few views on which that is tried
+band_error          what a few bands make of colours
+memory_budget       whether it has room
+frozen_kernels      what holds while Dr.Jit records
+receptor_noise      noise for all worlds at once
+noisy_signals       what retinas report
+"""

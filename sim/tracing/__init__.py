@@ -1,0 +1,12 @@
+"""Where rays end, and the light that they find there.
+
+tracer               which of the two tracers a world gets
+closed_form_tracer   walls, floor and spheres in closed form
+mitsuba_tracer       any shapes
+static_scene         what does not move, and the movers' shapes
+spheres              what moves
+walls                a world as upright walls
+wall_intersection    where rays meet them
+reflectance_atlas    all reflectances in one table
+lighting             direct light and one bounce
+"""

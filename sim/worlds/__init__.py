@@ -1,0 +1,11 @@
+"""The worlds of the tasks, as MuJoCo models.
+
+world        build_world, World
+detection    an open field with goal and adversaries; of tracking, too
+foraging     the same, for receptors of the ultraviolet
+navigation   mazes
+layout       cells, walls, a floor
+materials    reflectances, stripes, daylight
+agent_model  a world's agent by itself
+state        WorldState: where everything is
+"""
