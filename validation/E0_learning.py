@@ -1,10 +1,10 @@
 """E0: what is learnt, how soon, and with which settings
 
-Detection is solved if the goal comes first in 80 % of the episodes; one that reaches objects without telling them
-apart finds it first in a third. Every row is a training with `evolve.learning.ppo` in sim's worlds, watched every 50,000
+Detection is solved if the goal comes first in 80 % of the episodes; one that reaches objects without telling them apart
+finds it first in a third. Every row is a training with `evolve.learning.ppo` in sim's worlds, watched every 50,000
 steps: 100 episodes of the policy as it is, without exploration, in worlds it never saw. CPU seconds are those of one
-thread, rollouts and updates, without these evaluations; "update" is the optimiser's share of them. In brackets: the
-95 % interval of the last evaluation (Wilson). Returns are undiscounted training returns per episode.
+thread, rollouts and updates, without these evaluations; "update" is the optimiser's share of them. In brackets: the 95
+% interval of the last evaluation (Wilson). Returns are undiscounted training returns per episode.
 
 One receptor stays at chance: where it reaches something at all, that is the goal in one of three cases. Eyes of many
 receptors are sampled with one ray for each (in navigation 4), the lone receptor with 96.

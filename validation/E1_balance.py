@@ -8,7 +8,7 @@ sectors. The two lowest edges can hardly be seen and are not fitted.
 
 The table: adversary less goal, in units of the receptors' noise (a standard deviation of 0.01), as one receptor that
 looks straight ahead sees them; mean and root mean square over 24 directions. Here rays are cast at one lit sphere,
-without the renderer; `tests/sim/test_balance.py` holds the renderer to the same.
+without the renderer; `tests/sim/worlds/test_balance.py` holds the renderer to the same.
 
 Bounds, from 2 m on: the mean difference is below a fifth of the noise, and at most a tenth of it worse than with the
 fitted edges (which may shift by some degrees together: the shipped ones were rounded from such a fit). Nearer than 2 m

@@ -1,10 +1,10 @@
 """E2: does little training tell who will be good?
 
-Budget ladders (`search.rungs`, `evolve.search.successive_halving`) train all of a generation a little and only the better part on. That
-saves time only if the order after little training is the order after a whole one. Here animals drawn from the genome,
-one to four eyes with 1 x 1 to 15 x 15 receptors behind a perfect lens, learn detection up a ladder of four rungs, none
-held back, as a run would train them; the table compares their order on each rung with that on the last (Spearman's
-rank correlation, and its 90 % interval by bootstrap over animals).
+Budget ladders (`search.rungs`, `evolve.search.successive_halving`) train all of a generation a little and only the
+better part on. That saves time only if the order after little training is the order after a whole one. Here animals
+drawn from the genome, one to four eyes with 1 x 1 to 15 x 15 receptors behind a perfect lens, learn detection up a
+ladder of four rungs, none held back, as a run would train them; the table compares their order on each rung with that
+on the last (Spearman's rank correlation, and its 90 % interval by bootstrap over animals).
 
 "32 episodes" is what a run sees: each rung's fitness by its own evaluation episodes. "128 episodes" measures each
 rung's policy longer, in other worlds; the last line compares the last rung's own two measurements.

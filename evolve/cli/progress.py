@@ -36,7 +36,7 @@ class Tally:
 
     def evaluated(self, candidate: Candidate) -> None:
         self._in_training.pop(candidate.id, None)
-        below = self._run.before(candidate)
+        below = self._run.on_record(candidate.id, candidate.rung - 1)
         self._steps_done += candidate.steps - (below.steps if below else 0)
         self._busy += candidate.seconds - (below.seconds if below else 0.0)
 

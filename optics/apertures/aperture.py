@@ -1,8 +1,9 @@
 """An aperture's face: its shape, softened so that a grid can carry it, or as edge-fitted quadrature nodes.
 
 A hard edge has no band limit: sampled on a Cartesian grid, its error falls only like N⁻¹ to N⁻¹·⁵. Here the aperture is
-convolved with a low-pass kernel of compact support (optics.apertures.soft_edge), so that sums over samples (the trapezoid rule)
-converge as fast as the kernel's side lobes fall. The function is 1 or 0 except within `reach` of the edge.
+convolved with a low-pass kernel of compact support (optics.apertures.soft_edge), so that sums over samples (the
+trapezoid rule) converge as fast as the kernel's side lobes fall. The function is 1 or 0 except within `reach` of the
+edge.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A plane of a stack, sampled for the light that it has to pass on.
 
-A pupil's aperture is softened so that frequencies that can reach the next plane are exact (optics.apertures.aperture), and its
-samples lie so close that what folds back stays beyond them. Sums over samples then converge spectrally.
+A pupil's aperture is softened so that frequencies that can reach the next plane are exact (optics.apertures.aperture),
+and its samples lie so close that what folds back stays beyond them. Sums over samples then converge spectrally.
 """
 
 from __future__ import annotations

@@ -11,8 +11,8 @@ from sim.worlds.state import WorldState
 def infos_of(step: Step) -> list[dict[str, Any]]:
     """One per world, after an action."""
     places = (*step.state.position.T.tolist(), step.state.heading.tolist())
-    # In one go, the names of sim.tasks.reward.TERMS written out: this is done for every world in every step, and takes a
-    # third of the time that way.
+    # In one go, the names of sim.tasks.reward.TERMS written out: this is done for every world in every step, and takes
+    # a third of the time that way.
     return [
         {
             "reward_terms": {"progress": progress, "goal": goal, "adversary": adversary, "contact": contact},

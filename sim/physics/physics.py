@@ -2,8 +2,8 @@
 
 The agent is a heavy body on two slide joints driven by velocity actuators; its heading is set, not simulated.
 Objects are mocap bodies that collide with nothing, so that physics need not know where they are. Agents that surely
-touch nothing during the action glide (`sim.physics.free_motion`); the others are MuJoCo's, among the few geoms that they could touch
-(`sim.physics.local_contacts`).
+touch nothing during the action glide (`sim.physics.free_motion`); the others are MuJoCo's, among the few geoms that
+they could touch (`sim.physics.local_contacts`).
 """
 
 from __future__ import annotations

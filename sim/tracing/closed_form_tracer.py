@@ -1,9 +1,10 @@
 """Worlds of upright walls, a floor and spheres, ray traced in closed form.
 
 A few walls are all solved; many are found by walking through a grid of cells (Amanatides and Woo 1987), which wants
-their faces to lie on one. Colours are Mitsuba's (`sim.tracing.reflectance_atlas`). Where all lights have one spectrum and all materials
-share a few, light is traced in as many components as there are independent spectra, and not once per band. Light that
-is reflected twice has products of the materials' spectra: with it, all bands are traced, unless all materials are grey.
+their faces to lie on one. Colours are Mitsuba's (`sim.tracing.reflectance_atlas`). Where all lights have one spectrum
+and all materials share a few, light is traced in as many components as there are independent spectra, and not once per
+band. Light that is reflected twice has products of the materials' spectra: with it, all bands are traced, unless all
+materials are grey.
 """
 
 from __future__ import annotations

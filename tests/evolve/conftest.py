@@ -1,15 +1,14 @@
-"""Runs for tests that only read them, and the command line as a function. (This file also lets tests in folders below
-import the helpers that lie beside it.)"""
+"""Runs for tests that only read them, and the command line as a function."""
 
 import pytest
-from closed_form import bowl, tiny
-from small_run import small_run
 
 from evolve.analysis.episode import record
 from evolve.cli.main import main
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve as carry_on
 from evolve.store.directory import Run
+from tests.evolve.closed_form import bowl, tiny
+from tests.evolve.small_run import small_run
 
 
 @pytest.fixture(scope="session")

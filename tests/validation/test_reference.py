@@ -8,9 +8,9 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from quadrature import gauss_legendre
 from scipy.integrate import quad
 
+from tests.validation.quadrature import gauss_legendre
 from validation import reference
 
 WAVELENGTH = 550e-9

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 import pytest
-from quadrature import disk_nodes, gauss_legendre
 from scipy.integrate import dblquad
 
+from tests.validation.quadrature import disk_nodes, gauss_legendre
 from validation import reference
 
 WAVELENGTH = 550e-9

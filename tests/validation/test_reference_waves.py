@@ -9,9 +9,9 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from quadrature import gauss_legendre
 from scipy.special import j0
 
+from tests.validation.quadrature import gauss_legendre
 from validation import reference
 
 WAVELENGTH = 550e-9

@@ -1,10 +1,10 @@
 """One run, one episode of its best and one page of both, for all tests of the report."""
 
 import pytest
-from reported import Page, make_run
 
 from evolve.analysis.episode import record
 from evolve.report.page import render
+from tests.evolve.report.reported import Page, make_run
 
 
 @pytest.fixture(scope="package")

@@ -10,7 +10,6 @@ from html.parser import HTMLParser
 
 import numpy as np
 from matplotlib.image import imread
-from small_run import LEARNING, PHENOTYPE
 
 from evolve.config.run_config import EyeConfig, RunConfig, SearchConfig
 from evolve.genome.genotype import Genotype
@@ -18,6 +17,7 @@ from evolve.learning.fitness import evaluate
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
+from tests.evolve.small_run import LEARNING, PHENOTYPE
 
 HOSTILE = "</td></table><script>alert('x')</script><img src=http://evil.example/x> & \"quoted\""
 SEEING = replace(

@@ -1,9 +1,9 @@
 """Signals as pictures: sRGB, PNG that others read, sheets of frames."""
 
 import numpy as np
-from reported import picture
 
 from evolve.report.picture import data_uri, display, film_sheet, png
+from tests.evolve.report.reported import picture
 
 
 def test_display_is_srgb():

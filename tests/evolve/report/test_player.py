@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reported import Page, film_of, picture
 
 import sim
 from evolve.report.ground_plan import Stage
 from evolve.report.picture import display
 from evolve.report.player import write_player
+from tests.evolve.report.reported import Page, film_of, picture
 
 
 def test_film_is_the_episode(run, episode, content):

@@ -5,7 +5,6 @@ import shutil
 from collections import Counter
 
 import pytest
-from reported import BEST, HOSTILE, SEEING, Page, film_of
 
 from evolve.config.assemble import assemble
 from evolve.config.run_config import RunConfig
@@ -18,6 +17,7 @@ from evolve.report.tables import best_genes
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
+from tests.evolve.report.reported import BEST, HOSTILE, SEEING, Page, film_of
 
 
 def test_table_holds_every_candidate_with_the_stores_fitness(run, page):

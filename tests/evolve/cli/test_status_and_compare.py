@@ -1,0 +1,87 @@
+"""`evolve status` and `evolve compare`: they tell what records hold, to people and to machines."""
+
+import json
+
+import pytest
+
+from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop
+from evolve.store.candidate import Candidate
+from evolve.store.directory import Run
+from evolve.store.evaluation import Evaluation
+from tests.evolve.closed_form import tiny
+
+
+def test_status_tells_what_the_record_holds(call, finished):
+    run = Run.open(finished)
+    standing = json.loads(call("status", finished, "--json")[1])
+    assert standing["state"] == "finished"
+    assert standing["candidates"] == {"evaluated": 12, "failed": 0, "planned": 12}
+    assert standing["best"]["id"] == run.best.id
+    assert standing["steps"] == 12 * 4096
+    fitness = sorted(candidate.fitness for candidate in run.generation(1))
+    assert standing["generations"][1]["median"] == pytest.approx((fitness[1] + fitness[2]) / 2)
+    text = call("status", finished)[1]
+    assert f"best: candidate {run.best.id}, fitness {run.best.fitness:.4g}" in text
+
+
+def test_page_that_cannot_be_written_is_named(call, finished):
+    code, _, err = call("compare", finished, "--html", "/proc/page.html")
+    assert code == 2
+    assert err == "evolve: error: /proc/page.html: No such file or directory\n"
+
+
+def test_watch_ends_with_the_run(call, finished):
+    code, out, _ = call("status", finished, "--watch", "--json")
+    assert code == 0
+    assert [json.loads(line)["state"] for line in out.splitlines()] == ["finished"]
+
+
+def test_compare_puts_runs_side_by_side(call, finished, tmp_path):
+    other = Run.create(tmp_path / "other", tiny("seed=3", "search.sigma=0.1"))
+    code, out, _ = call("compare", finished, other.path, "--html", tmp_path / "page.html")
+    assert code == 0
+    rows = {line.split("  ")[0]: line.split()[-1] for line in out.splitlines()}
+    assert rows["search.sigma"] == "0.1"
+    assert rows["fitness"] == "-"
+    assert "search.population" not in rows
+    assert "best fitness so far" in (tmp_path / "page.html").read_text().lower()
+    both = json.loads(call("compare", finished, finished, "--json")[1])
+    assert both["settings"] == {}
+    assert both["runs"][0]["best"] == Run.open(finished).best.id
+    assert both["runs"][0]["best_so_far"] == sorted(both["runs"][0]["best_so_far"])
+
+
+@pytest.fixture
+def failed(tmp_path):
+    """A run of which nothing has succeeded."""
+    run = Run.create(tmp_path / "failed", tiny())
+    genome = Genotype(run.config.genome).start
+    outcome = Evaluation.failed("no luck")
+    run.append(Candidate.of((0, 0, 0), tuple(genome), develop(genome, run.config), 1, outcome))
+    return run
+
+
+def test_status_names_the_last_failure(call, finished, failed):
+    assert "last failure: no luck" in call("status", failed.path)[1]
+    assert json.loads(call("status", failed.path, "--json")[1])["last_failure"] == "no luck"
+    assert json.loads(call("status", finished, "--json")[1])["last_failure"] is None
+
+
+def test_what_is_no_number_is_null_for_machines(call, failed):
+    def refuse(name):
+        raise AssertionError(f"{name} is no JSON")
+
+    out = call("compare", failed.path, "--json")[1]
+    (row,) = json.loads(out, parse_constant=refuse)["runs"]
+    assert row["best_so_far"] == [None]
+    assert row["fitness_interval"] is None
+
+
+def test_a_single_episode_has_no_interval(call, failed):
+    genome = Genotype(failed.config.genome).start
+    alone = Evaluation(1.5, (1.5,), 1.0)
+    failed.append(Candidate.of((1, 0, 1), tuple(genome), develop(genome, failed.config), 1, alone))
+    (line,) = (line for line in call("compare", failed.path)[1].splitlines() if line.startswith("95 % interval"))
+    assert line.split() == ["95", "%", "interval", "-"]
+    assert json.loads(call("compare", failed.path, "--json")[1])["runs"][0]["fitness_interval"] is None

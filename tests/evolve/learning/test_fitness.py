@@ -1,0 +1,106 @@
+"""A candidate's life in sim's worlds."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sim
+from evolve.config.run_config import WorldConfig
+from evolve.learning.fitness import evaluate
+from evolve.learning.policy import load_policy
+from evolve.learning.ppo import play
+from tests.evolve.small_run import LEARNING, PHENOTYPE, small_config
+
+pytestmark = pytest.mark.usefixtures("short_episodes")
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory, short_episodes):
+    path = tmp_path_factory.mktemp("policy") / "0.safetensors"
+    told = []
+    return evaluate(PHENOTYPE, small_config(), 5, path, lambda *steps: told.append(steps)), path, told
+
+
+def test_fitness_is_the_mean_return_of_the_evaluation_episodes(outcome):
+    evaluation, _, _ = outcome
+    assert len(evaluation.returns) == 6
+    assert evaluation.fitness == pytest.approx(np.mean(evaluation.returns))
+    assert evaluation.failure is None
+    assert evaluation.steps == LEARNING.total_steps
+    assert [steps for steps, _ in evaluation.curve] == [512]
+
+
+def test_progress_is_told(outcome):
+    assert outcome[2] == [(256, 512), (512, 512)]
+
+
+def test_the_stored_policy_earns_the_same_returns(outcome):
+    """The file holds the policy that was evaluated: in the same worlds it plays the same episodes."""
+    evaluation, path, _ = outcome
+    config = small_config()
+    seed = int(np.random.SeedSequence(5).generate_state(3)[2])
+    worlds = sim.make_vec_env(
+        "detection", PHENOTYPE.eyes(config.eye), 6, seed, memory=3, mode="evaluation", rays_per_receptor=1
+    )
+    assert play(load_policy(path), worlds, seed).returns.tolist() == list(evaluation.returns)
+
+
+def test_same_seed_same_life(outcome, tmp_path):
+    evaluation, path, _ = outcome
+    again = evaluate(PHENOTYPE, small_config(), 5, tmp_path / "again.safetensors")
+    other = evaluate(PHENOTYPE, small_config(), 6, tmp_path / "other.safetensors")
+    assert again.returns == evaluation.returns
+    assert again.curve == evaluation.curve
+    assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
+    assert other.returns != evaluation.returns
+
+
+@pytest.mark.parametrize(("rays_per_eye", "expected"), [(1e6, None), (36.0, 3.0), (1.0, 1.0)])
+def test_training_looks_less_closely_than_evaluation(rays_per_eye, expected, tmp_path, monkeypatch):
+    """At most so many rays for an eye of 12 receptors, one per receptor at least; None: as many as the noise asks for.
+    Evaluation traces those in any case."""
+    rays = {}
+
+    def recorded(*args, make=sim.make_vec_env, **kwargs):
+        worlds = make(*args, **kwargs)
+        rays[kwargs["mode"]] = worlds.renderer.fidelity.rays_per_receptor
+        return worlds
+
+    monkeypatch.setattr(sim, "make_vec_env", recorded)
+    config = small_config()
+    learning = replace(config.learning, rays_per_eye=rays_per_eye)
+    config = replace(config, eye=replace(config.eye, rays_per_receptor="auto"), learning=learning)
+    assert evaluate(replace(PHENOTYPE, resolution=(3, 4)), config, 5, tmp_path / "0.safetensors").failure is None
+    assert rays["evaluation"] > 3
+    assert rays["training"] == (expected or rays["evaluation"])
+
+
+def test_a_training_that_diverges_is_a_failure_with_a_reason(tmp_path, monkeypatch):
+    """Signals that are no numbers: no exception leaves, no policy is written."""
+    monkeypatch.setattr(
+        "sim.render.receptor_noise.NoiseModel.__call__", lambda _, signals, *__: np.full_like(signals, np.nan)
+    )
+    evaluation = evaluate(PHENOTYPE, small_config(), 5, tmp_path / "0.safetensors")
+    assert evaluation.fitness == -math.inf
+    assert evaluation.failure is not None
+    assert "not finite" in evaluation.failure
+    assert not list(tmp_path.iterdir())
+
+
+def test_unseen_mazes_are_seen_by_the_evaluation_alone(tmp_path):
+    """The same training, other episodes after it; with more mazes, another training."""
+    outcomes = {}
+    for name, world in {
+        "one": WorldConfig(),
+        "other": WorldConfig(unseen=True),
+        "two": WorldConfig(mazes=2),
+    }.items():
+        config = replace(small_config(), task="navigation", world=world)
+        path = tmp_path / f"{name}.safetensors"
+        outcomes[name] = evaluate(PHENOTYPE, config, 5, path).returns, path.read_bytes()
+    (seen, taught), (unseen, taught_as_well), (_, of_two) = outcomes.values()
+    assert taught == taught_as_well
+    assert seen != unseen
+    assert of_two != taught

@@ -1,0 +1,182 @@
+"""The learner on a world that takes seconds: it learns, repeats itself exactly, stops in time and fails by name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from evolve.config.run_config import LearningConfig
+from evolve.learning.policy import TrainingDiverged, learnt
+from evolve.learning.ppo import contact_share, learner, play, stuck, train
+from tests.evolve.learning.bright_spot import BrightSpot
+
+QUICK = LearningConfig(total_steps=8192, n_envs=16, n_steps=32, batch_size=128, eval_interval=2048, patience=100)
+
+
+def learn(config=QUICK, seed=0, worlds=None, progress=None, **eyes):
+    return train(worlds or BrightSpot(config.n_envs, **eyes), BrightSpot(16, **eyes), 16, config, seed, progress)
+
+
+@pytest.mark.parametrize("memory", [1, 4])
+def test_learns_to_reach_what_it_sees(memory):
+    """Measured over three seeds: 1.0 after 8000 steps with sight, 0.0 without."""
+    training = learn(memory=memory)
+    assert training.steps == QUICK.total_steps
+    assert play(training.policy, BrightSpot(64, memory=memory), 99).successes.mean() > 0.9
+
+
+def test_the_blind_do_not():
+    assert play(learn(blind=True).policy, BrightSpot(64, blind=True), 99).successes.mean() < 0.2
+
+
+def test_same_seed_same_policy_bit_for_bit():
+    def weights(seed):
+        torch.rand(3), np.random.rand(3)  # noqa: NPY002 (whatever the process did before must not matter)
+        config = LearningConfig(total_steps=1024, n_envs=16, n_steps=32, batch_size=128, eval_interval=512)
+        training = learn(config, seed, memory=3)
+        return torch.cat([tensor.flatten() for tensor in training.policy.state_dict().values()]), training.curve
+
+    (a, curve_a), (b, curve_b), (c, _) = weights(2**40 + 1), weights(2**40 + 1), weights(1)
+    assert torch.equal(a, b)
+    assert curve_a == curve_b
+    assert not torch.equal(a, c)
+
+
+def test_progress_is_told_after_every_rollout():
+    told = []
+    learn(LearningConfig(total_steps=1024, n_envs=16, n_steps=32, batch_size=128), progress=lambda *p: told.append(p))
+    assert told == [(512, 1024), (1024, 1024)]
+
+
+def test_stops_when_evaluations_stop_improving():
+    """The second evaluation is the best by far: `patience` more, and no further."""
+    config = LearningConfig(total_steps=20_000, n_envs=16, n_steps=32, batch_size=128, eval_interval=512, patience=3)
+    training = train(BrightSpot(16), Favouring(kind_evaluation=2), 16, config, 0)
+    assert [steps for steps, _ in training.curve] == [512, 1024, 1536, 2048, 2560]
+
+
+@pytest.mark.parametrize(
+    ("returns", "expected"),
+    [((), False), ((1, 1), False), ((1, 1, 1), True), ((1, 0, 2), False), ((3, 2, 2, 2.5), True), ((3, 2, 3.1), False)],
+)
+def test_stuck_means_patience_evaluations_without_a_new_best(returns, expected):
+    assert stuck([(i, r) for i, r in enumerate(returns)], patience=2) is expected
+
+
+class Poisoned(BrightSpot):
+    def step_wait(self):
+        observation, reward, done, infos = super().step_wait()
+        return observation, reward * np.nan, done, infos
+
+
+def test_rewards_that_are_no_numbers_end_the_training():
+    with pytest.raises(TrainingDiverged, match="rewards not finite after 512 steps"):
+        learn(worlds=Poisoned(16))
+
+
+@pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
+def test_a_loss_that_overflows_ends_the_training():
+    """The critic's error squares to infinity; gradient clipping would turn it into a training that does nothing."""
+    model = learner(BrightSpot(16), 16, QUICK, 0)
+    model.learn(512)
+    model.rollout_buffer.returns[:] = 1e30
+    with pytest.raises(TrainingDiverged, match="loss not finite after 512 steps"):
+        model.train()
+
+
+class Dear(BrightSpot):
+    def step_wait(self):
+        observation, reward, done, infos = super().step_wait()
+        return observation, 1000 * reward, done, infos
+
+
+def test_the_unit_of_rewards_does_not_matter():
+    training = learn(worlds=Dear(16))
+    assert play(training.policy, BrightSpot(64), 99).successes.mean() > 0.9
+
+
+@pytest.mark.parametrize(
+    ("steps", "ramp", "share"),
+    [(0, 0, 1.0), (0, 900, 0.1), (300, 900, 0.1), (600, 900, 0.1**0.5), (900, 900, 1.0), (5000, 900, 1.0)],
+)
+def test_contact_costs_a_tenth_at_first_and_its_whole_price_at_the_end_of_the_ramp(steps, ramp, share):
+    assert contact_share(steps, ramp) == pytest.approx(share)
+
+
+class Touching(BrightSpot):
+    """Every action is in contact, and costs nothing else."""
+
+    def step_wait(self):
+        observation, reward, done, infos = super().step_wait()
+        for info in infos:
+            info["reward_terms"]["contact"] = -1.0
+        return observation, np.full_like(reward, -1), done, infos
+
+
+@pytest.mark.parametrize(("ramp", "cost"), [(0, 1.0), (10_000, 0.1)])
+def test_learners_pay_their_share_of_contact(ramp, cost):
+    model = learner(Touching(16), 16, replace(QUICK, contact_ramp=ramp), 0)
+    model.learn(512)
+    # Truncated episodes have the critic's guess of what follows added to their last reward.
+    assert np.median(-model.rollout_buffer.rewards) == pytest.approx(cost, rel=1e-6)
+
+
+@pytest.mark.parametrize("stretches", [(2048,), (512, 1536), (512,) * 4])
+def test_the_learning_rate_falls_with_steps_in_whatever_pieces(stretches):
+    """It stays for 1024 steps and then falls as one over the steps: 2/3 at 1536, half at 2048."""
+    config = LearningConfig(n_envs=16, n_steps=32, batch_size=128, learning_rate=4e-3, decay_after=1024)
+    model = learner(BrightSpot(16), 16, config, 0)
+    update, rates = model.train, []
+
+    def noted():
+        update()
+        rates.append(model.policy.optimizer.param_groups[0]["lr"])
+
+    model.train = noted
+    for steps in stretches:
+        model.learn(steps, reset_num_timesteps=False)
+    assert rates == pytest.approx([4e-3, 4e-3, 4e-3 * 2 / 3, 2e-3])
+
+
+class Favouring(BrightSpot):
+    """Evaluation worlds that are kinder in one evaluation than in all others."""
+
+    def __init__(self, kind_evaluation):
+        super().__init__(16)
+        self.evaluations, self.kind_evaluation = 0, kind_evaluation
+
+    def reset(self):
+        self.evaluations += 1
+        return super().reset()
+
+    def step_wait(self):
+        observation, reward, done, infos = super().step_wait()
+        return observation, reward + 100 * (self.evaluations == self.kind_evaluation), done, infos
+
+
+def test_the_best_policy_is_returned_not_the_last():
+    """Bit for bit the policy of a training that ended with that evaluation, adaptation included."""
+
+    def policy(evaluations, kind_evaluation):
+        config = LearningConfig(
+            total_steps=512 * evaluations, n_envs=16, n_steps=32, batch_size=128, eval_interval=512, patience=100
+        )
+        training = train(BrightSpot(16), Favouring(kind_evaluation), 16, config, 0)
+        assert training.steps == 512 * evaluations
+        return torch.cat([tensor.flatten() for tensor in learnt(training.policy).values()])
+
+    second = policy(4, kind_evaluation=2)
+    assert torch.equal(second, policy(2, kind_evaluation=2))
+    assert not torch.equal(second, policy(4, kind_evaluation=4))
+
+
+class Blinding(BrightSpot):
+    def step_wait(self):
+        observation, reward, done, infos = super().step_wait()
+        return {**observation, "eyes": observation["eyes"] * np.nan}, reward, done, infos
+
+
+def test_signals_that_are_no_numbers_end_the_training():
+    with pytest.raises(TrainingDiverged, match="not finite"):
+        learn(worlds=Blinding(16))

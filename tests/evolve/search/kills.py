@@ -1,0 +1,141 @@
+"""kill -9 at random moments of a run, again and again, until it is finished; the same run, killed by nobody, beside it.
+
+    RHABDOM_KILLS=500 python -m pytest tests/evolve/search/test_kill.py
+
+Each child is forked from a process that has loaded everything, so that a kill costs milliseconds and can hit any line
+of search, record and lock. What is evaluated is known in closed form and takes a millisecond.
+"""
+
+import os
+import random
+import signal
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from evolve.search.loop import evolve
+from evolve.search.search import Search
+from evolve.store.atomic_files import write_whole
+from evolve.store.directory import Run
+from evolve.store.evaluation import Evaluation
+from tests.evolve.closed_form import tiny
+from tests.evolve.remote_form import climbing
+
+LADDER = ("search.rungs=3", "learning.total_steps=16384")
+KINDS = ((), ("search.steady_state=true",), LADDER)  # of runs
+
+
+class Here:
+    """Evaluates in this process, and leaves a line for each that it has begun."""
+
+    def __init__(self, log):
+        self.log = log
+
+    def run(self, jobs, progress):
+        while jobs:
+            job = jobs.popleft()
+            with self.log.open("a") as log:
+                log.write(f"{job.id} {job.stretch.rung if job.stretch else 0}\n")
+            time.sleep(0.001)
+            if job.stretch is not None:
+                yield job, climbing(*job.arguments, lambda *steps: None)
+                continue
+            write_whole(job.policy_path, f"policy {job.seed}".encode())
+            fitness = -abs(job.phenotype.fov_deg - 70.0)
+            yield job, Evaluation(fitness, (fitness, fitness / 3), 0.5, 4096, 0.01, ((4096, fitness),))
+
+
+class Nobody:
+    """Watches and says nothing."""
+
+    def training(self, *report):
+        """Nothing."""
+
+    def evaluated(self, candidate):
+        """Nothing."""
+
+
+def carry(path, config):
+    """Begin a run, or go on with it, and bring it to its end."""
+    run = Run.open(path) if (path / "config.toml").exists() else Run.create(path, config)
+    with run.lock():
+        run.repair()
+        evolve(run, Here(path.parent / f"{path.name}.log"), Nobody())
+
+
+def child_killed_after(seconds, path, config):
+    """Whether the run was killed before its end."""
+    pid = os.fork()
+    if pid == 0:
+        try:
+            carry(path, config)
+        except BaseException as error:
+            print(f"{type(error).__name__}: {error}", file=sys.stderr)
+            os._exit(1)
+        os._exit(0)
+    deadline = time.monotonic() + seconds
+    while (ended := os.waitpid(pid, os.WNOHANG))[0] == 0:
+        if time.monotonic() > deadline:
+            os.kill(pid, signal.SIGKILL)
+            ended = os.waitpid(pid, 0)
+            break
+        time.sleep(0.0005)
+    status = ended[1]
+    assert os.WIFSIGNALED(status) or os.WEXITSTATUS(status) == 0, "a child failed"
+    return os.WIFSIGNALED(status)
+
+
+def history(run):
+    return [
+        (c.id, c.rung, c.genome, c.seed, c.fitness, c.returns, c.curve, c.phenotype, c.parents) for c in run.candidates
+    ]
+
+
+def begun(log):
+    """How often each candidate's evaluation was begun, on each rung."""
+    names = log.read_text().splitlines()
+    return {name: names.count(name) for name in names}
+
+
+def endure(kills, seed, folder):
+    """Runs that are killed `kills` times in all; asserts what a week-long run relies on. Returns runs finished."""
+    chance, done, finished = random.Random(seed), 0, 0
+    while done < kills:
+        config = tiny(f"seed={finished}", *KINDS[finished % len(KINDS)])
+        whole, path = folder / f"whole-{finished}", folder / f"run-{finished}"
+        began = time.monotonic()
+        assert not child_killed_after(60.0, whole, config)
+        longest = 0.7 * (time.monotonic() - began)
+        kept, deaths = b"", 0
+        while child_killed_after(chance.uniform(0, longest), path, config):
+            deaths += 1
+            record = path / "candidates.jsonl"
+            now = record.read_bytes() if record.exists() else b""
+            complete = now[: now.rfind(b"\n") + 1]
+            assert complete.startswith(kept), "something written was lost"
+            kept = complete
+        run = Run.open(path)
+        assert finished(run)
+        assert history(run) == history(Run.open(whole)), "another history than that of a run that nobody killed"
+        again = {name: count - 1 for name, count in begun(folder / f"{path.name}.log").items() if count > 1}
+        assert sum(again.values()) <= deaths, "a completed candidate was evaluated again"
+        places = (path, path / "policies", path / "trainings")
+        left = [entry.name for place in places if place.exists() for entry in place.glob(".*")]
+        assert not left, f"files half written are left: {left}"
+        done, finished = done + deaths, finished + 1
+    return finished
+
+
+def main(kills, seed=None):
+    Search(tiny())  # loads what children would each load again
+    seed = random.randrange(2**32) if seed is None else seed
+    print(f"seed {seed}", flush=True)
+    with TemporaryDirectory() as folder:
+        os.environ["RHABDOM_TEST"] = folder
+        finished = endure(kills, seed, Path(folder))
+    print(f"{kills} kills at least, {finished} runs finished as if nothing had happened")
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

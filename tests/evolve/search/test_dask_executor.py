@@ -1,0 +1,227 @@
+"""A real Dask cluster, a scheduler and two worker processes: same history as here, whoever dies."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import deque
+from pathlib import Path
+
+import pytest
+
+from evolve.search import dask_worker
+from evolve.search.dask_executor import DaskExecutor
+from evolve.search.local_executor import ExecutorError, LocalExecutor
+from evolve.search.loop import evolve
+from evolve.search.successive_halving import finished
+from evolve.store.directory import Run
+from evolve.store.versions import present
+from tests.evolve.closed_form import tiny
+from tests.evolve.remote_form import bowl, climbing
+from tests.evolve.search.test_local_executor import jobs
+from tests.evolve.search.test_loop import Onlooker, history
+
+pytest.importorskip("distributed")
+ROOT = Path(__file__).parents[3]
+
+
+class Cluster:
+    """Processes of a scheduler and its workers."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+        self.processes = []
+        self.environment = {**os.environ, "PYTHONPATH": str(ROOT), "RHABDOM_TEST": str(folder)}
+
+    def start(self, workers=2):
+        port = self.address.rpartition(":")[2]
+        self._run("scheduler", "--host", "127.0.0.1", "--port", port, "--dashboard-address", ":0")
+        for _ in range(workers):
+            self._run("worker", self.address, "--nthreads", "1", "--dashboard-address", ":0", "--death-timeout", "60")
+
+    def _run(self, *arguments):
+        command = [sys.executable, "-m", "dask", *arguments]
+        log = (self.folder / f"{arguments[0]}.log").open("a")
+        self.processes.append(
+            subprocess.Popen(
+                command, cwd=self.folder, env=self.environment, stdout=log, stderr=log, start_new_session=True
+            )
+        )
+        log.close()
+
+    def kill(self):
+        """All of it at once, nannies and their workers too."""
+        for process in self.processes:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        self.processes = []
+
+    def executor(self, function):
+        return DaskExecutor(self.address, f"tests.evolve.remote_form:{function}", patience_s=60)
+
+    def calls(self):
+        """How often each candidate has been begun, since asked last."""
+        log = self.folder / "calls.log"
+        names = [int(line.split()[0]) for line in log.read_text().splitlines()] if log.exists() else []
+        log.unlink(missing_ok=True)
+        return {name: names.count(name) for name in names}
+
+
+@pytest.fixture(autouse=True)
+def _any_commit(monkeypatch):
+    """A checkout that is being worked on changes between one process's start and another's."""
+    software = {**present(), "commit": ""}
+    monkeypatch.setattr(dask_worker, "_software", lambda: software)
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    cluster = Cluster(tmp_path_factory.mktemp("cluster"))
+    cluster.start()
+    yield cluster
+    cluster.kill()
+
+
+def carried(path, config, executor):
+    run = Run.create(path, config)
+    onlooker = Onlooker()
+    with executor as it:
+        evolve(run, it, onlooker)
+    return Run.open(path), onlooker
+
+
+def test_history_is_the_local_one(tmp_path, cluster):
+    config = tiny()
+    far, onlooker = carried(tmp_path / "dask", config, cluster.executor("bowl"))
+    local, _ = carried(tmp_path / "local", config, LocalExecutor(bowl, 2))
+    assert history(far) == history(local)
+    assert [c.curve for c in far.candidates] == [c.curve for c in local.candidates]
+    assert onlooker.steps > 0, "progress comes through"
+    assert cluster.calls() == dict.fromkeys(range(12), 1)
+    for candidate in local.candidates:
+        assert far.policy_path(candidate.id).read_bytes() == f"policy {candidate.seed}".encode()
+
+
+def test_history_on_a_ladder_is_the_local_one(tmp_path, cluster, monkeypatch):
+    """Trainings go from worker to worker, and a worker has no files of another's."""
+    monkeypatch.setenv("RHABDOM_TEST", str(tmp_path))
+    config = tiny("search.rungs=3", "learning.total_steps=16384")
+    far, _ = carried(tmp_path / "dask", config, cluster.executor("climbing"))
+    local, _ = carried(tmp_path / "local", config, LocalExecutor(climbing, 2))
+    assert history(far) == history(local)
+    assert finished(far)
+    whole = [candidate for candidate in local.candidates if candidate.rung == 2]
+    assert len(whole) == 3
+    for candidate in whole:
+        assert far.policy_path(candidate.id).read_bytes() == local.policy_path(candidate.id).read_bytes()
+    assert set(cluster.calls().values()) == {1, 2, 3}, "nobody begins a rung twice"
+
+
+def test_failures_and_infinities_come_through(tmp_path, cluster):
+    with cluster.executor("fails_for_some") as executor:
+        found = {job.id: outcome for job, outcome in executor.run(jobs(tmp_path))}
+    assert found[1].failure.startswith("ValueError: no such luck (remote_form.py:")
+    assert found[1].fitness == float("-inf")
+    assert found[0].failure is None
+    assert executor.count == 2
+
+
+def test_a_full_disk_is_no_animals_failure(tmp_path, cluster):
+    with (
+        cluster.executor("disk_full") as executor,
+        pytest.raises(ExecutorError, match=r"a worker's machine refuses: .*No space left on device"),
+    ):
+        list(executor.run(jobs(tmp_path)))
+
+
+def test_worker_killed_in_mid_candidate_is_replaced_and_its_candidate_evaluated_again(tmp_path, cluster):
+    cluster.calls()
+    with cluster.executor("killed_once") as executor:
+        found = {job.id: outcome for job, outcome in executor.run(jobs(tmp_path))}
+    assert cluster.calls()[2] == 2
+    assert len(found) == 4
+    assert all(outcome.failure is None for outcome in found.values())
+
+
+def test_candidate_that_kills_its_worker_thrice_has_failed(tmp_path, cluster):
+    cluster.calls()
+    with cluster.executor("killed_always") as executor:
+        found = {job.id: outcome for job, outcome in executor.run(jobs(tmp_path, 2))}
+    assert cluster.calls()[1] == 3
+    assert found[1].failure == "its worker process died 3 times"
+    assert found[0].failure is None
+
+
+def test_what_is_added_meanwhile_is_evaluated_too(tmp_path, cluster):
+    all_jobs = jobs(tmp_path, 5)
+    queue, found = deque(all_jobs[:2]), []
+    with cluster.executor("bowl") as executor:
+        for job, _ in executor.run(queue):
+            found.append(job.id)
+            if len(found) <= 3:
+                queue.append(all_jobs[len(found) + 1])
+    assert sorted(found) == list(range(5))
+
+
+def test_candidate_that_nobody_wants_any_more_is_given_up(tmp_path, cluster):
+    """As after Ctrl-C: it would go on for half a minute."""
+    told, beats = [], cluster.folder / "beats.log"
+    with cluster.executor("endless") as executor:
+        running = executor.run(jobs(tmp_path, 1), lambda *report: told.append(report) or interrupt())
+
+        def interrupt():
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            next(running)
+    assert told
+    deadline = time.monotonic() + 15
+    while True:
+        before = beats.stat().st_size
+        time.sleep(1.0)
+        if beats.stat().st_size == before:
+            break
+        assert time.monotonic() < deadline, "it goes on"
+
+
+def test_worker_with_other_software_is_refused(tmp_path, cluster, monkeypatch):
+    monkeypatch.setattr(dask_worker, "_software", lambda: {"torch": "0.4", "numpy": ""})
+    with (
+        cluster.executor("bowl") as executor,
+        pytest.raises(ExecutorError, match=r"other software.*torch .* \(here 0\.4\)"),
+    ):
+        list(executor.run(jobs(tmp_path, 1)))
+
+
+def test_nobody_there_is_said_in_one_line(tmp_path):
+    with pytest.raises(ExecutorError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9") as caught:
+        DaskExecutor("tcp://127.0.0.1:9", patience_s=1).__enter__()
+    assert "\n" not in str(caught.value)
+
+
+def test_scheduler_that_comes_back_is_asked_again(tmp_path):
+    cluster = Cluster(tmp_path)
+    cluster.start(workers=1)
+    try:
+        config = tiny("search.generations=2")
+        run, found = Run.create(tmp_path / "run", config), []
+
+        class Killer(Onlooker):
+            def evaluated(self, candidate):
+                found.append(candidate.id)
+                if len(found) == 2:
+                    cluster.kill()
+                    time.sleep(0.5)
+                    cluster.start(workers=1)
+
+        with cluster.executor("slow") as executor:
+            evolve(run, executor, Killer())
+    finally:
+        cluster.kill()
+    local, _ = carried(tmp_path / "local", config, LocalExecutor(bowl, 1))
+    assert history(Run.open(run.path)) == history(local)
