@@ -46,7 +46,7 @@ from evolve.genome.phenotype import Phenotype
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.learning.ppo import play
-from evolve.learning.training_stage import Stretch
+from evolve.learning.training_stage import TrainingStage
 from evolve.search.successive_halving import budgets
 from evolve.search.worker import prepare_device
 from evolve.store.atomic_files import write_whole
@@ -129,7 +129,7 @@ def climbed(number: int, animal: Phenotype) -> list[Row]:
         ends = budgets(run.search, run.learning)
         for rung in range(RUNGS):
             began = time.process_time()
-            outcome = evaluate(animal, run, number, policy, stretch=Stretch(ends[: rung + 1], kept[: rung + 1]))
+            outcome = evaluate(animal, run, number, policy, stretch=TrainingStage(ends[: rung + 1], kept[: rung + 1]))
             spent = time.process_time() - began
             if outcome.failure is not None:
                 raise RuntimeError(f"animal {number}: {outcome.failure}")

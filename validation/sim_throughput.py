@@ -39,7 +39,7 @@ import numpy as np
 import optics
 import sim
 from sim.envs.simulation import Simulation
-from sim.render.noisy_signals import Retinas
+from sim.render.noisy_signals import NoisySignals
 from sim.tasks.random_streams import Streams
 from sim.worlds.state import pose
 
@@ -137,7 +137,7 @@ class _Step:
     def __init__(self, case: Case, n_envs: int) -> None:
         self._worlds = sim.make_vec_env(case.task, with_pupil(case.eyes), n_envs)
         self._worlds.reset()
-        self._alone = Retinas(self._worlds.renderer, self._worlds.simulation.streams.noise_keys)
+        self._alone = NoisySignals(self._worlds.renderer, self._worlds.simulation.streams.noise_keys)
         self._rng = np.random.default_rng(0)
         self._parts: list[Callable[[], Any]] = []
         self.wholes: list[float] = []

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from evolve.cli.pace import Pace, calibrate
-from evolve.config.lint import remarks
+from evolve.config.lint import lint
 from evolve.config.run_config import RunConfig
 from evolve.genome.genes import CLUSTERS
 from evolve.genome.genotype import Genotype
@@ -21,14 +21,14 @@ from evolve.search.successive_halving import steps as total_steps
 from evolve.store.candidate import Candidate
 from evolve.store.evaluation import Evaluation
 
-__all__ = ["Plan"]
+__all__ = ["RunPlan"]
 
 REPORT_BYTES = 5_000_000  # report and replay pages together
 EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60  # of the episode that is exported: see evolve.analysis.episode
 
 
 @dataclass(frozen=True)
-class Plan:
+class RunPlan:
     """What a run is going to do. `paces` holds the pace of the start animal and of one in the middle of all ranges,
     which bracket what evolution will ask for; {} before `measured`."""
 
@@ -38,12 +38,12 @@ class Plan:
     paces: dict[str, Pace] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, config: RunConfig, directory: Path) -> Plan:
+    def of(cls, config: RunConfig, directory: Path) -> RunPlan:
         return cls(config, directory, config.workers or cores())
 
-    def measured(self) -> Plan:
+    def measured(self) -> RunPlan:
         """With the paces of this machine, which takes some ten seconds."""
-        return Plan(self.config, self.directory, self.workers, calibrate(self.config, self.animals, self.workers))
+        return RunPlan(self.config, self.directory, self.workers, calibrate(self.config, self.animals, self.workers))
 
     @property
     def animals(self) -> dict[str, Phenotype]:
@@ -126,7 +126,7 @@ class Plan:
     def notes(self) -> list[str]:
         """What one should know before it begins."""
         short = self.paces and self.disk_bytes > self.free_bytes
-        return [*remarks(self.config), *(["the disk is too small for this run"] if short else [])]
+        return [*lint(self.config), *(["the disk is too small for this run"] if short else [])]
 
     def record(self) -> dict[str, Any]:
         """The plan for machines."""

@@ -7,7 +7,7 @@ import numpy as np
 from evolve.config.run_config import RunConfig
 from evolve.genome.genes import INHERITED, LAMBDA_MAX
 
-__all__ = ["coarse_bands", "idle_genes", "idle_starts", "remarks"]
+__all__ = ["coarse_bands", "idle_genes", "idle_starts", "lint"]
 
 GREY_TASKS = ("navigation", "detection", "tracking")
 PEAKS = 17  # of an open gene's range, at which its pigment is tried
@@ -15,7 +15,7 @@ SHOWN = 4  # names in a line, at most
 LEAST_ERROR = 1e-3  # of white's signal: what the 64 bands that others are held against may be wrong by themselves
 
 
-def remarks(config: RunConfig) -> list[str]:
+def lint(config: RunConfig) -> list[str]:
     """One line each."""
     return [*idle_genes(config), *idle_starts(config), *coarse_bands(config)]
 

@@ -10,7 +10,7 @@ import numpy as np
 from evolve.config.checks import ConfigError
 from evolve.config.run_config import EyeConfig
 from evolve.genome.genes import RELIEF_POINTS
-from evolve.genome.relief_genes import PATCH, doe_names, doe_own_names, refined
+from evolve.genome.relief_genes import PATCH, doe_names, refined, representatives
 
 __all__ = ["no_such_gene", "with_relief"]
 
@@ -37,7 +37,7 @@ def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
         starts = {name: {**genes.get(name, {}), "start": float(u)} for name, u in zip(names, finer, strict=True)}
         genes = {**genes, **starts}
     if eye.relief_symmetric and all("start" in genes.get(name, {}) for name in names):
-        own = dict(zip(names, doe_own_names(eye.relief_points, True), strict=True))
+        own = dict(zip(names, representatives(eye.relief_points, True), strict=True))
         images = {name for name in names if own[name] != name and _same(genes[name], genes[own[name]])}
         genes = {name: use for name, use in genes.items() if name not in images}
     return {**tree, "genome": genes} if genes else tree

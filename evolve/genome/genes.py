@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from evolve.genome.interval import Interval
-from evolve.genome.relief_genes import doe_own_names
+from evolve.genome.relief_genes import representatives
 
 __all__ = [
     "ALL_GENES",
@@ -96,7 +96,7 @@ class Gene:
 def gene_table(relief_points: int = 4, relief_symmetric: bool = False) -> Mapping[str, Gene]:
     """Every gene by name, in the order in which they stand in a genome; the relief has relief_points² of them, or those
     of an eighth of it."""
-    relief = set(doe_own_names(relief_points, relief_symmetric))
+    relief = set(representatives(relief_points, relief_symmetric))
     genes = [*_body(), *_optics(relief_points), *_brain(), *_spectra()]
     genes = [gene for gene in genes if gene.name in relief or not gene.name.startswith("doe_")]
     return {gene.name: gene for gene in genes}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from evolve.genome.anatomy import Sizes, fitted
 from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, GeneConfig
 from evolve.genome.genotype import Genotype
-from evolve.genome.relief_genes import doe_own_names
+from evolve.genome.relief_genes import representatives
 
 if TYPE_CHECKING:
     import optics
@@ -131,7 +131,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
     """Phenotype of a genome under a run's config; every genome of the right length has one, and its eyes fit."""
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
     seen_through = config.eye.optics
-    relief = tuple(values[name] for name in doe_own_names(config.eye.relief_points, config.eye.relief_symmetric))
+    relief = tuple(values[name] for name in representatives(config.eye.relief_points, config.eye.relief_symmetric))
     peaks = tuple(values[name] for name in LAMBDA_MAX)[: int(values["receptor_types"])]
     return Phenotype(
         n_eyes=int(values["n_eyes"]),

@@ -7,7 +7,7 @@ from math import isqrt
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["PATCH", "doe_names", "doe_own_names", "refined"]
+__all__ = ["PATCH", "doe_names", "refined", "representatives"]
 
 Floats = NDArray[np.float64]
 PATCH = (
@@ -20,7 +20,7 @@ def doe_names(points: int) -> list[str]:
     return [f"doe_{i}{j}" for i in range(points) for j in range(points)]
 
 
-def doe_own_names(points: int, symmetric: bool) -> list[str]:
+def representatives(points: int, symmetric: bool) -> list[str]:
     """For each gene in `doe_names`, the one that its height is. A symmetric relief looks the same mirrored and turned
     by a quarter, as an eighth of it says: its genes are those of their own name."""
     if not symmetric:

@@ -17,7 +17,7 @@ from evolve.genome.phenotype import Phenotype
 from evolve.learning.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from evolve.learning.policy import TrainingDiverged, save_policy
 from evolve.learning.ppo import Episodes, Progress, Training, play, train
-from evolve.learning.training_stage import Stretch
+from evolve.learning.training_stage import TrainingStage
 from evolve.store.evaluation import Evaluation
 
 __all__ = ["evaluate"]
@@ -29,7 +29,7 @@ def evaluate(
     seed: int,
     policy_path: Path,
     progress: Progress | None = None,
-    stretch: Stretch | None = None,
+    stretch: TrainingStage | None = None,
 ) -> Evaluation:
     """Train one candidate, write its policy, and measure its fitness; same arguments, same outcome on one machine.
 
@@ -60,7 +60,7 @@ def evaluate(
 
 
 def _climb(
-    phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress | None, stretch: Stretch
+    phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress | None, stretch: TrainingStage
 ) -> tuple[Training, Episodes]:
     """Up to the stretch's last rung, from the highest one below whose checkpoint there is."""
     begun, first = None, 0

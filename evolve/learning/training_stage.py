@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Stretch"]
+__all__ = ["TrainingStage"]
 
 
 @dataclass(frozen=True)
-class Stretch:
+class TrainingStage:
     """A training from its beginning to one of its rungs.
 
     budgets      steps trained at the end of this rung, and of each below it, ascending

@@ -31,7 +31,7 @@ SHOWN_POWER = 0.98  # of the light in its window that the PSF's picture holds
 
 
 @dataclass(frozen=True)
-class Light:
+class WhiteLight:
     """An eye, its PSF per band, and in white daylight."""
 
     eye: optics.Eye
@@ -39,7 +39,7 @@ class Light:
     white: optics.PSFResult
 
     @classmethod
-    def through(cls, eye: optics.Eye) -> Light:
+    def through(cls, eye: optics.Eye) -> WhiteLight:
         psf = eye.psf()
         return cls(eye, psf, polychromatic(eye, psf))
 
@@ -54,7 +54,7 @@ def eye_figures(phenotype: Phenotype, config: EyeConfig) -> str:
     eye = phenotype.eyes(config).eye()
     if eye.pupil is None:
         return "<p>Optics are off in this run: every eye has a perfect lens, which neither blurs nor dims.</p>\n"
-    light = Light.through(eye)
+    light = WhiteLight.through(eye)
     parts = [_pupil(eye, phenotype), _psf(light), _cuts(light), _mtf(light)]
     return f'<div class="figures pairs">{"".join(parts)}</div>\n'
 
@@ -105,7 +105,7 @@ def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
     return heights.reshape(shape), np.reshape(pupil.aperture.contains(x, y), shape)
 
 
-def _psf(light: Light) -> str:
+def _psf(light: WhiteLight) -> str:
     """The polychromatic PSF, logarithmic, with a receptor's outline."""
     picture, half = _shown(light)
     edge, pitch = 1e6 * half, 1e6 * light.eye.receptor_pitch
@@ -134,7 +134,7 @@ def _psf(light: Light) -> str:
     return figure(svg, caption)
 
 
-def _shown(light: Light) -> tuple[np.ndarray, float]:
+def _shown(light: WhiteLight) -> tuple[np.ndarray, float]:
     """The middle of the PSF that holds most of the light, averaged to at most PIXELS, and its half width [m]."""
     image, dx = light.white.psf[0], light.white.dx
     middle = image.shape[0] // 2
@@ -150,7 +150,7 @@ def _shown(light: Light) -> tuple[np.ndarray, float]:
     return cut.reshape(cells, block, cells, block).mean(axis=(1, 3)), cells * block * dx / 2
 
 
-def _cuts(light: Light) -> str:
+def _cuts(light: WhiteLight) -> str:
     """Each band's PSF along x through the axis."""
     psf = light.psf
     _, half = _shown(light)
@@ -172,7 +172,7 @@ def _cuts(light: Light) -> str:
     return figure(svg, "<b>PSF per band</b>: cuts along x through the optical axis; dark lines are short wavelengths.")
 
 
-def _mtf(light: Light) -> str:
+def _mtf(light: WhiteLight) -> str:
     """Contrast over spatial frequency beside what the aperture allows at best."""
     eye, scale = light.eye, light.per_degree
     cutoff = optics.mtf(light.psf).cutoff
@@ -204,7 +204,7 @@ def _mtf(light: Light) -> str:
     return figure(svg, caption)
 
 
-def diffraction_limit(light: Light, frequency: np.ndarray) -> np.ndarray:
+def diffraction_limit(light: WhiteLight, frequency: np.ndarray) -> np.ndarray:
     """MTF of a circular aperture as wide, without aberrations, in white daylight, (frequency,): the bands' limits
     (2/π)(arccos s - s √(1 - s²)), s = f / cutoff (Goodman, §6.3.3), weighted by their light."""
     weights = light.eye.spectral_bands.weights.mean(axis=0) * daylight(light.psf.wavelengths)

@@ -12,11 +12,11 @@ from evolve.analysis.episode import Episode
 from sim.eyes.eyes import BODY_RADIUS
 from sim.physics.physics import SUBSTEPS
 
-__all__ = ["Stage"]
+__all__ = ["GroundPlan"]
 
 
 @dataclass(frozen=True)
-class Stage:
+class GroundPlan:
     """Ground plan [m] and eyes.
 
     walls          (n, 4): centre x, y and half sides along x, y
@@ -39,7 +39,7 @@ class Stage:
     gain: float
 
     @classmethod
-    def of(cls, episode: Episode) -> Stage:
+    def of(cls, episode: Episode) -> GroundPlan:
         """The stage of an episode."""
         where = episode.world.evaluation
         world = sim.build_world(episode.task, seed=where["world_seed"], mazes=where["mazes"])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from evolve.analysis.episode import Episode
-from evolve.report.ground_plan import Stage
+from evolve.report.ground_plan import GroundPlan
 from evolve.report.markup import document, exact, json_script, number, text
 from evolve.report.picture import data_uri, display, film_sheet
 from evolve.store.atomic_files import write_whole
@@ -26,7 +26,7 @@ def write_player(episode: Episode, path: Path) -> Path:
     name = f"{episode.task.capitalize()}: candidate {episode.candidate_id} plays"
     body = (
         f'<header><p class="kicker">rhabdom · replay</p>\n<h1>{text(name)}</h1>\n'
-        f"<p>{summary(episode)}</p></header>\n{player(episode, Stage.of(episode))}"
+        f"<p>{summary(episode)}</p></header>\n{player(episode, GroundPlan.of(episode))}"
     )
     write_whole(Path(path), document(name, body, ["player.js"]))
     return Path(path)
@@ -39,14 +39,14 @@ def summary(episode: Episode) -> str:
     return f"Evaluation episode with seed {episode.seed}: {len(episode)} actions, return {total} ({terms})."
 
 
-def player(episode: Episode, stage: Stage) -> str:
+def player(episode: Episode, stage: GroundPlan) -> str:
     """The player's element; the page that holds it needs player.js."""
     film = json_script(_film(episode, stage), "film")
     left, right = _world(stage) + _controls(episode), _sights(stage) + _score(episode)
     return f'<div class="player"><div>{left}</div><div>{right}</div>{film}</div>\n'
 
 
-def _world(stage: Stage) -> str:
+def _world(stage: GroundPlan) -> str:
     x0, y0, x1, y1 = stage.bounds
     legend = ""
     if stage.object_radius:
@@ -66,7 +66,7 @@ def _world(stage: Stage) -> str:
     )
 
 
-def _sights(stage: Stage) -> str:
+def _sights(stage: GroundPlan) -> str:
     """A pair of canvases per eye: what it signals, and what it would signal behind a perfect lens."""
     eyes = stage.eyes
     height, width = eyes.resolution
@@ -119,7 +119,7 @@ def _score(episode: Episode) -> str:
     )
 
 
-def _film(episode: Episode, stage: Stage) -> dict[str, Any]:
+def _film(episode: Episode, stage: GroundPlan) -> dict[str, Any]:
     """What player.js reads. Times [s], positions [m], angles [rad], commands [m/s] and [°]; everything over the frames
     that are kept."""
     kept = np.arange(0, len(episode), _stride(episode))

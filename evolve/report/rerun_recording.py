@@ -17,7 +17,7 @@ import numpy as np
 
 from evolve.analysis.episode import Episode
 from evolve.config.run_config import ConfigError
-from evolve.report.ground_plan import Stage
+from evolve.report.ground_plan import GroundPlan
 from evolve.report.picture import display
 from evolve.store.atomic_files import UNFINISHED
 from sim.eyes.eyes import EYE_HEIGHT, eye_positions, eye_rotations
@@ -49,7 +49,7 @@ def write_recording(episode: Episode, path: Path) -> Path:
         ConfigError: rerun is not installed.
     """
     rr = require_rerun()
-    stage = Stage.of(episode)
+    stage = GroundPlan.of(episode)
     name = f"{episode.task}, candidate {episode.candidate_id}, seed {episode.seed}"
     stream = rr.RecordingStream("rhabdom", recording_id=name, send_properties=False)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}{UNFINISHED}")
@@ -72,7 +72,7 @@ def write_recording(episode: Episode, path: Path) -> Path:
     return path
 
 
-def _furnish(rr: Any, stream: Any, stage: Stage) -> None:
+def _furnish(rr: Any, stream: Any, stage: GroundPlan) -> None:
     """What does not change: walls, the shapes of agent and objects, and the eyes as cameras."""
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     stream.log("world/walls", _boxes(rr, stage.walls, WALL_HEIGHT, GREY), static=True)
@@ -99,7 +99,7 @@ def _furnish(rr: Any, stream: Any, stage: Stage) -> None:
         )
 
 
-def _move(rr: Any, stream: Any, episode: Episode, stage: Stage) -> None:
+def _move(rr: Any, stream: Any, episode: Episode, stage: GroundPlan) -> None:
     """Where agent and objects are before each action."""
     for t in range(len(episode)):
         _now(stream, t, stage)
@@ -110,7 +110,7 @@ def _move(rr: Any, stream: Any, episode: Episode, stage: Stage) -> None:
             stream.log(f"world/{name}", rr.Transform3D(translation=position))
 
 
-def _look(rr: Any, stream: Any, episode: Episode, stage: Stage) -> None:
+def _look(rr: Any, stream: Any, episode: Episode, stage: GroundPlan) -> None:
     """What each eye signals, would signal behind a perfect lens, and what there is to see, before each action."""
     weights = stage.eyes.eye().spectral_bands.weights
     scenes = {int(t): frame for frame, t in enumerate(episode.radiance_frames)}
@@ -125,7 +125,7 @@ def _look(rr: Any, stream: Any, episode: Episode, stage: Stage) -> None:
                 stream.log(f"scene/{name}", rr.Image(display(scene)))
 
 
-def _count(rr: Any, stream: Any, episode: Episode, stage: Stage) -> None:
+def _count(rr: Any, stream: Any, episode: Episode, stage: GroundPlan) -> None:
     """Numbers over time: commands, rewards by term, contact."""
     numbers = {f"reward/{name}": term for name, term in episode.reward_terms.items()}
     numbers |= {"reward/total": episode.reward, "contact": episode.contact}
@@ -136,7 +136,7 @@ def _count(rr: Any, stream: Any, episode: Episode, stage: Stage) -> None:
         rr.send_columns(name, times, rr.Scalars.columns(scalars=values.astype(np.float64)), recording=stream)
 
 
-def _now(stream: Any, t: int, stage: Stage) -> None:
+def _now(stream: Any, t: int, stage: GroundPlan) -> None:
     stream.set_time("action", sequence=t)
     stream.set_time("time", duration=t * stage.seconds)
 

@@ -7,7 +7,7 @@ import numpy as np
 import optics
 from evolve.analysis.episode import Episode
 from evolve.analysis.statistics import psnr
-from evolve.report.ground_plan import Stage
+from evolve.report.ground_plan import GroundPlan
 from evolve.report.markup import number, text
 from evolve.report.picture import data_uri, display
 
@@ -17,7 +17,7 @@ WIDTH = 120  # CSS pixels of one picture, where there are few eyes
 MOST_EYES = 6
 
 
-def views(episode: Episode, stage: Stage) -> str:
+def views(episode: Episode, stage: GroundPlan) -> str:
     """Pictures and their caption."""
     frame = _busiest(episode)
     time = int(episode.radiance_frames[frame])

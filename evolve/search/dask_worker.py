@@ -18,7 +18,7 @@ from typing import Any
 
 from evolve.config.assemble import from_text
 from evolve.genome.phenotype import Phenotype
-from evolve.learning.training_stage import Stretch
+from evolve.learning.training_stage import TrainingStage
 from evolve.search.job import ATTEMPTS, Job
 from evolve.search.worker import evaluated, prepare_device
 from evolve.store.evaluation import Evaluation
@@ -122,7 +122,7 @@ def _evaluate(function: Callable[..., Evaluation], order: Order, progress: Calla
         if order.begun is not None:
             rung, content = order.begun
             checkpoints[rung].write_bytes(content)
-        ladder = (Stretch(order.budgets, checkpoints),) if checkpoints else ()
+        ladder = (TrainingStage(order.budgets, checkpoints),) if checkpoints else ()
         outcome = evaluated(function, (phenotype, config, order.seed, policy, *ladder), progress)
         return _text(outcome), _content(policy), _content(checkpoints[-1]) if checkpoints else b""
 

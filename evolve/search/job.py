@@ -9,7 +9,7 @@ from typing import Any
 
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.learning.training_stage import Stretch
+from evolve.learning.training_stage import TrainingStage
 
 __all__ = ["ATTEMPTS", "ExecutorError", "Job", "Progress"]
 
@@ -33,7 +33,7 @@ class Job:
     config: RunConfig
     seed: int
     policy_path: Path
-    stretch: Stretch | None = None
+    stretch: TrainingStage | None = None
 
     @property
     def arguments(self) -> tuple[Any, ...]:

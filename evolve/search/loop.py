@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from evolve.genome.phenotype import develop
-from evolve.learning.training_stage import Stretch
+from evolve.learning.training_stage import TrainingStage
 from evolve.search.job import Job, Progress
 from evolve.search.search import Proposal, Search, training_seed
 from evolve.search.successive_halving import budgets, reaching
@@ -102,7 +102,7 @@ def _job(run: Run, proposal: Proposal, rung: int = 0) -> Job:
     stretch = None
     if run.config.search.rungs > 1:
         ends = budgets(run.config.search, run.config.learning)[: rung + 1]
-        stretch = Stretch(ends, tuple(run.checkpoint_path(proposal.id, i) for i in range(rung + 1)))
+        stretch = TrainingStage(ends, tuple(run.checkpoint_path(proposal.id, i) for i in range(rung + 1)))
     return Job(proposal.id, phenotype, run.config, seed, run.policy_path(proposal.id), stretch)
 
 

@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.learning.training_stage import Stretch
+from evolve.learning.training_stage import TrainingStage
 from evolve.store.evaluation import Evaluation
 
 __all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "work"]
@@ -72,7 +72,7 @@ def evaluate_candidate(
     config: RunConfig,
     seed: int,
     policy_path: Path,
-    stretch: Stretch | None = None,
+    stretch: TrainingStage | None = None,
     *,
     progress: Callable[[int, int], None],
 ) -> Evaluation:

@@ -13,7 +13,7 @@ from optics.apertures.aperture import Aperture, Nodes, SoftAperture
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.arguments import in_range, shown
-from optics.numerics.interpolation import Table
+from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
 
@@ -107,10 +107,10 @@ class SoftAnnulus(SoftAperture):
 
 
 @lru_cache(maxsize=64)
-def _disk_table(edge: SoftEdge, radius: float) -> Table:
+def _disk_table(edge: SoftEdge, radius: float) -> Interpolant:
     """Profile of a soft disk across its edge."""
     ends = radius - edge.reach, radius + edge.reach
-    return Table.of(lambda rho: disk_profile(edge, radius, rho), ends, 2 * edge.cycles, edge.ripple / 4)
+    return Interpolant.of(lambda rho: disk_profile(edge, radius, rho), ends, 2 * edge.cycles, edge.ripple / 4)
 
 
 def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndarray:

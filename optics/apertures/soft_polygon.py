@@ -17,7 +17,7 @@ import numpy as np
 
 from optics.apertures.aperture import SoftAperture
 from optics.apertures.soft_edge import SoftEdge
-from optics.numerics.interpolation import Table
+from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision, opaque
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
@@ -119,7 +119,7 @@ def _nothing(*arguments: Any) -> Any:
 
 
 @lru_cache(maxsize=64)
-def _radial_table(edge: SoftEdge) -> Table:
+def _radial_table(edge: SoftEdge) -> Interpolant:
     """H(r) = G(r)/r², G = ∫₀^r g(r') r' dr'."""
     u, weight = gauss_legendre(int(24 + 4 * edge.cycles + edge.beta))
 
@@ -129,11 +129,11 @@ def _radial_table(edge: SoftEdge) -> Table:
         return np.asarray(edge.ring(np.outer(within, u)) @ weight * within / (2 * pi * r**2))
 
     # A little further than the reach, whence the interpolation's outermost samples come.
-    return Table.of(mean, (-1.1 * edge.reach, 1.1 * edge.reach), 2.2 * edge.cycles, edge.ripple / 4)
+    return Interpolant.of(mean, (-1.1 * edge.reach, 1.1 * edge.reach), 2.2 * edge.cycles, edge.ripple / 4)
 
 
 @lru_cache(maxsize=64)
-def _straight_table(edge: SoftEdge) -> Table:
+def _straight_table(edge: SoftEdge) -> Interpolant:
     """Transmittance at a distance d inside a half-plane: 1 - ∫ g(r) r 2 arccos(d/r) dr from d to the reach."""
     u, weight = gauss_legendre(int(24 + 4 * edge.cycles + 2 * edge.beta))
 
@@ -144,4 +144,4 @@ def _straight_table(edge: SoftEdge) -> Table:
         beyond = (jacobian * edge.ring(r) * np.arccos(np.clip(depth / r, 0, 1)) / pi) @ weight
         return np.where(d < 0, beyond, 1 - beyond)
 
-    return Table.of(inside, (-edge.reach, edge.reach), 2 * edge.cycles, edge.ripple / 4)
+    return Interpolant.of(inside, (-edge.reach, edge.reach), 2 * edge.cycles, edge.ripple / 4)

@@ -10,7 +10,7 @@ import numpy as np
 
 from optics.apertures.aperture import Aperture
 from optics.elements.relief import Relief, square_heights
-from optics.numerics.autodiff import is_tracked
+from optics.numerics.autodiff import is_differentiable
 from optics.numerics.precision import Precision
 
 __all__ = ["PixelRelief"]
@@ -37,14 +37,14 @@ class PixelRelief(Relief):
     def __post_init__(self) -> None:
         heights = square_heights(self.samples)
         object.__setattr__(self, "_heights", heights)
-        if not is_tracked(self.samples):
+        if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", heights)
 
     def height(self, x: Any, y: Any, types: Precision) -> Any:
         import drjit as dr
 
         n = len(self._heights)
-        known = dr.ravel(self.samples) if is_tracked(self.samples) else self._heights.ravel()
+        known = dr.ravel(self.samples) if is_differentiable(self.samples) else self._heights.ravel()
         column, row = (dr.clip(dr.floor((place + 1) * (n / 2)), 0, n - 1) for place in (x, y))
         return dr.gather(types.Float64, types.Float64(known), types.Index(row * n + column))
 
@@ -82,7 +82,7 @@ class PixelRelief(Relief):
 
     @property
     def _level(self) -> bool:
-        return not is_tracked(self.samples) and bool(np.ptp(self._heights) == 0)
+        return not is_differentiable(self.samples) and bool(np.ptp(self._heights) == 0)
 
 
 def _reach(power: np.ndarray, share: float) -> float:

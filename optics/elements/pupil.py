@@ -16,7 +16,7 @@ from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
 from optics.elements.wavefront_slopes import Slopes, _derivative
 from optics.numerics.arguments import finite, in_range, of_kind, positive, reals
-from optics.numerics.autodiff import is_tracked, number
+from optics.numerics.autodiff import is_differentiable, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
 
@@ -56,7 +56,7 @@ class Pupil:
             object.__setattr__(self, "n", RefractiveIndex(self.n))
         of_kind("aperture", self.aperture, Aperture, "Circle()")
         if self.height is not None and not isinstance(self.height, Relief):
-            height = self.height if is_tracked(self.height) else reals("height", self.height)
+            height = self.height if is_differentiable(self.height) else reals("height", self.height)
             object.__setattr__(self, "height", HeightMap(height))
         if self.thin_lens_focal_length is not None:
             positive("abs(thin_lens_focal_length)", abs(finite("thin_lens_focal_length", self.thin_lens_focal_length)))
@@ -87,7 +87,7 @@ class Pupil:
     def bends(self, wavelength: float) -> bool:
         """Whether the relief does anything, or is asked what it would do."""
         step = self.index_step(wavelength)
-        return self.height is not None and (is_tracked(step) or step != 0)
+        return self.height is not None and (is_differentiable(step) or step != 0)
 
     def rotationally_symmetric(self, wavelength: float) -> bool:
         relief_is = not self.bends(wavelength) or self.height.rotationally_symmetric

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import reals
-from optics.numerics.autodiff import is_tracked, plain
+from optics.numerics.autodiff import is_differentiable, plain
 from optics.numerics.precision import Precision
 
 __all__ = ["BSplineRelief", "HeightMap", "Relief"]
@@ -65,11 +65,11 @@ class BSplineRelief(Relief):
 
     def __post_init__(self) -> None:
         points = np.array(plain(self.control_points))
-        if is_tracked(self.control_points) and points.size == 16:
+        if is_differentiable(self.control_points) and points.size == 16:
             points = points.reshape(4, 4)
         if points.shape != (4, 4) or not np.isfinite(points).all():
             raise ValueError(f"control_points has shape {points.shape}: must be 4 x 4 finite heights [m]")
-        if not is_tracked(self.control_points):
+        if not is_differentiable(self.control_points):
             points.setflags(write=False)
             object.__setattr__(self, "control_points", points)
 
@@ -90,7 +90,7 @@ class BSplineRelief(Relief):
         import drjit as dr
 
         points = types.Float64(
-            dr.ravel(self.control_points) if is_tracked(self.control_points) else self.control_points.ravel()
+            dr.ravel(self.control_points) if is_differentiable(self.control_points) else self.control_points.ravel()
         )
         across, along = _cubic_basis((x + 1) / 2), _cubic_basis((y + 1) / 2)
         total = types.Float64(0)
@@ -111,7 +111,7 @@ class BSplineRelief(Relief):
     @property
     def rotationally_symmetric(self) -> bool:
         """A paraboloid on the axis, whose control values lie on c₀ + c₁ (i² + j²), or a constant."""
-        if is_tracked(self.control_points):
+        if is_differentiable(self.control_points):
             return False  # a derivative asks about every control point
         points = self.control_points
         square = (2 * np.arange(4) - 3) ** 2
@@ -138,7 +138,7 @@ class HeightMap(Relief):
     def __post_init__(self) -> None:
         samples = square_heights(self.samples)
         object.__setattr__(self, "_heights", samples)
-        if not is_tracked(self.samples):
+        if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", samples)
 
     @cached_property
@@ -154,7 +154,7 @@ class HeightMap(Relief):
         """Spline coefficients as a flat array; they are linear in the samples, M h Mᵀ."""
         import drjit as dr
 
-        if not is_tracked(self.samples):
+        if not is_differentiable(self.samples):
             return types.Float64(self._coefficients.ravel())
         matmul: Any = dr.matmul
         n = len(self._heights)
@@ -220,7 +220,7 @@ def square_heights(samples: Any) -> np.ndarray:
     Raises:
         ValueError: not square, empty, or not finite.
     """
-    heights = np.array(plain(samples) if is_tracked(samples) else reals("height", samples))
+    heights = np.array(plain(samples) if is_differentiable(samples) else reals("height", samples))
     if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.size == 0:
         raise ValueError(f"height has shape {heights.shape}: must be square (n, n), n at least 1")
     if not np.isfinite(heights).all():

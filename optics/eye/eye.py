@@ -10,12 +10,12 @@ import numpy as np
 
 from optics.elements.pupil import Pupil
 from optics.eye.band_choice import choose_bands
-from optics.eye.kernel_bank import Sight, prepare
+from optics.eye.kernel_bank import KernelBank, prepare
 from optics.eye.photoreceptor import gaussian_noise, own_type, photon_noise, quantum_catch, throughput
 from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
 from optics.eye.retinal_image import blur, centred, receptor_average
 from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
-from optics.numerics.autodiff import at_border, is_tracked, number, plain
+from optics.numerics.autodiff import is_differentiable, number, plain, to_user
 from optics.numerics.precision import precision
 from optics.point_spread.psf import PSFResult
 from optics.spectra.bands import SpectralBands
@@ -92,7 +92,7 @@ class Eye:
     @property
     def sensor_distance(self) -> Any:
         """f [m], from pupil to retina."""
-        if is_tracked(self.fov_deg):
+        if is_differentiable(self.fov_deg):
             import drjit as dr
 
             return self.sensor_width / (2 * dr.tan(dr.deg2rad(self.fov_deg) / 2))
@@ -161,7 +161,7 @@ class Eye:
         """
         positive("z", z, infinite=True)
         right, up = (math.tan(math.radians(in_range("direction_deg", at, -80, 80))) for at in direction_deg)
-        return at_border(self._kernel(_whole(samples_per_receptor), z, (right, -up)))
+        return to_user(self._kernel(_whole(samples_per_receptor), z, (right, -up)))
 
     def _kernel(
         self, samples_per_receptor: int, z: Any, direction: tuple[float, float], from_cell: bool = False
@@ -194,7 +194,7 @@ class Eye:
         field_zones: int | str = 1,
         tolerance: float | None = None,
         light_from: str = "cells",
-    ) -> Sight:
+    ) -> KernelBank:
         """Kernels for a scene in depth and over the field of view; printed, it says what was chosen and why.
 
         z: distances [m] that occur: one, or an array whose nearest and farthest count.
@@ -227,7 +227,7 @@ class Eye:
         samples_per_receptor: int,
         rng: np.random.Generator | None = None,
         z: Any = math.inf,
-        sight: Sight | None = None,
+        sight: KernelBank | None = None,
     ) -> Any:
         """Signals (channel, h, w) of a scene in the tangent plane, by convolution (the reference).
 
@@ -255,7 +255,7 @@ class Eye:
         signal = quantum_catch(irradiance, self.spectral_bands.weights, self.throughput, types)
         if self.mosaic is not None:
             signal = own_type(signal, self.mosaic, types)
-        return at_border(signal) if rng is None else at_border(signal + types.Tensor(self._noise(signal, rng)))
+        return to_user(signal) if rng is None else to_user(signal + types.Tensor(self._noise(signal, rng)))
 
     def _noise(self, signal: Any, rng: np.random.Generator) -> np.ndarray:
         """What noise adds to the signal."""

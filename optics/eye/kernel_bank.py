@@ -16,18 +16,18 @@ from typing import Any
 
 import numpy as np
 
-from optics.eye.kernel_interpolation import Choice, Ladder, hats, nodes
+from optics.eye.kernel_interpolation import Choice, NodeChoice, linear_weights, nodes
 from optics.numerics.arguments import positive, shown, whole
-from optics.numerics.autodiff import is_tracked, number, plain
+from optics.numerics.autodiff import is_differentiable, number, plain
 
-__all__ = ["Sight", "prepare"]
+__all__ = ["KernelBank", "prepare"]
 
 MOST_NODES = 64
 DEPTH_RUNGS, FIELD_RUNGS = (1, 3, 5, 9, 17), (1, 3, 5, 9)
 
 
 @dataclass(frozen=True)
-class Sight:
+class KernelBank:
     """The kernels of an eye at all nodes, and what each cell of a scene has of them.
 
     vergence: (nearest, farthest) 1/z [1/m]; field: (half height, half width) of the retina in cells.
@@ -45,7 +45,7 @@ class Sight:
         Raises:
             ValueError: z of another shape.
         """
-        if not is_tracked(z) and np.ndim(z) and np.shape(z) != shape:
+        if not is_differentiable(z) and np.ndim(z) and np.shape(z) != shape:
             raise ValueError(f"z has shape {np.shape(z)}: must be one distance or one per cell, {shape}")
         if len(self.kernels) == 1:
             return [1]
@@ -53,10 +53,14 @@ class Sight:
         near, far = self.vergence
         depth = (2 / np.broadcast_to(plain(z), shape) - near - far) / ((near - far) or 1.0)
         down, across = ((np.arange(n) - (n - 1) / 2) / half for n, half in zip(shape, self.field, strict=True))
-        by_depth, by_row, by_column = hats(depth, layers), hats(down, rows), hats(across, columns)
+        by_depth, by_row, by_column = (
+            linear_weights(depth, layers),
+            linear_weights(down, rows),
+            linear_weights(across, columns),
+        )
         return [by_depth[i] * by_row[j][:, None] * by_column[k] for i, j, k in self.kernels]
 
-    def of(self, shape: tuple[int, int]) -> Sight:
+    def of(self, shape: tuple[int, int]) -> KernelBank:
         """Itself; ValueError unless it was made for a retina of `shape` cells."""
         if (shape[0] / 2, shape[1] / 2) != self.field:
             made = " x ".join(f"{2 * half:g}" for half in self.field)
@@ -76,7 +80,7 @@ class _Range:
 
     @classmethod
     def of(cls, z: Any) -> _Range:
-        if is_tracked(z):
+        if is_differentiable(z):
             positive("z", z, infinite=True)
             return cls((1 / number(z), 1 / number(z)), z)
         distances = _distances(z)
@@ -99,7 +103,7 @@ def prepare(
     z: Any,
     counts: tuple[int | str, int | str],
     tolerance: float,
-) -> Sight:
+) -> KernelBank:
     """Choose how many kernels, and make them. kernel_at(z, right, down): positions in the field from -1 to 1 at the
     retina's edges; counts of depth layers and of zones across the longer side, or "auto"."""
     s, depths = samples_per_receptor, _Range.of(z)
@@ -107,8 +111,8 @@ def prepare(
         None if count == "auto" else whole(name, count, 1, MOST_NODES)
         for name, count in zip(("depth_layers", "field_zones"), counts, strict=True)
     )
-    along = Ladder("depth", lambda at: kernel_at(depths.distance(at[0]), 0.0, 0.0), [(n,) for n in DEPTH_RUNGS], s)
-    across = Ladder(
+    along = NodeChoice("depth", lambda at: kernel_at(depths.distance(at[0]), 0.0, 0.0), [(n,) for n in DEPTH_RUNGS], s)
+    across = NodeChoice(
         "field", lambda at: kernel_at(depths.distance(0), at[1], at[0]), [_grid(n, resolution) for n in FIELD_RUNGS], s
     )
     if depths.only is not None:
@@ -119,10 +123,10 @@ def prepare(
     deep, down, right = (nodes(n) for n in (*depth.counts, *wide.counts))
     places = itertools.product(range(len(deep)), range(len(down)), range(len(right)))
     kernels = {(i, j, k): kernel_at(depths.distance(deep[i]), right[k], down[j]) for i, j, k in places}
-    return Sight(depths.vergence, (resolution[0] * s / 2, resolution[1] * s / 2), kernels, (depth, wide))
+    return KernelBank(depths.vergence, (resolution[0] * s / 2, resolution[1] * s / 2), kernels, (depth, wide))
 
 
-def _chosen(ladder: Ladder, asked: tuple[int, ...] | None, tolerance: float) -> Choice:
+def _chosen(ladder: NodeChoice, asked: tuple[int, ...] | None, tolerance: float) -> Choice:
     return ladder.choose(tolerance) if asked is None else Choice(ladder.stage, asked, None, "as asked")
 
 

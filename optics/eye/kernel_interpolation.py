@@ -18,7 +18,7 @@ import numpy as np
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.autodiff import plain
 
-__all__ = ["Choice", "Ladder", "hats", "nodes", "worst_difference"]
+__all__ = ["Choice", "NodeChoice", "linear_weights", "nodes", "worst_difference"]
 
 MOST_CHECKS = 8  # kernels that tell a rung's error
 CAUTION = 1.3  # of that error: the worst place may lie between
@@ -45,7 +45,7 @@ def nodes(count: int) -> np.ndarray:
     return np.linspace(-1, 1, count) if count > 1 else np.zeros(1)
 
 
-def hats(position: np.ndarray, count: int) -> np.ndarray:
+def linear_weights(position: np.ndarray, count: int) -> np.ndarray:
     """Linear interpolation between nodes, constant beyond: (node, ...)."""
     if count == 1:
         return np.ones((1, *position.shape))
@@ -68,7 +68,7 @@ def _places(axes: Iterable[np.ndarray]) -> list[Place]:
 
 
 @dataclass(frozen=True)
-class Ladder:
+class NodeChoice:
     """One stage: rungs are numbers of nodes along each of its axes; kernel_at a place in [-1, 1]^axes."""
 
     stage: str
@@ -98,7 +98,7 @@ class Ladder:
         coarse = _places(nodes(n) for n in rung)
         worst = 0.0
         for place in checks(rung):
-            by_axis = [hats(np.asarray(at), n) for at, n in zip(place, rung, strict=True)]
+            by_axis = [linear_weights(np.asarray(at), n) for at, n in zip(place, rung, strict=True)]
             shares = [math.prod(map(float, share)) for share in itertools.product(*by_axis)]
             between = [(s, self._kernel(node)) for s, node in zip(shares, coarse, strict=True) if s > 0]
             worst = max(worst, worst_difference([*between, (-1, self._kernel(place))], self.samples_per_receptor))

@@ -14,7 +14,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.methods.problem import Problem
 from optics.numerics.accuracy import AccuracyError, Plan
-from optics.numerics.autodiff import is_tracked, number
+from optics.numerics.autodiff import is_differentiable, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.point_spread.psf import PSFResult, spread
@@ -78,7 +78,7 @@ def visual_kernel(
     """
     import drjit as dr
 
-    if is_tracked(retina.distance) and direction != (0.0, 0.0):
+    if is_differentiable(retina.distance) and direction != (0.0, 0.0):
         raise ValueError("fov_deg is a Dr.Jit array: must be a number off the axis, where it turns the light as well")
     matmul: Any = dr.matmul
     beams = _beams(pupil, retina, z, (-direction[0], -direction[1]))

@@ -10,7 +10,7 @@ import numpy as np
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length
 from optics.numerics.grid import Grid
-from optics.numerics.precision import Precision, with_room
+from optics.numerics.precision import Precision, padded_for_packets
 
 __all__ = ["blur", "centred", "receptor_average"]
 
@@ -64,7 +64,7 @@ def _tensor(kernel: Any, types: Precision) -> Any:
 
 
 def _flat(array: np.ndarray, types: Precision) -> Any:
-    return types.Float(with_room(np.asarray(array, types.complex_dtype(0).real.dtype)))
+    return types.Float(padded_for_packets(np.asarray(array, types.complex_dtype(0).real.dtype)))
 
 
 def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, ...]) -> tuple[int, int]:

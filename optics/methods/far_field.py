@@ -14,7 +14,7 @@ from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import TAPS, chebyshev_points, lagrange, lagrange_weights
-from optics.numerics.precision import Precision, opaque, precision, with_room
+from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["FarFieldSampling", "far_field"]
 
@@ -141,7 +141,7 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
         for b, along in enumerate(np.tan(nodes)):
             part = u * _slow_kernel(float(across), float(along), beam, how.pupil, types)
             part = dft2(part, how.period, how.directions.shape, -1, how.directions.dx)
-            weight = types.Float(with_room((along_x[a] * along_x[b].T).astype(types.dtype)))
+            weight = types.Float(padded_for_packets((along_x[a] * along_x[b].T).astype(types.dtype)))
             total_re, total_im = total_re + weight * part.re, total_im + weight * part.im
             dr.eval(total_re, total_im)
     return _onto_window(total_re * total_re + total_im * total_im, beam, problem, how, types)

@@ -12,7 +12,7 @@ from optics.apertures.aperture import EDGE_REACH
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.rays import MARGIN, Rays, brightness, disk_area, mismatch
-from optics.numerics.autodiff import is_tracked, number
+from optics.numerics.autodiff import is_differentiable, number
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, predicted_seconds
 from optics.numerics.grid import Grid
@@ -150,7 +150,7 @@ def paraxial_integral(u: Field, distance: Any, wavelength: float, window: Grid, 
     if curved:
         x, y = grid.coordinates(types)
         u = u * Field.from_waves(1.0, (x * x + y * y) * (0.5 / scale), grid, types)
-    period = scale if is_tracked(distance) else wavelength * number(distance)
+    period = scale if is_differentiable(distance) else wavelength * number(distance)
     return dft2(u, period / (grid.dx * window.dx), window.shape, -1, window.dx, window.centre).scaled(
         grid.dx**2 / scale
     )

@@ -13,8 +13,8 @@ from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import cached_nodes, node_count
 from optics.methods.rays import brightness, mismatch
-from optics.numerics.autodiff import is_tracked
-from optics.numerics.precision import Precision, opaque, precision, with_room
+from optics.numerics.autodiff import is_differentiable
+from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["PinholeSampling", "RaySampling", "geometric", "pinhole"]
 
@@ -82,14 +82,14 @@ class PinholeSampling:
         types = precision(problem.dtype)
         zero = types.Float64(0)
         x, y, propagates = _landings(beam, zero, zero, types)
-        if dr.grad_enabled(x, y) or is_tracked(beam.radius):
+        if dr.grad_enabled(x, y) or is_differentiable(beam.radius):
             raise ValueError("method = 'pinhole': has no derivatives; ask for 'geometric' or a wave method")
         window = problem.window
         column, row = (round((float(at[0]) - first) / window.dx) for at, first in ((x, window.x[0]), (y, window.y[0])))
         image = np.zeros(window.shape, dtype=types.dtype)
         if 0 <= row < window.shape[0] and 0 <= column < window.shape[1] and bool(propagates[0]):
             image[row, column] = beam.pupil.area / window.dx**2
-        return types.Float(with_room(image))
+        return types.Float(padded_for_packets(image))
 
     def plane(self, problem: Problem) -> float:
         """Nothing rounds."""

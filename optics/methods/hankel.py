@@ -22,7 +22,7 @@ from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
-from optics.numerics.radial_profile import RadialLine
+from optics.numerics.radial_profile import RadialProfile
 
 __all__ = ["HankelSampling", "hankel"]
 
@@ -38,7 +38,7 @@ class HankelSampling:
     taper: Taper
     radii: int
     angles: int
-    line: RadialLine
+    line: RadialProfile
     seconds: float
     method: str = "hankel"
     model_error: float = 0.0
@@ -78,7 +78,7 @@ def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
     steepest = math.hypot(problem.distance, problem.radius + outermost) / problem.wavelength
     angles = gauss_legendre_count(steepest * math.asin(min(1.0, taper.end * problem.wavelength)), digits)
     band = min(2 * taper.end, 2 * problem.radius / (problem.wavelength * problem.distance) + 2 / taper.blur)
-    line = RadialLine.resolving(outermost, band, problem.distance, problem.ripple)
+    line = RadialProfile.resolving(outermost, band, problem.distance, problem.ripple)
     pairs = radii * angles + angles * line.points
     seconds = 1e-3 + pairs * 1e-8 + line.points * line.table * 1e-9 + math.prod(problem.window.shape) * 1.5e-8
     return HankelSampling(taper, _round_up(radii), _round_up(angles), line, seconds)

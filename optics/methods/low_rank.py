@@ -14,7 +14,7 @@ from optics.methods.pupil_sampling import PupilSamples, samples_of
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import chebyshev_points, lagrange
-from optics.numerics.precision import Precision, opaque, precision, with_room
+from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["LowRankSampling", "low_rank"]
 
@@ -182,7 +182,7 @@ def _fourier(
     waves = np.tile(np.outer(at, xi) / (-problem.wavelength * how.scale), rank)
     weight = np.repeat(lagrange(at - middle, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
     wheel = weight * np.exp(2j * np.pi * waves)
-    re, im = (with_room(part.astype(types.dtype)) for part in (wheel.real, wheel.imag))
+    re, im = (padded_for_packets(part.astype(types.dtype)) for part in (wheel.real, wheel.imag))
     return types.Tensor(re, wheel.shape), types.Tensor(im, wheel.shape)
 
 

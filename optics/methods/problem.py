@@ -20,8 +20,8 @@ __all__ = ["Problem", "PupilEdge"]
 
 # Amplitude ripple of the soft aperture and of the spectral taper against the tolerance on intensity. Edge-diffracted
 # light errs by several ripples, its intensity by twice that, and a window may hold no other light: half the tolerance.
-RIPPLE_PER_TOLERANCE = 0.1
-BRIGHT_RIPPLE_PER_TOLERANCE = 0.3
+EDGE_RIPPLE_PER_TOLERANCE = 0.1
+BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Problem:
     @property
     def ripple(self) -> float:
         """Amplitude error allowed to the soft aperture's spectrum."""
-        return self.tolerance * (RIPPLE_PER_TOLERANCE if self.reach is None else BRIGHT_RIPPLE_PER_TOLERANCE)
+        return self.tolerance * (EDGE_RIPPLE_PER_TOLERANCE if self.reach is None else BRIGHT_EDGE_RIPPLE_PER_TOLERANCE)
 
     @property
     def fade_ripple(self) -> float:

@@ -15,7 +15,7 @@ from optics.methods.problem import Problem
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
-from optics.numerics.radial_profile import RadialLine
+from optics.numerics.radial_profile import RadialProfile
 
 __all__ = [
     "MOST_DIGITS",
@@ -50,7 +50,7 @@ class NodeSampling:
     cycles: float
     digits: float
     count: int
-    line: RadialLine | None
+    line: RadialProfile | None
     seconds: float
     method: str = "rayleigh_sommerfeld"
     model_error: float = 0.0
@@ -88,7 +88,7 @@ def nodes(problem: Problem) -> list[NodeSampling]:
     line, outputs = None, math.prod(problem.window.shape)
     if problem.symmetric:
         outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
-        line = RadialLine.resolving(outermost, _intensity_band(problem), problem.distance, problem.ripple)
+        line = RadialProfile.resolving(outermost, _intensity_band(problem), problem.distance, problem.ripple)
         line = line if line.pays(outputs) else None
         outputs = line.points if line else outputs
         count = count if line is None else math.ceil(count / 2)

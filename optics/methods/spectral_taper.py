@@ -9,10 +9,10 @@ from typing import Any
 from optics.methods.problem import Problem
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["FADES", "STEEPEST_SINE", "Taper", "tapers"]
+__all__ = ["FADES", "TAPER_END_SINE", "Taper", "tapers"]
 
 # The taper must end this far from grazing incidence, where z tan θ has no bound.
-STEEPEST_SINE = 0.9995
+TAPER_END_SINE = 0.9995
 FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)  # blurs to try, in units of the problem's size
 
 
@@ -53,4 +53,4 @@ def tapers(problem: Problem) -> list[Taper]:
     """Tapers that end before grazing incidence."""
     size = problem.radius + problem.outermost
     found = [Taper.of(problem, share * size) for share in FADES]
-    return [taper for taper in found if taper.sine < STEEPEST_SINE]
+    return [taper for taper in found if taper.sine < TAPER_END_SINE]

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["at_border", "is_tracked", "number", "plain"]
+__all__ = ["is_differentiable", "number", "plain", "to_user"]
 
 
-def is_tracked(value: Any) -> bool:
+def is_differentiable(value: Any) -> bool:
     """Whether value is a Dr.Jit array (or tensor), not a Python or NumPy number."""
     return type(value).__module__.startswith("drjit")
 
@@ -20,21 +20,21 @@ def number(value: Any) -> float:
     Raises:
         TypeError, ValueError: no number.
     """
-    if is_tracked(value):
+    if is_differentiable(value):
         return float(plain(value).reshape(()))
     return float(value)
 
 
 def plain(value: Any) -> np.ndarray:
     """value as a NumPy array, without derivative."""
-    if is_tracked(value):
+    if is_differentiable(value):
         import drjit as dr
 
         return np.array(dr.detach(value).numpy(), dtype=np.float64)
     return np.asarray(value, dtype=np.float64)
 
 
-def at_border(tensor: Any) -> Any:
+def to_user(tensor: Any) -> Any:
     """What a user gets: a NumPy array, or the Dr.Jit tensor itself where it carries derivatives."""
     import drjit as dr
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.grid import Grid
-from optics.numerics.precision import Precision, opaque, with_room
+from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = ["Field"]
 
@@ -36,7 +36,9 @@ class Field:
     @classmethod
     def from_numpy(cls, u: np.ndarray, dx: float, types: Precision) -> Field:
         u = np.asarray(u, dtype=types.complex_dtype)
-        return cls(types.Float(with_room(u.real)), types.Float(with_room(u.imag)), Grid(u.shape, dx), types)
+        return cls(
+            types.Float(padded_for_packets(u.real)), types.Float(padded_for_packets(u.imag)), Grid(u.shape, dx), types
+        )
 
     def __mul__(self, other: Field) -> Field:
         re = self.re * other.re - self.im * other.im

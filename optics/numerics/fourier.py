@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.autodiff import is_tracked
+from optics.numerics.autodiff import is_differentiable
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
-from optics.numerics.precision import Precision, opaque, with_room
+from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = [
     "dft2",
@@ -60,8 +60,8 @@ def dft2(
     """
     grid = Grid(shape, pitch, centre)
     if centre != (0.0, 0.0):
-        field = _turned(field, period, (sign * centre[0] / pitch, sign * centre[1] / pitch))
-    if not is_tracked(period) and _fft_wins(field.grid.shape, period, shape):
+        field = _recentred(field, period, (sign * centre[0] / pitch, sign * centre[1] / pitch))
+    if not is_differentiable(period) and _fft_wins(field.grid.shape, period, shape):
         re, im = _fft(field, int(period), shape, sign)
     else:
         re, im = _matrix_dft(field, period, shape, sign)
@@ -74,18 +74,18 @@ def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int)
         for axis in (1, 0):
             u = _fft_axis(u, int(period), shape[axis], sign, axis)
         return u
-    down, across = (_wheel(m, n, period, sign, u.dtype.str) for m, n in zip(shape, u.shape, strict=True))
+    down, across = (dft_matrix(m, n, period, sign, u.dtype.str) for m, n in zip(shape, u.shape, strict=True))
     return down @ u @ across.T
 
 
 @lru_cache(maxsize=16)
-def _wheel(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> np.ndarray:
+def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> np.ndarray:
     """exp(±2πi k j / period) as a (k, j) matrix."""
     waves = np.outer(np.arange(n_out) - n_out // 2, np.arange(n_in) - n_in // 2) / period
     return np.exp(2j * np.pi * sign * (waves - np.round(waves))).astype(dtype)
 
 
-def _turned(field: Field, period: Any, by: tuple[float, float]) -> Field:
+def _recentred(field: Field, period: Any, by: tuple[float, float]) -> Field:
     """Field times exp(2πi j·by / period), which moves the sum's centre."""
     types = field.types
     x, y = Grid(field.grid.shape, 1.0).coordinates(types)
@@ -186,7 +186,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
         u.real, u.imag = re.numpy().reshape(from_), im.numpy().reshape(from_)
         for axis in (1, 0):
             u = _fft_axis(u, period, to[axis], turn, axis)
-        return types.Float(with_room(u.real)), types.Float(with_room(u.imag))
+        return types.Float(padded_for_packets(u.real)), types.Float(padded_for_packets(u.imag))
 
     class FourierSum(dr.CustomOp):
         """Its adjoint is the sum with the other sign, from the output's samples to the input's."""

@@ -12,14 +12,14 @@ import numpy as np
 
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["TAPS", "Table", "chebyshev_points", "lagrange", "lagrange_weights"]
+__all__ = ["TAPS", "Interpolant", "chebyshev_points", "lagrange", "lagrange_weights"]
 
 # Samples beyond either end that six-point interpolation reads.
 MARGIN = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Interpolant:
     """Samples at first + i step, i = -2 ... n + 1; constant beyond its ends."""
 
     first: float
@@ -29,7 +29,7 @@ class Table:
     @classmethod
     def of(
         cls, function: Callable[[np.ndarray], np.ndarray], ends: tuple[float, float], cycles: float, error: float
-    ) -> Table:
+    ) -> Interpolant:
         """Table of a function that turns through at most `cycles` cycles between the ends, and is constant beyond.
 
         The function is evaluated at Chebyshev nodes only, because it is dear. Six-point interpolation of a unit wave

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.autodiff import is_tracked
+from optics.numerics.autodiff import is_differentiable
 
-__all__ = ["Precision", "opaque", "precision", "with_room"]
+__all__ = ["Precision", "opaque", "padded_for_packets", "precision"]
 
 ROOM = 64  # elements: more than any processor takes at once
 
@@ -52,7 +52,7 @@ def precision(dtype: str = "float32") -> Precision:
     )
 
 
-def with_room(values: np.ndarray) -> np.ndarray:
+def padded_for_packets(values: np.ndarray) -> np.ndarray:
     """The same numbers, flat, in memory that may be read some way past their end.
 
     Dr.Jit works on NumPy's memory itself, without a copy, and its kernels take whole packets of numbers, sixteen with
@@ -72,6 +72,6 @@ def opaque(types: Precision, value: Any) -> Any:
     """
     import drjit as dr
 
-    if is_tracked(value):
+    if is_differentiable(value):
         return types.Float64(dr.ravel(value))
     return dr.opaque(types.Float64, value)

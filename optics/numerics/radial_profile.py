@@ -14,14 +14,14 @@ from optics.numerics.interpolation import TAPS, lagrange_weights
 from optics.numerics.precision import Precision
 from optics.numerics.quadrature import harmonics
 
-__all__ = ["RadialLine"]
+__all__ = ["RadialProfile"]
 
 # Entries of the matrix from points to table: 128 MB in float64.
 LARGEST_MATRIX = 2**24
 
 
 @dataclass(frozen=True)
-class RadialLine:
+class RadialProfile:
     """A picture that is even in r, wanted up to `rim` [m]: Chebyshev points on [0, radius], and a finer even spacing
     for the way to a grid.
 
@@ -35,7 +35,7 @@ class RadialLine:
     table: int
 
     @classmethod
-    def resolving(cls, rim: float, band: float, distance: float, error: float) -> RadialLine:
+    def resolving(cls, rim: float, band: float, distance: float, error: float) -> RadialProfile:
         """Points that carry intensity frequencies up to `band` [1/m] with a relative error of about `error`.
 
         A wave of r over [-R, R] has the Chebyshev coefficients 2 J_m(2πbR); obliquity has poles at ±i distance, whose

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import in_range, point_2d, positive, reals, shown
-from optics.numerics.autodiff import at_border, number
+from optics.numerics.autodiff import number, to_user
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2
 from optics.numerics.grid import Grid
-from optics.numerics.precision import opaque, precision, with_room
+from optics.numerics.precision import opaque, padded_for_packets, precision
 from optics.point_spread.psf import PSFResult
 
 __all__ = ["MTF", "encircled_energy", "image_quality", "mtf", "strehl_ratio"]
@@ -71,7 +71,7 @@ class MTF:
                 at = types.Index((plane + (row + i) * side + column + j).astype(np.uint32))
                 total += dr.gather(types.Float, self.tensor.array, at) * types.Float(down * across * inside)
         mean = dr.block_reduce(dr.ReduceOp.Add, total, ORIENTATIONS) / ORIENTATIONS
-        return at_border(types.Tensor(mean, (waves, f.size)))
+        return to_user(types.Tensor(mean, (waves, f.size)))
 
 
 def mtf(result: PSFResult, arriving: Any = None) -> MTF:
@@ -147,7 +147,7 @@ def strehl_ratio(result: PSFResult) -> Any:
     wavenumber = types.Float(2 * np.pi * result.pupil.medium_n / result.wavelengths)
     near, far = dr.sum(size / slant), dr.sum(size) * wavenumber
     ideal = (near * near + far * far) * radius * radius / result.pupil.aperture.area
-    return at_border(types.Tensor(peak / ideal, (waves,)))
+    return to_user(types.Tensor(peak / ideal, (waves,)))
 
 
 def encircled_energy(
@@ -203,11 +203,11 @@ def image_quality(result: PSFResult, nyquist: float, throughput: Any = 1.0, nois
     light = opaque(types, throughput)
     contrast = types.Float(_flat(mtf(result).profile(f)))
     above = dr.maximum(contrast - noise_sigma / light, 0) * types.Float(np.tile(weight, waves))
-    return at_border(types.Tensor(light * dr.block_reduce(dr.ReduceOp.Add, above, f.size), (waves,)))
+    return to_user(types.Tensor(light * dr.block_reduce(dr.ReduceOp.Add, above, f.size), (waves,)))
 
 
 def _flat(tensor: Any) -> Any:
     """Row by row, Dr.Jit or NumPy."""
     import drjit as dr
 
-    return with_room(tensor) if isinstance(tensor, np.ndarray) else dr.ravel(tensor)
+    return padded_for_packets(tensor) if isinstance(tensor, np.ndarray) else dr.ravel(tensor)

@@ -18,10 +18,10 @@ from optics.elements.source import PointSource
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.propagation.propagate import RIPPLE_PER_TOLERANCE, PropagationResult, propagate
+from optics.propagation.propagate import WRAP_RIPPLE_PER_TOLERANCE, PropagationResult, propagate
 from optics.propagation.transfer_function import kept_band, kept_square
 
-__all__ = ["Light", "PlaneField", "PupilSampling", "Stop"]
+__all__ = ["PlaneField", "PupilSampling", "StepSettings", "Stop"]
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Light:
+class StepSettings:
     """What is the same at every plane. tolerance: each step's; wavelength: vacuum [m]."""
 
     wavelength: float
@@ -62,7 +62,7 @@ class Light:
 
     @property
     def ripple(self) -> float:
-        return RIPPLE_PER_TOLERANCE * self.tolerance
+        return WRAP_RIPPLE_PER_TOLERANCE * self.tolerance
 
     def reaching(self, half_widths: float, distance: float) -> float:
         """Highest frequency [1/m] that `propagate` keeps between planes whose half widths add up to so much, its fade
@@ -104,7 +104,9 @@ class PupilSampling:
     band: float
 
     @classmethod
-    def of(cls, stop: Stop, following: Stop, light: Light, source: PointSource, arriving: float) -> PupilSampling:
+    def of(
+        cls, stop: Stop, following: Stop, light: StepSettings, source: PointSource, arriving: float
+    ) -> PupilSampling:
         """arriving: the highest frequency [1/m] of the light that arrives.
 
         That and the pupil's phase turn, and meet the edge's frequencies; what they make together beyond the band may
@@ -134,7 +136,7 @@ class PupilSampling:
             )
         return cls(pupil, source, Grid.square(across, pitch), soft, band)
 
-    def transmitted(self, u: np.ndarray | float, light: Light) -> PlaneField:
+    def transmitted(self, u: np.ndarray | float, light: StepSettings) -> PlaneField:
         """The field u on the grid, times the pupil's transmittance (its conjugate backwards)."""
         import drjit as dr
 

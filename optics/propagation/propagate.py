@@ -24,14 +24,14 @@ from optics.numerics.arguments import finite, in_range, vacuum_wavelength
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum, predicted_seconds
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, precision
-from optics.propagation.sampling import Sampling, blur_left, blurred_back, most_spare, sampling
+from optics.propagation.sampling import TransformSampling, blur_left, blurred_back, most_spare, sampling
 from optics.propagation.transfer_function import EVERYTHING, Passage, TransferFunction, evanescent
 
-__all__ = ["PROPAGATION_METHODS", "RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
+__all__ = ["PROPAGATION_METHODS", "WRAP_RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
 
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 # Share of faded light that strays into the window: small, because the window may hold far less than is faded.
-RIPPLE_PER_TOLERANCE = 3e-3
+WRAP_RIPPLE_PER_TOLERANCE = 3e-3
 # First room for the blur of light cut at Nyquist's frequency [√(λz)].
 SPARE = 1.0
 # The estimate of that blur is good to a factor of two or three: carried again is only what is clearly too much.
@@ -50,7 +50,7 @@ class PropagationResult:
     dx: float
     plan: Plan
     _source: np.ndarray = field(repr=False)  # (plane, y, x)
-    _sampling: Sampling = field(repr=False)
+    _sampling: TransformSampling = field(repr=False)
 
     @cached_property
     def evanescent_power(self) -> float:
@@ -100,7 +100,7 @@ def propagate(
         finite("distance", distance),
         method == "fresnel",
         EVERYTHING,
-        RIPPLE_PER_TOLERANCE * tolerance,
+        WRAP_RIPPLE_PER_TOLERANCE * tolerance,
         window.centre,
     )
     how, planes = _with_room(sources, passage, (source, window), tolerance, precision(dtype))
@@ -147,7 +147,7 @@ class _Carried:
 
 def _with_room(
     sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
-) -> tuple[Sampling, list[_Carried]]:
+) -> tuple[TransformSampling, list[_Carried]]:
     """The planes, carried with as much room as their light at Nyquist's frequency asks for.
 
     None is made where even all that is worth making would not do: what blurs so far belongs to the error of the
@@ -165,7 +165,7 @@ def _with_room(
     return how, planes
 
 
-def _one(plane: np.ndarray, how: Sampling, types: Precision) -> _Carried:
+def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carried:
     plane = np.ascontiguousarray(plane, dtype=types.complex_dtype)
     total = _power(plane)
     if total == 0:
@@ -195,7 +195,7 @@ def _one(plane: np.ndarray, how: Sampling, types: Precision) -> _Carried:
     return _Carried(result, error, 2 * math.sqrt(blurred / arrived))
 
 
-def _evanescent_share(plane: np.ndarray, how: Sampling) -> float:
+def _evanescent_share(plane: np.ndarray, how: TransformSampling) -> float:
     """Of a plane's power."""
     total = _power(plane)
     if total == 0 or how.passage.paraxial:
@@ -217,7 +217,7 @@ def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
 
 
 @lru_cache(maxsize=4)
-def _free_space(how: Sampling, dtype: str) -> TransferFunction:
+def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
     """Over the spectrum, with the sums' scale. The same distance is often travelled again; the transfer function costs
     more than the transforms."""
     step = 1 / (how.period * how.source.dx)
@@ -239,7 +239,7 @@ def _untold(planes: list[_Carried], tolerance: float) -> str:
     return f"; u's light at Nyquist's frequency blurs by about {blur:.1g}: sample u more finely, or soften its edges"
 
 
-def _plan(how: Sampling, error: float, untold: str, dtype: str) -> Plan:
+def _plan(how: TransformSampling, error: float, untold: str, dtype: str) -> Plan:
     band = how.passage.band
     kept = f"band {band.kept * how.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
     period = how.period * how.source.dx

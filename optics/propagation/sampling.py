@@ -17,9 +17,9 @@ import numpy as np
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.fourier import fast_length
 from optics.numerics.grid import Grid
-from optics.propagation.transfer_function import EVERYTHING, STEEPEST_SINE, Passage, kept_band, kept_square, walk
+from optics.propagation.transfer_function import EVERYTHING, PERIOD_MAX_SINE, Passage, kept_band, kept_square, walk
 
-__all__ = ["Sampling", "blur_left", "blurred_back", "most_spare", "sampling"]
+__all__ = ["TransformSampling", "blur_left", "blurred_back", "most_spare", "sampling"]
 
 # Pitches are one and the same where they differ by less than this share of a sample over the whole window.
 SAME_PITCH = 1e-9
@@ -28,7 +28,7 @@ NYQUIST_SHARE, NYQUIST_LINES = 1 / 16, 9
 
 
 @dataclass(frozen=True)
-class Sampling:
+class TransformSampling:
     """period: in samples of the source; across: frequencies kept along each axis; step: the window's pitch in samples
     of the source where it is a whole number of them, else 0; reach [m]: from one plane's far edge to the other's along
     the longer axis."""
@@ -47,7 +47,7 @@ class Sampling:
 
 
 @lru_cache(maxsize=64)
-def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Sampling:
+def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> TransformSampling:
     """The shortest period for a passage (its band is found here). spare [m]: room for the blur of what is cut.
 
     Raises:
@@ -79,14 +79,16 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Samp
         )
     step = round(window.dx / source.dx)
     exactly = abs(window.dx - step * source.dx) <= SAME_PITCH * source.dx / max(window.shape)
-    return Sampling(replace(passage, band=band), source, window, samples, across, step if exactly else 0, reach)
+    return TransformSampling(
+        replace(passage, band=band), source, window, samples, across, step if exactly else 0, reach
+    )
 
 
 def most_spare(passage: Passage, source: Grid) -> float:
     """Room [m] worth making for what is cut: with it, the corner's light could walk along an axis."""
     nyquist, z, paraxial = 0.5 / source.dx, abs(passage.z), passage.paraxial
     end = math.sqrt(2) * nyquist
-    whole = walk(end if paraxial else min(end, STEEPEST_SINE / passage.wavelength), passage.wavelength, z, paraxial)
+    whole = walk(end if paraxial else min(end, PERIOD_MAX_SINE / passage.wavelength), passage.wavelength, z, paraxial)
     return whole - _farthest(nyquist, passage.wavelength, z, paraxial)
 
 
@@ -94,16 +96,16 @@ def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> fl
     """How far [m] along an axis anything walks that a square of frequencies holds: what is in its corner."""
     if paraxial:
         return walk(nyquist, wavelength, z, paraxial)
-    end = min(math.sqrt(2) * nyquist, STEEPEST_SINE / wavelength)
+    end = min(math.sqrt(2) * nyquist, PERIOD_MAX_SINE / wavelength)
     return walk(end, wavelength, z) * min(nyquist / end, 1)
 
 
-def blurred_back(spectrum: np.ndarray, how: Sampling) -> float:
+def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
     """Power (of u's samples) that the end of the spectrum at Nyquist's frequency brings back into the window, if the
     source holds such light everywhere alike. The spectrum is of the field at the source: (fx, fy) in FFT order where
     the window's pitch is a number of samples, else centred (fy, fx)."""
     nyquist = 0.5 / how.source.dx
-    if how.passage.band.fade or not (how.passage.paraxial or nyquist * how.passage.wavelength < STEEPEST_SINE):
+    if how.passage.band.fade or not (how.passage.paraxial or nyquist * how.passage.wavelength < PERIOD_MAX_SINE):
         return 0.0  # what ends by fading, or by decaying, does not end as if cut
     width = max(round(NYQUIST_SHARE * how.period), 1)
     lines = np.unique(np.linspace(-width, width, NYQUIST_LINES).round().astype(int))
@@ -117,14 +119,14 @@ def blurred_back(spectrum: np.ndarray, how: Sampling) -> float:
     return total
 
 
-def blur_left(how: Sampling, roomier: Sampling) -> float:
+def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
     """What a roomier sampling leaves of the blur's amplitude, if Nyquist's light is even along the other axis."""
     power, left = (sum(float(_blur_weights(sampling, axis).sum()) for axis in (0, 1)) for sampling in (how, roomier))
     return math.sqrt(left / power) if power else 1.0
 
 
 @lru_cache(maxsize=8)
-def _blur_weights(how: Sampling, axis: int) -> np.ndarray:
+def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
     """Of the power at Nyquist's frequency along one axis, per frequency along the other: what comes back."""
     source, window = how.source, how.window
     ring = (np.arange(how.period) - how.period // 2) / (how.period * source.dx)
@@ -137,7 +139,7 @@ def _blur_weights(how: Sampling, axis: int) -> np.ndarray:
     return weights
 
 
-def _share_that_meets(walks: np.ndarray, how: Sampling, axis: int) -> np.ndarray:
+def _share_that_meets(walks: np.ndarray, how: TransformSampling, axis: int) -> np.ndarray:
     """Share of a source's light that walks so far [m] along an axis (0: y) and lands beside the window."""
     lit, seen = (grid.shape[axis] * grid.dx for grid in (how.source, how.window))
     missed = np.maximum(walks - abs(how.window.centre[1 - axis]), 0)
@@ -145,10 +147,10 @@ def _share_that_meets(walks: np.ndarray, how: Sampling, axis: int) -> np.ndarray
     return share
 
 
-def _walks(fx: float, fy: np.ndarray, how: Sampling) -> tuple[np.ndarray, np.ndarray]:
+def _walks(fx: float, fy: np.ndarray, how: TransformSampling) -> tuple[np.ndarray, np.ndarray]:
     """How far [m] along x and along y light of (fx, fy) walks; infinite where it is too near grazing."""
     wavelength, z = how.passage.wavelength, abs(how.passage.z)
     sine2 = 0 * fy if how.passage.paraxial else (fx**2 + fy**2) * wavelength**2
-    steep = sine2 >= STEEPEST_SINE**2
+    steep = sine2 >= PERIOD_MAX_SINE**2
     per_sine = np.where(steep, math.inf, z * wavelength / np.sqrt(1 - np.where(steep, 0, sine2)))
     return fx * per_sine, np.abs(fy) * per_sine

@@ -15,9 +15,9 @@ from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
 from optics.numerics.arguments import in_range, positive, vacuum_wavelength
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.propagation.planes import Light, PlaneField, PupilSampling, Stop
+from optics.propagation.planes import PlaneField, PupilSampling, StepSettings, Stop
 
-__all__ = ["FreeSpace", "StackResult", "Step", "propagate_through"]
+__all__ = ["FreeSpace", "StackResult", "SystemStep", "propagate_through"]
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class FreeSpace:
 
 
 @dataclass(frozen=True)
-class Step:
+class SystemStep:
     """What happened on the way to one plane.
 
     distance [m], negative backwards. plan: how it was computed; its error is relative to the light within the window.
@@ -59,7 +59,7 @@ class StackResult:
 
     u: np.ndarray
     dx: float
-    steps: tuple[Step, ...]
+    steps: tuple[SystemStep, ...]
     predicted_error: float
 
 
@@ -97,8 +97,10 @@ def propagate_through(
     if field is not None and source is not None:
         raise ValueError("source: must not be given with u")
     each = in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5) / (2 * len(stops))
-    light = Light(vacuum_wavelength(wavelength), _medium(elements), backward, max(each, 10 * FLOAT_NOISE[dtype]), dtype)
-    steps: list[Step] = []
+    light = StepSettings(
+        vacuum_wavelength(wavelength), _medium(elements), backward, max(each, 10 * FLOAT_NOISE[dtype]), dtype
+    )
+    steps: list[SystemStep] = []
     for i, stop in enumerate(stops):
         sampling = None
         if stop.pupil is not None:
@@ -108,7 +110,7 @@ def propagate_through(
         if field is not None:
             out = light.carried(field, stop.distance, grid)
             arrived = PlaneField(out.u, out.dx, field.band)
-            steps.append(Step(stop.distance, out.plan, field.power, arrived.power, out.evanescent_power))
+            steps.append(SystemStep(stop.distance, out.plan, field.power, arrived.power, out.evanescent_power))
             field = arrived
         if sampling is not None:
             field = sampling.transmitted(1.0 if field is None else field.u, light)
@@ -159,14 +161,14 @@ def _medium(elements: Sequence[Pupil | FreeSpace]) -> float:
     return media[0]
 
 
-def _arriving(field: PlaneField | None, stop: Stop, light: Light) -> float:
+def _arriving(field: PlaneField | None, stop: Stop, light: StepSettings) -> float:
     """Highest frequency [1/m] of the light that arrives at a stop; a source's counts with the pupil's own phase."""
     if field is None:
         return 0.0
     return min(field.band, light.reaching(field.half_width + stop.half_width, stop.distance))
 
 
-def _error(steps: list[Step], tolerance: float, light: Light) -> float:
+def _error(steps: list[SystemStep], tolerance: float, light: StepSettings) -> float:
     """Errors of the steps, and of the soft edges between them, each as much larger as the light since has dwindled.
 
     Raises:

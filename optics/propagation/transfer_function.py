@@ -19,13 +19,13 @@ import numpy as np
 from optics.apertures.soft_edge import kaiser_beta
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
-from optics.numerics.interpolation import Table
-from optics.numerics.precision import Precision, opaque, with_room
+from optics.numerics.interpolation import Interpolant
+from optics.numerics.precision import Precision, opaque, padded_for_packets
 
-__all__ = ["STEEPEST_SINE", "Band", "TransferFunction", "evanescent", "kept_band", "kept_square", "walk"]
+__all__ = ["PERIOD_MAX_SINE", "Band", "TransferFunction", "evanescent", "kept_band", "kept_square", "walk"]
 
 # Steepest light that a period makes room for, as sin θ; z tan θ has no bound beyond.
-STEEPEST_SINE = 0.995
+PERIOD_MAX_SINE = 0.995
 # Steepest fade along the axes, one by one: towards grazing they would be ever narrower.
 STEEPEST_SQUARE = 0.8
 # What a fade blurs lands outside its own walk as well, though less: its last part is dark.
@@ -80,7 +80,7 @@ def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxia
 
 def _shortest(distance: float, wavelength: float, z: float, ripple: float, paraxial: bool, square: bool) -> Band:
     blur = kaiser_beta(ripple) / math.pi
-    steepest = STEEPEST_SQUARE if square else STEEPEST_SINE
+    steepest = STEEPEST_SQUARE if square else PERIOD_MAX_SINE
     best = EVERYTHING
     for fade in np.geomspace(0.003, 0.6, 33) / wavelength if z else ():
         band = 0.0
@@ -116,7 +116,7 @@ def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
 
 
 @lru_cache(maxsize=8)
-def _fade_table(ripple: float) -> Table:
+def _fade_table(ripple: float) -> Interpolant:
     """1 at 0, 0 at 1: the rest of a Kaiser window's integral. It blurs by β/(π fade) and, beyond, by `ripple`."""
     beta = kaiser_beta(ripple)
     nodes, weights = np.polynomial.legendre.leggauss(math.ceil(beta) + 24)
@@ -129,7 +129,7 @@ def _fade_table(ripple: float) -> Table:
         return whole
 
     total = left(np.zeros(1))[0]
-    return Table.of(lambda t: left(t) / total, (0.0, 1.0), beta / math.pi, 0.1 * ripple)
+    return Interpolant.of(lambda t: left(t) / total, (0.0, 1.0), beta / math.pi, 0.1 * ripple)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ class Passage:
         grazing = None
         if math.isinf(self.band.kept) and self.z != 0 and not self.paraxial:
             sine = np.hypot(fx[None, :], fy[:, None]) * self.wavelength
-            grazing = (sine > STEEPEST_SINE) & (sine < 1)
+            grazing = (sine > PERIOD_MAX_SINE) & (sine < 1)
         weight = None if grazing is None or not grazing.any() else np.repeat(grazing, 2, axis=1).astype(types.dtype)
         return TransferFunction(self._transfer(fx, fy, types), weight)
 
@@ -167,7 +167,7 @@ class Passage:
         import drjit as dr
 
         grid = Grid((len(fy), len(fx)), 1.0)
-        x, y = (types.Float64(with_room(a)) for a in np.meshgrid(fx, fy))
+        x, y = (types.Float64(padded_for_packets(a)) for a in np.meshgrid(fx, fy))
         s2 = (x * x + y * y) * opaque(types, self.wavelength**2)
         z = opaque(types, self.z / self.wavelength)
         if self.paraxial:

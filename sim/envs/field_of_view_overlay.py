@@ -22,7 +22,7 @@ LINE = 1.2  # [pixels] width
 
 
 @dataclass(frozen=True)
-class Level:
+class HorizontalSection:
     """The part of a picture in which the level of the eyes is seen, nothing in front of it.
 
     seen   (y, x) bool · points: (y, x, 2) [m] in the world · pixel: size of a pixel there [m], (y, x)
@@ -33,7 +33,7 @@ class Level:
     pixel: np.ndarray
 
 
-def level_of(view: Viewpoint, depth: np.ndarray) -> Level:
+def level_of(view: Viewpoint, depth: np.ndarray) -> HorizontalSection:
     """depth: (y, x) [m] along the camera's axis."""
     height, width = depth.shape
     half = np.tan(np.radians(view.fovy_deg) / 2)
@@ -44,7 +44,7 @@ def level_of(view: Viewpoint, depth: np.ndarray) -> Level:
         t = (EYE_HEIGHT - view.position[2]) / directions[..., 2]
     seen = (t > 0) & (t < depth) & np.isfinite(t)
     t = np.where(seen, t, 0.0)
-    return Level(seen, view.position[:2] + t[..., None] * directions[..., :2], t * 2 * half / height)
+    return HorizontalSection(seen, view.position[:2] + t[..., None] * directions[..., :2], t * 2 * half / height)
 
 
 def draw_fields(
@@ -63,7 +63,7 @@ def draw_fields(
 
 
 def _opacity(
-    level: Level, eyes: Eyes, azimuth: float, eye: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData
+    level: HorizontalSection, eyes: Eyes, azimuth: float, eye: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData
 ) -> np.ndarray:
     """Of one eye's field, (y, x)."""
     half = np.radians(eyes.fov_deg) / 2

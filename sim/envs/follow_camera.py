@@ -31,7 +31,7 @@ def check_render_mode(render_mode: str | None) -> None:
         raise ValueError(f"render_mode = {render_mode!r}, must be one of {modes} or None")
 
 
-class Onlooker:
+class FollowCamera:
     """A camera that follows the agent; it holds its own mirror of the world.
 
     eyes  whose fields of view are drawn; None: no one's

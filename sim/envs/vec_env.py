@@ -11,7 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
 from optics.spectra.spectrum import Spectrum
-from sim.envs.follow_camera import Onlooker, check_render_mode
+from sim.envs.follow_camera import FollowCamera, check_render_mode
 from sim.envs.info import first_infos, infos_of
 from sim.envs.observation import STANDING, Memory, action_space, observation_space
 from sim.envs.retina_images import side_by_side
@@ -19,7 +19,7 @@ from sim.envs.simulation import NOWHERE, Simulation, Step
 from sim.eyes.eyes import Eyes
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.fidelity import Fidelity
-from sim.render.noisy_signals import Pending, Retinas
+from sim.render.noisy_signals import NoisySignals, Pending
 from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
 
@@ -39,9 +39,9 @@ class EyesVecEnv(VecEnv):
     ) -> None:
         self.simulation, self.renderer, self.eyes = simulation, renderer, renderer.eyes
         self.render_mode = render_mode
-        self._onlooker: Onlooker | None = None
+        self._onlooker: FollowCamera | None = None
         self._memory = Memory(memory)
-        self._retinas = Retinas(renderer, simulation.streams.noise_keys)
+        self._retinas = NoisySignals(renderer, simulation.streams.noise_keys)
         space = observation_space(self.eyes, renderer.eye.channels, memory, renderer.brightest, self._retinas.spread)
         super().__init__(simulation.n, space, action_space())
         self._commanded = self._actions = np.zeros((self.num_envs, 2), np.float32)
@@ -132,7 +132,7 @@ class EyesVecEnv(VecEnv):
         if self.render_mode == "eyes":
             return [side_by_side(frame, self.renderer.eye) for frame in self._memory.newest]
         if self.render_mode == "rgb_array":
-            self._onlooker = self._onlooker or Onlooker(self.simulation.world, self.eyes)
+            self._onlooker = self._onlooker or FollowCamera(self.simulation.world, self.eyes)
             return [self._onlooker.picture(state, world) for world in range(state.n)]
         return []
 

@@ -35,8 +35,8 @@ class DepthLayers:
     def distances(self) -> tuple[float, ...]:
         """[m], farthest first, (layer,)."""
         far, near = 1 / self.farthest, 1 / self.nearest
-        places = [i / (self.count - 1) for i in range(self.count)] if self.count > 1 else [0.5]
-        return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in places)
+        bounce_samples = [i / (self.count - 1) for i in range(self.count)] if self.count > 1 else [0.5]
+        return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in bounce_samples)
 
     def shares(self, vergence: Any) -> list[Any]:
         """Share of each layer in light from 1/z [1/m], Dr.Jit arrays; they sum to 1."""

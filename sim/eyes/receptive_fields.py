@@ -16,7 +16,7 @@ from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 MIN_CELLS = 32
 
 
-class Unseen(ValueError):
+class NoRaysError(ValueError):
     """So few rays that a receptor has none in its receptive field."""
 
 
@@ -35,7 +35,7 @@ class Draw:
 
 
 @dataclass(frozen=True)
-class Fields:
+class ReceptiveFields:
     """field       power per cell of one receptor's field: the turned PSF convolved with its square; (plane, y, x), a
                 plane for every depth layer's every band
     density     probability per cell of the mean over all receptors and planes, each with the same weight, (Y, X)
@@ -48,7 +48,7 @@ class Fields:
     cells: int
 
     @classmethod
-    def of(cls, eye: optics.Eye, cells: int, depth: DepthLayers = ONE_PSF) -> Fields:
+    def of(cls, eye: optics.Eye, cells: int, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
         """Those of an eye. Raises optics.AccuracyError, see `optics.Eye.kernel`."""
         # (K ⊗ L)(r) = Σ_v K(r - v) L(v): as weights around the receptor, the convolution's kernel is turned about.
         kernels = [eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances]
@@ -94,7 +94,7 @@ class Fields:
         weights = table[:, index] / self.density[draw.rows, draw.columns]
         total = weights.sum(axis=2, keepdims=True)
         if not (total > 0).all():
-            raise Unseen(f"rays_per_receptor: {len(draw)} rays leave a receptor without any; use more")
+            raise NoRaysError(f"rays_per_receptor: {len(draw)} rays leave a receptor without any; use more")
         weights *= self.power[:, None, None] / total
         return weights
 
@@ -104,13 +104,13 @@ def cells_per_receptor(resolution: tuple[int, int]) -> int:
     return max(4, -(-MIN_CELLS // max(resolution)))
 
 
-def fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> Fields:
+def fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
     """The fields of an eye on cells as fine as its PSF can be had on. Raises optics.AccuracyError for a pupil whose
     light spreads too far for the coarsest."""
     cells = cells_per_receptor(eye.resolution)
     while True:
         try:
-            return Fields.of(eye, cells, depth)
+            return ReceptiveFields.of(eye, cells, depth)
         except optics.AccuracyError:
             # Light that spreads over too many cells for a PSF is smooth on the scale of coarser ones.
             if cells == 1:
@@ -125,7 +125,7 @@ def low_discrepancy(n: int) -> np.ndarray:
     return np.stack([(np.arange(n) + 0.5) / n, van_der_corput(n, 2) + first_dyadic / 2], axis=-1)
 
 
-def places(n: int) -> np.ndarray:
+def bounce_samples(n: int) -> np.ndarray:
     """n more points in the unit square, (n, 2), that together with `low_discrepancy` fill the hypercube evenly: the
     next bases of Halton's sequence, from 1 on."""
     return np.stack([van_der_corput(n + 1, 3), van_der_corput(n + 1, 5)], axis=-1)[1:]

@@ -67,10 +67,10 @@ def _views_at_once(weights: np.ndarray) -> int:
 # What turns components of light, (component, view, ...), into signals, (view, channel, ...), as matrices say:
 # signals_c = sum_b mixing[c, b] sum_k basis[k, b] (light of component k, gathered by the weights of band b).
 # Every sum is in a fixed order: the same rounding for any number of worlds.
-Readout = Callable[[np.ndarray], np.ndarray]
+ReceptorSums = Callable[[np.ndarray], np.ndarray]
 
 
-def of_receptors(factors: np.ndarray) -> Readout:
+def of_receptors(factors: np.ndarray) -> ReceptorSums:
     """From light summed over each receptor already: factors (channel, component)."""
     factors = factors.astype(np.float32)
 
@@ -85,7 +85,7 @@ def of_receptors(factors: np.ndarray) -> Readout:
 
 def of_components(
     weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int], mixing: np.ndarray, basis: np.ndarray
-) -> Readout:
+) -> ReceptorSums:
     """From light along rays, bands and channels multiplied into the weights: a product per component and channel."""
     products = [
         RowProduct.of([_mixed(weights, channel * component) for channel in mixing], resolution) for component in basis
@@ -100,7 +100,7 @@ def of_components(
     return signals
 
 
-def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarray) -> Readout:
+def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
     """From light along rays, a product per band: cheaper where components are as many as bands."""
     mixing, basis = mixing.astype(np.float32), basis.astype(np.float32)
     every = np.array_equal(basis, np.eye(len(basis)))

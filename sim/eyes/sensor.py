@@ -15,8 +15,8 @@ import scipy.sparse
 
 import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
-from sim.eyes.receptive_fields import Draw, Fields, Unseen, fields_of, low_discrepancy, places
-from sim.eyes.receptor_sums import Readout, RowProduct, of_bands, of_components, of_receptors, within_stretches
+from sim.eyes.receptive_fields import Draw, NoRaysError, ReceptiveFields, bounce_samples, fields_of, low_discrepancy
+from sim.eyes.receptor_sums import ReceptorSums, RowProduct, of_bands, of_components, of_receptors, within_stretches
 
 # Weights that together change no signal by more than this share of the receptors' noise are left out.
 NEGLIGIBLE = 0.1
@@ -34,7 +34,7 @@ class BoxSensor:
     """
 
     directions: np.ndarray
-    places: np.ndarray
+    bounce_samples: np.ndarray
     rays_per_receptor: int
     depth: DepthLayers = ONE_PSF
 
@@ -42,7 +42,7 @@ class BoxSensor:
         """Mean radiance of each receptor from the sums over its rays: (band, view, receptor), both ways."""
         return sums * np.float32(1.0 / self.rays_per_receptor)
 
-    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> Readout:
+    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Signals from sums of components over receptors' rays, see sim.eyes.receptor_sums."""
         return of_receptors(mixing @ basis.T / self.rays_per_receptor)
 
@@ -70,7 +70,7 @@ class ReceptiveFieldSensor:
     """
 
     directions: np.ndarray
-    places: np.ndarray
+    bounce_samples: np.ndarray
     weights: tuple[scipy.sparse.csr_array, ...]
     resolution: tuple[int, int]
     depth: DepthLayers = ONE_PSF
@@ -82,7 +82,7 @@ class ReceptiveFieldSensor:
         layers = np.stack([plane.reshape(len(plane), -1) for plane in planes])
         return layers.reshape(self.depth.count, -1, *layers.shape[1:]).sum(axis=0)
 
-    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> Readout:
+    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Signals from components along rays (layer * component, view, ray), see sim.eyes.receptor_sums."""
         count, k = self.depth.count, len(basis)
         bands = len(self.weights) // count
@@ -91,7 +91,7 @@ class ReceptiveFieldSensor:
             return readouts[0]
         return lambda light: np.sum([of_layer(light[i * k :][:k]) for i, of_layer in enumerate(readouts)], axis=0)
 
-    def _readout(self, first: int, bands: int, mixing: np.ndarray, basis: np.ndarray) -> Readout:
+    def _readout(self, first: int, bands: int, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         planes = slice(first, first + bands)
         if len(mixing) * len(basis) > bands:
             return of_bands(self._products[planes], mixing, basis)
@@ -116,7 +116,7 @@ class Trial:
     (layer * band, receptor, ray)."""
 
     directions: np.ndarray
-    places: np.ndarray
+    bounce_samples: np.ndarray
     weights: np.ndarray
 
 
@@ -146,7 +146,7 @@ class BoxSampling:
         row, column = np.divmod(receptors, width)
         corners = np.stack([column - width / 2, row - height / 2], axis=-1)[:, None]
         directions = directions_of(self.eye, ((low_discrepancy(rays) + shifts) % 1.0 + corners).reshape(-1, 2))
-        return directions, ((places(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
+        return directions, ((bounce_samples(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class FieldSampling:
     receptor has one."""
 
     eye: optics.Eye
-    fields: Fields
+    fields: ReceptiveFields
     depth: DepthLayers = ONE_PSF
 
     def sensor(self, rays_per_receptor: float) -> ReceptiveFieldSensor:
@@ -164,14 +164,14 @@ class FieldSampling:
         while True:
             try:
                 return self._sensor(rays)
-            except Unseen:
+            except NoRaysError:
                 rays += max(1, rays // 4)
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
         """What that sensor has for these receptors. Raises Unseen where one has no ray."""
         draw = self.fields.draw(self._rays(rays_per_receptor))
         weights = self.fields.weights(draw, receptors)
-        return Trial(directions_of(self.eye, draw.points), _places(draw), weights)
+        return Trial(directions_of(self.eye, draw.points), _bounce_samples(draw), weights)
 
     def _rays(self, rays_per_receptor: float) -> int:
         return max(1, round(rays_per_receptor * np.prod(self.eye.resolution)))
@@ -185,25 +185,25 @@ class FieldSampling:
         weights = tuple(scipy.sparse.vstack(plane, format="csr") for plane in zip(*rows, strict=True))
         weights = within_stretches(weights, self.eye.resolution, negligible_share(self.eye))
         directions = directions_of(self.eye, draw.points)
-        return ReceptiveFieldSensor(directions, _places(draw), weights, self.eye.resolution, self.depth)
+        return ReceptiveFieldSensor(directions, _bounce_samples(draw), weights, self.eye.resolution, self.depth)
 
 
-def _places(draw: Draw) -> np.ndarray:
-    return places(len(draw)).astype(np.float32)
+def _bounce_samples(draw: Draw) -> np.ndarray:
+    return bounce_samples(len(draw)).astype(np.float32)
 
 
 # Makes sensors of one eye, with any number of rays.
-Sampling = BoxSampling | FieldSampling
+EyeSampling = BoxSampling | FieldSampling
 
 
-def sampling_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> Sampling:
+def eye_sampling(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> EyeSampling:
     """How an eye is sampled. Raises optics.AccuracyError for a pupil whose light spreads too far to be computed."""
     return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, fields_of(eye, depth), depth)
 
 
 def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers = ONE_PSF) -> Sensor:
     """The sensor of an eye. Raises optics.AccuracyError for a pupil whose light spreads too far to be computed."""
-    return sampling_of(eye, depth).sensor(rays_per_receptor)
+    return eye_sampling(eye, depth).sensor(rays_per_receptor)
 
 
 def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:

@@ -19,11 +19,11 @@ ROUNDING = 1e-11
 
 # Path (run, substep, 2) [m] from where it begins, and velocity after each substep, of runs that start at speeds
 # (run, 2) [m/s] under commands (run, 2), (run, 2) [m] from where the model has its agent, with all contacts off.
-Run = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+FreeSteps = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
-class Glide:
+class FreeMotion:
     """One action of an agent that touches nothing.
 
     response       of path [m] and velocity [m/s] after each substep to a speed of 1 m/s and a command of 1, per
@@ -72,7 +72,7 @@ class Glide:
         return obeys
 
 
-def glide_of(model: mujoco.MjModel, agent: int, run: Run, strongest: float) -> Glide | None:
+def glide_of(model: mujoco.MjModel, agent: int, run: FreeSteps, strongest: float) -> FreeMotion | None:
     """What `model` does to the body `agent` away from everything; None where that is not linear, or where something
     it can touch moves or has no end."""
     obstacles = _obstacles(model, agent)
@@ -86,7 +86,7 @@ def glide_of(model: mujoco.MjModel, agent: int, run: Run, strongest: float) -> G
     reach = float((np.linalg.norm(model.geom_pos[geoms], axis=1) + model.geom_rbound[geoms]).max())
     ids, lower, upper, their_margin = obstacles
     margin = model.geom_margin[geoms].max() + model.geom_gap[geoms].max() + their_margin
-    glide = Glide(response, ids, lower, upper, reach + float(margin), strongest)
+    glide = FreeMotion(response, ids, lower, upper, reach + float(margin), strongest)
     actual = run(*trial)
     path, velocity = glide(*trial[:2])
     linear = np.abs(path - actual[0]).max() < ROUNDING and np.abs(velocity - actual[1][:, -1]).max() < ROUNDING

@@ -12,8 +12,8 @@ import copy
 import mujoco
 import numpy as np
 
-from sim.physics.free_motion import Glide
-from sim.physics.mujoco_batch import Rollouts
+from sim.physics.free_motion import FreeMotion
+from sim.physics.mujoco_batch import BatchedStep
 from sim.worlds.world import World
 
 MOST = 1024  # models that are kept, 50 kB each; a maze has two or three hundred places that differ
@@ -23,7 +23,7 @@ _SHAPES = [
 ]
 
 
-class Vicinity:
+class LocalContacts:
     """Models of the agent among some of a world's geoms, made when first asked for, and their steps.
 
     whole    the world's model, as it is stepped
@@ -32,7 +32,7 @@ class Vicinity:
     threads  of the steps, see `sim.physics.mujoco_batch`
     """
 
-    def __init__(self, whole: mujoco.MjModel, alone: mujoco.MjModel, glide: Glide, threads: int) -> None:
+    def __init__(self, whole: mujoco.MjModel, alone: mujoco.MjModel, glide: FreeMotion, threads: int) -> None:
         self._alone = copy.copy(alone)
         self._alone.opt.disableflags = whole.opt.disableflags | mujoco.mjtDisableBit.mjDSBL_MIDPHASE
         for name in ("body_contype", "body_conaffinity", "body_margin"):  # of all geoms of the world's body together
@@ -41,7 +41,7 @@ class Vicinity:
         self._slots = np.flatnonzero(alone.geom_bodyid == 0)
         self._arrays = _arrays_of_geoms(alone)
         self._models: dict[bytes, mujoco.MjModel] = {}
-        self._rollouts = Rollouts(self._alone, threads)
+        self._rollouts = BatchedStep(self._alone, threads)
 
     def few(self, met: np.ndarray) -> np.ndarray:
         """The obstacles met (n, obstacle) bool; none where they are more than there is room for."""
@@ -49,7 +49,7 @@ class Vicinity:
         return few
 
     def roll(self, few: np.ndarray, initial: np.ndarray, control: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Steps of each agent among these of the obstacles, (n, obstacle) bool: see `Rollouts`."""
+        """Steps of each agent among these of the obstacles, (n, obstacle) bool: see `BatchedStep`."""
         if len(self._models) > MOST:
             self._models.clear()
         keys = [row.tobytes() for row in np.packbits(few, axis=1)]
@@ -74,7 +74,7 @@ class Vicinity:
         return model
 
 
-def vicinity_of(world: World, whole: mujoco.MjModel, glide: Glide | None, threads: int) -> Vicinity | None:
+def vicinity_of(world: World, whole: mujoco.MjModel, glide: FreeMotion | None, threads: int) -> LocalContacts | None:
     """None where models of a part cannot stand for the whole: where agents do not glide or have nothing to touch,
     obstacles are on bodies of their own or of other shapes than MuJoCo's simple ones, more moves than the agent, or
     the world's model is not the one that it was compiled to. `whole`: that model, as it is stepped."""
@@ -84,7 +84,7 @@ def vicinity_of(world: World, whole: mujoco.MjModel, glide: Glide | None, thread
     still = (whole.geom_bodyid[glide.obstacles] == 0).all() and np.isin(whole.geom_type[glide.obstacles], _SHAPES).all()
     same = all(_state_size(whole, kind) == _state_size(alone.model, kind) for kind in ("FULLPHYSICS", "CTRL"))
     same &= whole.nsensordata == alone.model.nsensordata
-    return Vicinity(whole, alone.model, glide, threads) if still and same else None
+    return LocalContacts(whole, alone.model, glide, threads) if still and same else None
 
 
 def _state_size(model: mujoco.MjModel, kind: str) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 POOLED = 128
 
 
-class Rollouts:
+class BatchedStep:
     """Open-loop steps of many worlds whose models differ by numbers alone.
 
     like     a model of their sizes

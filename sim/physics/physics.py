@@ -16,7 +16,7 @@ import numpy as np
 
 from sim.physics.free_motion import glide_of
 from sim.physics.local_contacts import vicinity_of
-from sim.physics.mujoco_batch import Rollouts
+from sim.physics.mujoco_batch import BatchedStep
 from sim.worlds.state import WorldState
 from sim.worlds.world import MAX_SPEED, World
 
@@ -71,7 +71,7 @@ class Physics:
     def __init__(self, world: World, threads: int, gliding: bool = True) -> None:
         model = _without_detours(world.model)
         self._model = model
-        self._rollouts = Rollouts(model, threads)
+        self._rollouts = BatchedStep(model, threads)
         self._columns = _Columns.of(model)
         self._actuators = [_actuator(model, joint) for joint in ("agent_x", "agent_y")]
         self._touch = _touch_columns(model)
@@ -142,7 +142,7 @@ class Physics:
         initial = self._initial(len(speed))
         initial[:, self._columns.position] += displacement
         initial[:, self._columns.velocity] = speed
-        states, _ = Rollouts(model, 1)([model] * len(speed), initial, self._control(command))
+        states, _ = BatchedStep(model, 1)([model] * len(speed), initial, self._control(command))
         path = states[:, :, self._columns.position] - initial[:, None, self._columns.position]
         return path, states[:, :, self._columns.velocity]
 

@@ -14,13 +14,13 @@ from optics.spectra.bands import daylight
 from sim.scene.mirror import MirrorWarning
 from sim.worlds.world import World
 
-__all__ = ["band_error", "lit_in_bands", "measured"]
+__all__ = ["band_error", "measured", "with_band_averaged_lights"]
 
 FINE_BANDS = 64
 LEAST_MISS = 1e-3  # of white in daylight: what a type may catch too much or too little of a lamp without a word
 
 
-def lit_in_bands(world: World, eye: Eye) -> World:
+def with_band_averaged_lights(world: World, eye: Eye) -> World:
     """The same world as this eye's bands have it: measured lights are, at the bands' centres, worth what each type of
     receptor catches of them in white (`SpectralBands.of`), and not what their lines leave there by chance.
 

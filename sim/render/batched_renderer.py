@@ -17,15 +17,15 @@ import numpy as np
 
 import optics
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
-from sim.eyes.sensor import sampling_of
+from sim.eyes.sensor import eye_sampling
 from sim.render import memory_budget
-from sim.render.band_error import lit_in_bands
+from sim.render.band_error import with_band_averaged_lights
 from sim.render.fidelity import Fidelity, chosen
-from sim.render.fidelity_trials import Pilot
+from sim.render.fidelity_trials import FidelityTrials
 from sim.render.frozen_kernels import aligned, garbage_kept
 from sim.scene.variant import variant
 from sim.tracing import lighting
-from sim.tracing.static_scene import Stage, build_stage
+from sim.tracing.static_scene import StaticScene, build_static_scene
 from sim.tracing.tracer import Tracer, Tracers
 from sim.worlds.state import WorldState
 from sim.worlds.world import World
@@ -62,14 +62,16 @@ class BatchedRenderer:
         self.world, self.eyes = world, eyes if asked is None else replace(eyes, bands=asked.bands)
         self.eye = self.eyes.eye()
         self.bands: optics.SpectralBands = self.eye.spectral_bands
-        self._stage = build_stage(lit_in_bands(world, self.eye))
+        self._stage = build_static_scene(with_band_averaged_lights(world, self.eye))
         tracers = Tracers(world, self._stage, self.bands.wavelengths, tracer)
         with variant(self._stage.variant):
             white = lighting.white_radiance(self._stage.scene, self.bands.wavelengths)
         if asked is None:
-            self.fidelity, sampling = chosen(Pilot(world, self._stage, tracers, eyes, self.eye), eyes, self.eye)
+            self.fidelity, sampling = chosen(
+                FidelityTrials(world, self._stage, tracers, eyes, self.eye), eyes, self.eye
+            )
         else:
-            self.fidelity, sampling = asked, sampling_of(self.eye, asked.depth)
+            self.fidelity, sampling = asked, eye_sampling(self.eye, asked.depth)
         self.tracer: Tracer = tracers.of(self.fidelity.light)
         self._check_room(n_envs)
         self.sensor = sampling.sensor(self.fidelity.rays_per_receptor)
@@ -92,7 +94,7 @@ class BatchedRenderer:
             raise ValueError(f"n_envs = {n_envs!r}, must be at least 1")
         fidelity, layers = self.fidelity, self.fidelity.depth.count
         planes, weights = layers * len(self.tracer.basis), layers * len(self.bands.wavelengths)
-        memory_budget.check(
+        memory_budget.check_memory(
             memory_budget.Demand(
                 fidelity.rays_per_receptor,
                 n_envs,
@@ -111,7 +113,7 @@ class BatchedRenderer:
             self._inputs = {
                 "directions": mi.Float(_in_agent_frame(self.eyes, self.sensor.directions)),
                 "origins": mi.Float(_in_fours(eye_positions(self.eyes.azimuths()), 0.0)),
-                "places": mi.Float(self.sensor.places.ravel()),
+                "bounce_samples": mi.Float(self.sensor.bounce_samples.ravel()),
                 **self.tracer.inputs,
             }
             wavefront = _Wavefront(self)
@@ -200,7 +202,7 @@ class _PoseBuffer:
         self.stride = -(-4 * (1 + n_spheres) // ROW) * ROW
         self._rows = aligned(n_envs * self.stride, np.float32).reshape(n_envs, self.stride)
 
-    def pack(self, state: WorldState, stage: Stage) -> np.ndarray:
+    def pack(self, state: WorldState, stage: StaticScene) -> np.ndarray:
         rows = self._rows
         rows[:, :2] = state.position
         rows[:, 2], rows[:, 3] = np.cos(state.heading), np.sin(state.heading)
@@ -227,7 +229,7 @@ class _Wavefront:
         sample = lane - view * self.n_rays
         ray, cosine, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, sample)
         bounces = self.tracer.light == lighting.BOUNCE
-        place = dr.gather(mi.Point2f, inputs["places"], sample) if bounces else None
+        place = dr.gather(mi.Point2f, inputs["bounce_samples"], sample) if bounces else None
         components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs, place)
         if self.depth.count > 1:
             shares = self.depth.shares(dr.rcp(distance * cosine))

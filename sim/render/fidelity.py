@@ -15,12 +15,12 @@ import numpy as np
 import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.eyes import Eyes
-from sim.eyes.receptive_fields import Unseen
-from sim.eyes.sensor import Sampling, sampling_of
-from sim.render.band_error import band_error, lit_in_bands, measured
-from sim.render.fidelity_trials import Pilot
+from sim.eyes.receptive_fields import NoRaysError
+from sim.eyes.sensor import EyeSampling, eye_sampling
+from sim.render.band_error import band_error, measured, with_band_averaged_lights
+from sim.render.fidelity_trials import FidelityTrials
 from sim.tracing.lighting import BOUNCE, DIRECT, LEVELS
-from sim.tracing.static_scene import build_stage
+from sim.tracing.static_scene import build_static_scene
 from sim.tracing.tracer import Tracers
 from sim.worlds.world import World
 
@@ -115,17 +115,19 @@ def choose_fidelity(world: World, eyes: Eyes, tolerance: float | None = None) ->
     bands, level = _bands(eyes.eye(), SHARE_OF_BANDS * allowed)
     chosen_eyes = replace(eyes, bands=bands)
     eye = chosen_eyes.eye()
-    stage = build_stage(lit_in_bands(world, eye))
+    stage = build_static_scene(with_band_averaged_lights(world, eye))
     tracers = Tracers(world, stage, eye.spectral_bands.wavelengths)
-    fidelity, _ = chosen(Pilot(world, stage, tracers, chosen_eyes, eye), chosen_eyes, eye, allowed)
+    fidelity, _ = chosen(FidelityTrials(world, stage, tracers, chosen_eyes, eye), chosen_eyes, eye, allowed)
     return replace(fidelity, levels=(level, *fidelity.levels[1:]))
 
 
-def chosen(pilot: Pilot, eyes: Eyes, eye: optics.Eye, tolerance: float | None = None) -> tuple[Fidelity, Sampling]:
+def chosen(
+    pilot: FidelityTrials, eyes: Eyes, eye: optics.Eye, tolerance: float | None = None
+) -> tuple[Fidelity, EyeSampling]:
     """What `choose_fidelity` gives, with the eyes' own bands, and how the eye is to be sampled."""
     allowed = _allowed(eyes, eye, tolerance)
     depth, depth_level = _depth(pilot, eye, SHARE_OF_DEPTH * allowed)
-    sampling = sampling_of(eye, depth)
+    sampling = eye_sampling(eye, depth)
     light_level = _light(pilot, sampling, SHARE_OF_LIGHT * allowed)
     spent = (
         SHARE_OF_DEPTH**2 + SHARE_OF_BANDS**2 + min((light_level.predicted_error or 0) / allowed, SHARE_OF_LIGHT) ** 2
@@ -137,7 +139,7 @@ def chosen(pilot: Pilot, eyes: Eyes, eye: optics.Eye, tolerance: float | None = 
     return Fidelity(rays, eyes.bands, depth, allowed, levels, light_level.level), sampling
 
 
-def _light(pilot: Pilot, sampling: Sampling, allowed: float) -> Level:
+def _light(pilot: FidelityTrials, sampling: EyeSampling, allowed: float) -> Level:
     """Direct light where what is reflected twice is little; else both, and of all that is reflected more often only
     its size is known: as small beside what is reflected twice as that is beside direct light."""
     try:
@@ -177,7 +179,7 @@ def _own_bands(world: World, eye: optics.Eye) -> Level:
     return Level("bands", f"{eye.bands}", error, "the eyes' own; error: of measured reflectances in daylight")
 
 
-def _depth(pilot: Pilot, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
+def _depth(pilot: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
     """One PSF for infinity where that is certainly enough, else as few layers as glimpses of the world want.
 
     Light through the pupil's point p lands f p/z further off than from infinity. In the mean over a disk of radius R
@@ -210,7 +212,7 @@ def _fewest(error: Callable[[float], float], rungs: tuple[float, ...], allowed: 
         tried += 1
         try:
             predicted = CAUTION * error(rungs[at])
-        except Unseen:
+        except NoRaysError:
             predicted = math.inf
         if predicted <= allowed or at == len(rungs) - 1:
             break

@@ -17,12 +17,12 @@ import numpy as np
 from optics import Eye
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
-from sim.eyes.sensor import BoxSampling, Sampling, Trial, sampling_of
+from sim.eyes.sensor import BoxSampling, EyeSampling, Trial, eye_sampling
 from sim.render.frozen_kernels import aligned
 from sim.scene.variant import variant
 from sim.tasks.placement import CLEARANCE
 from sim.tracing import lighting
-from sim.tracing.static_scene import Stage
+from sim.tracing.static_scene import StaticScene
 from sim.tracing.tracer import Tracers
 from sim.worlds.world import World
 
@@ -36,7 +36,7 @@ STRAY = 0.75  # [m] from a cell's centre, along either axis
 
 
 @dataclass(frozen=True)
-class Glimpses:
+class RandomViews:
     """Views of single eyes; first axis: glimpse.
 
     position  of the agent [m], (n, 2) · heading [rad], (n,) · objects: centres [m], (n, k, 3) · eye: which, (n,)
@@ -47,15 +47,15 @@ class Glimpses:
     objects: np.ndarray
     eye: np.ndarray
 
-    def take(self, n: int) -> Glimpses:
+    def take(self, n: int) -> RandomViews:
         """The first n."""
-        return Glimpses(self.position[:n], self.heading[:n], self.objects[:n], self.eye[:n])
+        return RandomViews(self.position[:n], self.heading[:n], self.objects[:n], self.eye[:n])
 
     def __len__(self) -> int:
         return len(self.heading)
 
 
-def glimpses(world: World, eyes: Eyes, n: int) -> Glimpses:
+def glimpses(world: World, eyes: Eyes, n: int) -> RandomViews:
     """Agents about the cells where agents or objects may start, looking anywhere; objects on theirs."""
     rng = np.random.default_rng(0)
     k = len(world.objects)
@@ -67,7 +67,7 @@ def glimpses(world: World, eyes: Eyes, n: int) -> Glimpses:
             places = world.object_spawn[rng.choice(len(world.object_spawn), k, replace=len(world.object_spawn) < k)]
             objects[i] = np.column_stack([places, heights])
         position[i] = _clear_of(objects[i, :, :2], everywhere, rng)
-    return Glimpses(position, rng.uniform(-np.pi, np.pi, n), objects, rng.integers(eyes.n_eyes, size=n))
+    return RandomViews(position, rng.uniform(-np.pi, np.pi, n), objects, rng.integers(eyes.n_eyes, size=n))
 
 
 def _clear_of(objects: np.ndarray, cells: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -79,16 +79,16 @@ def _clear_of(objects: np.ndarray, cells: np.ndarray, rng: np.random.Generator) 
     return place
 
 
-class Pilot:
+class FidelityTrials:
     """Tries ways of sampling on one world, as these eyes see it; tracers: of the world at the eye's bands."""
 
-    def __init__(self, world: World, stage: Stage, tracers: Tracers, eyes: Eyes, eye: Eye) -> None:
+    def __init__(self, world: World, stage: StaticScene, tracers: Tracers, eyes: Eyes, eye: Eye) -> None:
         self.world = world
         self._stage, self._tracers, self._eyes, self._eye = stage, tracers, eyes, eye
         self._views = glimpses(world, eyes, GLIMPSES[1])
         self._receptors = np.sort(np.random.default_rng(0).permutation(int(np.prod(eyes.resolution)))[:RECEPTORS])
 
-    def errors(self, sampling: Sampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
+    def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
         """Root mean square error of the signals with so many rays per receptor; raises Unseen where a receptor has
         none."""
         truths: dict[int, np.ndarray] = {}
@@ -109,7 +109,7 @@ class Pilot:
 
         return error
 
-    def reflected_twice(self, sampling: Sampling) -> tuple[float, float]:
+    def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
         """Root mean square of what light that is reflected twice adds to the signals, and of direct light's signals.
         Raises ValueError where it cannot be followed."""
         trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
@@ -119,7 +119,7 @@ class Pilot:
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
         """Root mean square difference to the signals with the finest layers, all with the same rays; the nodes of
         each count must be among those of the finest. Raises optics.AccuracyError, see `optics.Eye.kernel`."""
-        sampling = sampling_of(self._eye, finest)
+        sampling = eye_sampling(self._eye, finest)
         trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
         truth = self._signals(trial, finest, lighting.DIRECT)
         nodes = trial.weights.reshape(finest.count, -1, *trial.weights.shape[1:])
@@ -152,7 +152,7 @@ class Pilot:
         weights = np.einsum("ckb,lbrp->clkrp", factors, planes, optimize=True).astype(np.float32)
         return np.einsum("clkrp,lkvp->vcr", weights, layers, optimize=True)
 
-    def _trace(self, views: Glimpses, trial: Trial, light: str) -> tuple[list[Any], Any]:
+    def _trace(self, views: RandomViews, trial: Trial, light: str) -> tuple[list[Any], Any]:
         """Components of light along a trial's rays of each view's eye, and from how far along its axis [m]: Dr.Jit,
         flat (view, ray)."""
         directions, azimuths = trial.directions, self._eyes.azimuths()
@@ -175,7 +175,7 @@ class Pilot:
             centres = [lanes(views.objects[:, k]) for k in range(views.objects.shape[1])]
             place = None
             if light == lighting.BOUNCE:
-                place = mi.Point2f([_lanes(np.tile(column, len(views))) for column in trial.places.T])
+                place = mi.Point2f([_lanes(np.tile(column, len(views))) for column in trial.bounce_samples.T])
             components, t = tracer.radiance(tracer.scene, ray, lanes(agent), centres, tracer.inputs, place)
             z = t * _lanes(np.tile(directions[:, 2], len(views)))
             dr.eval(components, z)

@@ -9,7 +9,8 @@ from contextlib import contextmanager
 import numpy as np
 
 ALIGNMENT = 64  # [bytes]
-# [bytes] that a kernel takes at once, at most: it may read past an array's end (`optics.numerics.precision.with_room`)
+# [bytes] that a kernel takes at once, at most: it may read past an array's end
+# (`optics.numerics.precision.padded_for_packets`)
 PACKET = 128
 
 

@@ -45,7 +45,7 @@ class Demand:
         return 4 * self.elements + self.rays * (RAY_BYTES * self.eyes + 16 * self.weights * self.resolution[1])
 
 
-def check(demand: Demand) -> None:
+def check_memory(demand: Demand) -> None:
     """Raise ValueError for more rays than there is room for, with how many there is room for."""
     free = available()
     excess = max(demand.bytes / free, demand.elements / INDICES)

@@ -14,7 +14,7 @@ from sim.worlds.state import WorldState
 Pending = Callable[[], np.ndarray]  # waits for signals (env, eye, channel, height, width) float32
 
 
-class Retinas:
+class NoisySignals:
     """Renderer and receptor noise of one batch of worlds.
 
     renderer  of all worlds

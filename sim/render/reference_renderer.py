@@ -14,7 +14,7 @@ import numpy as np
 
 import optics
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, camera_rotations, eye_positions
-from sim.render.band_error import lit_in_bands
+from sim.render.band_error import with_band_averaged_lights
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import mirror
 from sim.scene.variant import DEFAULT_VARIANT
@@ -61,7 +61,7 @@ class ReferenceRenderer:
         z: Any = np.array(depths) if depths else math.inf
         self.sight = self.eye.sight(self.samples_per_receptor, z, depth_layers, light_from="centres")
         self._data = mujoco.MjData(world.model)
-        self._mirror = mirror(world.model, variant=variant, spectra=lit_in_bands(world, self.eye).spectra)
+        self._mirror = mirror(world.model, variant=variant, spectra=with_band_averaged_lights(world, self.eye).spectra)
 
     @property
     def shape(self) -> tuple[int, int]:

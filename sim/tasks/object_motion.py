@@ -7,14 +7,14 @@ from functools import cache
 import numpy as np
 
 from sim.tasks.placement import SEPARATION
-from sim.tasks.random_streams import Chance
+from sim.tasks.random_streams import MotionNoise
 from sim.worlds.state import WorldState, wrap_angle
 
 SPEED = 0.5  # [m/s]
 TURN = 0.4  # standard deviation of the change of heading per action [rad]
 
 
-def wander(state: WorldState, chance: Chance, bounds: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+def wander(state: WorldState, chance: MotionNoise, bounds: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """Object positions (n, k, 3) and headings (n, k) one action later.
 
     Every object walks at SPEED with a heading that drifts at random. A step that would leave `bounds`

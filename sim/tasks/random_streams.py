@@ -24,11 +24,11 @@ class Streams:
         self.placement, motion = (
             [np.random.Generator(np.random.PCG64(child)) for child in children(purpose)] for purpose in (0, 1)
         )
-        self.motion = Chance(motion)
+        self.motion = MotionNoise(motion)
         self.noise_keys = np.array([child.generate_state(1, np.uint64)[0] for child in children(2)])
 
 
-class Chance:
+class MotionNoise:
     """What chance does to movers: for every action of every world, numbers from the world's own generator."""
 
     def __init__(self, generators: list[np.random.Generator]) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from sim.tasks.object_motion import wander
 from sim.tasks.placement import REACH, Places, free_spot
-from sim.tasks.random_streams import Chance
+from sim.tasks.random_streams import MotionNoise
 from sim.worlds.state import WorldState
 from sim.worlds.world import TASKS, World
 
@@ -59,7 +59,7 @@ class Task(Protocol):
     def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """Start of an episode in one world: agent (2,) and objects (k, 2)."""
 
-    def move(self, state: WorldState, chance: Chance, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    def move(self, state: WorldState, chance: MotionNoise, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         """Objects (n, k, 3) and their headings (n, k) one action later."""
 
     def judge(self, before: WorldState, after: WorldState, path: np.ndarray, ends: bool) -> Outcome:
@@ -99,7 +99,7 @@ class FindGoal:
     def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         return self._places.draw(rng, len(self.world.objects))
 
-    def move(self, state: WorldState, chance: Chance, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    def move(self, state: WorldState, chance: MotionNoise, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         if not self.moving:
             return state.objects, state.object_heading
         return wander(state, chance, self._bounds, seconds)
@@ -137,7 +137,7 @@ class LeaveMaze:
     def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         return self.world.agent_spawn[rng.integers(len(self.world.agent_spawn))], np.empty((0, 2))
 
-    def move(self, state: WorldState, chance: Chance, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    def move(self, state: WorldState, chance: MotionNoise, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         return state.objects, state.object_heading
 
     def judge(self, before: WorldState, after: WorldState, path: np.ndarray, ends: bool) -> Outcome:

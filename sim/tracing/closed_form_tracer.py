@@ -19,9 +19,9 @@ import numpy as np
 from sim.eyes.eyes import EYE_HEIGHT
 from sim.tracing import lighting, spheres
 from sim.tracing.reflectance_atlas import Atlas, bake
-from sim.tracing.static_scene import Stage
+from sim.tracing.static_scene import StaticScene
 from sim.tracing.wall_intersection import Footprints, footprints_of
-from sim.tracing.walls import ALIGNED, Unsuited, Walls, walls_of
+from sim.tracing.walls import ALIGNED, NoClosedForm, Walls, walls_of
 from sim.worlds.world import World
 
 # Singular values below this share of the largest are float32 rounding.
@@ -83,13 +83,13 @@ class ClosedForm:
     light       what of it is followed, one of `lighting.LEVELS`
     basis       (component, band): what each component is worth in each band
 
-    Raises Unsuited for worlds that are not made of upright walls, and, where light that is reflected twice is followed,
-    for walls of several heights or lower than what stands between them.
+    Raises NoClosedForm for worlds that are not made of upright walls, and, where light that is reflected twice is
+    followed, for walls of several heights or lower than what stands between them.
     """
 
     name = "closed_form"
 
-    def __init__(self, world: World, stage: Stage, wavelengths: np.ndarray, light: str = lighting.DIRECT) -> None:
+    def __init__(self, world: World, stage: StaticScene, wavelengths: np.ndarray, light: str = lighting.DIRECT) -> None:
         walls = walls_of(world.model, stage.geoms)
         self.light = light
         if light == lighting.BOUNCE:
@@ -99,7 +99,7 @@ class ClosedForm:
         self._bodies, self._walls = stage.bodies, walls
         self._lights = lighting.directional_lights(stage.scene, wavelengths)
         if any(source.direction[2] <= 0 for source in self._lights):
-            raise Unsuited("a light shines from below")
+            raise NoClosedForm("a light shines from below")
         geoms, place = np.unique(walls.geoms, return_inverse=True)
         visible = stage.bodies if light == lighting.BOUNCE else stage.spheres
         bsdfs = [*(stage.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
@@ -222,13 +222,13 @@ class ClosedForm:
         return [sum(w * dr.gather(mi.Float, inputs[f"texels_{k}"], i) for i, w in index) for k in range(n)]
 
 
-def _check_tops(world: World, walls: Walls, stage: Stage) -> None:
+def _check_tops(world: World, walls: Walls, stage: StaticScene) -> None:
     """No top of a wall may be seen from where light is reflected: from any point of walls and movers."""
     objects = [world.model.body(name).pos[2] for name in world.objects]
     bodies = np.add(np.add([*objects, EYE_HEIGHT], stage.bodies.radii), stage.bodies.offsets[:, 2])
     lowest, highest = walls.top.min(initial=np.inf), max(walls.top.max(initial=-np.inf), bodies.max())
     if highest > lowest + ALIGNED:
-        raise Unsuited(f"light that is reflected twice sees the top of a wall {lowest:.2g} m high")
+        raise NoClosedForm(f"light that is reflected twice sees the top of a wall {lowest:.2g} m high")
 
 
 def _face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:

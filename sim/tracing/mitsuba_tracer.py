@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from sim.tracing import lighting, spheres
-from sim.tracing.static_scene import Stage
+from sim.tracing.static_scene import StaticScene
 
 
 class Traced:
@@ -23,7 +23,7 @@ class Traced:
 
     name = "mitsuba"
 
-    def __init__(self, stage: Stage, wavelengths: np.ndarray, why: str, light: str = lighting.DIRECT) -> None:
+    def __init__(self, stage: StaticScene, wavelengths: np.ndarray, why: str, light: str = lighting.DIRECT) -> None:
         self.why, self.light = why, light
         self.basis = np.eye(len(wavelengths))
         self.scene = stage.scene

@@ -25,7 +25,7 @@ from sim.worlds.world import World
 
 
 @dataclass(frozen=True)
-class Stage:
+class StaticScene:
     """scene    mi.Scene of the world's own geoms
     geoms    their ids · bsdfs: of each, by id
     spheres  the objects', in the order of World.objects
@@ -41,7 +41,7 @@ class Stage:
     variant: str
 
 
-def build_stage(world: World) -> Stage:
+def build_static_scene(world: World) -> StaticScene:
     """The stage of a world. Raises ValueError for an object that is not one sphere, for moving geoms that are
     neither the agent's nor an object's, and for geoms that glow."""
     model = world.model
@@ -55,7 +55,7 @@ def build_stage(world: World) -> Stage:
     standing = tuple(map(int, static.geoms))
     with in_variant(static.variant):
         scene = _static_scene(static)
-        return Stage(scene, standing, {g: static.bsdf(g) for g in standing}, spheres, bodies, static.variant)
+        return StaticScene(scene, standing, {g: static.bsdf(g) for g in standing}, spheres, bodies, static.variant)
 
 
 def _spheres(static: Mirror, geoms: list[int]) -> Spheres:

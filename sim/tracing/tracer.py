@@ -11,8 +11,8 @@ from sim.scene.variant import variant
 from sim.tracing import lighting
 from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.mitsuba_tracer import Traced
-from sim.tracing.static_scene import Stage
-from sim.tracing.walls import Unsuited
+from sim.tracing.static_scene import StaticScene
+from sim.tracing.walls import NoClosedForm
 from sim.worlds.world import World
 
 TRACERS = ("auto", ClosedForm.name, Traced.name)
@@ -48,7 +48,7 @@ class Tracer(Protocol):
 class Tracers:
     """The tracers of a world, one for every level of light. Raises what `tracer_of` does for direct light."""
 
-    def __init__(self, world: World, stage: Stage, wavelengths: np.ndarray, name: str = "auto") -> None:
+    def __init__(self, world: World, stage: StaticScene, wavelengths: np.ndarray, name: str = "auto") -> None:
         self._world, self._stage, self._wavelengths, self._name = world, stage, wavelengths, name
         self._known: dict[str, Tracer] = {}
         self.of(lighting.DIRECT)
@@ -61,7 +61,9 @@ class Tracers:
         return self._known[light]
 
 
-def tracer_of(world: World, stage: Stage, wavelengths: np.ndarray, name: str, light: str = lighting.DIRECT) -> Tracer:
+def tracer_of(
+    world: World, stage: StaticScene, wavelengths: np.ndarray, name: str, light: str = lighting.DIRECT
+) -> Tracer:
     """The tracer of a world, "auto" being the fastest that can.
 
     Raises ValueError for an unknown name, for "closed_form" where the world has none, for lights other than
@@ -76,7 +78,7 @@ def tracer_of(world: World, stage: Stage, wavelengths: np.ndarray, name: str, li
         return Traced(stage, wavelengths, "asked for", light)
     try:
         return ClosedForm(world, stage, wavelengths, light)
-    except Unsuited as reason:
+    except NoClosedForm as reason:
         if name == ClosedForm.name:
             raise ValueError(f"tracer = 'closed_form': this world has no closed form: {reason}") from reason
         return Traced(stage, wavelengths, f"no closed form: {reason}", light)

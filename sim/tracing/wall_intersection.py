@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from sim.tracing.walls import ALIGNED, SIDES, Unsuited, Walls
+from sim.tracing.walls import ALIGNED, SIDES, NoClosedForm, Walls
 
 FEW = 8  # walls that are solved one by one; a walk through a grid costs about as much
 CELLS = 1_000_000  # of a grid, at most
@@ -30,7 +30,7 @@ class Footprints(Protocol):
 
 
 def footprints_of(walls: Walls) -> Footprints:
-    """The cheaper way for these walls. Raises Unsuited for many walls that do not fit a grid."""
+    """The cheaper way for these walls. Raises NoClosedForm for many walls that do not fit a grid."""
     return EachWall(walls) if len(walls) <= FEW else Cells(walls)
 
 
@@ -85,7 +85,7 @@ class Cells:
         for i, (low, high) in enumerate(zip(walls.lower, walls.upper, strict=True)):
             first, last = (np.rint((c - origin) / self._side).astype(int) for c in (low, high))
             if (cells[first[1] : last[1], first[0] : last[0]] >= 0).any():
-                raise Unsuited("walls overlap")
+                raise NoClosedForm("walls overlap")
             cells[first[1] : last[1], first[0] : last[0]] = i
         self._climb, self._ceiling = float(walls.top.max() - walls.floor), float(walls.top.max())
         self.how = f"found in a grid of {shape[1]} x {shape[0]} cells"
@@ -192,7 +192,7 @@ def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
     extent = np.array([f[-1] - f[0] for f in faces]) / side
     columns, rows = np.rint(extent).astype(int)
     if side < ALIGNED or rows * columns > CELLS:
-        raise Unsuited(f"{len(walls)} walls that lie on no grid")
+        raise NoClosedForm(f"{len(walls)} walls that lie on no grid")
     return side, origin, (int(rows), int(columns))
 
 

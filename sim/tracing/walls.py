@@ -23,7 +23,7 @@ ALIGNED = (
 )
 
 
-class Unsuited(ValueError):
+class NoClosedForm(ValueError):
     """Why a world has no closed form, in words."""
 
 
@@ -51,25 +51,25 @@ class Walls:
 
 
 def walls_of(model: mujoco.MjModel, geoms: Sequence[int]) -> Walls:
-    """The walls and the floor that these geoms are. Raises Unsuited for any other geom or placement."""
+    """The walls and the floor that these geoms are. Raises NoClosedForm for any other geom or placement."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     floors = [g for g in geoms if surfaces.geom_type(model, g) == mujoco.mjtGeom.mjGEOM_PLANE]
     boxes = [g for g in geoms if surfaces.geom_type(model, g) == mujoco.mjtGeom.mjGEOM_BOX]
     others = set(geoms) - {*floors, *boxes}
     if others:
-        raise Unsuited(f"geom {model.geom(others.pop()).name!r} is neither a plane nor a box")
+        raise NoClosedForm(f"geom {model.geom(others.pop()).name!r} is neither a plane nor a box")
     if len(floors) != 1:
-        raise Unsuited(f"{len(floors)} floors")
+        raise NoClosedForm(f"{len(floors)} floors")
     floor = _rectangle(model, data, floors[0])
     height = float(floor[0, 2])
     sides = [_box(model, data, g) for g in boxes]
     corners = np.array([[low, high] for low, high, _ in sides]).reshape(-1, 2, 3)
     if (np.abs(corners[:, 0, 2] - height) > ALIGNED).any() or (corners[:, 1, 2] <= EYE_HEIGHT).any():
-        raise Unsuited("a wall does not stand on the floor, or ends below the eyes")
+        raise NoClosedForm("a wall does not stand on the floor, or ends below the eyes")
     floor_lower, floor_upper = floor[:, :2].min(axis=0), floor[:, :2].max(axis=0)
     if (corners[..., :2] < floor_lower - ALIGNED).any() or (corners[..., :2] > floor_upper + ALIGNED).any():
-        raise Unsuited("a wall stands beside the floor")
+        raise NoClosedForm("a wall stands beside the floor")
     return Walls(
         lower=corners[:, 0, :2],
         upper=corners[:, 1, :2],
@@ -90,7 +90,7 @@ def _rectangle(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndar
     pose = shapes.pose(data, geom)
     points = corners @ (pose @ part.local).T
     if np.abs(pose[:3, 2] - [0, 0, 1]).max() > ALIGNED or np.abs(np.abs(pose[:2, :2]).max(axis=0) - 1).max() > ALIGNED:
-        raise Unsuited(f"plane {model.geom(geom).name!r} is not level, or turned")
+        raise NoClosedForm(f"plane {model.geom(geom).name!r} is not level, or turned")
     return points[:, :3]
 
 
@@ -102,12 +102,12 @@ def _box(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> tuple[np.ndar
     """Lower and upper corner of a box, and the texture coordinates of its sides."""
     pose = shapes.pose(data, geom)
     if np.abs(np.abs(pose[:3, :3]).max(axis=0) - 1).max() > ALIGNED:
-        raise Unsuited(f"box {model.geom(geom).name!r} is not aligned with the axes")
+        raise NoClosedForm(f"box {model.geom(geom).name!r} is not aligned with the axes")
     (part,) = shapes.parts(model, geom)
     triangles = part.triangles
     assert triangles is not None
     if len(triangles.vertices) != 4 * FACES:
-        raise Unsuited(f"box {model.geom(geom).name!r} has a cube texture")
+        raise NoClosedForm(f"box {model.geom(geom).name!r} has a cube texture")
     vertices = triangles.vertices @ pose[:3, :3].T + pose[:3, 3]
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     uv = np.zeros((len(vertices), 2)) if triangles.uv is None else triangles.uv

@@ -12,7 +12,7 @@ ROOM = 4  # geoms about an agent: the corner of two walls, and one or two more i
 
 
 @dataclass(frozen=True)
-class AgentAlone:
+class AgentModel:
     """An agent without its world.
 
     model  it, among ROOM boxes that touch nothing: no objects, walls, lights, cameras or textures
@@ -23,7 +23,7 @@ class AgentAlone:
     whole: bytes
 
     @classmethod
-    def of(cls, spec: mujoco.MjSpec, whole: mujoco.MjModel) -> AgentAlone:
+    def of(cls, spec: mujoco.MjSpec, whole: mujoco.MjModel) -> AgentModel:
         """The body "agent" of a spec that has been compiled into `whole`."""
         return cls(_alone(spec.copy()), _fingerprint(whole))
 

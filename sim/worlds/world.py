@@ -17,7 +17,7 @@ from optics.spectra.spectrum import Spectrum
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.scene.spectra import resolve
 from sim.worlds import detection, foraging, materials, navigation
-from sim.worlds.agent_model import AgentAlone
+from sim.worlds.agent_model import AgentModel
 from sim.worlds.layout import WALL_CONAFFINITY
 
 _LAYOUTS = {
@@ -59,7 +59,7 @@ class World:
     object_spawn: np.ndarray
     goal_region: np.ndarray | None
     spectra: Mapping[str, Spectrum] = field(default_factory=dict)
-    alone: AgentAlone | None = None
+    alone: AgentModel | None = None
 
 
 def build_world(
@@ -102,7 +102,7 @@ def build_world(
         object_spawn=layout.object_spawn,
         goal_region=layout.goal_region,
         spectra=resolve(model, {**layout.spectra, **(spectra or {})}),
-        alone=AgentAlone.of(spec, model),
+        alone=AgentModel.of(spec, model),
     )
 
 

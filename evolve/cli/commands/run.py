@@ -9,11 +9,11 @@ from contextlib import nullcontext
 
 from evolve.cli.commands import INTERRUPTED
 from evolve.cli.progress import Bar, Events, Lines, Watchers, watcher
-from evolve.cli.run_plan import Plan
+from evolve.cli.run_plan import RunPlan
 from evolve.cli.start_from import starts_from
 from evolve.cli.tensorboard import Scalars
 from evolve.config.assemble import assemble
-from evolve.config.lint import remarks
+from evolve.config.lint import lint
 from evolve.config.run_config import ConfigError, RunConfig
 from evolve.genome.phenotype import repaired
 from evolve.search.dask_executor import DaskExecutor
@@ -42,8 +42,8 @@ def start(arguments: Namespace) -> int:
     backend.require()
     directory = arguments.out or next_directory(config.task, arguments.preset.removesuffix(f"-{config.task}"))
     if arguments.dry_run:
-        return _show(Plan.of(config, directory), arguments.json)
-    notes = [] if arguments.json else remarks(config)  # looks at the world, which takes its time: nothing is begun yet
+        return _show(RunPlan.of(config, directory), arguments.json)
+    notes = [] if arguments.json else lint(config)  # looks at the world, which takes its time: nothing is begun yet
     run = Run.create(directory, config, starts.name.removeprefix("--from ") if starts else None)
     if not arguments.json:
         for note in notes:
@@ -73,7 +73,7 @@ def resume(arguments: Namespace) -> int:
         return _carry(run, arguments)
 
 
-def _show(plan: Plan, as_json: bool) -> int:
+def _show(plan: RunPlan, as_json: bool) -> int:
     """The plan, with what this machine makes of it; nothing is begun."""
     if not as_json:
         print("measuring this machine's pace ...", file=sys.stderr, flush=True)

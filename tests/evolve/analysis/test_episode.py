@@ -15,7 +15,7 @@ from evolve.analysis.episode import Episode, _perfect_views, record
 from evolve.config.run_config import WorldConfig
 from evolve.learning.policy import PolicyConfig, build_policy, load_policy, save_policy
 from evolve.report import exr_export, replay
-from evolve.report.ground_plan import Stage
+from evolve.report.ground_plan import GroundPlan
 from evolve.store.directory import RunError
 
 
@@ -172,7 +172,7 @@ def test_a_maze_is_that_which_was_walked_through(episode, tmp_path):
     assert again.world == world
     model = sim.build_world("navigation", seed=1, mazes=2).model
     walls = [i for i in range(model.ngeom) if model.geom(i).name.startswith("wall")]
-    shown, y = Stage.of(again), model.geom_pos[walls, 1]
+    shown, y = GroundPlan.of(again), model.geom_pos[walls, 1]
     north = y[y > 0] if again.position[0, 1] > 0 else y[y < 0]
     np.testing.assert_array_equal(shown.walls[:, 1], north)
     assert shown.bounds[3] - shown.bounds[1] == pytest.approx(26.0)

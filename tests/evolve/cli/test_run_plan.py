@@ -8,9 +8,9 @@ import pytest
 import evolve.cli.run_plan
 from evolve.cli.main import main
 from evolve.cli.pace import Pace, calibrate
-from evolve.cli.run_plan import Plan
+from evolve.cli.run_plan import RunPlan
 from evolve.config.assemble import assemble
-from evolve.config.lint import idle_genes, idle_starts, remarks
+from evolve.config.lint import idle_genes, idle_starts, lint
 from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
@@ -32,9 +32,9 @@ def test_hours_count_rounds_of_workers_and_all_that_a_candidate_does(tmp_path, p
     config = assemble("detection", assignments=[*settings, "learning.eval_interval=30000"])
     candidate_s = 10 + 100 + (4 + 1) * 5
     assert PACE.candidate_s(config) == candidate_s
-    plan = Plan.of(config, tmp_path).measured()
+    plan = RunPlan.of(config, tmp_path).measured()
     assert plan.hours["start"] == pytest.approx(10 * 2 * candidate_s / 3600), "6 on 4 workers take two rounds"
-    steady = Plan.of(replace(config, search=replace(config.search, steady_state=True)), tmp_path).measured()
+    steady = RunPlan.of(replace(config, search=replace(config.search, steady_state=True)), tmp_path).measured()
     assert steady.hours["start"] == pytest.approx(15 * candidate_s / 3600), "60 on 4 workers, nobody waits"
 
 
@@ -51,12 +51,12 @@ def test_animal_that_cannot_be_evaluated_is_named():
 def test_disk_holds_policies_and_record_and_a_small_disk_is_noticed(tmp_path, paced, monkeypatch):
     def plan(generations):
         settings = (f"search.generations={generations}", "search.population=2")
-        return Plan.of(assemble("detection", assignments=settings), tmp_path).measured()
+        return RunPlan.of(assemble("detection", assignments=settings), tmp_path).measured()
 
     per_candidate = (plan(20).disk_bytes - plan(10).disk_bytes) / 20
     assert 50_000 + 500 < per_candidate < 50_000 + 5_000
     assert plan(10).notes() == []
-    monkeypatch.setattr(Plan, "free_bytes", 1000)
+    monkeypatch.setattr(RunPlan, "free_bytes", 1000)
     assert plan(10).notes() == ["the disk is too small for this run"]
 
 
@@ -96,7 +96,7 @@ def test_bands_too_few_for_the_colours_of_a_world_are_named():
     """Four bands put the ultraviolet that a goal reflects where pigments of 410 nm look: 0.18 of white's signal."""
 
     def notes(task, *settings):
-        return remarks(assemble(task, assignments=settings))
+        return lint(assemble(task, assignments=settings))
 
     few = "eye.bands = 4 misjudge what foraging's objects reflect by up to 0.065 of white's signal, more than "
     assert notes("foraging") == [few + "a receptor's noise, 0.01; 16 do not"]
@@ -115,7 +115,7 @@ def test_a_ladder_costs_what_its_rungs_cost(tmp_path, paced):
     settings = ("search.population=6", "search.generations=10", "learning.total_steps=100000", "workers=4")
     climb = ("search.rungs=2", "search.promoted=0.25")
     config = assemble("detection", assignments=[*settings, *climb, "learning.eval_interval=30000"])
-    plan = Plan.of(config, tmp_path).measured()
+    plan = RunPlan.of(config, tmp_path).measured()
     first, second = 10 + 25 + (1 + 1) * 5, 10 + 75 + (3 + 1) * 5
     assert plan.hours["start"] == pytest.approx(10 * (2 * first + 1 * second) / 3600), "6 and 2 on 4 workers"
     assert plan.record()["steps"] == 10 * (6 * 25_000 + 2 * 75_000)

@@ -11,7 +11,7 @@ import optics
 from evolve.cli.main import main
 from evolve.cli.pace import Pace
 from evolve.config.assemble import SCALES, assemble, preset_names
-from evolve.config.lint import remarks
+from evolve.config.lint import lint
 from evolve.config.provenance import Source
 from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
@@ -57,7 +57,7 @@ def test_paper_scale_has_the_published_budget_and_laptop_a_tenth_of_it_at_most(p
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("preset", EXPERIMENTS)
 def test_every_open_gene_changes_something_and_colours_are_seen_as_they_are(preset, scale):
-    assert remarks(assemble(preset=preset, scale=scale)) == []
+    assert lint(assemble(preset=preset, scale=scale)) == []
 
 
 def test_bifurcations_differ_in_their_task_and_begin_with_one_photoreceptor():

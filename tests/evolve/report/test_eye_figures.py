@@ -7,7 +7,7 @@ import pytest
 
 import optics
 from evolve.analysis.episode import record
-from evolve.report.eye_figures import Light, diffraction_limit, relief_heights
+from evolve.report.eye_figures import WhiteLight, diffraction_limit, relief_heights
 from evolve.report.views import through
 from evolve.store.directory import Run
 from optics.spectra.bands import daylight
@@ -48,7 +48,7 @@ def test_height_map_ends_where_the_pupil_does(aperture):
 def test_mtf_of_a_perfect_lens_is_the_diffraction_limit():
     """The PSF's window lacks up to 1 % of the light, which lifts the contrast by as much."""
     eye = optics.Eye(optics.Pupil(20e-6, thin_lens_focal_length=100e-6 / np.tan(np.radians(22.5))), (15, 15), 45.0)
-    light = Light.through(eye)
+    light = WhiteLight.through(eye)
     frequency = np.array([0.1, 0.3, 0.5, 0.8]) * optics.mtf(light.psf).cutoff.max()
     contrast = optics.mtf(light.white).profile(frequency)[0]
     np.testing.assert_allclose(contrast, diffraction_limit(light, frequency), atol=0.01)
@@ -57,7 +57,7 @@ def test_mtf_of_a_perfect_lens_is_the_diffraction_limit():
 def test_diffraction_limit_weighs_the_bands_by_their_light():
     """At the shortest band's cutoff nothing passes; at that of the longest, only what the shorter ones pass."""
     eye = optics.Eye(optics.Pupil(20e-6, thin_lens_focal_length=241e-6), (15, 15), 45.0, bands=2)
-    light = Light.through(eye)
+    light = WhiteLight.through(eye)
     short, long = optics.mtf(light.psf).cutoff
     s = long / short
     weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sim
-from evolve.report.ground_plan import Stage
+from evolve.report.ground_plan import GroundPlan
 from evolve.report.picture import display
 from evolve.report.player import write_player
 from tests.evolve.report.reported import Page, film_of, picture
@@ -73,7 +73,7 @@ def test_long_films_of_many_receptors_are_thinned(episode, tmp_path):
 
 
 def test_stage_is_the_world(episode):
-    stage = Stage.of(episode)
+    stage = GroundPlan.of(episode)
     assert stage.bounds == pytest.approx((-13, -11, 13, 11))  # 11 x 9 cells of 2 m and walls of 2 m
     assert stage.object_radius == (0.5, 0.5, 0.5)
     assert stage.gain == pytest.approx(1 / 0.3**2)
@@ -81,7 +81,7 @@ def test_stage_is_the_world(episode):
 
 
 def test_ground_plan_of_the_maze_leaves_free_cells_free(episode):
-    stage = Stage.of(replace(episode, task="navigation"))
+    stage = GroundPlan.of(replace(episode, task="navigation"))
     spots = sim.build_world("navigation").agent_spawn
     gap = np.abs(spots[:, None] - stage.walls[None, :, :2]) - stage.walls[None, :, 2:]
     assert (gap.max(axis=-1) > 0.5).all()  # a cell's centre is 1 m from the next wall

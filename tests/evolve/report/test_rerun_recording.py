@@ -7,7 +7,7 @@ import pytest
 
 from evolve.cli.main import main
 from evolve.report import replay
-from evolve.report.ground_plan import Stage
+from evolve.report.ground_plan import GroundPlan
 from evolve.report.rerun_recording import write_recording
 
 
@@ -86,7 +86,7 @@ def test_eyes_are_cameras_that_look_where_the_eyes_look(columns, episode):
 
 def test_time_is_the_worlds(columns, episode):
     seconds = np.array([value.total_seconds() for value in columns["/contact", "time"]])
-    np.testing.assert_allclose(seconds, np.arange(256) * Stage.of(episode).seconds, atol=1e-6)
+    np.testing.assert_allclose(seconds, np.arange(256) * GroundPlan.of(episode).seconds, atol=1e-6)
 
 
 def test_replay_writes_page_and_recording(run, columns, capsys):

@@ -21,7 +21,7 @@ from evolve.store.versions import present
 from tests.evolve.closed_form import tiny
 from tests.evolve.remote_form import bowl, climbing
 from tests.evolve.search.test_local_executor import jobs
-from tests.evolve.search.test_loop import Onlooker, history
+from tests.evolve.search.test_loop import SilentWatcher, history
 
 pytest.importorskip("distributed")
 ROOT = Path(__file__).parents[3]
@@ -89,7 +89,7 @@ def cluster(tmp_path_factory):
 
 def carried(path, config, executor):
     run = Run.create(path, config)
-    onlooker = Onlooker()
+    onlooker = SilentWatcher()
     with executor as it:
         evolve(run, it, onlooker)
     return Run.open(path), onlooker
@@ -211,7 +211,7 @@ def test_scheduler_that_comes_back_is_asked_again(tmp_path):
         config = tiny("search.generations=2")
         run, found = Run.create(tmp_path / "run", config), []
 
-        class Killer(Onlooker):
+        class Killer(SilentWatcher):
             def evaluated(self, candidate):
                 found.append(candidate.id)
                 if len(found) == 2:

@@ -19,7 +19,7 @@ from evolve.store.evaluation import Evaluation
 from tests.evolve.closed_form import bowl, calls, fails_for_some, slow_for_some, tiny
 
 
-class Onlooker:
+class SilentWatcher:
     """Watches; interrupts after a number of candidates."""
 
     def __init__(self, until=None):
@@ -41,7 +41,7 @@ def history(run):
 def carry(path, config, evaluate=bowl, workers=1, until=None):
     run = Run.open(path) if path.exists() else Run.create(path, config)
     run.repair()
-    onlooker = Onlooker(until)
+    onlooker = SilentWatcher(until)
     with LocalExecutor(evaluate, workers) as executor:
         evolve(run, executor, onlooker)
     return Run.open(path), onlooker
@@ -169,7 +169,7 @@ def test_steady_state_keeps_workers_busy_that_would_wait_for_a_generation(tmp_pa
             tmp_path / steady, tiny(f"search.steady_state={steady}", "search.population=16", "search.generations=20")
         )
         executor = Imagined(workers)
-        evolve(run, executor, Onlooker())
+        evolve(run, executor, SilentWatcher())
         assert finished(run)
         found[steady] = executor.utilisation
     assert found == pytest.approx(UTILISATION[workers], abs=0.005)

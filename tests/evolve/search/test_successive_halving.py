@@ -9,14 +9,14 @@ from evolve.config.assemble import assemble
 from evolve.config.run_config import ConfigError, LearningConfig, SearchConfig
 from evolve.learning.checkpoint import load_checkpoint
 from evolve.learning.fitness import evaluate
-from evolve.learning.training_stage import Stretch
+from evolve.learning.training_stage import TrainingStage
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
 from evolve.search.successive_halving import budgets, evaluations, finished, promoted, sizes, steps, stretches
 from evolve.store.directory import Run, RunError
 from tests.evolve.closed_form import tiny
 from tests.evolve.remote_form import climbing
-from tests.evolve.search.test_loop import Onlooker
+from tests.evolve.search.test_loop import SilentWatcher
 from tests.evolve.small_run import PHENOTYPE, small_config
 
 THREE = SearchConfig(population=7, generations=5, rungs=3, promoted=0.5)
@@ -56,7 +56,7 @@ def carry(path, config, monkeypatch, evaluate=climbing, until=None):
     monkeypatch.setenv("RHABDOM_TEST", str(path.parent))
     run = Run.open(path) if path.exists() else Run.create(path, config)
     run.repair()
-    onlooker = Onlooker(until)
+    onlooker = SilentWatcher(until)
     with LocalExecutor(evaluate, 2) as executor:
         evolve(run, executor, onlooker)
     return Run.open(path), onlooker
@@ -139,7 +139,7 @@ def test_a_training_in_pieces_is_one_training(tmp_path, short_episodes):
 
     def life(name, ends):
         kept = tuple(tmp_path / f"{name}-{rung}" for rung in range(len(ends)))
-        outcome = evaluate(PHENOTYPE, config, 5, tmp_path / name, stretch=Stretch(ends, kept))
+        outcome = evaluate(PHENOTYPE, config, 5, tmp_path / name, stretch=TrainingStage(ends, kept))
         return outcome, kept
 
     ends = (256, 512, 1024)
@@ -159,10 +159,12 @@ def test_the_first_rung_is_a_short_training_and_the_next_goes_on_from_it(tmp_pat
     short = replace(config, learning=replace(config.learning, total_steps=256))
     plain = evaluate(PHENOTYPE, short, 5, tmp_path / "plain")
     kept = (tmp_path / "0", tmp_path / "1")
-    rung = evaluate(PHENOTYPE, config, 5, tmp_path / "policy", stretch=Stretch((256,), kept[:1]))
+    rung = evaluate(PHENOTYPE, config, 5, tmp_path / "policy", stretch=TrainingStage((256,), kept[:1]))
     assert (rung.returns, rung.curve) == (plain.returns, plain.curve)
     told = []
-    goes_on = evaluate(PHENOTYPE, config, 5, tmp_path / "policy", lambda *s: told.append(s), Stretch((256, 512), kept))
+    goes_on = evaluate(
+        PHENOTYPE, config, 5, tmp_path / "policy", lambda *s: told.append(s), TrainingStage((256, 512), kept)
+    )
     assert told == [(512, 512)]
     assert goes_on.curve[0] == plain.curve[0]
 

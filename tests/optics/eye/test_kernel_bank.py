@@ -9,8 +9,8 @@ import pytest
 
 from optics import AccuracyError, BSplineRelief, Eye, Pupil
 from optics.eye.eye import LIGHT_FROM
-from optics.eye.kernel_bank import Sight
-from optics.eye.kernel_interpolation import Ladder, checks, hats, worst_difference
+from optics.eye.kernel_bank import KernelBank
+from optics.eye.kernel_interpolation import NodeChoice, checks, linear_weights, worst_difference
 
 S = 2
 NEAR, FAR = 0.6e-3, 5e-3
@@ -178,7 +178,7 @@ class TestLadder:
     def test_hats_sum_to_one(self):
         at = np.linspace(-1.5, 1.5, 31)
         for count in (1, 2, 3, 5):
-            np.testing.assert_allclose(hats(at, count).sum(axis=0), 1)
+            np.testing.assert_allclose(linear_weights(at, count).sum(axis=0), 1)
 
     def test_the_worst_scene_reaches_the_worst_difference(self):
         """Light only where the receptive field grew."""
@@ -193,7 +193,7 @@ class TestLadder:
 
     def test_a_quadratic_family_errs_as_predicted(self):
         """Kernels linear in t² between nodes at distance h: error h²/4 halfway."""
-        ladder = Ladder("test", lambda at: np.full((1, 1, 1), at[0] ** 2), [(3,), (5,), (9,)], 1)
+        ladder = NodeChoice("test", lambda at: np.full((1, 1, 1), at[0] ** 2), [(3,), (5,), (9,)], 1)
         assert [ladder.error((n,)) for n in (3, 5, 9)] == pytest.approx([1 / 4, 1 / 16, 1 / 64])
         assert ladder.choose(0.1).counts == (5,)
         with pytest.raises(AccuracyError, match=r"9 test nodes leave 2\.0e-02"):
@@ -220,7 +220,7 @@ def test_bad_sights(arguments, message):
 
 def test_a_sight_of_another_eye():
     sight = Eye().sight(S)
-    assert isinstance(sight, Sight)
+    assert isinstance(sight, KernelBank)
     with pytest.raises(ValueError, match="sight is for a retina of 30 x 30 cells"):
         LENS.see(np.zeros((1, 14, 18)), S, sight=sight)
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import erf
 
 import optics.numerics.interpolation
-from optics.numerics.interpolation import Table
+from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import precision
 
 TYPES = precision("float64")
@@ -22,7 +22,7 @@ def values(table):
 
 @pytest.mark.parametrize("error", [1e-3, 1e-6, 1e-9])
 def test_as_exact_as_asked(error):
-    table = Table.of(lambda x: np.asarray(step(x)), (-1.0, 1.0), 24.0, error)
+    table = Interpolant.of(lambda x: np.asarray(step(x)), (-1.0, 1.0), 24.0, error)
     assert np.abs(values(table) - step(PLACES)).max() < error
 
 
@@ -32,7 +32,7 @@ def test_sixth_order():
         samples = step(
             -1 + h * np.arange(-optics.numerics.interpolation.MARGIN, n + optics.numerics.interpolation.MARGIN)
         )
-        return np.abs(values(Table(-1.0, h, samples)) - step(PLACES)).max()
+        return np.abs(values(Interpolant(-1.0, h, samples)) - step(PLACES)).max()
 
     assert np.log2(error(101) / error(201)) == pytest.approx(6, abs=0.3)
 
@@ -40,7 +40,7 @@ def test_sixth_order():
 def test_slope():
     import drjit as dr
 
-    table = Table.of(lambda x: np.asarray(step(x)), (-1.0, 1.0), 24.0, 1e-9)
+    table = Interpolant.of(lambda x: np.asarray(step(x)), (-1.0, 1.0), 24.0, 1e-9)
     x = TYPES.Float64(PLACES)
     dr.enable_grad(x)
     dr.backward(dr.sum(table.at(x, TYPES)))

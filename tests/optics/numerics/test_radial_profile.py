@@ -7,7 +7,7 @@ import pytest
 
 import optics
 from optics import Pupil
-from optics.numerics.radial_profile import RadialLine
+from optics.numerics.radial_profile import RadialProfile
 from validation.reference import circular_aperture_on_axis, ideal_lens_field, relative_l2
 
 
@@ -23,7 +23,7 @@ def test_obliquity_alone_is_resolved(tolerance):
 
 def test_a_window_far_off_the_axis_needs_no_line():
     """From the axis to 5 mm there are 18 000 fringes, of which the window sees two."""
-    line = RadialLine.resolving(5e-3, 5e5, 2e-4, 1e-4)
+    line = RadialProfile.resolving(5e-3, 5e5, 2e-4, 1e-4)
     assert not line.pays(81)
     asked = {"centre": (5e-3, 0.0), "dx": 2e-6, "shape": (3, 3), "tolerance": 1e-3, "dtype": "float64"}
     result = optics.psf(Pupil(30e-6), [550e-9], 2e-4, **asked, method="rayleigh_sommerfeld")

@@ -20,8 +20,8 @@ def test_the_default_is_three_rgb_like_channels_from_400_to_700_nm():
     )
     catch[:, [0, -1]] /= 2
     centres = np.array([437.5, 512.5, 587.5, 662.5])
-    hats = np.stack([np.interp(nm, centres, row) for row in np.eye(4)])
-    expected = (catch @ hats.T) / catch.sum(axis=1, keepdims=True) / daylight(centres * 1e-9)
+    linear_weights = np.stack([np.interp(nm, centres, row) for row in np.eye(4)])
+    expected = (catch @ linear_weights.T) / catch.sum(axis=1, keepdims=True) / daylight(centres * 1e-9)
     assert np.array_equal(bands.weights, expected)
     assert np.array_equal(bands.wavelengths, centres * 1e-9)
     assert np.array_equal(Eye().spectral_bands.weights, expected)

@@ -15,7 +15,7 @@ from stable_baselines3.common.env_checker import check_env as sb3_check
 
 import optics
 import sim
-from sim.envs.follow_camera import Onlooker, _follow
+from sim.envs.follow_camera import FollowCamera, _follow
 from sim.envs.registration import IDS
 from sim.envs.retina_images import GAP
 from sim.eyes.eyes import EYE_HEIGHT
@@ -113,7 +113,7 @@ def test_fields_are_drawn_on_the_eyes_level_and_end_where_sight_ends():
     objects[0, :, :2] = [[3.0, 0.0], [-6.0, 0.0], [-6.0, 3.0]]
     state = dataclasses.replace(state, position=np.zeros((1, 2)), heading=np.zeros(1), objects=objects)
     world = env._batch.simulation.world
-    bare, drawn = (Onlooker(world, who).picture(state).astype(int) for who in (None, eyes))
+    bare, drawn = (FollowCamera(world, who).picture(state).astype(int) for who in (None, eyes))
     changed = np.abs(bare - drawn).max(axis=2) > 8
 
     def at(x, y):
@@ -169,8 +169,8 @@ def test_pictures_of_eyes_show_their_signals(receptors):
 
 @pytest.mark.parametrize(("mode", "rows", "columns"), [("eyes", 2, 2), ("rgb_array", 2, 1)])
 def test_batches_are_shown_as_tiles_of_the_single_worlds_pictures(mode, rows, columns, monkeypatch):
-    small = partialmethod(Onlooker.picture, size=(90, 120))  # as good as large ones, and a sixteenth of the work
-    monkeypatch.setattr(Onlooker, "picture", small)
+    small = partialmethod(FollowCamera.picture, size=(90, 120))  # as good as large ones, and a sixteenth of the work
+    monkeypatch.setattr(FollowCamera, "picture", small)
     venv = sim.make_vec_env("detection", EYES, rows * columns, 3, render_mode=mode)
     env = sim.make_env("detection", EYES, render_mode=mode)
     venv.reset()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import optics
-from sim.eyes.receptive_fields import Fields, Unseen, cells_per_receptor, low_discrepancy
-from sim.eyes.sensor import BoxSampling, BoxSensor, FieldSampling, ReceptiveFieldSensor, build_sensor, sampling_of
+from sim.eyes.receptive_fields import NoRaysError, ReceptiveFields, cells_per_receptor, low_discrepancy
+from sim.eyes.sensor import BoxSampling, BoxSensor, FieldSampling, ReceptiveFieldSensor, build_sensor, eye_sampling
 
 L = 200e-6
 
@@ -21,7 +21,7 @@ def box_sensor(eye, rays):
 
 
 def receptive_field_sensor(eye, rays, cells):
-    return FieldSampling(eye, Fields.of(eye, cells)).sensor(rays / math.prod(eye.resolution))
+    return FieldSampling(eye, ReceptiveFields.of(eye, cells)).sensor(rays / math.prod(eye.resolution))
 
 
 def focused(a=0.3):
@@ -202,7 +202,7 @@ def test_a_trial_is_part_of_the_sensor():
     """Directions and weights of some receptors, without the rest."""
     for e in (eye((4, 5)), eye((4, 5), focused())):
         some = np.array([0, 7, 19])
-        sampling = sampling_of(e)
+        sampling = eye_sampling(e)
         trial, sensor = sampling.trial(12, some), sampling.sensor(12)
         light = np.random.default_rng(0).random(len(sensor.directions))
         if isinstance(sensor, BoxSensor):
@@ -218,7 +218,7 @@ def test_a_trial_is_part_of_the_sensor():
 
 
 def test_so_few_rays_that_a_receptor_has_none_become_more():
-    sampling = sampling_of(eye((6, 6), focused()))
-    with pytest.raises(Unseen, match="rays_per_receptor"):
+    sampling = eye_sampling(eye((6, 6), focused()))
+    with pytest.raises(NoRaysError, match="rays_per_receptor"):
         sampling.trial(1 / 36, np.arange(36))
     assert 1 < len(sampling.sensor(1 / 36).directions) < 36

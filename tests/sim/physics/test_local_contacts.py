@@ -9,10 +9,10 @@ import pytest
 
 from sim.envs.simulation import Simulation
 from sim.physics import mujoco_batch
-from sim.physics.local_contacts import Vicinity
+from sim.physics.local_contacts import LocalContacts
 from sim.physics.mujoco_batch import POOLED
 from sim.physics.physics import SUBSTEPS, Physics
-from sim.worlds.agent_model import AgentAlone
+from sim.worlds.agent_model import AgentModel
 from sim.worlds.world import _add_agent, _empty_world, build_world
 
 
@@ -90,7 +90,7 @@ def test_agents_that_stray_to_what_their_models_lack_are_done_again(monkeypatch,
     without_room = Physics(world, 1)
     without_room.vicinity._slots = without_room.vicinity._slots[:0]
     if not noticed:
-        monkeypatch.setattr(Vicinity, "strayed", lambda _, position, path, few: np.zeros(len(few), bool))
+        monkeypatch.setattr(LocalContacts, "strayed", lambda _, position, path, few: np.zeros(len(few), bool))
     ours, theirs = without_room.step(state, command), Physics(world, 1, gliding=False).step(state, command)
     assert (np.abs(ours.path - theirs.path).max() < 1e-12) == noticed
     assert np.array_equal(ours.contact, theirs.contact) == noticed
@@ -127,7 +127,7 @@ def test_a_world_with_nothing_to_touch_is_glided_through():
     field, spec = build_world("detection"), _empty_world()
     _add_agent(spec, np.zeros(2), None)
     model = spec.compile()
-    world = dataclasses.replace(field, model=model, objects=(), alone=AgentAlone.of(spec, model))
+    world = dataclasses.replace(field, model=model, objects=(), alone=AgentModel.of(spec, model))
     state = begun(field, 4)
     motion = Physics(world, 1).step(state, np.full((4, 2), 3.0))
     assert not motion.contact.any()

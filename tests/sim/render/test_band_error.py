@@ -91,7 +91,7 @@ class TestLampsWithLines:
         assert few.max() > 0.05
 
     def test_samples_at_the_centres_miss_lines(self, monkeypatch):
-        monkeypatch.setattr("sim.render.batched_renderer.lit_in_bands", lambda world, eye: world)
+        monkeypatch.setattr("sim.render.batched_renderer.with_band_averaged_lights", lambda world, eye: world)
         few, many = (self.signals("batched", bands) for bands in (4, 64))
         assert (few > 1.9 * many)[many > 0.1].any()
 

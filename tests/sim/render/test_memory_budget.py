@@ -8,7 +8,7 @@ import pytest
 import optics
 import sim
 from sim.render import memory_budget
-from sim.render.memory_budget import Demand, check
+from sim.render.memory_budget import Demand, check_memory
 
 EYES = sim.Eyes(n_eyes=2, resolution=(3, 4))
 SOME = Demand(8, 64, 2, (15, 15), 1, 0)
@@ -25,13 +25,13 @@ def test_a_renderer_says_what_it_has_room_for(pupil):
 
 def test_what_it_recommends_fits(monkeypatch):
     monkeypatch.setattr(memory_budget, "available", lambda: 1e9)
-    check(SOME)
+    check_memory(SOME)
     with pytest.raises(ValueError, match="use at most") as error:
-        check(dataclasses.replace(SOME, rays_per_receptor=1e6))
+        check_memory(dataclasses.replace(SOME, rays_per_receptor=1e6))
     most = float(str(error.value).split("at most ")[1].split()[0])
-    check(dataclasses.replace(SOME, rays_per_receptor=most))
+    check_memory(dataclasses.replace(SOME, rays_per_receptor=most))
     with pytest.raises(ValueError, match="at most"):
-        check(dataclasses.replace(SOME, rays_per_receptor=1.2 * most))
+        check_memory(dataclasses.replace(SOME, rays_per_receptor=1.2 * most))
 
 
 def test_weights_behind_a_pupil_count():
@@ -41,7 +41,7 @@ def test_weights_behind_a_pupil_count():
 def test_more_than_an_array_can_number_is_refused_whatever_the_memory(monkeypatch):
     monkeypatch.setattr(memory_budget, "available", lambda: math.inf)
     with pytest.raises(ValueError, match="use at most"):
-        check(dataclasses.replace(SOME, rays_per_receptor=2**20))
+        check_memory(dataclasses.replace(SOME, rays_per_receptor=2**20))
 
 
 def test_memory_is_known():

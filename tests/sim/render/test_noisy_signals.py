@@ -6,7 +6,7 @@ import pytest
 import sim
 from sim.envs.simulation import Simulation
 from sim.render.batched_renderer import BatchedRenderer
-from sim.render.noisy_signals import Retinas
+from sim.render.noisy_signals import NoisySignals
 from sim.render.receptor_noise import FEW
 from sim.worlds.world import build_world
 
@@ -23,7 +23,7 @@ def before_and_after():
 
 
 def retinas(renderer):
-    return Retinas(renderer, np.arange(N, dtype=np.uint64))
+    return NoisySignals(renderer, np.arange(N, dtype=np.uint64))
 
 
 @pytest.mark.parametrize("worlds", [[4], [7, 2, 19], list(range(1, N, 2))], ids=["one", "a few", "many"])

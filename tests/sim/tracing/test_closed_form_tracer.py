@@ -13,7 +13,7 @@ from sim.envs.simulation import Simulation
 from sim.scene.variant import variant
 from sim.tracing.closed_form_tracer import components_of
 from sim.tracing.reflectance_atlas import bake
-from sim.tracing.static_scene import build_stage
+from sim.tracing.static_scene import build_static_scene
 from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=3, resolution=(9, 12), fov_deg=70, placement_range_deg=240, bands=5, noise_sigma=0)
@@ -136,7 +136,7 @@ def test_unknown_tracers_are_refused():
 def test_the_atlas_holds_mitsubas_reflectances():
     """At the texels' centres and between them, for a texture with colours along both axes."""
     world = furnished(2, grid=False)
-    stage = build_stage(world)
+    stage = build_static_scene(world)
     wavelengths = EYES.eye().spectral_bands.wavelengths
     with variant(stage.variant):
         geom = stage.geoms[1]
