@@ -39,12 +39,12 @@ class ExrError(ValueError):
 class View:
     """What one eye saw.
 
-    name            of the eye: "left"
-    wavelengths_nm  (band,), the radiance's
-    radiance        (band, y, x) float32, or None
-    receptors       (channel, y, x) float32, or None
-    rgb             (y, x, 3) float32 linear sRGB preview of the radiance; None: made when written
-    attributes      whatever JSON can hold: seed, time step, position, ...
+    name: of the eye: "left"
+    wavelengths_nm: (band,), the radiance's
+    radiance: (band, y, x) float32, or None
+    receptors: (channel, y, x) float32, or None
+    rgb: (y, x, 3) float32 linear sRGB preview of the radiance; None: made when written
+    attributes: whatever JSON can hold: seed, time step, position, ...
     """
 
     name: str
@@ -74,8 +74,9 @@ class View:
 def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
     """Write views to an OpenEXR file, whole or not at all; an existing file is replaced.
 
-    Raises ValueError for no views, a name twice, or attributes that JSON cannot hold; OSError where the file cannot
-    be written.
+    Raises:
+        ValueError: no views, a name twice, or attributes that JSON cannot hold.
+        OSError: the file cannot be written.
     """
     import OpenEXR
 
@@ -102,8 +103,12 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
 
 
 def read_exr(path: str | os.PathLike[str]) -> list[View]:
-    """Read what `write_exr` wrote. Raises ExrError, one line, for a truncated, damaged or foreign file, and
-    FileNotFoundError where there is none."""
+    """Read what `write_exr` wrote.
+
+    Raises:
+        ExrError: one line, for a truncated, damaged or foreign file.
+        FileNotFoundError: there is none.
+    """
     import OpenEXR
 
     if not Path(path).is_file():

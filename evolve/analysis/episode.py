@@ -30,15 +30,15 @@ class Episode:
     """One evaluation episode. Time runs along the first axis: at time t the eyes saw, then the agent acted,
     and `reward`, `reward_terms` and `contact` are what that action led to.
 
-    task, candidate_id, seed, phenotype, eye, world   which episode of whom, and where
+    task, candidate_id, seed, phenotype, eye, world: which episode of whom, and where
     position (t, 2) [m], heading (t,) [rad], objects (t, object, 3) [m]   before the action
     action (t, 2)             as Gymnasium's action in [-1, 1]
     reward (t,), reward_terms name -> (t,), contact (t,) bool   after it
-    signals                   what the receptors reported, noise included, (t, eye, channel, height, width)
-    perfect_signals           the same receptors behind a perfect lens, without noise
-    wavelengths_nm            of the bands, (band,)
-    radiance_frames           times t at which radiance was kept, (frame,)
-    radiance                  of the scene before each eye, on a finer grid, (frame, eye, band, y, x)
+    signals: what the receptors reported, noise included, (t, eye, channel, height, width)
+    perfect_signals: the same receptors behind a perfect lens, without noise
+    wavelengths_nm: of the bands, (band,)
+    radiance_frames: times t at which radiance was kept, (frame,)
+    radiance: of the scene before each eye, on a finer grid, (frame, eye, band, y, x)
     """
 
     task: str
@@ -88,7 +88,11 @@ class Episode:
 
     @classmethod
     def load(cls, path: Path | str) -> Episode:
-        """Inverse of `save`; raises ValueError, naming the file, if it holds no episode. Nothing in it is executed."""
+        """Inverse of `save`; Nothing in it is executed.
+
+        Raises:
+            ValueError: one line, naming the file, if it holds no episode.
+        """
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays = dict(file)
@@ -104,9 +108,10 @@ class Episode:
 def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_every: int = 8) -> Episode:
     """Let a candidate (default: the best) play one evaluation episode; same arguments, same episode, bit for bit.
 
-    radiance_every  actions between two pictures of the scene's radiance
+    radiance_every: actions between two pictures of the scene's radiance
 
-    Raises RunError where there is no such candidate, or its policy is missing or no policy.
+    Raises:
+        RunError: there is no such candidate, or its policy is missing or no policy.
     """
     candidate = run.candidate(candidate_id)
     try:

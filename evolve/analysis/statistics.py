@@ -46,8 +46,8 @@ PERCENTILE_RESAMPLES = 2000
 class GenerationStatistics:
     """Fitness of one generation; NaN where every candidate failed.
 
-    low, high    the population's 10 % and 90 % quantiles (linear interpolation)
-    best_so_far  best fitness up to and including this generation
+    low, high: the population's 10 % and 90 % quantiles (linear interpolation)
+    best_so_far: best fitness up to and including this generation
     """
 
     generation: int
@@ -64,7 +64,7 @@ class GenerationStatistics:
 class Trajectory:
     """One quantity of the phenotypes over the generations; all arrays (generation,).
 
-    best  its value in the best candidate found so far; NaN before there is one
+    best: its value in the best candidate found so far; NaN before there is one
     """
 
     generations: NDArray[np.int64]
@@ -210,7 +210,10 @@ def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
 def image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
     """`optics.image_quality` of the phenotype's eye in white daylight, up to its receptors' Nyquist frequency: [0, 1].
 
-    A perfect lens has contrast 1 at all of them. Raises optics.AccuracyError where the PSF cannot be computed.
+    A perfect lens has contrast 1 at all of them.
+
+    Raises:
+        optics.AccuracyError: the PSF cannot be computed.
     """
     import optics
     from optics.eye.summary import noise_of
@@ -230,11 +233,13 @@ def bootstrap_interval(
 ) -> tuple[float, float]:
     """Percentile bootstrap interval of a statistic (Efron & Tibshirani 1993, ch. 13); same seed, same interval.
 
-    statistic  called as statistic(resamples, axis=1)
+    statistic: called as statistic(resamples, axis=1)
 
-    Narrow for few samples: of six normal ones, the 95 % interval of the mean covers it in about 88 %. A single one
-    says nothing about its spread: (NaN, NaN).
-    Raises ValueError without samples, with one that is not finite, or for a level outside (0, 1).
+    Narrow for few samples: of six normal ones, the 95 % interval of the mean covers it in about 88 %. A single one says
+    nothing about its spread: (NaN, NaN).
+
+    Raises:
+        ValueError: without samples, with one that is not finite, or for a level outside (0, 1).
     """
     values = np.asarray(samples, dtype=np.float64)
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():
@@ -251,7 +256,10 @@ def bootstrap_interval(
 def psnr(signals: NDArray[np.floating], reference: NDArray[np.floating], gain: float = 1.0) -> float:
     """Peak signal-to-noise ratio of `gain` x signals against a reference [dB]; the peak is 1, white in daylight.
 
-    Infinite where they agree. Raises ValueError for different shapes.
+    Infinite where they agree.
+
+    Raises:
+        ValueError: different shapes.
     """
     if signals.shape != reference.shape:
         raise ValueError(f"signals has shape {signals.shape}: must be that of the reference, {reference.shape}")

@@ -26,10 +26,10 @@ Floats = NDArray[np.floating]
 class Vision:
     """One eye, by four measures; NaN where one has no meaning.
 
-    image_quality  area of the MTF above the noise, times throughput, in [0, 1]: `optics.image_quality`
-    contrast       MTF in white daylight at half the receptors' Nyquist frequency
-    psnr_db        of the view, brought to the brightness of a perfect lens's, against that view
-    ssim           structural similarity of the same, in [-1, 1]; NaN for retinas narrower than three receptors
+    image_quality: area of the MTF above the noise, times throughput, in [0, 1]: `optics.image_quality`
+    contrast: MTF in white daylight at half the receptors' Nyquist frequency
+    psnr_db: of the view, brought to the brightness of a perfect lens's, against that view
+    ssim: structural similarity of the same, in [-1, 1]; NaN for retinas narrower than three receptors
     """
 
     image_quality: float

@@ -24,9 +24,9 @@ ROLLOUTS = 4  # that a short life learns from; an evaluation after the second an
 class Pace:
     """What one worker achieves with one animal while all others work too.
 
-    start_s      until its first world is ready
-    steps_per_s  agent steps trained per second, learning included
-    play_s       one evaluation: all its episodes, side by side
+    start_s: until its first world is ready
+    steps_per_s: agent steps trained per second, learning included
+    play_s: one evaluation: all its episodes, side by side
     policy_bytes of its trained policy
     """
 

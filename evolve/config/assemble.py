@@ -54,9 +54,9 @@ def assemble(
 ) -> RunConfig:
     """A run's configuration from all its sources; `task` and `assignments` ("search.population=8") win.
 
-    task    may be missing where preset or file names one
-    starts  where the genes start instead, as `evolve.cli.start_from` reads it from another run
-    scale   how much of its work a preset does, where it comes in several: one of SCALES, "laptop" if not given
+    task: may be missing where preset or file names one
+    starts: where the genes start instead, as `evolve.cli.start_from` reads it from another run
+    scale: how much of its work a preset does, where it comes in several: one of SCALES, "laptop" if not given
 
     Raises:
         ConfigError: unknown key, wrong type, value out of range, contradiction, unreadable file; one line that names
@@ -138,7 +138,11 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def _read(path: Path) -> Source:
-    """A TOML file; raises ConfigError naming file and, where there is one to name, line."""
+    """A TOML file.
+
+    Raises:
+        ConfigError: one line, naming file and, where there is one to name, line.
+    """
     try:
         text = path.read_text(encoding="utf-8")
         return Source(str(path), tomllib.loads(text), text)

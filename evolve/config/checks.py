@@ -16,7 +16,7 @@ AUTO = "auto"  # in place of a number: chosen when it is needed
 class ConfigError(ValueError):
     """A setting that cannot be used; the message is one line naming key, value and what is allowed.
 
-    keys  dotted names of the settings to blame, so that whoever knows where they were set can say so
+    keys: dotted names of the settings to blame, so that whoever knows where they were set can say so
     """
 
     def __init__(self, message: str, *keys: str) -> None:
@@ -25,7 +25,11 @@ class ConfigError(ValueError):
 
 
 def check_value(cls: type, name: str, value: Any, key: str) -> Any:
-    """`value` as field `name` of `cls` takes it; raises ConfigError naming `key`, the value and what is allowed."""
+    """`value` as field `name` of `cls` takes it.
+
+    Raises:
+        ConfigError: one line, naming `key`, the value and what is allowed.
+    """
     definition = next(f for f in fields(cls) if f.name == name)
     if definition.type == "float | str":
         if value == AUTO:
@@ -37,7 +41,11 @@ def check_value(cls: type, name: str, value: Any, key: str) -> Any:
 
 
 def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
-    """`value` as a gene's "open", "low", "high", "start" or "opens_at" takes it; raises ConfigError."""
+    """`value` as a gene's "open", "low", "high", "start" or "opens_at" takes it.
+
+    Raises:
+        ConfigError: see above.
+    """
     if name == "open":
         return _checked(value, bool, None, key)
     if name == "opens_at":

@@ -18,9 +18,9 @@ Tree = dict[str, Any]
 class Source:
     """Settings from one place.
 
-    name  as messages call it: a file's path, "--set fov_deg=3", "preset quick"; "" for what needs no name
-    tree  the settings, as nested tables
-    text  the TOML they were read from; None where there is none
+    name: as messages call it: a file's path, "--set fov_deg=3", "preset quick"; "" for what needs no name
+    tree: the settings, as nested tables
+    text: the TOML they were read from; None where there is none
     """
 
     name: str

@@ -44,7 +44,7 @@ LAMBDA_MAX: Mapping[str, float] = {f"lambda_max_{i}_nm": peak for i, peak in enu
 class GeneConfig:
     """How a run uses one gene: evolved over [low, high] from `start` where open, else held at `start`.
 
-    opens_at  the first generation that varies it; until then it is held at its start
+    opens_at: the first generation that varies it; until then it is held at its start
     """
 
     open: bool

@@ -122,7 +122,11 @@ class Phenotype:
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> Phenotype:
-        """Inverse of `to_json`; raises TypeError where a field is missing or unknown."""
+        """Inverse of `to_json`.
+
+        Raises:
+            TypeError: a field is missing or unknown.
+        """
         values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in record.items()}
         return cls(**values)
 

@@ -20,12 +20,12 @@ __all__ = ["Checkpoint", "load_checkpoint", "save_checkpoint"]
 class Checkpoint:
     """Where a training stands.
 
-    steps   trained so far
-    curve   (steps, mean return of the evaluation episodes), so far
-    unit    in which rewards are measured
-    now     all that learning has changed, as it is
-    best    the same, as it was at the best evaluation
-    adam    state of the optimizer: mean, square, steps
+    steps: trained so far
+    curve: (steps, mean return of the evaluation episodes), so far
+    unit: in which rewards are measured
+    now: all that learning has changed, as it is
+    best: the same, as it was at the best evaluation
+    adam: state of the optimizer: mean, square, steps
     """
 
     steps: int

@@ -33,10 +33,10 @@ def evaluate(
 ) -> Evaluation:
     """Train one candidate, write its policy, and measure its fitness; same arguments, same outcome on one machine.
 
-    seed         of the policy's first weights, of all worlds and of all chance in learning
-    policy_path  where the trained policy is written (safetensors); nothing is written if learning diverged
-    progress     told (steps trained, steps planned) after every rollout
-    stretch      how far to train, and from where (`evolve.search.successive_halving`); None: a whole training
+    seed: of the policy's first weights, of all worlds and of all chance in learning
+    policy_path: where the trained policy is written (safetensors); nothing is written if learning diverged
+    progress: told (steps trained, steps planned) after every rollout
+    stretch: how far to train, and from where (`evolve.search.successive_halving`); None: a whole training
 
     A training that diverges is a failed Evaluation, not an exception.
     """

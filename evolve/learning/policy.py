@@ -249,7 +249,9 @@ def load_policy(path: Path | str) -> EyePolicy:
 
     Sets torch to one thread, as learning does: more sum in another order, and an episode must repeat.
 
-    Raises ValueError, naming the file, if it is no policy written by `save_policy` (a pickle, say, or cut short).
+    Raises:
+        ValueError: one line, naming the file, if it is no policy written by `save_policy` (a pickle, say, or cut
+            short).
     """
     try:
         with safetensors.safe_open(str(path), framework="pt") as file:
@@ -282,7 +284,11 @@ def learnt(policy: EyePolicy) -> dict[str, Tensor]:
 
 @torch.no_grad()
 def set_learnt(policy: EyePolicy, tensors: Mapping[str, Tensor]) -> None:
-    """Inverse of `learnt`. Raises ValueError for a name or a shape that the policy has not."""
+    """Inverse of `learnt`.
+
+    Raises:
+        ValueError: a name or a shape that the policy has not.
+    """
     own = learnt(policy)
     if tensors.keys() != own.keys():
         raise ValueError(f"tensors missing or unknown: {sorted(tensors.keys() ^ own.keys())}")

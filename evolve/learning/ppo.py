@@ -33,10 +33,10 @@ Progress = Callable[[int, int], None]  # (steps trained, steps planned)
 class Training:
     """What became of a training.
 
-    policy  as it was at the best evaluation
-    steps   environment steps taken, in whole rollouts
-    curve   (steps, mean return of the evaluation episodes), every `eval_interval` steps
-    end     as it stands at its end, for a training that goes on from there
+    policy: as it was at the best evaluation
+    steps: environment steps taken, in whole rollouts
+    curve: (steps, mean return of the evaluation episodes), every `eval_interval` steps
+    end: as it stands at its end, for a training that goes on from there
     """
 
     policy: EyePolicy
@@ -211,7 +211,8 @@ def train(
     after `patience` such evaluations without a better mean return, or after `total_steps`. The policy returned
     is the one with the best mean return (the earliest of them).
 
-    Raises TrainingDiverged where rewards, loss, weights or actions stop being finite.
+    Raises:
+        TrainingDiverged: rewards, loss, weights or actions stop being finite.
     """
     model = learner(worlds, neurons, config, seed, layers)
     report = _Report(progress, config.total_steps) if progress else None

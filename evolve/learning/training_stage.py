@@ -12,8 +12,8 @@ __all__ = ["TrainingStage"]
 class TrainingStage:
     """A training from its beginning to one of its rungs.
 
-    budgets      steps trained at the end of this rung, and of each below it, ascending
-    checkpoints  where the training is kept as it stands at each of them; those that are missing are trained again
+    budgets: steps trained at the end of this rung, and of each below it, ascending
+    checkpoints: where the training is kept as it stands at each of them; those that are missing are trained again
     """
 
     budgets: tuple[int, ...]

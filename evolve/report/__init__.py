@@ -22,7 +22,9 @@ def write(run: Run, episode: Episode | None = None) -> Path:
     """Write `report.html` of a run, whole or not at all, with an episode of the best candidate (default: played now).
 
     The same run gives the same bytes with the same versions of the libraries.
-    Raises ValueError where the best candidate's policy is missing or damaged.
+
+    Raises:
+        ValueError: the best candidate's policy is missing or damaged.
     """
     from evolve.analysis.episode import record
     from evolve.report.page import render

@@ -17,7 +17,8 @@ __all__ = ["export_episode", "main"]
 def main(run: Run, candidate_id: int | None = None, seed: int = 0) -> list[Path]:
     """Record an episode (default: of the best candidate) and write it under the run's `exr/`; returns the files.
 
-    Raises RunError where there is no such candidate, or no policy of it.
+    Raises:
+        RunError: there is no such candidate, or no policy of it.
     """
     return export_episode(record(run, candidate_id, seed), run.path / "exr")
 

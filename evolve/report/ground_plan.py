@@ -19,13 +19,13 @@ __all__ = ["GroundPlan"]
 class GroundPlan:
     """Ground plan [m] and eyes.
 
-    walls          (n, 4): centre x, y and half sides along x, y
-    bounds         x_min, y_min, x_max, y_max of all walls
-    goal_region    the same of navigation's goal, or None
-    object_names, object_radius  (object,)
-    body_radius    of the agent
-    seconds        that one action lasts
-    gain           1/a²: what the pupil's area takes from the light
+    walls: (n, 4): centre x, y and half sides along x, y
+    bounds: x_min, y_min, x_max, y_max of all walls
+    goal_region: the same of navigation's goal, or None
+    object_names, object_radius: (object,)
+    body_radius: of the agent
+    seconds: that one action lasts
+    gain: 1/a²: what the pupil's area takes from the light
     """
 
     eyes: sim.Eyes

@@ -16,8 +16,11 @@ def main(run: Run, candidate_id: int | None = None, seed: int = 0, rrd: bool = F
     """Record an episode (default: of the best candidate), print how it went, and write a page that plays it; with `rrd`
     a recording for rerun as well.
 
-    Returns the paths, in the run directory. Raises RunError where there is no such candidate, or no policy of it, and
-    ConfigError where rerun is asked for, but not installed.
+    Returns the paths, in the run directory.
+
+    Raises:
+        RunError: there is no such candidate, or no policy of it.
+        ConfigError: rerun is asked for, but not installed.
     """
     if rrd:
         require_rerun()

@@ -38,9 +38,9 @@ class _Trial:
 class DaskExecutor:
     """Workers of a Dask scheduler, one candidate each at a time; a context manager that takes back what it asked for.
 
-    scheduler   address, "tcp://host:8786"
-    function    "module:name" of what evaluates, with the arguments of `evolve.learning.fitness.evaluate`
-    patience_s  how long to wait for workers, and for a scheduler that is gone to come back
+    scheduler: address, "tcp://host:8786"
+    function: "module:name" of what evaluates, with the arguments of `evolve.learning.fitness.evaluate`
+    patience_s: how long to wait for workers, and for a scheduler that is gone to come back
 
     A worker that dies takes nobody with it: its candidate is evaluated again, `ATTEMPTS` times in all. When the
     scheduler comes back, whatever was under way is asked for again.

@@ -44,12 +44,12 @@ class _Unwanted(Exception):
 class Order:
     """A job as text.
 
-    function  "module:name" of what evaluates it
-    counter   name of the scheduler's variable that counts its attempts
-    topic     under which it tells its progress
-    budgets   on the rungs of a ladder up to where it trains; () without one
-    begun     (rung, checkpoint): where its training stands, if it has begun
-    software  that the sender runs
+    function: "module:name" of what evaluates it
+    counter: name of the scheduler's variable that counts its attempts
+    topic: under which it tells its progress
+    budgets: on the rungs of a ladder up to where it trains; () without one
+    begun: (rung, checkpoint): where its training stands, if it has begun
+    software: that the sender runs
     """
 
     function: str

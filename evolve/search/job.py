@@ -25,7 +25,7 @@ class ExecutorError(RuntimeError):
 class Job:
     """One candidate to evaluate: arguments of `evolve.learning.fitness.evaluate`, under the candidate's id.
 
-    stretch  how far it is trained, on a ladder; None: to the end
+    stretch: how far it is trained, on a ladder; None: to the end
     """
 
     id: int

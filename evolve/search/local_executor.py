@@ -38,8 +38,8 @@ class _Worker:
 class LocalExecutor:
     """Worker processes that call `evaluate(*job.arguments, progress=...)`; a context manager that ends them.
 
-    count     workers; 0: one per core that this process may use
-    prepare   called once in each new worker; an exception there ends the run, because no candidate could be evaluated
+    count: workers; 0: one per core that this process may use
+    prepare: called once in each new worker; an exception there ends the run, because no candidate could be evaluated
 
     An exception in `evaluate` is that candidate's failure, but an OSError, which ends the run. A worker that dies takes
     nobody with it: it is replaced and its candidate evaluated again, `ATTEMPTS` times in all.

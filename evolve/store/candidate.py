@@ -20,8 +20,8 @@ __all__ = ["Candidate"]
 class Candidate:
     """A genome, the animal it became, and how that one fared; see `Evaluation` for the fields it has in common.
 
-    parents  ids of the candidates from which the search made it; () where it drew from none
-    rung     of the ladder, to which it was trained; steps and seconds are from the beginning
+    parents: ids of the candidates from which the search made it; () where it drew from none
+    rung: of the ladder, to which it was trained; steps and seconds are from the beginning
     """
 
     id: int
@@ -68,7 +68,11 @@ class Candidate:
 
     @classmethod
     def from_line(cls, line: str) -> Candidate:
-        """Inverse of `to_line`; raises ValueError that says what is wrong with the line."""
+        """Inverse of `to_line`.
+
+        Raises:
+            ValueError: says what is wrong with the line.
+        """
         record = json.loads(line)
         if isinstance(record, dict):
             record = {"parents": [], "rung": 0, **record}  # not written by the first runs

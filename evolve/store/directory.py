@@ -90,7 +90,11 @@ class Run:
         return run
 
     def lock(self) -> RunLock:
-        """The right to write to this run, as a context manager; raises LockedError if another process has it."""
+        """The right to write to this run, as a context manager.
+
+        Raises:
+            LockedError: another process has it.
+        """
         return RunLock(self.path)
 
     def repair(self) -> None:

@@ -12,11 +12,11 @@ __all__ = ["Evaluation"]
 class Evaluation:
     """Outcome of one candidate's learning and evaluation episodes.
 
-    fitness  mean of `returns`; -inf where the evaluation failed
-    steps    agent steps trained
-    seconds  wall time
-    curve    (training steps, mean evaluation return), ...
-    failure  one line that says what went wrong; None if nothing did
+    fitness: mean of `returns`; -inf where the evaluation failed
+    steps: agent steps trained
+    seconds: wall time
+    curve: (training steps, mean evaluation return), ...
+    failure: one line that says what went wrong; None if nothing did
     """
 
     fitness: float

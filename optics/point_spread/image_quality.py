@@ -48,7 +48,10 @@ class MTF:
     def profile(self, frequencies: np.ndarray) -> Any:
         """Mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency); 0 beyond the grid.
 
-        Interpolated linearly between the grid's frequencies. Raises ValueError for the MTF of a single sample.
+        Interpolated linearly between the grid's frequencies.
+
+        Raises:
+            ValueError: the MTF of a single sample.
         """
         import drjit as dr
 

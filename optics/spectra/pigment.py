@@ -85,8 +85,8 @@ def pigment_absorptance(wavelengths: np.ndarray, lambda_max: float, chromophore:
 class Pigment:
     """A receptor type that is what its visual pigment makes it.
 
-    lambda_max_nm  the α band's peak [nm], in [330, 700]
-    chromophore    "A1" (retinal) or "A2" (3,4-didehydroretinal, of freshwater fish and amphibians)
+    lambda_max_nm: the α band's peak [nm], in [330, 700]
+    chromophore: "A1" (retinal) or "A2" (3,4-didehydroretinal, of freshwater fish and amphibians)
 
     Raises:
         ValueError: names argument, value and valid range.

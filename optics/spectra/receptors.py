@@ -24,13 +24,13 @@ STEP_NM = 10  # the range's ends are multiples of it
 class Receptors:
     """The receptor types of an eye, one channel of signals each, or a mosaic of them.
 
-    types     of one or more kinds each: a `Pigment`; a number, the λmax [nm] of an A1 pigment; or a `Spectrum`, a
-              quantal sensitivity as measured. Their order is that of the channels.
-    mosaic    None: every receptor has all types, as pixels have: signals are (type, h, w). Or rows of indices into
-              `types`, ((0, 1), (1, 2)), repeated over the retina from its top left corner: every receptor has one type,
-              as in a real retina, and signals are (1, h, w).
-    range_nm  (low, high) [nm], whole numbers within 300-780: light taken into account, divided into bands. None: as
-              wide as it must be to leave out less than 1e-3 of any type's catch from white in daylight at either end.
+    types: of one or more kinds each: a `Pigment`; a number, the λmax [nm] of an A1 pigment; or a `Spectrum`, a quantal
+        sensitivity as measured. Their order is that of the channels.
+    mosaic: None: every receptor has all types, as pixels have: signals are (type, h, w). Or rows of indices into
+        `types`, ((0, 1), (1, 2)), repeated over the retina from its top left corner: every receptor has one type, as in
+        a real retina, and signals are (1, h, w).
+    range_nm: (low, high) [nm], whole numbers within 300-780: light taken into account, divided into bands. None: as
+        wide as it must be to leave out less than 1e-3 of any type's catch from white in daylight at either end.
 
     Raises:
         ValueError: names argument, value and what is allowed.

@@ -18,7 +18,8 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     task, eyes, memory, mode, rays_per_receptor, world_seed, spectra, render_mode as in `sim.make_vec_env`
 
-    Raises ValueError for a bad argument.
+    Raises:
+        ValueError: a bad argument.
     """
 
     metadata = {"render_modes": [*RENDER_MODES], "render_fps": 5}  # noqa: RUF012 (Gymnasium's own declaration)
@@ -49,7 +50,11 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         return _only(observation), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info[0]
 
     def render(self) -> np.ndarray | None:
-        """A picture (y, x, 3) uint8 as `render_mode` asks. Raises RuntimeError before the first reset."""
+        """A picture (y, x, 3) uint8 as `render_mode` asks.
+
+        Raises:
+            RuntimeError: before the first reset.
+        """
         return None if self.render_mode is None else self._batch.get_images()[0]
 
     def close(self) -> None:

@@ -25,7 +25,7 @@ LINE = 1.2  # [pixels] width
 class HorizontalSection:
     """The part of a picture in which the level of the eyes is seen, nothing in front of it.
 
-    seen   (y, x) bool · points: (y, x, 2) [m] in the world · pixel: size of a pixel there [m], (y, x)
+    seen: (y, x) bool · points: (y, x, 2) [m] in the world · pixel: size of a pixel there [m], (y, x)
     """
 
     seen: np.ndarray

@@ -25,7 +25,9 @@ RENDER_MODES = ("rgb_array", "eyes")
 
 
 def check_render_mode(render_mode: str | None) -> None:
-    """Raises ValueError for other render modes than RENDER_MODES and None."""
+    """Raises:
+    ValueError: other render modes than RENDER_MODES and None.
+    """
     if render_mode not in (None, *RENDER_MODES):
         modes = ", ".join(map(repr, RENDER_MODES))
         raise ValueError(f"render_mode = {render_mode!r}, must be one of {modes} or None")
@@ -34,7 +36,7 @@ def check_render_mode(render_mode: str | None) -> None:
 class FollowCamera:
     """A camera that follows the agent; it holds its own mirror of the world.
 
-    eyes  whose fields of view are drawn; None: no one's
+    eyes: whose fields of view are drawn; None: no one's
     """
 
     def __init__(self, world: World, eyes: Eyes | None = None) -> None:

@@ -26,10 +26,10 @@ NOWHERE = np.empty(0, int)
 class Moved:
     """Worlds that have moved by one action.
 
-    actions  as they were taken, (n, 2): within [-1, 1], and STANDING where they were not finite
-    state    after it; where the physics broke down, the last good one
-    motion   of the agents
-    failed   worlds that could not go on, most often none: what the action or the physics was
+    actions: as they were taken, (n, 2): within [-1, 1], and STANDING where they were not finite
+    state: after it; where the physics broke down, the last good one
+    motion: of the agents
+    failed: worlds that could not go on, most often none: what the action or the physics was
     """
 
     actions: np.ndarray
@@ -49,11 +49,11 @@ class Moved:
 class Step:
     """One action of all worlds, before any world is started anew.
 
-    state         after the action; where `failure` is set, the last good one
-    terms         of the reward, in the order of TERMS (term, n)
-    terminated, truncated, contact, success  (n,) bool; success: the goal was reached in this episode
-    respawned     worlds in which an object was put elsewhere
-    failure       world that could not go on -> why: "unstable physics" or "action is not finite"
+    state: after the action; where `failure` is set, the last good one
+    terms: of the reward, in the order of TERMS (term, n)
+    terminated, truncated, contact, success: (n,) bool; success: the goal was reached in this episode
+    respawned: worlds in which an object was put elsewhere
+    failure: world that could not go on -> why: "unstable physics" or "action is not finite"
     """
 
     state: WorldState
@@ -83,14 +83,15 @@ class Step:
 class Simulation:
     """`n` independent worlds of one layout.
 
-    world    geometry and places to start from
-    n        number of worlds
-    seed     of all random streams; None draws one
-    mode     "training": reaching an object ends the episode; "evaluation": the object respawns, and rewards are
-             weighted as fitness
-    threads  of the physics
+    world: geometry and places to start from
+    n: number of worlds
+    seed: of all random streams; None draws one
+    mode: "training": reaching an object ends the episode; "evaluation": the object respawns, and rewards are weighted
+        as fitness
+    threads: of the physics
 
-    Raises ValueError for an unknown mode or less than one world.
+    Raises:
+        ValueError: an unknown mode or less than one world.
     """
 
     def __init__(self, world: World, n: int, seed: int | None, mode: str, threads: int) -> None:
@@ -107,7 +108,11 @@ class Simulation:
 
     @property
     def state(self) -> WorldState:
-        """All worlds as they are now. Raises RuntimeError before the first reset."""
+        """All worlds as they are now.
+
+        Raises:
+            RuntimeError: before the first reset.
+        """
         if self._state is None:
             raise RuntimeError("the worlds have not begun: call reset first")
         return self._state

@@ -126,8 +126,11 @@ class EyesVecEnv(VecEnv):
     # --- pictures
 
     def get_images(self) -> list[np.ndarray]:
-        """A picture of every world, (y, x, 3) uint8, as `render_mode` asks; none without. Raises RuntimeError before
-        the first reset."""
+        """A picture of every world, (y, x, 3) uint8, as `render_mode` asks; none without.
+
+        Raises:
+            RuntimeError: before the first reset.
+        """
         state = self.state
         if self.render_mode == "eyes":
             return [side_by_side(frame, self.renderer.eye) for frame in self._memory.newest]
@@ -218,21 +221,23 @@ def make_vec_env(
 ) -> EyesVecEnv:
     """A batched environment of one task.
 
-    task               "detection", "foraging", "navigation" or "tracking"
-    eyes               of every agent; default Eyes()
-    n_envs             number of worlds
-    seed               of episodes and noise; None draws one
-    memory             frames in an observation
-    mode               "training", or "evaluation" (objects respawn; rewards weighted as fitness)
-    rays_per_receptor  rays traced for each receptor, in direct light; "auto": as few as its noise allows, and light
-                       that was reflected twice where it counts, see `sim.BatchedRenderer`; or a whole Fidelity
-    world_seed, mazes  of the layout that all worlds share: navigation's mazes, and how many
-    spectra            of materials and lights, by name, in the place of their colours: see `sim.build_world`
-    render_mode        "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye
-                       reports, side by side
+    task: "detection", "foraging", "navigation" or "tracking"
+    eyes: of every agent; default Eyes()
+    n_envs: number of worlds
+    seed: of episodes and noise; None draws one
+    memory: frames in an observation
+    mode: "training", or "evaluation" (objects respawn; rewards weighted as fitness)
+    rays_per_receptor: rays traced for each receptor, in direct light; "auto": as few as its noise allows, and light
+        that was reflected twice where it counts, see `sim.BatchedRenderer`; or a whole Fidelity
+    world_seed, mazes: of the layout that all worlds share: navigation's mazes, and how many
+    spectra: of materials and lights, by name, in the place of their colours: see `sim.build_world`
+    render_mode: "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye reports,
+        side by side
 
     Physics takes as many threads as Dr.Jit has: limit both with drjit.set_thread_count.
-    Raises ValueError for a bad argument.
+
+    Raises:
+        ValueError: a bad argument.
     """
     eyes = Eyes() if eyes is None else eyes
     if not isinstance(eyes, Eyes):

@@ -14,7 +14,7 @@ class DepthLayers:
     """Distances for which an eye has a kernel, evenly spaced in vergence 1/z, in which defocus is linear. Light from
     between two of them is shared linearly, light from beyond the ends goes to the ends.
 
-    farthest, nearest  [m], farthest may be infinite · count: with a single layer it is at the mean vergence
+    farthest, nearest: [m], farthest may be infinite · count: with a single layer it is at the mean vergence
     """
 
     farthest: float = math.inf

@@ -27,21 +27,22 @@ EYE_HEIGHT = BODY_RADIUS  # [m] above the floor: the equator of a sphere that st
 class Eyes:
     """The eyes of one agent, all alike but for their azimuth.
 
-    n_eyes               number of eyes, >= 1
-    resolution           receptors of one eye (height, width), each >= 1
-    fov_deg              horizontal field of view of one eye [deg], in (0, 180)
-    placement_range_deg  azimuth from the leftmost to the rightmost eye [deg], in [0, 360]
-    optics               pupil of every eye; None is the perfect lens
-    sensor_width         width of the retina [m]
-    noise_sigma          standard deviation of a receptor's noise, in units of its signal
-    bands                spectral bands
-    receptors            types of receptor: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish",
-                         wavelengths of visual pigments' peaks [nm] such as (350, 440, 530), or `optics.Receptors`,
-                         which can be a mosaic; the field then holds optics.Receptors
-    photon_budget        optics.PhotonBudget: how much light there is and how long receptors gather it; its shot noise
-                         comes beside `noise_sigma`. None: light is no object
+    n_eyes: number of eyes, >= 1
+    resolution: receptors of one eye (height, width), each >= 1
+    fov_deg: horizontal field of view of one eye [deg], in (0, 180)
+    placement_range_deg: azimuth from the leftmost to the rightmost eye [deg], in [0, 360]
+    optics: pupil of every eye; None is the perfect lens
+    sensor_width: width of the retina [m]
+    noise_sigma: standard deviation of a receptor's noise, in units of its signal
+    bands: spectral bands
+    receptors: types of receptor: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", wavelengths of
+        visual pigments' peaks [nm] such as (350, 440, 530), or `optics.Receptors`, which can be a mosaic; the field
+        then holds optics.Receptors
+    photon_budget: optics.PhotonBudget: how much light there is and how long receptors gather it; its shot noise comes
+        beside `noise_sigma`. None: light is no object
 
-    Raises ValueError for values outside these ranges and for unknown receptors, with the nearest name.
+    Raises:
+        ValueError: values outside these ranges and for unknown receptors, with the nearest name.
     """
 
     n_eyes: int = 2

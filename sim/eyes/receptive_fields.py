@@ -22,8 +22,8 @@ class NoRaysError(ValueError):
 
 @dataclass(frozen=True)
 class Draw:
-    """points  on the tangent plane [receptor pitches], x right, y down, (ray, 2), in order of y
-    rows, columns  of the cells that hold them, counted from the first cell of the mixture, (ray,)
+    """points: on the tangent plane [receptor pitches], x right, y down, (ray, 2), in order of y
+    rows, columns: of the cells that hold them, counted from the first cell of the mixture, (ray,)
     """
 
     points: np.ndarray
@@ -36,10 +36,11 @@ class Draw:
 
 @dataclass(frozen=True)
 class ReceptiveFields:
-    """field       power per cell of one receptor's field: the turned PSF convolved with its square; (plane, y, x), a
-                plane for every depth layer's every band
-    density     probability per cell of the mean over all receptors and planes, each with the same weight, (Y, X)
-    resolution  receptors (height, width) · cells: along a receptor's side
+    """field: power per cell of one receptor's field: the turned PSF convolved with its square; (plane, y, x), a plane
+    for
+        every depth layer's every band
+    density: probability per cell of the mean over all receptors and planes, each with the same weight, (Y, X)
+    resolution: receptors (height, width) · cells: along a receptor's side
     """
 
     field: np.ndarray
@@ -49,7 +50,11 @@ class ReceptiveFields:
 
     @classmethod
     def of(cls, eye: optics.Eye, cells: int, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
-        """Those of an eye. Raises optics.AccuracyError, see `optics.Eye.kernel`."""
+        """Those of an eye.
+
+        Raises:
+            optics.AccuracyError: see `optics.Eye.kernel`.
+        """
         # (K ⊗ L)(r) = Σ_v K(r - v) L(v): as weights around the receptor, the convolution's kernel is turned about.
         kernels = [eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances]
         field = _averaged(_as_wide(kernels), cells)
@@ -105,8 +110,11 @@ def cells_per_receptor(resolution: tuple[int, int]) -> int:
 
 
 def fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
-    """The fields of an eye on cells as fine as its PSF can be had on. Raises optics.AccuracyError for a pupil whose
-    light spreads too far for the coarsest."""
+    """The fields of an eye on cells as fine as its PSF can be had on.
+
+    Raises:
+        optics.AccuracyError: a pupil whose light spreads too far for the coarsest.
+    """
     cells = cells_per_receptor(eye.resolution)
     while True:
         try:

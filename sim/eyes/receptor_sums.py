@@ -25,7 +25,7 @@ ONE_THREAD = 2**18
 class RowProduct:
     """signal[view, channel, i, j] = sum over rays of radiance[view, ray] W[channel, receptor (i, j), ray].
 
-    stretches  per row of receptors: the first ray, and weights (ray, channel * width) float32
+    stretches: per row of receptors: the first ray, and weights (ray, channel * width) float32
     """
 
     stretches: tuple[tuple[int, np.ndarray], ...]

@@ -26,11 +26,11 @@ NEGLIGIBLE = 0.1
 class BoxSensor:
     """Perfect lens: a receptor's signal is the mean over the square it covers.
 
-    directions         unit vectors in the eye's frame (x right, y up, z optical axis), (ray, 3) float32;
-                       ray = receptor * rays_per_receptor + sample
-    places             of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
-    rays_per_receptor  samples of one receptor; the renderer sums them in its kernel
-    depth              nothing is blurred, whatever its distance
+    directions: unit vectors in the eye's frame (x right, y up, z optical axis), (ray, 3) float32; ray = receptor *
+        rays_per_receptor + sample
+    places: of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
+    rays_per_receptor: samples of one receptor; the renderer sums them in its kernel
+    depth: nothing is blurred, whatever its distance
     """
 
     directions: np.ndarray
@@ -62,11 +62,11 @@ class ReceptiveFieldSensor:
     the tolerance asked of the PSF, and change no signal of a scene up to white in full daylight by more than
     NEGLIGIBLE of the receptors' noise.
 
-    directions  unit vectors in the eye's frame, (ray, 3) float32
-    places      of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
-    weights     per plane, a band of a depth layer, sparse (receptor, ray)
-    resolution  receptors (height, width)
-    depth       the layers
+    directions: unit vectors in the eye's frame, (ray, 3) float32
+    places: of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
+    weights: per plane, a band of a depth layer, sparse (receptor, ray)
+    resolution: receptors (height, width)
+    depth: the layers
     """
 
     directions: np.ndarray
@@ -197,12 +197,20 @@ EyeSampling = BoxSampling | FieldSampling
 
 
 def eye_sampling(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> EyeSampling:
-    """How an eye is sampled. Raises optics.AccuracyError for a pupil whose light spreads too far to be computed."""
+    """How an eye is sampled.
+
+    Raises:
+        optics.AccuracyError: a pupil whose light spreads too far to be computed.
+    """
     return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, fields_of(eye, depth), depth)
 
 
 def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers = ONE_PSF) -> Sensor:
-    """The sensor of an eye. Raises optics.AccuracyError for a pupil whose light spreads too far to be computed."""
+    """The sensor of an eye.
+
+    Raises:
+        optics.AccuracyError: a pupil whose light spreads too far to be computed.
+    """
     return eye_sampling(eye, depth).sensor(rays_per_receptor)
 
 

@@ -26,12 +26,12 @@ FreeSteps = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.
 class FreeMotion:
     """One action of an agent that touches nothing.
 
-    response       of path [m] and velocity [m/s] after each substep to a speed of 1 m/s and a command of 1, per
-                   axis: (path | velocity, substep, speed | command, 2)
-    obstacles      ids of the geoms that could be touched (n,)
-    lower, upper   upright boxes around them (n, 2) [m]
-    reach          how near the agent's centre may come to them and still touch nothing [m]
-    strongest      command beyond which the servo saturates
+    response: of path [m] and velocity [m/s] after each substep to a speed of 1 m/s and a command of 1, per axis: (path
+        | velocity, substep, speed | command, 2)
+    obstacles: ids of the geoms that could be touched (n,)
+    lower, upper: upright boxes around them (n, 2) [m]
+    reach: how near the agent's centre may come to them and still touch nothing [m]
+    strongest: command beyond which the servo saturates
     """
 
     response: np.ndarray

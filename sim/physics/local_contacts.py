@@ -26,10 +26,10 @@ _SHAPES = [
 class LocalContacts:
     """Models of the agent among some of a world's geoms, made when first asked for, and their steps.
 
-    whole    the world's model, as it is stepped
-    alone    its agent by itself (`sim.worlds.agent_model`)
-    glide    knows what the agent can touch, and from where
-    threads  of the steps, see `sim.physics.mujoco_batch`
+    whole: the world's model, as it is stepped
+    alone: its agent by itself (`sim.worlds.agent_model`)
+    glide: knows what the agent can touch, and from where
+    threads: of the steps, see `sim.physics.mujoco_batch`
     """
 
     def __init__(self, whole: mujoco.MjModel, alone: mujoco.MjModel, glide: FreeMotion, threads: int) -> None:

@@ -20,8 +20,8 @@ POOLED = 128
 class BatchedStep:
     """Open-loop steps of many worlds whose models differ by numbers alone.
 
-    like     a model of their sizes
-    threads  that POOLED worlds or more are shared among; fewer are stepped on the calling thread
+    like: a model of their sizes
+    threads: that POOLED worlds or more are shared among; fewer are stepped on the calling thread
     """
 
     def __init__(self, like: mujoco.MjModel, threads: int) -> None:

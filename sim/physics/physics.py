@@ -29,9 +29,9 @@ FEW_GEOMS = 200  # so few are sooner gone through one by one than by MuJoCo's tr
 class Motion:
     """One action's motion of the agents.
 
-    path      at the end of each substep [m], (n, substep, 2) · velocity at the last [m/s], (n, 2)
-    contact   touched anything in any substep, (n,) bool
-    unstable  the simulation broke down: path and velocity are the last good ones, (n,) bool
+    path: at the end of each substep [m], (n, substep, 2) · velocity at the last [m/s], (n, 2)
+    contact: touched anything in any substep, (n,) bool
+    unstable: the simulation broke down: path and velocity are the last good ones, (n,) bool
     """
 
     path: np.ndarray
@@ -60,12 +60,12 @@ class Agents:
 class Physics:
     """Batched physics of one world's model.
 
-    threads  of MuJoCo's batched step, see `sim.physics.mujoco_batch`
-    gliding  whether agents out of reach of everything move in closed form, and those near something among that alone
-             (`.glide`, `.vicinity`: how, None where they cannot); otherwise everything is MuJoCo's, in the whole world
+    threads: of MuJoCo's batched step, see `sim.physics.mujoco_batch`
+    gliding: whether agents out of reach of everything move in closed form, and those near something among that alone
+        (`.glide`, `.vicinity`: how, None where they cannot); otherwise everything is MuJoCo's, in the whole world
 
-    Raises ValueError for a model without the agent's joints, actuators and touch sensor, and for objects that
-    could collide.
+    Raises:
+        ValueError: a model without the agent's joints, actuators and touch sensor, and for objects that could collide.
     """
 
     def __init__(self, world: World, threads: int, gliding: bool = True) -> None:

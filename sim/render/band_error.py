@@ -57,7 +57,8 @@ def band_error(reflectances: Iterable[Spectrum], receptors: Any, bands: int) -> 
     """What so many bands make of these reflectances in daylight, against 64: the worst difference over reflectances
     and types of receptor, white being 1. Blur that differs from band to band is not in it. 0 without reflectances.
 
-    Raises ValueError for receptors that `optics.receptors_of` does not know, or bands out of its range.
+    Raises:
+        ValueError: receptors that `optics.receptors_of` does not know, or bands out of its range.
     """
     few, many = (SpectralBands.uniform(n, receptors_of(receptors)) for n in (bands, FINE_BANDS))
     return max((float(np.abs(_signals(few, one) - _signals(many, one)).max()) for one in reflectances), default=0.0)

@@ -36,18 +36,19 @@ ROW = 16  # floats: rows of the pose buffer start on 64 bytes
 class BatchedRenderer:
     """Sees `n_envs` worlds with the same eyes.
 
-    world              geometry, materials and lights; shared by all worlds
-    eyes               of every agent
-    n_envs             number of worlds in a state
-    rays_per_receptor  samples of each receptor (rounded, perfect lens), or per receptor on average (behind a
-                       pupil); "auto": as few as the receptors' noise allows in this world, see `sim.choose_fidelity`;
-                       or a whole Fidelity. The one in use is in `.fidelity`
-    brightest          signal of a white surface that faced all lights at once
-    tracer             "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto";
-                       the one in use is in `.tracer.name`, why in `.tracer.why`
+    world: geometry, materials and lights; shared by all worlds
+    eyes: of every agent
+    n_envs: number of worlds in a state
+    rays_per_receptor: samples of each receptor (rounded, perfect lens), or per receptor on average (behind a pupil);
+        "auto": as few as the receptors' noise allows in this world, see `sim.choose_fidelity`; or a whole Fidelity. The
+        one in use is in `.fidelity`
+    brightest: signal of a white surface that faced all lights at once
+    tracer: "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto"; the one in
+        use is in `.tracer.name`, why in `.tracer.why`
 
-    Raises ValueError for less than one world or ray, for more rays than there is memory for, for lights other than
-    directional ones, and for a world that has no closed form where that is asked for.
+    Raises:
+        ValueError: less than one world or ray, for more rays than there is memory for, for lights other than
+            directional ones, and for a world that has no closed form where that is asked for.
     """
 
     def __init__(

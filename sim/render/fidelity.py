@@ -52,14 +52,15 @@ class Level:
 class Fidelity:
     """How finely a world is rendered for given eyes; printed, it is a table.
 
-    rays_per_receptor  on average; behind a pupil it may be below 1, since all receptors share all rays
-    bands              spectral bands
-    depth              distances for which the eye has a PSF
-    light              what of it is followed: "direct", or "bounce", which adds light that is reflected twice
-    tolerance          error allowed to a receptor's signal (root mean square); None where nothing was chosen
-    levels             what was chosen for each stage, and why
+    rays_per_receptor: on average; behind a pupil it may be below 1, since all receptors share all rays
+    bands: spectral bands
+    depth: distances for which the eye has a PSF
+    light: what of it is followed: "direct", or "bounce", which adds light that is reflected twice
+    tolerance: error allowed to a receptor's signal (root mean square); None where nothing was chosen
+    levels: what was chosen for each stage, and why
 
-    Raises ValueError for less than one band, rays_per_receptor that are not positive, or unknown light.
+    Raises:
+        ValueError: less than one band, rays_per_receptor that are not positive, or unknown light.
     """
 
     rays_per_receptor: float
@@ -109,7 +110,8 @@ def choose_fidelity(world: World, eyes: Eyes, tolerance: float | None = None) ->
     tolerance: of a receptor's signal (root mean square); None: half of the receptors' noise, but no less than
         LEAST_TOLERANCE of what white is worth behind the eyes' pupil.
 
-    Raises ValueError for a tolerance that is not positive, and what BatchedRenderer raises for such a world.
+    Raises:
+        ValueError: a tolerance that is not positive, and what BatchedRenderer raises for such a world.
     """
     allowed = _allowed(eyes, eyes.eye(), tolerance)
     bands, level = _bands(eyes.eye(), SHARE_OF_BANDS * allowed)

@@ -39,7 +39,7 @@ STRAY = 0.75  # [m] from a cell's centre, along either axis
 class RandomViews:
     """Views of single eyes; first axis: glimpse.
 
-    position  of the agent [m], (n, 2) · heading [rad], (n,) · objects: centres [m], (n, k, 3) · eye: which, (n,)
+    position: of the agent [m], (n, 2) · heading [rad], (n,) · objects: centres [m], (n, k, 3) · eye: which, (n,)
     """
 
     position: np.ndarray
@@ -111,14 +111,21 @@ class FidelityTrials:
 
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
         """Root mean square of what light that is reflected twice adds to the signals, and of direct light's signals.
-        Raises ValueError where it cannot be followed."""
+
+        Raises:
+            ValueError: it cannot be followed.
+        """
         trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
         direct, both = (self._signals(trial, sampling.depth, light) for light in lighting.LEVELS)
         return _rms(both - direct), _rms(direct)
 
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
-        """Root mean square difference to the signals with the finest layers, all with the same rays; the nodes of
-        each count must be among those of the finest. Raises optics.AccuracyError, see `optics.Eye.kernel`."""
+        """Root mean square difference to the signals with the finest layers, all with the same rays; the nodes of each
+        count must be among those of the finest.
+
+        Raises:
+            optics.AccuracyError: see `optics.Eye.kernel`.
+        """
         sampling = eye_sampling(self._eye, finest)
         trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
         truth = self._signals(trial, finest, lighting.DIRECT)

@@ -18,8 +18,8 @@ class Demand:
     """What rendering takes, at the least.
 
     rays_per_receptor · worlds · eyes of one agent · resolution: receptors (height, width) of an eye
-    planes    components of light times depth layers, along every ray
-    weights   planes of weights behind a pupil (bands times depth layers); 0: none
+    planes: components of light times depth layers, along every ray
+    weights: planes of weights behind a pupil (bands times depth layers); 0: none
     """
 
     rays_per_receptor: float
@@ -46,7 +46,9 @@ class Demand:
 
 
 def check_memory(demand: Demand) -> None:
-    """Raise ValueError for more rays than there is room for, with how many there is room for."""
+    """Raises:
+    ValueError: more rays than there is room for, with how many there is room for.
+    """
     free = available()
     excess = max(demand.bytes / free, demand.elements / INDICES)
     if excess <= 1:

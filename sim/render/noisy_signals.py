@@ -17,9 +17,9 @@ Pending = Callable[[], np.ndarray]  # waits for signals (env, eye, channel, heig
 class NoisySignals:
     """Renderer and receptor noise of one batch of worlds.
 
-    renderer  of all worlds
-    keys      of their noise, (n,) uint64
-    spread    largest standard deviation of a signal's noise
+    renderer: of all worlds
+    keys: of their noise, (n,) uint64
+    spread: largest standard deviation of a signal's noise
     """
 
     def __init__(self, renderer: BatchedRenderer, keys: np.ndarray) -> None:

@@ -26,7 +26,7 @@ FEW = 8  # worlds of the narrower kernel that serves a few of them
 class Normals:
     """Standard normal numbers, `shape` of them per world and frame.
 
-    keys   one per world, (n,) uint64 · shape: of one world's receptors
+    keys: one per world, (n,) uint64 · shape: of one world's receptors
     """
 
     def __init__(self, keys: np.ndarray, shape: tuple[int, ...]) -> None:
@@ -99,8 +99,8 @@ class _Kernel:
 class NoiseModel:
     """How noisy a signal s is: variance V = σ² + s / N, N the photons that a signal of 1 stands for.
 
-    sigma    standard deviation of the Gaussian part
-    photons  N, to be broadcast against signals (..., channel, h, w); None: no shot noise
+    sigma: standard deviation of the Gaussian part
+    photons: N, to be broadcast against signals (..., channel, h, w); None: no shot noise
     """
 
     sigma: float

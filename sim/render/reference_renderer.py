@@ -25,18 +25,20 @@ from sim.worlds.world import World
 class ReferenceRenderer:
     """Sees worlds one eye at a time: a path-traced picture of the tangent plane, then `Eye.see`.
 
-    world, eyes           as in `sim.BatchedRenderer`
-    integrator            of Mitsuba: "path", "direct", or its description, {"type": "path", "max_depth": 3}
-    spp                   samples per cell of a picture
-    samples_per_receptor  cells along a receptor's side; None: 4 behind a pupil, 1 for the perfect lens (pixels)
-    depths                nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all
-                          light is blurred as if from infinity
-    depth_layers          kernels between them, or "auto"
-    sampler               of Mitsuba: "multijitter" for less noise
-    variant               of Mitsuba, spectral; scalar_spectral runs without LLVM
-    seed                  of the samples; may be changed between pictures
+    world, eyes: as in `sim.BatchedRenderer`
+    integrator: of Mitsuba: "path", "direct", or its description, {"type": "path", "max_depth": 3}
+    spp: samples per cell of a picture
+    samples_per_receptor: cells along a receptor's side; None: 4 behind a pupil, 1 for the perfect lens (pixels)
+    depths: nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all light is
+        blurred as if from infinity
+    depth_layers: kernels between them, or "auto"
+    sampler: of Mitsuba: "multijitter" for less noise
+    variant: of Mitsuba, spectral; scalar_spectral runs without LLVM
+    seed: of the samples; may be changed between pictures
 
-    Raises ValueError for a bad argument, optics.AccuracyError for a pupil whose light spreads too far.
+    Raises:
+        ValueError: a bad argument.
+        optics.AccuracyError: a pupil whose light spreads too far.
     """
 
     def __init__(

@@ -42,7 +42,11 @@ class Viewpoint:
 
 
 def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: str | int | Viewpoint) -> Viewpoint:
-    """Where a camera of the model is. Raises ValueError for an unknown one and for other than plain perspective."""
+    """Where a camera of the model is.
+
+    Raises:
+        ValueError: an unknown one and for other than plain perspective.
+    """
     if isinstance(camera, Viewpoint):
         return camera
     index = _camera_id(model, camera)

@@ -40,17 +40,18 @@ def mirror(
 ) -> Mirror:
     """Mirror a MuJoCo model.
 
-    model    an MjModel, or what compiles to one: an MjSpec, the path of an MJCF, URDF or MJB file, MJCF text
-    data     poses to start from; None: the model's reference pose
-    bodies   names of the bodies whose geoms are wanted ("world" is the static one); None: all
-    groups   geom groups that are visible; a geom of alpha 0 never is
-    variant  a spectral Mitsuba variant; scalar_spectral runs without LLVM, slowly
-    spectra  reflectances of materials and emission of lights, by name, in the place of their colours:
-             `optics.Spectrum`, or what `optics.reflectance` and `optics.illuminant` know by name; {"headlight": "A"} is
-             the camera's
+    model: an MjModel, or what compiles to one: an MjSpec, the path of an MJCF, URDF or MJB file, MJCF text
+    data: poses to start from; None: the model's reference pose
+    bodies: names of the bodies whose geoms are wanted ("world" is the static one); None: all
+    groups: geom groups that are visible; a geom of alpha 0 never is
+    variant: a spectral Mitsuba variant; scalar_spectral runs without LLVM, slowly
+    spectra: reflectances of materials and emission of lights, by name, in the place of their colours:
+        `optics.Spectrum`, or what `optics.reflectance` and `optics.illuminant` know by name; {"headlight": "A"} is the
+        camera's
 
-    Raises ValueError for a model that does not compile, an unknown body, a variant without spectra, a model without
-    visible geoms, or spectra of what the model does not have; warns once, by MirrorWarning, of what has no counterpart.
+    Raises:
+        ValueError: a model that does not compile, an unknown body, a variant without spectra, a model without visible
+            geoms, or spectra of what the model does not have; warns once, by MirrorWarning, of what has no counterpart.
     """
     return Mirror(source.load(model), data, bodies=bodies, groups=groups, variant=variant, spectra=spectra)
 
@@ -58,10 +59,10 @@ def mirror(
 class Mirror:
     """A Mitsuba scene that mirrors a MuJoCo model.
 
-    model, variant   as given
-    scene            mi.Scene; shape ids are "geom_<geom id>_<part>"
-    geoms            ids of the geoms in the scene, (n,)
-    spectra          of materials and lights, by name
+    model, variant: as given
+    scene: mi.Scene; shape ids are "geom_<geom id>_<part>"
+    geoms: ids of the geoms in the scene, (n,)
+    spectra: of materials and lights, by name
     """
 
     def __init__(
@@ -99,7 +100,8 @@ class Mirror:
         """Move everything to where `data` has it (after mj_forward or mj_step). Only what moved is touched: a scene
         in which nothing moved is not rebuilt.
 
-        Raises ValueError for the data of another model, and for positions that are not finite.
+        Raises:
+            ValueError: the data of another model, and for positions that are not finite.
         """
         self._data = _checked(self.model, data)
         with in_variant(self.variant):
@@ -132,10 +134,10 @@ class Mirror:
     ) -> np.ndarray:
         """Spectral radiance at `wavelengths` [m], (band, y, x) float32, averaged over each pixel's square.
 
-        camera      name or id of a camera of the model, or a Viewpoint
-        integrator  a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}
-        spp         samples per pixel
-        sampler     "independent", or "multijitter" for pictures: less noise
+        camera: name or id of a camera of the model, or a Viewpoint
+        integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}
+        spp: samples per pixel
+        sampler: "independent", or "multijitter" for pictures: less noise
         Units: a white Lambertian that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
         """
         view = self.viewpoint(camera)

@@ -51,8 +51,8 @@ class Camera:
     ) -> np.ndarray:
         """Radiance (band, y, x) float32 at `wavelengths` [m]: the mean over `spp` random positions in each pixel.
 
-        sampler  of Mitsuba's: "independent", or "multijitter", whose samples of a pixel keep apart: less noise, of
-                 another kind than a standard error tells; not in scalar variants, nor for spp that it would round
+        sampler: of Mitsuba's: "independent", or "multijitter", whose samples of a pixel keep apart: less noise, of
+            another kind than a standard error tells; not in scalar variants, nor for spp that it would round
         """
         width, height = self.size
         method = mi.load_dict(_description(integrator))

@@ -12,7 +12,8 @@ import mujoco
 def load(source: mujoco.MjModel | mujoco.MjSpec | str | Path) -> mujoco.MjModel:
     """The model of an MjModel, an MjSpec, a file (MJCF, URDF, or MJB) or MJCF text (which starts with "<").
 
-    Raises ValueError, in one line that names the thing, for anything that does not become a model.
+    Raises:
+        ValueError: one line that names the thing, for anything that does not become a model.
     """
     if isinstance(source, mujoco.MjModel):
         return source

@@ -23,8 +23,9 @@ Spectra = Mapping[str, Spectrum]
 def resolve(model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None) -> Spectra:
     """Spectra by name, where names of optics' own (`optics.REFLECTANCES`, `optics.ILLUMINANTS`) stand for theirs.
 
-    Raises ValueError for a name that the model has neither as a material nor as a light, or has as both; for a value
-    that is no spectrum; and for reflectances above 1.
+    Raises:
+        ValueError: a name that the model has neither as a material nor as a light, or has as both; for a value that is
+            no spectrum; and for reflectances above 1.
     """
     materials = [model.material(i).name for i in range(model.nmat)]
     lights = [*(model.light(i).name for i in range(model.nlight)), HEADLIGHT]

@@ -22,7 +22,8 @@ class Places:
     def draw(self, rng: np.random.Generator, n_objects: int) -> tuple[np.ndarray, np.ndarray]:
         """An agent's position (2,) and those of objects (k, 2).
 
-        Raises ValueError when the cells cannot hold them SEPARATION and CLEARANCE apart.
+        Raises:
+            ValueError: the cells cannot hold them SEPARATION and CLEARANCE apart.
         """
         for _ in range(TRIES):
             agent, chosen = rng.integers(len(self._agents)), []

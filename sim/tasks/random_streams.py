@@ -11,7 +11,7 @@ class Streams:
     """For every world i: `placement[i]`, a part of `motion` and a key for its noise, children of one seed that depend
     on the seed, i and the purpose alone; never on the number of worlds.
 
-    noise_keys  (n,) uint64, for sim.render.receptor_noise
+    noise_keys: (n,) uint64, for sim.render.receptor_noise
     """
 
     def __init__(self, seed: int | None, n: int) -> None:

@@ -80,7 +80,11 @@ class FindGoal:
 
     @cached_property
     def _goals(self) -> int:
-        """How many of the objects, the first ones, are goals. Raises ValueError where others are between them."""
+        """How many of the objects, the first ones, are goals.
+
+        Raises:
+            ValueError: others are between them.
+        """
         are_goals = [name.startswith("goal") for name in self.world.objects]
         if sorted(are_goals, reverse=True) != are_goals:
             raise ValueError(f"objects = {self.world.objects}: goals must come first")
@@ -159,7 +163,11 @@ class LeaveMaze:
 
 
 def task_of(world: World) -> Task:
-    """The rules that go with a world. Raises ValueError for a world of no known task."""
+    """The rules that go with a world.
+
+    Raises:
+        ValueError: a world of no known task.
+    """
     if world.task in ("detection", "foraging", "tracking"):
         return FindGoal(world, moving=world.task == "tracking")
     if world.task == "navigation":
@@ -204,7 +212,8 @@ def _on_the_ground(objects: np.ndarray) -> np.ndarray:
 def respawned(task: Task, state: WorldState, which: np.ndarray, rngs: list[np.random.Generator]) -> WorldState:
     """The state with the objects `which` (n, k) put on free spots of their world.
 
-    Raises ValueError where the world has no free spot left.
+    Raises:
+        ValueError: the world has no free spot left.
     """
     if not which.any():
         return state

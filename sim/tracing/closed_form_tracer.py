@@ -79,12 +79,13 @@ class _Hit:
 class ClosedForm:
     """Traces rays through one world.
 
-    name, why   of this way of tracing, for reports
-    light       what of it is followed, one of `lighting.LEVELS`
-    basis       (component, band): what each component is worth in each band
+    name, why: of this way of tracing, for reports
+    light: what of it is followed, one of `lighting.LEVELS`
+    basis: (component, band): what each component is worth in each band
 
-    Raises NoClosedForm for worlds that are not made of upright walls, and, where light that is reflected twice is
-    followed, for walls of several heights or lower than what stands between them.
+    Raises:
+        NoClosedForm: worlds that are not made of upright walls, and, where light that is reflected twice is followed,
+            for walls of several heights or lower than what stands between them.
     """
 
     name = "closed_form"

@@ -35,7 +35,11 @@ def spectra(wavelengths: np.ndarray) -> list[Any]:
 
 
 def directional_lights(scene: Any, wavelengths: np.ndarray) -> tuple[DirectionalLight, ...]:
-    """The scene's lights at the bands' wavelengths [m]. Raises ValueError for any other kind of emitter."""
+    """The scene's lights at the bands' wavelengths [m].
+
+    Raises:
+        ValueError: any other kind of emitter.
+    """
     lights = []
     for emitter in scene.emitters():
         if emitter.class_name() != "DirectionalEmitter":
@@ -59,7 +63,9 @@ def white_radiance(scene: Any, wavelengths: np.ndarray) -> np.ndarray:
 
 
 def check_lambertian(bsdfs: Sequence[Any]) -> None:
-    """Raise ValueError for a BSDF that is not a Lambertian reflector, on one side or both."""
+    """Raises:
+    ValueError: a BSDF that is not a Lambertian reflector, on one side or both.
+    """
     sides = int(mi.BSDFFlags.FrontSide) | int(mi.BSDFFlags.BackSide)
     for bsdf in bsdfs:
         kinds = int(bsdf.flags()) & ~(sides | int(mi.BSDFFlags.SpatiallyVarying))

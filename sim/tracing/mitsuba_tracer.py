@@ -15,10 +15,11 @@ from sim.tracing.static_scene import StaticScene
 class Traced:
     """Traces rays through one world: one component per band.
 
-    name, why   of this way of tracing, for reports
-    basis       (component, band): what each component is worth in each band
+    name, why: of this way of tracing, for reports
+    basis: (component, band): what each component is worth in each band
 
-    Raises ValueError for lights other than directional ones and for surfaces that are not Lambertian.
+    Raises:
+        ValueError: lights other than directional ones and for surfaces that are not Lambertian.
     """
 
     name = "mitsuba"

@@ -21,9 +21,9 @@ from sim.tracing import lighting
 
 @dataclass(frozen=True)
 class Atlas:
-    """texels       reflectance, (texel, band), all textures one after the other, row by row
-    places       per texture: first texel, columns, rows, (texture, 3)
-    to_texels    per texture: (column, row) = to_texels @ (u, v, 1), (texture, 2, 3); texel centres at whole numbers
+    """texels: reflectance, (texel, band), all textures one after the other, row by row
+    places: per texture: first texel, columns, rows, (texture, 3)
+    to_texels: per texture: (column, row) = to_texels @ (u, v, 1), (texture, 2, 3); texel centres at whole numbers
     """
 
     texels: np.ndarray

@@ -19,11 +19,11 @@ import numpy as np
 class Spheres:
     """The movers of one world, alike in all worlds but for their positions.
 
-    radii     [m], (k,)
-    frames    rotation from the sphere's frame to the world's, (k, 3, 3)
-    offsets   of the sphere's centre from the body's origin, in the world's frame [m], (k, 3)
-    bsdfs     one Mitsuba BSDF each; kept here, since a BSDFPtr does not keep its objects alive
-    geoms     ids of the geoms, (k,)
+    radii: [m], (k,)
+    frames: rotation from the sphere's frame to the world's, (k, 3, 3)
+    offsets: of the sphere's centre from the body's origin, in the world's frame [m], (k, 3)
+    bsdfs: one Mitsuba BSDF each; kept here, since a BSDFPtr does not keep its objects alive
+    geoms: ids of the geoms, (k,)
     """
 
     radii: np.ndarray

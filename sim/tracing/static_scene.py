@@ -26,11 +26,11 @@ from sim.worlds.world import World
 
 @dataclass(frozen=True)
 class StaticScene:
-    """scene    mi.Scene of the world's own geoms
-    geoms    their ids · bsdfs: of each, by id
-    spheres  the objects', in the order of World.objects
-    bodies   the same, and the agent's body: what light that was reflected may come from
-    variant  of Mitsuba
+    """scene: mi.Scene of the world's own geoms
+    geoms: their ids · bsdfs: of each, by id
+    spheres: the objects', in the order of World.objects
+    bodies: the same, and the agent's body: what light that was reflected may come from
+    variant: of Mitsuba
     """
 
     scene: Any
@@ -42,8 +42,12 @@ class StaticScene:
 
 
 def build_static_scene(world: World) -> StaticScene:
-    """The stage of a world. Raises ValueError for an object that is not one sphere, for moving geoms that are
-    neither the agent's nor an object's, and for geoms that glow."""
+    """The stage of a world.
+
+    Raises:
+        ValueError: an object that is not one sphere, for moving geoms that are neither the agent's nor an object's, and
+            for geoms that glow.
+    """
     model = world.model
     static = mirror(model, bodies=["world"], spectra=world.spectra)
     geoms = [_sphere_of(model, name) for name in world.objects]

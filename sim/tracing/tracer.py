@@ -19,10 +19,10 @@ TRACERS = ("auto", ClosedForm.name, Traced.name)
 
 
 class Tracer(Protocol):
-    """name   of the way of tracing, one of TRACERS · why it was taken
-    light  what of it is followed, one of `lighting.LEVELS`
-    scene  what the kernel wants as an argument of its own; inputs: arrays that it reads
-    basis  (component, band): radiance_b = sum_k basis[k, b] component_k
+    """name: of the way of tracing, one of TRACERS · why it was taken
+    light: what of it is followed, one of `lighting.LEVELS`
+    scene: what the kernel wants as an argument of its own; inputs: arrays that it reads
+    basis: (component, band): radiance_b = sum_k basis[k, b] component_k
     """
 
     name: str
@@ -54,7 +54,11 @@ class Tracers:
         self.of(lighting.DIRECT)
 
     def of(self, light: str) -> Tracer:
-        """The one that follows this much of the light. Raises ValueError, see `tracer_of`."""
+        """The one that follows this much of the light.
+
+        Raises:
+            ValueError: see `tracer_of`.
+        """
         if light not in self._known:
             with variant(self._stage.variant):
                 self._known[light] = tracer_of(self._world, self._stage, self._wavelengths, self._name, light)
@@ -66,8 +70,9 @@ def tracer_of(
 ) -> Tracer:
     """The tracer of a world, "auto" being the fastest that can.
 
-    Raises ValueError for an unknown name, for "closed_form" where the world has none, for lights other than
-    directional ones, for surfaces that are not Lambertian, and for light that bounces off an agent with a texture.
+    Raises:
+        ValueError: an unknown name, for "closed_form" where the world has none, for lights other than directional ones,
+            for surfaces that are not Lambertian, and for light that bounces off an agent with a texture.
     """
     if light == lighting.BOUNCE and shapes.is_textured(world.model, stage.bodies.geoms[-1]):
         raise ValueError("light = 'bounce': the agent's body has a texture, which would have to turn with it")

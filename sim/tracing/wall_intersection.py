@@ -30,7 +30,11 @@ class Footprints(Protocol):
 
 
 def footprints_of(walls: Walls) -> Footprints:
-    """The cheaper way for these walls. Raises NoClosedForm for many walls that do not fit a grid."""
+    """The cheaper way for these walls.
+
+    Raises:
+        NoClosedForm: many walls that do not fit a grid.
+    """
     return EachWall(walls) if len(walls) <= FEW else Cells(walls)
 
 

@@ -31,10 +31,10 @@ class NoClosedForm(ValueError):
 class Walls:
     """Walls and floor of a world.
 
-    lower, upper  corners of the walls' footprints [m], (n, 2) · top of each [m], (n,)
-    floor         height of the floor [m] · floor_lower, floor_upper  its corners (2,)
-    uv            texture coordinates of faces, (SIDES n + 1, 2, 4): (u, v) = uv @ (x, y, z, 1); the floor comes last
-    geoms         the geom of each face, (SIDES n + 1,)
+    lower, upper: corners of the walls' footprints [m], (n, 2) · top of each [m], (n,)
+    floor: height of the floor [m] · floor_lower, floor_upper  its corners (2,)
+    uv: texture coordinates of faces, (SIDES n + 1, 2, 4): (u, v) = uv @ (x, y, z, 1); the floor comes last
+    geoms: the geom of each face, (SIDES n + 1,)
     """
 
     lower: np.ndarray
@@ -51,7 +51,11 @@ class Walls:
 
 
 def walls_of(model: mujoco.MjModel, geoms: Sequence[int]) -> Walls:
-    """The walls and the floor that these geoms are. Raises NoClosedForm for any other geom or placement."""
+    """The walls and the floor that these geoms are.
+
+    Raises:
+        NoClosedForm: any other geom or placement.
+    """
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     floors = [g for g in geoms if surfaces.geom_type(model, g) == mujoco.mjtGeom.mjGEOM_PLANE]

@@ -15,8 +15,8 @@ ROOM = 4  # geoms about an agent: the corner of two walls, and one or two more i
 class AgentModel:
     """An agent without its world.
 
-    model  it, among ROOM boxes that touch nothing: no objects, walls, lights, cameras or textures
-    whole  fingerprint of the world's model that it is the agent of
+    model: it, among ROOM boxes that touch nothing: no objects, walls, lights, cameras or textures
+    whole: fingerprint of the world's model that it is the agent of
     """
 
     model: mujoco.MjModel

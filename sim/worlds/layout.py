@@ -22,10 +22,10 @@ WALL_CONAFFINITY = 1
 class Layout:
     """What a task adds to a world: its mocap sphere bodies and the places to start from.
 
-    objects       names of mocap sphere bodies
-    agent_spawn   (n, 2) [m];  object_spawn (m, 2) [m]
-    goal_region   (x_min, y_min, x_max, y_max) [m] or None
-    spectra       reflectances of materials, by name, where a colour would not do
+    objects: names of mocap sphere bodies
+    agent_spawn: (n, 2) [m];  object_spawn (m, 2) [m]
+    goal_region: (x_min, y_min, x_max, y_max) [m] or None
+    spectra: reflectances of materials, by name, where a colour would not do
     """
 
     objects: tuple[str, ...]

@@ -31,8 +31,8 @@ def stripes(shape: tuple[int, int], edges: int | Sequence[float], axis: int) -> 
     """Image of stripes, alternately light and dark along `axis` (0: rows, 1: columns), (height, width, 3) uint8,
     display-referred; the first stripe is light.
 
-    edges  between stripes, as parts of the axis in (0, 1); or how many stripes there are, all equally wide. A texel
-           that an edge crosses has the mean reflectance of what it covers.
+    edges: between stripes, as parts of the axis in (0, 1); or how many stripes there are, all equally wide. A texel
+        that an edge crosses has the mean reflectance of what it covers.
     """
     n = shape[axis]
     inner = np.arange(1, edges) / edges if isinstance(edges, int) else np.asarray(edges, float)

@@ -15,15 +15,15 @@ from sim.worlds.world import World
 class WorldState:
     """All worlds of a batch at one instant; first axis: world.
 
-    position           agent [m], (n, 2)
-    heading            agent [rad], in [-π, π), (n,)
-    velocity           agent [m/s], (n, 2)
-    objects            centres of the objects, in the order of World.objects [m], (n, k, 3)
-    object_heading     direction in which each object moves [rad], (n, k)
-    start              where the agent started its episode [m], (n, 2)
-    steps              actions taken in this episode, (n,) int
-    goals_reached      in this episode, (n,) int
-    adversaries_reached  in this episode, (n,) int
+    position: agent [m], (n, 2)
+    heading: agent [rad], in [-π, π), (n,)
+    velocity: agent [m/s], (n, 2)
+    objects: centres of the objects, in the order of World.objects [m], (n, k, 3)
+    object_heading: direction in which each object moves [rad], (n, k)
+    start: where the agent started its episode [m], (n, 2)
+    steps: actions taken in this episode, (n,) int
+    goals_reached: in this episode, (n,) int
+    adversaries_reached: in this episode, (n,) int
     """
 
     position: np.ndarray

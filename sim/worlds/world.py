@@ -42,14 +42,14 @@ WHISKER_LENGTH = MAX_SPEED * TIMESTEP  # [m]
 class World:
     """A compiled world.
 
-    model         static geoms; body "agent" with slide joints agent_x, agent_y and hinge agent_heading, actuators
-                  agent_x, agent_y (commanded velocity [m/s], world axes), sensor agent_touch (> 0: wall contact);
-                  mocap bodies for the objects; cameras eye_0 ... on the agent if it was built with eyes
-    objects       mocap sphere bodies: ("goal", "adversary_0", "adversary_1"), or () for navigation
-    agent_spawn   (n, 2) cell centres [m];  object_spawn (m, 2) cell centres [m]
-    goal_region   navigation: (x_min, y_min, x_max, y_max) [m]
-    spectra       measured spectra of materials and lights, by name: what the renderers use instead of their colours
-    alone         the model's agent by itself; without, agents that may touch something are stepped in the whole model
+    model: static geoms; body "agent" with slide joints agent_x, agent_y and hinge agent_heading, actuators agent_x,
+        agent_y (commanded velocity [m/s], world axes), sensor agent_touch (> 0: wall contact); mocap bodies for the
+        objects; cameras eye_0 ... on the agent if it was built with eyes
+    objects: mocap sphere bodies: ("goal", "adversary_0", "adversary_1"), or () for navigation
+    agent_spawn: (n, 2) cell centres [m];  object_spawn (m, 2) cell centres [m]
+    goal_region: navigation: (x_min, y_min, x_max, y_max) [m]
+    spectra: measured spectra of materials and lights, by name: what the renderers use instead of their colours
+    alone: the model's agent by itself; without, agents that may touch something are stepped in the whole model
     """
 
     task: str
@@ -72,15 +72,16 @@ def build_world(
 ) -> World:
     """Build the world of a task.
 
-    task     "detection", "foraging", "navigation" or "tracking"
-    seed     draws the mazes of navigation; the field of the others is always the same
-    mazes    of navigation: so many different ones, and an episode begins in any of them
-    eyes     if given, the agent carries cameras eye_0 ..., left to right
-    spectra  of materials and lights, by name ("wall", "floor", "light_0" ...), in addition to or instead of the task's
-             own: `optics.Spectrum`, or names out of `optics.reflectance` and `optics.illuminant`
+    task: "detection", "foraging", "navigation" or "tracking"
+    seed: draws the mazes of navigation; the field of the others is always the same
+    mazes: of navigation: so many different ones, and an episode begins in any of them
+    eyes: if given, the agent carries cameras eye_0 ..., left to right
+    spectra: of materials and lights, by name ("wall", "floor", "light_0" ...), in addition to or instead of the task's
+        own: `optics.Spectrum`, or names out of `optics.reflectance` and `optics.illuminant`
 
-    Raises ValueError for an unknown task, a negative seed, mazes for another task than navigation, or spectra of what
-    is not there.
+    Raises:
+        ValueError: an unknown task, a negative seed, mazes for another task than navigation, or spectra of what is not
+            there.
     """
     if task not in TASKS:
         near = difflib.get_close_matches(task, TASKS, n=1)
