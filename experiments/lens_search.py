@@ -20,7 +20,7 @@ from scipy.optimize import minimize
 import optics
 from evolve.config.run_config import SearchConfig
 from evolve.genome.genes import GENES
-from evolve.search.optimizers import Space, build
+from evolve.search.optimizers import Space, build_optimizer
 from experiments.page import parser
 from experiments.store import Origin, read_rows, write_rows
 
@@ -173,7 +173,7 @@ def by_cma(watch: Watch, spots: Sequence[float | None]) -> None:
     """CMA-ES as evolution uses it; stages share its generations evenly."""
     genes = [(GENES[name], GENES[name].default) for name in GENE_NAMES]
     search = SearchConfig(population=POPULATION, generations=GENERATIONS, sigma=STEP)
-    optimizer = build(Space(genes, start(watch.seed), (watch.seed,)), search)
+    optimizer = build_optimizer(Space(genes, start(watch.seed), (watch.seed,)), search)
     for generation in range(GENERATIONS):
         stage, within = divmod(generation * len(spots), GENERATIONS)
         if within < len(spots):

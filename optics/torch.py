@@ -31,7 +31,8 @@ def psf(
     Returns (wavelength, y, x) [1/m²], float32 unless dtype="float64".
 
     Raises:
-        ValueError, AccuracyError: see `optics.psf`.
+        ValueError: see `optics.psf`.
+        AccuracyError: see `optics.psf`.
     """
     import drjit as dr
 

@@ -62,13 +62,13 @@ class View:
             raise ValueError(f"{where}: has neither radiance nor receptors")
         for label, image in (("radiance", self.radiance), ("receptors", self.receptors)):
             if image is not None and (image.ndim != 3 or 0 in image.shape):
-                raise ValueError(f"{where}: {label} has shape {image.shape}, must be (band, y, x)")
+                raise ValueError(f"{where}: {label} has shape {image.shape}: must be (band, y, x)")
         if self.radiance is not None:
             names = {_channel(nm) for nm in self.wavelengths_nm}
             if len(self.radiance) != len(self.wavelengths_nm) or len(names) != len(self.radiance):
                 raise ValueError(f"{where}: needs one distinct wavelength per band of {self.radiance.shape}")
             if self.rgb is not None and self.rgb.shape != (*self.radiance.shape[1:], 3):
-                raise ValueError(f"{where}: rgb has shape {self.rgb.shape}, must be (y, x, 3) like the radiance")
+                raise ValueError(f"{where}: rgb has shape {self.rgb.shape}: must be (y, x, 3) like the radiance")
 
 
 def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
@@ -82,7 +82,7 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
 
     names = [view.name for view in views]
     if not views or len(set(names)) != len(names):
-        raise ValueError(f"write_exr: views = {names}, must be at least one, and no name twice")
+        raise ValueError(f"write_exr: views = {names}: must be at least one, and no name twice")
     spectral = [_part(view, "spectral") for view in views if view.radiance is not None]
     receptors = [_part(view, "receptors") for view in views if view.receptors is not None]
     # One display window for all parts: OpenEXR demands it, and the images differ in size.

@@ -1,20 +1,131 @@
-"""The tools that hold the style: ruff and mypy over the whole tree."""
+"""One form of docstring, one form of message, one meaning per name."""
 
-import subprocess
-import sys
+import ast
+import re
+from collections import defaultdict
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("optics", "sim", "evolve")
+SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+
+# A row explains arguments or fields: "name: meaning", "one, another: meaning".
+ROW = re.compile(r"^(?P<names>[a-z_]\w*(?:, [a-z_]\w*)*): \S")
+COLUMN = re.compile(r"^[a-z_]\w*(?:, [a-z_]\w*)* {2,}\S")
+RAISES = re.compile(r"^Raises:\n((?:    .+\n?)+)", re.MULTILINE)
+RAISED = re.compile(r"^    (?P<error>(?:optics\.)?[A-Z]\w+): \S")
+RAISES_IN_PROSE = re.compile(r"\b[Rr]aises? (?:optics\.)?[A-Z]\w+")
+Definition = ast.FunctionDef | ast.ClassDef
+
+
+@dataclass(frozen=True)
+class Documented:
+    """A class or function, where it stands, and what its docstring says."""
+
+    where: str
+    node: Definition
+    text: str
+
+
+def documented(path: Path, source: str | None = None) -> list[Documented]:
+    tree = ast.parse(source or path.read_text())
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, Definition) and (text := ast.get_docstring(node)):
+            found.append(Documented(f"{path}:{node.lineno} {node.name}", node, text))
+    return found
+
+
+def faults(thing: Documented) -> list[str]:
+    """What of a docstring has another form."""
+    lines, found = thing.text.split("\n"), []
+    found += [f"column of names: {line}" for line in lines if COLUMN.match(line)]
+    prose = RAISES.sub("", thing.text)
+    found += [f"errors in prose: {said[0]}" for said in RAISES_IN_PROSE.finditer(prose)]
+    for block in RAISES.findall(thing.text):
+        entries = [line for line in block.rstrip("\n").split("\n") if not line.startswith("     ")]
+        found += [f"no error: {line.strip()}" for line in entries if not RAISED.match(line)]
+    if thing.text.startswith("Raises:"):
+        found.append("no first line")
+    if "Raises:" in thing.text and not RAISES.search(thing.text):
+        found.append("Raises: without errors")
+    return found
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_docstrings_have_one_form(path):
+    found = {thing.where: wrong for thing in documented(path) if (wrong := faults(thing))}
+    assert not found
 
 
 @pytest.mark.parametrize(
-    "command",
-    [("ruff", "check", "."), ("ruff", "format", "--check", "."), ("mypy",)],
-    ids=" ".join,
+    "docstring",
+    [
+        "What it is.\n\n    radius  of it [m]\n    ",
+        "What it is. Raises ValueError for no good.\n    ",
+        "Raises:\n        ValueError: no good.\n    ",
+        "What it is.\n\n    Raises:\n        no good\n    ",
+    ],
+    ids=["column", "prose", "no first line", "no error"],
 )
-def test_tool_is_content(command):
-    tool = Path(sys.executable).with_name(command[0])
-    child = subprocess.run([tool, *command[1:]], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert child.returncode == 0, child.stdout + child.stderr
+def test_other_forms_are_noticed(docstring):
+    [thing] = documented(Path("some.py"), f'def some(radius):\n    """{docstring}"""\n')
+    assert faults(thing)
+
+
+# --- messages
+
+
+def messages(tree: ast.AST) -> list[str]:
+    """What raised errors say, {} in the place of values."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
+            first = node.exc.args[0]
+            if isinstance(first, ast.Constant) and isinstance(first.value, str):
+                found.append(first.value)
+            elif isinstance(first, ast.JoinedStr):
+                found.append("".join(part.value if isinstance(part, ast.Constant) else "{}" for part in first.values))
+    return found
+
+
+def ill_formed(message: str) -> bool:
+    """What is wrong comes first, after a colon or semicolon what would be right: "name = value: must be ..."."""
+    return "\n" in message or bool(re.search(r"^[^:;]*\bmust\b", message))
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_messages_have_one_form(path):
+    assert [message for message in messages(ast.parse(path.read_text())) if ill_formed(message)] == []
+
+
+def test_other_messages_are_noticed():
+    tree = ast.parse('raise ValueError(f"n = {n}, must be 1")\nraise ValueError("n = 0: must be 1")')
+    assert [ill_formed(message) for message in messages(tree)] == [True, False]
+
+
+# --- names
+
+
+def exported(path: Path) -> set[str]:
+    """Classes and functions that other modules may use."""
+    return {
+        node.name for node in ast.parse(path.read_text()).body if isinstance(node, Definition) and node.name[0] != "_"
+    }
+
+
+def test_no_two_names_of_different_packages_are_alike():
+    """Nor two classes of one package. Functions that are called by their module's name (`shapes.build`) may be."""
+    homes = defaultdict(list)
+    for path in SOURCES:
+        for name in exported(path):
+            homes[name].append(path.relative_to(ROOT))
+    alike = {
+        name: [str(path) for path in paths]
+        for name, paths in homes.items()
+        if len({path.parts[0] for path in paths}) > 1 or (name[0].isupper() and len(paths) > 1)
+    }
+    assert alike == {}

@@ -27,9 +27,9 @@ __all__ = [
     "acuity_cpd",
     "bootstrap_interval",
     "champions",
+    "eye_image_quality",
     "gene_values",
     "generation_statistics",
-    "image_quality",
     "polychromatic",
     "psnr",
     "succeeded",
@@ -207,7 +207,7 @@ def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
     return share
 
 
-def image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
+def eye_image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
     """`optics.image_quality` of the phenotype's eye in white daylight, up to its receptors' Nyquist frequency: [0, 1].
 
     A perfect lens has contrast 1 at all of them.

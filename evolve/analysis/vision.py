@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import optics
 import sim
-from evolve.analysis.statistics import image_quality, polychromatic, psnr
+from evolve.analysis.statistics import eye_image_quality, polychromatic, psnr
 from evolve.config.run_config import RunConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
 
@@ -42,7 +42,7 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
     """How well an animal's eyes see the run's task; NaN throughout where their optics cannot be computed."""
     eyes = animal.eyes(config.eye)
     try:
-        quality, contrast = image_quality(animal, config.eye), _contrast(eyes.eye())
+        quality, contrast = eye_image_quality(animal, config.eye), _contrast(eyes.eye())
         seen, perfect = views(eyes, config.task, config.world)
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, fields, replace
@@ -17,8 +16,9 @@ from evolve.config.provenance import Source
 from evolve.config.relief_starts import no_such_gene, with_relief
 from evolve.config.run_config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
 from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, GeneConfig, group_members
+from optics.numerics.arguments import close_match
 
-__all__ = ["SCALES", "assemble", "from_toml", "nearest", "parse_assignment", "preset_names", "to_toml"]
+__all__ = ["SCALES", "assemble", "from_toml", "parse_assignment", "preset_names", "suggestion", "to_toml"]
 
 Tree = dict[str, Any]
 GENE_FIELDS = tuple(f.name for f in fields(GeneConfig))
@@ -127,14 +127,13 @@ def preset_names() -> list[str]:
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
+def suggestion(word: str, known: Iterable[str]) -> str:
     """ "did you mean X?" where a known word, or the last part of one, is near; else the list of them."""
     known = list(known)
-    whole = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
     by_last = {name.rpartition(".")[2]: name for name in known}
-    last = difflib.get_close_matches(word.rpartition(".")[2], by_last, n=1, cutoff=0.75)
-    close = whole or [by_last[name] for name in last]
-    return f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
+    last = close_match(word.rpartition(".")[2], by_last, cutoff=0.75)
+    close = close_match(word, known) or (by_last[last] if last else None)
+    return f"did you mean {close!r}?" if close else f"known: {', '.join(known)}"
 
 
 def _read(path: Path) -> Source:
@@ -159,7 +158,7 @@ def _preset(name: str | None, scale: str | None) -> list[Source]:
     if name is None:
         return []
     if name not in preset_names():
-        raise ConfigError(f"unknown preset {name!r}; {nearest(name, preset_names())}")
+        raise ConfigError(f"unknown preset {name!r}; {suggestion(name, preset_names())}")
     text = (resources.files("evolve") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
     tree = tomllib.loads(text)
     scales = tree.pop("scales", {})
@@ -170,7 +169,7 @@ def _preset(name: str | None, scale: str | None) -> list[Source]:
         return [settings]
     chosen = scale or SCALES[0]
     if chosen not in scales:
-        raise ConfigError(f"unknown scale {chosen!r} of preset {name}; {nearest(chosen, scales)}")
+        raise ConfigError(f"unknown scale {chosen!r} of preset {name}; {suggestion(chosen, scales)}")
     return [settings, Source(f"preset {name} on {chosen} scale", scales[chosen])]
 
 
@@ -195,13 +194,13 @@ def _blamed(error: ConfigError, layers: Iterable[Source]) -> str:
 def _checked_entry(key: str, value: Any) -> Any:
     if key == "task":
         if not isinstance(value, str) or value not in TASKS:
-            raise ConfigError(f"unknown task {str(value)!r}; {nearest(str(value), TASKS)}", key)
+            raise ConfigError(f"unknown task {str(value)!r}; {suggestion(str(value), TASKS)}", key)
         return value
     if key in TOP_LEVEL:
         return check_value(RunConfig, key, value, key)
     if key not in (*SECTIONS, "genome"):
         known = (*TOP_LEVEL, *SECTIONS, "genome") if isinstance(value, dict) else SETTINGS
-        raise ConfigError(f"unknown key {key!r}; {nearest(key, known)}", key)
+        raise ConfigError(f"unknown key {key!r}; {suggestion(key, known)}", key)
     if not isinstance(value, dict):
         raise ConfigError(f"{key} = {value!r}: is a section; set {key}.NAME", key)
     if key == "genome":
@@ -209,8 +208,8 @@ def _checked_entry(key: str, value: Any) -> Any:
     names = [f.name for f in fields(SECTIONS[key])]
     for name in value:
         if name not in names:
-            hint = nearest(name, names)
-            hint = hint if hint.startswith("did") else nearest(name, SETTINGS)
+            hint = suggestion(name, names)
+            hint = hint if hint.startswith("did") else suggestion(name, SETTINGS)
             raise ConfigError(f"unknown key '{key}.{name}'; {hint}", f"{key}.{name}")
     return {name: check_value(SECTIONS[key], name, leaf, f"{key}.{name}") for name, leaf in value.items()}
 
@@ -221,12 +220,12 @@ def _checked_genome(section: Tree) -> Tree:
     for group in sorted(section, key=lambda name: -len(group_members(name))):
         key, members, use = f"genome.{group}", group_members(group), section[group]
         if not members:
-            raise ConfigError(f"unknown gene {group!r}; {nearest(group, (*GENES, *CLUSTERS, *FAMILIES))}", key)
+            raise ConfigError(f"unknown gene {group!r}; {suggestion(group, (*GENES, *CLUSTERS, *FAMILIES))}", key)
         if not isinstance(use, dict):
             raise ConfigError(f"{key} = {use!r}: set {key}.open, .low, .high, .start or .opens_at", key)
         for name in use:
             if name not in GENE_FIELDS:
-                raise ConfigError(f"unknown key '{key}.{name}'; {nearest(name, GENE_FIELDS)}", f"{key}.{name}")
+                raise ConfigError(f"unknown key '{key}.{name}'; {suggestion(name, GENE_FIELDS)}", f"{key}.{name}")
         for gene in members:
             checked = {k: check_gene_value(ALL_GENES[gene], k, v, f"{key}.{k}") for k, v in use.items()}
             result[gene] = {**result.get(gene, {}), **checked}

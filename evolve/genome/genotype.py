@@ -54,7 +54,7 @@ class Genotype:
         """
         genome = np.asarray(genome, dtype=np.float64)
         if genome.shape != (self.dimension,) or not np.all(np.isfinite(genome)):
-            raise ValueError(f"genome must be {self.dimension} finite numbers, got an array of shape {genome.shape}")
+            raise ValueError(f"genome has shape {genome.shape}: must be {self.dimension} finite numbers")
         values = {name: use.start for name, use in self.uses.items()}
         for gene, u in zip(self.open_genes, np.clip(genome, 0.0, 1.0), strict=True):
             values[gene.name] = gene.decode(float(u), self.uses[gene.name])

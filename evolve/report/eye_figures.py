@@ -15,7 +15,7 @@ import optics
 from evolve.analysis.statistics import polychromatic
 from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.report.markup import KEY, figure, number
+from evolve.report.markup import KEY, figure, rounded
 from evolve.report.svg import drawing, inline
 from evolve.report.theme import ACCENT, INK, MUTED, VERMILLION
 from optics.eye.summary import noise_of
@@ -81,9 +81,9 @@ def _pupil(eye: optics.Eye, phenotype: Phenotype) -> str:
     index = phenotype.refractive_index or 1.0
     waves = (index - 1) * (high - low) / 0.55
     caption = (
-        f"<b>Pupil.</b> Height of its relief, {number(low)} to {number(high)} µm within a radius of "
-        f"{number(radius)} µm (a = {number(eye.relative_aperture)}). With n = {number(index, 4)} the relief delays "
-        f"green light (550 nm) by up to {number(waves)} waves from place to place."
+        f"<b>Pupil.</b> Height of its relief, {rounded(low)} to {rounded(high)} µm within a radius of "
+        f"{rounded(radius)} µm (a = {rounded(eye.relative_aperture)}). With n = {rounded(index, 4)} the relief delays "
+        f"green light (550 nm) by up to {rounded(waves)} waves from place to place."
     )
     return figure(svg, caption)
 
@@ -128,7 +128,7 @@ def _psf(light: WhiteLight) -> str:
     plan = light.psf.plan
     caption = (
         f"<b>Point spread function</b> of a distant point, all bands as white daylight weighs them; logarithmic, "
-        f"{DECADES} decades. White square: one receptor, {number(pitch)} µm wide. Least accurate band: "
+        f"{DECADES} decades. White square: one receptor, {rounded(pitch)} µm wide. Least accurate band: "
         f"{plan.method.replace('_', ' ')}, predicted error {plan.predicted_error:.1g}."
     )
     return figure(svg, caption)
@@ -197,9 +197,9 @@ def _mtf(light: WhiteLight) -> str:
     caption = (
         f"<b>Modulation transfer function</b> in white daylight, mean of all orientations ({KEY.format('accent')}), "
         f"and the diffraction limit{of_whom} (dashed). Dotted: the receptors' Nyquist frequency, "
-        f"{number(nyquist * scale)} cycles per degree; contrast there {number(at_nyquist)}. Strehl ratio "
-        f"{number(strehl)} at {1e9 * light.psf.wavelengths[green]:.0f} nm; image quality {number(quality)} (in 0 to 1: "
-        "contrast above the noise, times throughput)."
+        f"{rounded(nyquist * scale)} cycles per degree; contrast there {rounded(at_nyquist)}. Strehl ratio "
+        f"{rounded(strehl)} at {1e9 * light.psf.wavelengths[green]:.0f} nm; image quality {rounded(quality)} "
+        "(in 0 to 1: contrast above the noise, times throughput)."
     )
     return figure(svg, caption)
 

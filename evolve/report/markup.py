@@ -9,7 +9,7 @@ from html import escape
 from importlib import resources
 from typing import Any
 
-__all__ = ["KEY", "asset", "document", "exact", "figure", "json_script", "number", "section", "table", "text"]
+__all__ = ["KEY", "asset", "document", "exact", "figure", "json_script", "rounded", "section", "table", "text"]
 
 # The browser itself refuses anything from outside this file.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
@@ -22,7 +22,7 @@ def text(value: object) -> str:
     return escape(str(value), quote=True)
 
 
-def number(value: float, digits: int = 3) -> str:
+def rounded(value: float, digits: int = 3) -> str:
     """`digits` significant digits without an exponent, a real minus sign; an en dash for what is no number."""
     if not math.isfinite(value):
         return "–"

@@ -22,7 +22,7 @@ from evolve.report.figures import (
     vision_figure,
 )
 from evolve.report.ground_plan import GroundPlan
-from evolve.report.markup import KEY, document, figure, number, section, text
+from evolve.report.markup import KEY, document, figure, rounded, section, text
 from evolve.report.player import player, summary
 from evolve.report.views import views
 from evolve.store.candidate import Candidate
@@ -112,7 +112,7 @@ def _gene(run: Run, gene: Gene) -> str:
 
 
 def _dimensionless(gene: Gene) -> str:
-    return "number" if gene.kind == "integer" else "ratio"
+    return "rounded" if gene.kind == "integer" else "ratio"
 
 
 def _acuity(run: Run) -> str:
@@ -161,7 +161,7 @@ def facts_section(run: Run) -> str:
 
 def best_section(run: Run, best: Candidate, episode: Episode) -> str:
     """The best candidate: its eye, what it sees, and its genes."""
-    intro = f"<p>Candidate {best.id} of generation {best.generation}, fitness {number(best.fitness, 4)}.</p>\n"
+    intro = f"<p>Candidate {best.id} of generation {best.generation}, fitness {rounded(best.fitness, 4)}.</p>\n"
     seen = f"<h3>What it sees</h3>\n{views(episode, GroundPlan.of(episode))}"
     genes = f"<h3>Its genes</h3>\n{tables.best_genes(run, best)}"
     return section("best", "The best eye", f"{intro}{eye_figures(best.phenotype, run.config.eye)}{seen}{genes}")

@@ -9,7 +9,7 @@ import numpy as np
 
 from evolve.analysis.episode import Episode
 from evolve.report.ground_plan import GroundPlan
-from evolve.report.markup import document, exact, json_script, number, text
+from evolve.report.markup import document, exact, json_script, rounded, text
 from evolve.report.picture import data_uri, display, film_sheet
 from evolve.store.atomic_files import write_whole
 from sim.envs.simulation import MAX_TURN
@@ -34,8 +34,8 @@ def write_player(episode: Episode, path: Path) -> Path:
 
 def summary(episode: Episode) -> str:
     """One sentence of HTML on how the episode went."""
-    total = number(float(episode.reward.sum(dtype=np.float64)), 4)
-    terms = ", ".join(f"{text(name)} {number(float(term.sum()))}" for name, term in episode.reward_terms.items())
+    total = rounded(float(episode.reward.sum(dtype=np.float64)), 4)
+    terms = ", ".join(f"{text(name)} {rounded(float(term.sum()))}" for name, term in episode.reward_terms.items())
     return f"Evaluation episode with seed {episode.seed}: {len(episode)} actions, return {total} ({terms})."
 
 
@@ -75,7 +75,7 @@ def _sights(stage: GroundPlan) -> str:
     size = f'width="{width}" height="{height}" style="width:{scale * width:.4g}px;aspect-ratio:{width}/{height}"'
     pairs = [_pair(eye, name, size) for eye, name in enumerate(eyes.names())]
     brighter = (
-        "" if stage.gain == 1 else f", brightened {number(stage.gain)} times (1/a², the light the pupil leaves out)"
+        "" if stage.gain == 1 else f", brightened {rounded(stage.gain)} times (1/a², the light the pupil leaves out)"
     )
     note = (
         f"<b>What the eyes see</b>, left to right: receptor signals shown as linear red, green and blue, noise "

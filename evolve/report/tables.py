@@ -6,7 +6,7 @@ from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, gene_valu
 from evolve.config.assemble import to_toml
 from evolve.genome.genes import ALL_GENES
 from evolve.genome.phenotype import Phenotype
-from evolve.report.markup import exact, number, table, text
+from evolve.report.markup import exact, rounded, table, text
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.versions import recorded
@@ -27,8 +27,8 @@ def headline(run: Run) -> str:
             f"of {run.config.candidates} planned; {failed} failed",
         ),
         ("Generations", f"{generations}", f"of {run.config.search.generations} planned"),
-        ("Training", f"{number(steps / 1e6)} M", "agent steps, all candidates"),
-        ("Evaluation time", f"{number(hours)} h", "training and evaluation, summed over workers"),
+        ("Training", f"{rounded(steps / 1e6)} M", "agent steps, all candidates"),
+        ("Evaluation time", f"{rounded(hours)} h", "training and evaluation, summed over workers"),
     ]
     if (best := run.best) is not None:
         tiles = [*_best_tiles(best), *tiles]
@@ -40,12 +40,12 @@ def _best_tiles(best: Candidate) -> list[tuple[str, str, str]]:
     low, high = bootstrap_interval(best.returns)
     spread = "a single episode"
     if len(best.returns) > 1:
-        spread = f"mean of {len(best.returns)} episodes; 95 % interval {number(low)} to {number(high)}"
+        spread = f"mean of {len(best.returns)} episodes; 95 % interval {rounded(low)} to {rounded(high)}"
     return [
-        ("Best fitness", number(best.fitness, 4), spread),
+        ("Best fitness", rounded(best.fitness, 4), spread),
         ("Best candidate", f"no. {best.id}", f"generation {best.generation}"),
-        ("Episodes solved by the best", f"{number(100 * best.success_rate)} %", f"of {len(best.returns)}"),
-        ("Its acuity", f"{number(acuity_cpd(best.phenotype))} cpd", "cycles per degree, by sampling alone"),
+        ("Episodes solved by the best", f"{rounded(100 * best.success_rate)} %", f"of {len(best.returns)}"),
+        ("Its acuity", f"{rounded(acuity_cpd(best.phenotype))} cpd", "cycles per degree, by sampling alone"),
     ]
 
 
@@ -65,7 +65,7 @@ def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str]
     name, meaning = names[0], genes[0].meaning
     if len(names) > 1:
         name, meaning = f"{names[0]} … {names[-1]}", f"relief, row {names[0][-2]}"
-    best = [exact(values[g.name]) if g.kind == "integer" else number(values[g.name]) for g in genes]
+    best = [exact(values[g.name]) if g.kind == "integer" else rounded(values[g.name]) for g in genes]
     searched = list(dict.fromkeys(f"{exact(u.low)} to {exact(u.high)}" if u.open else "frozen" for u in uses))
     columns = (best, [exact(u.start) for u in uses], searched)
     return [f"<code>{name}</code>", text(meaning), *("&ensp;".join(c) for c in columns), text(genes[0].unit) or "–"]
@@ -86,20 +86,20 @@ def all_candidates(run: Run) -> str:
 def _candidate_row(candidate: Candidate) -> list[str]:
     good = succeeded(candidate)
     outcome = [candidate.fitness, min(candidate.returns), max(candidate.returns)] if good and candidate.returns else []
-    shown = [number(value) for value in outcome] or ["failed", "–", "–"]
-    solved = number(100 * candidate.success_rate) if good else "–"
-    effort = [number(candidate.steps / 1000), number(candidate.seconds / 60)]
+    shown = [rounded(value) for value in outcome] or ["failed", "–", "–"]
+    solved = rounded(100 * candidate.success_rate) if good else "–"
+    effort = [rounded(candidate.steps / 1000), rounded(candidate.seconds / 60)]
     return [str(candidate.id), str(candidate.generation), *shown, solved, *_traits(candidate.phenotype), *effort]
 
 
 def _traits(phenotype: Phenotype) -> list[str]:
     height, width = phenotype.resolution
     aperture, index = (
-        "–" if value is None else number(value) for value in (phenotype.relative_aperture, phenotype.refractive_index)
+        "–" if value is None else rounded(value) for value in (phenotype.relative_aperture, phenotype.refractive_index)
     )
     return [
-        *(str(phenotype.n_eyes), number(phenotype.placement_range_deg), number(phenotype.fov_deg)),
-        *(f"{height} × {width}", number(acuity_cpd(phenotype)), aperture, index),
+        *(str(phenotype.n_eyes), rounded(phenotype.placement_range_deg), rounded(phenotype.fov_deg)),
+        *(f"{height} × {width}", rounded(acuity_cpd(phenotype)), aperture, index),
         *(str(phenotype.memory_frames), str(phenotype.neurons)),
     ]
 

@@ -8,7 +8,7 @@ import optics
 from evolve.analysis.episode import Episode
 from evolve.analysis.statistics import psnr
 from evolve.report.ground_plan import GroundPlan
-from evolve.report.markup import number, text
+from evolve.report.markup import rounded, text
 from evolve.report.picture import data_uri, display
 
 __all__ = ["through", "views"]
@@ -25,14 +25,14 @@ def views(episode: Episode, stage: GroundPlan) -> str:
     names = stage.eyes.names()
     shown = range(min(len(names), MOST_EYES))
     rows = "".join(_row(episode, eye, names[eye], frame, lens) for eye in shown)
-    brighter = f", brightened {number(stage.gain)} times (1/a²)" if stage.gain != 1 else ""
+    brighter = f", brightened {rounded(stage.gain)} times (1/a²)" if stage.gain != 1 else ""
     rest = f" The first {MOST_EYES} of {len(names)} eyes." if len(names) > MOST_EYES else ""
     quality = psnr(episode.signals, episode.perfect_signals, stage.gain)
     caption = (
-        f"<b>What it sees</b> at {number(time * stage.seconds)} s of the episode below, left to right: the scene, "
+        f"<b>What it sees</b> at {rounded(time * stage.seconds)} s of the episode below, left to right: the scene, "
         "finely sampled; what its receptors would signal behind a perfect lens; what its own optics make of it"
         f"{brighter}; and the same with the receptors' noise, as the brain gets it.{rest} Over the whole episode "
-        f"the signals have a PSNR of {number(quality)} dB against the perfect lens."
+        f"the signals have a PSNR of {rounded(quality)} dB against the perfect lens."
     )
     return f'<figure class="views"><div class="eyes">{rows}</div><figcaption>{caption}</figcaption></figure>\n'
 

@@ -16,11 +16,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.config.assemble import nearest
+from evolve.config.assemble import suggestion
 from evolve.config.run_config import ConfigError, SearchConfig
 from evolve.genome.genes import Gene, GeneConfig
 
-__all__ = ["Optimizer", "Space", "build"]
+__all__ = ["Optimizer", "Space", "build_optimizer"]
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class Optimizer(Protocol):
         """Fitness of a candidate that was asked for; finite."""
 
 
-def build(space: Space, search: SearchConfig) -> Optimizer:
+def build_optimizer(space: Space, search: SearchConfig) -> Optimizer:
     """The optimizer that `search.optimizer` names.
 
     Raises:
@@ -103,7 +103,7 @@ class Named:
 
         name = search.optimizer
         if name not in registry:
-            known = nearest(name, ("CMA", "mutation", *sorted(registry)))
+            known = suggestion(name, ("CMA", "mutation", *sorted(registry)))
             hint = known if known.startswith("did") else "see nevergrad's list of optimizers"
             raise ConfigError(
                 f"search.optimizer = {name!r}: must be CMA, mutation or one of nevergrad's; {hint}", "search.optimizer"

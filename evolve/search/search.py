@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import Genotype
-from evolve.search.optimizers import Optimizer, Space, build
+from evolve.search.optimizers import Optimizer, Space, build_optimizer
 
 __all__ = ["Proposal", "Search", "training_seed"]
 
@@ -115,7 +115,7 @@ class Search:
             start=self._base[self._varied],
             seed=(self._config.seed, *phase),
         )
-        self._optimizer = build(space, self._config.search)
+        self._optimizer = build_optimizer(space, self._config.search)
 
 
 def training_seed(run_seed: int, candidate_id: int) -> int:

@@ -78,7 +78,7 @@ class Candidate:
             record = {"parents": [], "rung": 0, **record}  # not written by the first runs
         names = [f.name for f in fields(cls)]
         if not isinstance(record, dict) or sorted(record) != sorted(names):
-            raise ValueError(f"must hold exactly {', '.join(names)}")
+            raise ValueError(f"wrong fields: must hold exactly {', '.join(names)}")
         try:
             return cls(
                 id=int(record["id"]),

@@ -10,6 +10,8 @@ import numpy as np
 from optics.numerics.autodiff import number
 
 __all__ = [
+    "close_match",
+    "did_you_mean",
     "finite",
     "in_range",
     "of_kind",
@@ -111,11 +113,23 @@ def one_of(name: str, value: Any, options: Iterable[str]) -> str:
     """`value`; ValueError, with the nearest option, unless it is one of them."""
     known = tuple(options)
     if value not in known:
-        plain = {option.lower(): option for option in known}
-        near = difflib.get_close_matches(str(value).lower(), plain, n=1, cutoff=0.5)
-        hint = f"; did you mean {plain[near[0]]!r}?" if near else ""
-        raise ValueError(f"{name} = {shown(value)}: must be one of {', '.join(map(repr, known))}{hint}")
+        raise ValueError(
+            f"{name} = {shown(value)}: must be one of {', '.join(map(repr, known))}{did_you_mean(value, known)}"
+        )
     return str(value)
+
+
+def did_you_mean(word: Any, known: Iterable[str], cutoff: float = 0.5) -> str:
+    """ "; did you mean 'this'?" where a known word is near, in capitals or not; else nothing."""
+    match = close_match(str(word), known, cutoff)
+    return f"; did you mean {match!r}?" if match else ""
+
+
+def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | None:
+    """The known word that is nearest, in capitals or not; None where none is near (difflib's ratio below `cutoff`)."""
+    plain = {option.lower(): option for option in known}
+    near = difflib.get_close_matches(word.lower(), plain, n=1, cutoff=cutoff)
+    return plain[near[0]] if near else None
 
 
 def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:

@@ -18,7 +18,8 @@ def number(value: Any) -> float:
     """value as a float; a Dr.Jit array of one element gives its entry, without derivative.
 
     Raises:
-        TypeError, ValueError: no number.
+        TypeError: of a type that is no number's.
+        ValueError: an array of more than one element.
     """
     if is_differentiable(value):
         return float(plain(value).reshape(()))

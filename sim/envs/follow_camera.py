@@ -25,12 +25,14 @@ RENDER_MODES = ("rgb_array", "eyes")
 
 
 def check_render_mode(render_mode: str | None) -> None:
-    """Raises:
-    ValueError: other render modes than RENDER_MODES and None.
+    """Refuse what nothing can be drawn by.
+
+    Raises:
+        ValueError: neither one of RENDER_MODES nor None.
     """
     if render_mode not in (None, *RENDER_MODES):
         modes = ", ".join(map(repr, RENDER_MODES))
-        raise ValueError(f"render_mode = {render_mode!r}, must be one of {modes} or None")
+        raise ValueError(f"render_mode = {render_mode!r}: must be one of {modes} or None")
 
 
 class FollowCamera:

@@ -40,7 +40,7 @@ class Memory:
 
     def __init__(self, frames: int) -> None:
         if frames < 1:
-            raise ValueError(f"memory = {frames!r}, must be at least 1 frame")
+            raise ValueError(f"memory = {frames!r}: must be at least 1 frame")
         self.frames = frames
         self._past: list[np.ndarray] = []
 

@@ -96,9 +96,9 @@ class Simulation:
 
     def __init__(self, world: World, n: int, seed: int | None, mode: str, threads: int) -> None:
         if mode not in MODES:
-            raise ValueError(f"mode = {mode!r}, must be one of {', '.join(map(repr, MODES))}")
+            raise ValueError(f"mode = {mode!r}: must be one of {', '.join(map(repr, MODES))}")
         if n < 1:
-            raise ValueError(f"n_envs = {n!r}, must be at least 1")
+            raise ValueError(f"n_envs = {n!r}: must be at least 1")
         self.world, self.n, self.mode = world, n, mode
         self.task = task_of(world)
         self._physics = Physics(world, threads)

@@ -72,7 +72,7 @@ class EyesVecEnv(VecEnv):
     def step_async(self, actions: np.ndarray) -> None:
         actions = np.asarray(actions, np.float32)
         if actions.shape != (self.num_envs, 2):
-            raise ValueError(f"actions have shape {actions.shape}, must be ({self.num_envs}, 2)")
+            raise ValueError(f"actions have shape {actions.shape}: must be ({self.num_envs}, 2)")
         self._commanded = actions
 
     def step_once(
@@ -202,7 +202,7 @@ class EyesVecEnv(VecEnv):
 
 def _require_whole(name: str, number: Any, least: int) -> None:
     if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
-        raise ValueError(f"{name} = {number!r}, must be a whole number, at least {least}")
+        raise ValueError(f"{name} = {number!r}: must be a whole number, at least {least}")
 
 
 def make_vec_env(
@@ -241,7 +241,7 @@ def make_vec_env(
     """
     eyes = Eyes() if eyes is None else eyes
     if not isinstance(eyes, Eyes):
-        raise ValueError(f"eyes = {eyes!r}, must be sim.Eyes or None, the default ones")
+        raise ValueError(f"eyes = {eyes!r}: must be sim.Eyes or None, the default ones")
     for name, number, least in (("n_envs", n_envs, 1), ("memory", memory, 1), ("world_seed", world_seed, 0)):
         _require_whole(name, number, least)
     if seed is not None:

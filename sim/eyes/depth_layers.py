@@ -24,11 +24,11 @@ class DepthLayers:
     def __post_init__(self) -> None:
         if not 0 < self.nearest <= self.farthest:
             raise ValueError(
-                f"depth: nearest = {self.nearest!r}, must be positive and at most farthest {self.farthest!r}"
+                f"depth: nearest = {self.nearest!r}: must be positive and at most farthest {self.farthest!r}"
             )
         if self.count < 1 or (self.count > 1 and self.nearest == self.farthest):
             raise ValueError(
-                f"depth: {self.count} layers from {self.nearest!r} to {self.farthest!r} m, must be 1 or more"
+                f"depth: {self.count} layers from {self.nearest!r} to {self.farthest!r} m: must be 1 or more"
             )
 
     @property

@@ -64,7 +64,7 @@ class Eyes:
             except (TypeError, ValueError, OverflowError):
                 fits = False
             if not fits:
-                raise ValueError(f"Eyes: {name} = {value!r}, must be {range_}")
+                raise ValueError(f"Eyes: {name} = {value!r}: must be {range_}")
 
         def counts(value: Any) -> bool:
             return value == int(value) >= 1
@@ -83,7 +83,7 @@ class Eyes:
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
         check("optics", _is_pupil, "an optics.Pupil or None, the perfect lens")
         if not isinstance(self.photon_budget, PhotonBudget | None):
-            raise ValueError(f"Eyes: photon_budget = {self.photon_budget!r}, must be an optics.PhotonBudget or None")
+            raise ValueError(f"Eyes: photon_budget = {self.photon_budget!r}: must be an optics.PhotonBudget or None")
 
     def eye(self) -> Eye:
         """One eye's optics and retina."""

@@ -87,7 +87,8 @@ class ReceptiveFields:
     def weights(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
         """What each ray counts for some receptors (row by row), (plane, receptor, ray); a receptor's sum to `power`.
 
-        Raises Unseen where a receptor has no ray in its field.
+        Raises:
+            NoRaysError: a receptor has no ray in its field.
         """
         row, column = np.divmod(receptors, self.resolution[1])
         y = draw.rows[None] - row[:, None] * self.cells

@@ -168,7 +168,11 @@ class FieldSampling:
                 rays += max(1, rays // 4)
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """What that sensor has for these receptors. Raises Unseen where one has no ray."""
+        """What that sensor has for these receptors.
+
+        Raises:
+            NoRaysError: one of them has no ray.
+        """
         draw = self.fields.draw(self._rays(rays_per_receptor))
         weights = self.fields.weights(draw, receptors)
         return Trial(directions_of(self.eye, draw.points), _bounce_samples(draw), weights)

@@ -92,7 +92,7 @@ class BatchedRenderer:
 
     def _check_room(self, n_envs: int) -> None:
         if n_envs < 1:
-            raise ValueError(f"n_envs = {n_envs!r}, must be at least 1")
+            raise ValueError(f"n_envs = {n_envs!r}: must be at least 1")
         fidelity, layers = self.fidelity, self.fidelity.depth.count
         planes, weights = layers * len(self.tracer.basis), layers * len(self.bands.wavelengths)
         memory_budget.check_memory(
@@ -189,7 +189,7 @@ def _asked(rays_per_receptor: float | str | Fidelity, eyes: Eyes) -> Fidelity | 
         return rays_per_receptor
     if isinstance(rays_per_receptor, str):
         if rays_per_receptor != "auto":
-            raise ValueError(f"rays_per_receptor = {rays_per_receptor!r}, must be positive, or 'auto'")
+            raise ValueError(f"rays_per_receptor = {rays_per_receptor!r}: must be positive, or 'auto'")
         return None
     return Fidelity(rays_per_receptor, eyes.bands)
 

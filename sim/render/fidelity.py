@@ -72,11 +72,11 @@ class Fidelity:
 
     def __post_init__(self) -> None:
         if not 0 < self.rays_per_receptor < math.inf:
-            raise ValueError(f"rays_per_receptor = {self.rays_per_receptor!r}, must be positive, or 'auto'")
+            raise ValueError(f"rays_per_receptor = {self.rays_per_receptor!r}: must be positive, or 'auto'")
         if self.bands < 1:
-            raise ValueError(f"bands = {self.bands!r}, must be at least 1")
+            raise ValueError(f"bands = {self.bands!r}: must be at least 1")
         if self.light not in LEVELS:
-            raise ValueError(f"light = {self.light!r}, must be one of {', '.join(map(repr, LEVELS))}")
+            raise ValueError(f"light = {self.light!r}: must be one of {', '.join(map(repr, LEVELS))}")
 
     @property
     def predicted_error(self) -> float | None:
@@ -159,7 +159,7 @@ def _allowed(eyes: Eyes, eye: optics.Eye, tolerance: float | None) -> float:
     if tolerance is None:
         return float(allowed)
     if not 0 < tolerance < math.inf:
-        raise ValueError(f"tolerance = {tolerance!r}, must be positive")
+        raise ValueError(f"tolerance = {tolerance!r}: must be positive")
     return tolerance
 
 

@@ -89,8 +89,11 @@ class FidelityTrials:
         self._receptors = np.sort(np.random.default_rng(0).permutation(int(np.prod(eyes.resolution)))[:RECEPTORS])
 
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
-        """Root mean square error of the signals with so many rays per receptor; raises Unseen where a receptor has
-        none."""
+        """Root mean square error of the signals with so many rays per receptor.
+
+        Raises:
+            NoRaysError: a receptor has none, when the function that is returned is called.
+        """
         truths: dict[int, np.ndarray] = {}
         receptors = np.prod(self._eyes.resolution)
         least = TRUE / receptors if self._eye.pupil else FINER

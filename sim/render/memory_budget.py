@@ -46,8 +46,10 @@ class Demand:
 
 
 def check_memory(demand: Demand) -> None:
-    """Raises:
-    ValueError: more rays than there is room for, with how many there is room for.
+    """Refuse what would not fit.
+
+    Raises:
+        ValueError: more rays than there is room for, with how many there is room for.
     """
     free = available()
     excess = max(demand.bytes / free, demand.elements / INDICES)

@@ -76,7 +76,7 @@ class Mirror:
         spectra: Mapping[str, Spectrum | str] | None,
     ) -> None:
         if not variant.endswith("spectral"):
-            raise ValueError(f"mirror: variant = {variant!r}, must be a spectral one such as {DEFAULT_VARIANT!r}")
+            raise ValueError(f"mirror: variant = {variant!r}: must be a spectral one such as {DEFAULT_VARIANT!r}")
         self.model, self.variant = model, variant
         self.spectra = resolve(model, spectra)
         visible = _visible(model, bodies, groups)

@@ -22,7 +22,7 @@ NESTED = 64  # bodies in each other that a camera may be inside of
 def check_size(width: int, height: int, spp: int) -> None:
     for name, value in (("width", width), ("height", height), ("spp", spp)):
         if value < 1:
-            raise ValueError(f"{name} = {value}, must be at least 1")
+            raise ValueError(f"{name} = {value}: must be at least 1")
 
 
 @dataclass(frozen=True)

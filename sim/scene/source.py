@@ -23,7 +23,7 @@ def load(source: mujoco.MjModel | mujoco.MjSpec | str | Path) -> mujoco.MjModel:
         return _compiled(lambda: mujoco.MjModel.from_xml_string(source), "this MJCF text")
     if not isinstance(source, str | Path):
         raise ValueError(
-            f"mirror: model is a {type(source).__name__}, must be an MjModel, an MjSpec, a path or MJCF text"
+            f"mirror: model is a {type(source).__name__}: must be an MjModel, an MjSpec, a path or MJCF text"
         )
     if not Path(source).is_file():
         raise ValueError(f"mirror: no file {str(source)!r}; give the path of an MJCF, URDF or MJB file")

@@ -7,13 +7,13 @@ glows as it would look in daylight.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from optics.numerics.arguments import did_you_mean
 from optics.spectra.spectrum import LIMITS_NM, Spectrum, daylight, illuminant, reflectance
 
 HEADLIGHT = "headlight"
@@ -35,8 +35,7 @@ def resolve(model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None)
 def _resolved(name: str, value: Any, materials: list[str], lights: list[str]) -> Spectrum:
     known = [known for known in (*materials, *lights) if known]
     if name not in known:
-        near = difflib.get_close_matches(str(name), known, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else f"; it has {', '.join(map(repr, known))}"
+        hint = did_you_mean(name, known) or f"; it has {', '.join(map(repr, known))}"
         raise ValueError(f"spectra: the model has no material or light {name!r}{hint}")
     if name in materials and name in lights:
         raise ValueError(f"spectra: {name!r} is a material and a light: rename one of them")

@@ -16,8 +16,10 @@ DEFAULT_VARIANT = "llvm_ad_spectral"
 def variant(name: str = DEFAULT_VARIANT) -> Iterator[None]:
     """Mitsuba's variant inside the block; afterwards the caller's own is in force again, if there was one.
 
-    (`mi.variant_context` fails where none was set before.) Raises optics.BackendError where LLVM is wanted and
-    cannot run.
+    (`mi.variant_context` fails where none was set before.)
+
+    Raises:
+        optics.BackendError: LLVM is wanted and cannot run.
     """
     before = mi.variant()
     if before == name:

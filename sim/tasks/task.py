@@ -172,7 +172,7 @@ def task_of(world: World) -> Task:
         return FindGoal(world, moving=world.task == "tracking")
     if world.task == "navigation":
         return LeaveMaze(world)
-    raise ValueError(f"task = {world.task!r}, must be one of {', '.join(map(repr, TASKS))}")
+    raise ValueError(f"task = {world.task!r}: must be one of {', '.join(map(repr, TASKS))}")
 
 
 def _distance_to_goal(state: WorldState, goals: int) -> np.ndarray:

@@ -63,8 +63,10 @@ def white_radiance(scene: Any, wavelengths: np.ndarray) -> np.ndarray:
 
 
 def check_lambertian(bsdfs: Sequence[Any]) -> None:
-    """Raises:
-    ValueError: a BSDF that is not a Lambertian reflector, on one side or both.
+    """Refuse what the renderer cannot light.
+
+    Raises:
+        ValueError: a BSDF that is not a Lambertian reflector, on one side or both.
     """
     sides = int(mi.BSDFFlags.FrontSide) | int(mi.BSDFFlags.BackSide)
     for bsdf in bsdfs:
@@ -95,7 +97,7 @@ def direct_light(
         chunks = np.pad(light.irradiance, (0, -len(light.irradiance) % LANES)).reshape(-1, LANES)
         for i, chunk in enumerate(chunks):
             irradiance[i] += cosine * mi.Spectrum(*map(float, chunk))
-    return [e * reflectance(si, bsdf, b) * dr.inv_pi for e, b in zip(irradiance, bands, strict=True)]
+    return [e * diffuse_reflectance(si, bsdf, b) * dr.inv_pi for e, b in zip(irradiance, bands, strict=True)]
 
 
 def onwards(point: Any, normal: Any, place: Any) -> Any:
@@ -115,7 +117,7 @@ def clear_of(point: Any, normal: Any) -> Any:
     return mi.Point3f(dr.fma(normal, offset, point))
 
 
-def reflectance(si: Any, bsdf: Any, wavelengths: Any) -> Any:
+def diffuse_reflectance(si: Any, bsdf: Any, wavelengths: Any) -> Any:
     """Of a Lambertian surface."""
     si.wavelengths = wavelengths
     return bsdf.eval_diffuse_reflectance(si, si.is_valid())

@@ -51,7 +51,7 @@ class Traced:
             second = lighting.onwards(si.p, si.sh_frame.n * seen_from, place)
             there = self._first_hit(scene, second, bodies, inputs)
             bounced = lighting.direct_light(*there, self._lights, self._bands, occluded)
-            sent_on = [lighting.reflectance(si, bsdf, b) for b in self._bands]
+            sent_on = [lighting.diffuse_reflectance(si, bsdf, b) for b in self._bands]
             valid = si.is_valid()
             spectra = [dr.select(valid, dr.fma(r, b, s), s) for s, r, b in zip(spectra, sent_on, bounced, strict=True)]
         return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], si.t

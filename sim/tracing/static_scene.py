@@ -114,7 +114,7 @@ def _refuse_glow(model: mujoco.MjModel, geom: int) -> None:
 def _sphere_of(model: mujoco.MjModel, body: str) -> int:
     geoms = np.flatnonzero(model.geom_bodyid == model.body(body).id)
     if len(geoms) != 1 or model.geom_type[geoms[0]] != mujoco.mjtGeom.mjGEOM_SPHERE:
-        raise ValueError(f"body {body!r} must be a single sphere geom")
+        raise ValueError(f"body {body!r} has {len(geoms)} geoms: must be a single sphere")
     return int(geoms[0])
 
 

@@ -77,7 +77,7 @@ def tracer_of(
     if light == lighting.BOUNCE and shapes.is_textured(world.model, stage.bodies.geoms[-1]):
         raise ValueError("light = 'bounce': the agent's body has a texture, which would have to turn with it")
     if name not in TRACERS:
-        raise ValueError(f"tracer = {name!r}, must be one of {', '.join(map(repr, TRACERS))}")
+        raise ValueError(f"tracer = {name!r}: must be one of {', '.join(map(repr, TRACERS))}")
     lighting.check_lambertian([*stage.spheres.bsdfs, *(shape.bsdf() for shape in stage.scene.shapes())])
     if name == Traced.name:
         return Traced(stage, wavelengths, "asked for", light)

@@ -6,13 +6,13 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
 
+from optics.numerics.arguments import did_you_mean
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.scene.spectra import resolve
@@ -84,13 +84,11 @@ def build_world(
             there.
     """
     if task not in TASKS:
-        near = difflib.get_close_matches(task, TASKS, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"unknown task {task!r}, must be one of {', '.join(TASKS)}{hint}")
+        raise ValueError(f"unknown task {task!r}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")
     if seed < 0:
-        raise ValueError(f"build_world: seed = {seed}, must be at least 0")
+        raise ValueError(f"build_world: seed = {seed}: must be at least 0")
     if mazes < 1 or (mazes > 1 and task != "navigation"):
-        raise ValueError(f"build_world: mazes = {mazes}, must be 1, or more for 'navigation'")
+        raise ValueError(f"build_world: mazes = {mazes}: must be 1, or more for 'navigation'")
     spec, rng = _empty_world(), np.random.default_rng(seed)
     layout = navigation.add_layout(spec, rng, mazes) if task == "navigation" else _LAYOUTS[task](spec, rng)
     _add_agent(spec, layout.agent_spawn[0], eyes)

@@ -9,9 +9,9 @@ import optics
 from evolve.analysis.statistics import (
     acuity_cpd,
     bootstrap_interval,
+    eye_image_quality,
     gene_values,
     generation_statistics,
-    image_quality,
     polychromatic,
     psnr,
     trajectory,
@@ -197,7 +197,7 @@ LENS = (0.2, 0.5, 0.5, 0.2, 0.5, 0.8, 0.8, 0.5, 0.5, 0.8, 0.8, 0.5, 0.2, 0.5, 0.
 
 def test_image_quality_of_the_perfect_lens_is_what_noise_leaves():
     perfect = phenotype(relative_aperture=None, relief=None, refractive_index=None)
-    assert image_quality(perfect, EyeConfig(optics=False, noise_sigma=0.05)) == pytest.approx(0.95)
+    assert eye_image_quality(perfect, EyeConfig(optics=False, noise_sigma=0.05)) == pytest.approx(0.95)
 
 
 def test_image_quality_knows_focus_light_and_noise():
@@ -205,10 +205,10 @@ def test_image_quality_knows_focus_light_and_noise():
     focused = phenotype(relative_aperture=0.3, relief=LENS, resolution=(15, 15))
     flat = phenotype(relative_aperture=0.3, relief=(0.5,) * 16, resolution=(15, 15))
     calm, loud = EyeConfig(noise_sigma=0.0), EyeConfig(noise_sigma=0.1)
-    quality = image_quality(focused, calm)
+    quality = eye_image_quality(focused, calm)
     assert 0.7 * 0.09 < quality < 0.09  # throughput a² = 0.09 times a contrast that the aperture keeps near 1
-    assert image_quality(flat, calm) < 0.7 * quality
-    assert image_quality(focused, loud) == 0.0  # the noise floor, 0.1 / 0.09, lies above all contrast
+    assert eye_image_quality(flat, calm) < 0.7 * quality
+    assert eye_image_quality(focused, loud) == 0.0  # the noise floor, 0.1 / 0.09, lies above all contrast
 
 
 def test_polychromatic_weighs_bands_by_daylight_and_receptors():
@@ -239,6 +239,6 @@ DAYLIGHT_475 = 1.15392  # CIE D65 at 475 nm over that at 560 nm: 115.392 / 100
 def test_photons_count_in_image_quality():
     """As much as the eye's own description says."""
     animal, dusk = phenotype(relative_aperture=0.3, relief=LENS), EyeConfig(bands=2, illuminance=0.05)
-    dim, bright = (image_quality(animal, config) for config in (dusk, EyeConfig(bands=2)))
+    dim, bright = (eye_image_quality(animal, config) for config in (dusk, EyeConfig(bands=2)))
     assert dim < 0.9 * bright
     assert dim == pytest.approx(animal.eyes(dusk).eye().describe().image_quality, rel=1e-3)

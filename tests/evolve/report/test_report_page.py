@@ -1,4 +1,4 @@
-"""The report: every number in it is the store's, nothing in it comes from elsewhere, nothing in it is executed."""
+"""The report: every rounded in it is the store's, nothing in it comes from elsewhere, nothing in it is executed."""
 
 import re
 import shutil
@@ -11,7 +11,7 @@ from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
 from evolve.report import write
-from evolve.report.markup import exact, number
+from evolve.report.markup import exact, rounded
 from evolve.report.page import genes_section, render
 from evolve.report.tables import best_genes
 from evolve.store.candidate import Candidate
@@ -40,7 +40,7 @@ def test_best_candidate_is_the_stores(run, content, page):
 def test_headline_counts(page):
     text = " ".join(page.texts["all"].split())
     assert "6of 6 planned; 1 failed" in text
-    assert f"{number(5 * 90 / 3600 + 2 / 3600)} h" in text
+    assert f"{rounded(5 * 90 / 3600 + 2 / 3600)} h" in text
 
 
 def test_every_section_and_every_open_gene_is_there(run, page):
@@ -140,7 +140,7 @@ def test_a_run_without_candidates_is_reported(tmp_path):
     ],
 )
 def test_numbers_have_sensible_digits(value, shown):
-    assert number(value) == shown
+    assert rounded(value) == shown
 
 
 def test_exact_settings():

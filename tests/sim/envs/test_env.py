@@ -191,11 +191,11 @@ def test_renders_nothing_before_the_world_has_begun():
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        ({"render_mode": "human"}, "render_mode = 'human', must be one of 'rgb_array', 'eyes' or None"),
+        ({"render_mode": "human"}, "render_mode = 'human': must be one of 'rgb_array', 'eyes' or None"),
         ({"spectra": {"wal": "foliage"}}, "no material or light 'wal'; did you mean 'wall'"),
         ({"memory": 0}, "memory = 0"),
-        ({"memory": 1.5}, "memory = 1.5, must be a whole number"),
-        ({"world_seed": 1.5}, "world_seed = 1.5, must be a whole number"),
+        ({"memory": 1.5}, "memory = 1.5: must be a whole number"),
+        ({"world_seed": 1.5}, "world_seed = 1.5: must be a whole number"),
     ],
 )
 def test_bad_options_are_named(options, named):
@@ -206,7 +206,7 @@ def test_bad_options_are_named(options, named):
 def test_actions_of_another_shape_are_named():
     env = sim.make_env("detection", EYES)
     env.reset(seed=0)
-    with pytest.raises(ValueError, match=r"actions have shape \(1, 3\), must be \(1, 2\)"):
+    with pytest.raises(ValueError, match=r"actions have shape \(1, 3\): must be \(1, 2\)"):
         env.step(np.zeros(3))
 
 
@@ -222,11 +222,11 @@ def test_gymnasiums_own_statistics_can_be_wrapped_around():
 
 
 def test_eyes_and_seeds_of_another_kind_are_named():
-    with pytest.raises(ValueError, match=r"eyes = 'x', must be sim.Eyes"):
+    with pytest.raises(ValueError, match=r"eyes = 'x': must be sim.Eyes"):
         sim.make_env("detection", "x")
-    with pytest.raises(ValueError, match="seed = -1, must be a whole number, at least 0"):
+    with pytest.raises(ValueError, match="seed = -1: must be a whole number, at least 0"):
         sim.make_vec_env("detection", EYES, 1, seed=-1)
-    with pytest.raises(ValueError, match=r"optics = 'lens', must be an optics.Pupil or None"):
+    with pytest.raises(ValueError, match=r"optics = 'lens': must be an optics.Pupil or None"):
         sim.Eyes(optics="lens")
 
 

@@ -142,7 +142,7 @@ def test_it_says_why():
         (lambda world: sim.BatchedRenderer(world, DETECTION, 1, "many"), "rays_per_receptor = 'many'"),
         (lambda world: sim.choose_fidelity(world, DETECTION, tolerance=0), "tolerance = 0"),
         (lambda world: sim.Fidelity(1.0, 0), "bands = 0"),
-        (lambda world: sim.Fidelity(1.0, 3, light="path"), "light = 'path', must be one of 'direct', 'bounce'"),
+        (lambda world: sim.Fidelity(1.0, 3, light="path"), "light = 'path': must be one of 'direct', 'bounce'"),
     ],
 )
 def test_bad_arguments_are_named(call, named):

@@ -101,5 +101,5 @@ def test_dim_light_is_noisy_light():
 
 
 def test_photon_budgets_are_checked():
-    with pytest.raises(ValueError, match=r"photon_budget = 3, must be an optics\.PhotonBudget or None"):
+    with pytest.raises(ValueError, match=r"photon_budget = 3: must be an optics\.PhotonBudget or None"):
         sim.Eyes(photon_budget=3)

@@ -202,7 +202,7 @@ def test_stripes_start_light_and_split_evenly():
 
 
 def test_bad_input_is_named():
-    with pytest.raises(ValueError, match="mazes = 2, must be 1, or more for 'navigation'"):
+    with pytest.raises(ValueError, match="mazes = 2: must be 1, or more for 'navigation'"):
         sim.build_world("detection", mazes=2)
     with pytest.raises(ValueError, match="did you mean 'navigation'"):
         sim.build_world("navigate")
