@@ -1,4 +1,4 @@
-"""The report: every rounded in it is the store's, nothing in it comes from elsewhere, nothing in it is executed."""
+"""The report: every number in it is the store's, nothing in it comes from elsewhere, nothing in it is executed."""
 
 import re
 import shutil
