@@ -59,6 +59,50 @@ def test_nothing_reads_or_writes_pickles():
     assert not any(offenders.values()), offenders
 
 
+FOLDERS = sorted(
+    folder
+    for package in PACKAGES
+    for folder in (ROOT / package).iterdir()
+    if folder.is_dir() and any(folder.glob("*.py"))
+)
+
+
+def test_packages_are_folders_with_names():
+    """`ls` shows a handful of rooms, and at most three modules beside the table of contents."""
+    for package in PACKAGES:
+        modules = {path.name for path in (ROOT / package).glob("*.py")} - {"__init__.py"}
+        assert len(modules) <= 3, modules
+        assert sum(folder.parent.name == package for folder in FOLDERS) <= 9
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.relative_to(ROOT).as_posix())
+def test_a_folder_lists_its_modules(folder):
+    """Its `__init__` is a table of contents."""
+    listed = {line.split()[0].split(".")[0] for line in table(folder / "__init__.py")}
+    there = {path.stem for path in folder.glob("*.py")} | {path.parent.name for path in folder.glob("*/__init__.py")}
+    assert listed >= there - {"__init__"}, there - listed
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.relative_to(ROOT).as_posix())
+def test_tests_mirror_the_folder_and_say_what_covers_what(folder):
+    """In `tests`, the folder's `__init__` names for each module the files that fail where it is wrong."""
+    here = ROOT / "tests" / folder.relative_to(ROOT)
+    covered = dict(line.split(": ", 1) for line in table(here / "__init__.py") if ": " in line)
+    modules = {path.relative_to(folder).with_suffix("") for path in folder.rglob("*.py")}
+    wanted = {".".join(path.parts) for path in modules if path.name != "__init__"}
+    assert wanted <= covered.keys(), wanted - covered.keys()
+    places = (here, here.parent, ROOT / "tests")
+    named = {file for files in covered.values() for file in files.split(", ")}
+    missing = {file for file in named if not any((place / f"{file}.py").is_file() for place in places)}
+    assert not missing
+
+
+def table(init: Path) -> list[str]:
+    """What a folder's docstring has below its first line, a line each."""
+    text = ast.get_docstring(ast.parse(init.read_text())) or ""
+    return [line for line in text.split("\n")[1:] if line and not line.startswith(" ")]
+
+
 def test_files_are_small():
     """A file longer than 300 lines holds two nouns."""
     long = {str(path.relative_to(ROOT)): n for path in SOURCES if (n := len(path.read_text().splitlines())) > 300}

@@ -1,37 +1,19 @@
-"""The report of a run: one HTML file that needs nothing but itself.
+"""What people look at: reports, replays, comparisons, EXR files.
 
-write(run)                          the report, into the run's directory
-player.write_player(episode, path)  one episode as a playable page
+write            the report of a run: one HTML file
+page             its sections
+tables           its numbers
+figures          figures of a whole run
+eye_figures      figures of one eye's optics
+ground_plan      where an episode plays
+views            one moment, through a perfect lens and through the evolved one
+player           an episode to play
+picture          signals as pictures
+svg              figures that follow the page's theme
+theme            its colours
+markup           pieces of HTML
+comparison       runs side by side
+replay           an episode once more
+exr_export       what an agent saw, as EXR files
+rerun_recording  an episode for rerun
 """
-
-from __future__ import annotations
-
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from evolve.analysis.episode import Episode
-    from evolve.store.directory import Run
-
-__all__ = ["write"]
-
-FILE = "report.html"
-
-
-def write(run: Run, episode: Episode | None = None) -> Path:
-    """Write `report.html` of a run, whole or not at all, with an episode of the best candidate (default: played now).
-
-    The same run gives the same bytes with the same versions of the libraries.
-
-    Raises:
-        ValueError: the best candidate's policy is missing or damaged.
-    """
-    from evolve.analysis.episode import record
-    from evolve.report.page import render
-    from evolve.store.atomic_files import write_whole
-
-    if episode is None and run.best is not None:
-        episode = record(run)
-    path = run.path / FILE
-    write_whole(path, render(run, episode))
-    return path

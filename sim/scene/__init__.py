@@ -13,4 +13,6 @@ sky            the skybox -> light from infinity
 cameras        cameras -> sensors
 rays           what a sensor sees of a scene
 inventory      what has no counterpart, in words
+color          sRGB and linear light
+variant        Mitsuba's variant, for the span of a call
 """

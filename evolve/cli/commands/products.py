@@ -23,7 +23,7 @@ def replay(arguments: Namespace) -> int:
 def report(arguments: Namespace) -> int:
     """Write the report."""
     run = _open(arguments)
-    from evolve.report import write
+    from evolve.report.write import write
 
     print(f"report: {write(run)}")
     return 0

@@ -128,12 +128,12 @@ def _finish(run: Run, as_json: bool) -> int:
     if not as_json:
         print("\n".join(_outcome(run, run.best, failures)))
         print("writing report and EXR files ...", flush=True)
-    from evolve import report
     from evolve.analysis import episode
     from evolve.report import exr_export
+    from evolve.report.write import write
 
     best = episode.record(run)
-    page, frames = report.write(run, best), exr_export.export_episode(best, run.path / "exr")
+    page, frames = write(run, best), exr_export.export_episode(best, run.path / "exr")
     if as_json:
         products = {"directory": str(run.path), "report": str(page), "exr": [str(frame) for frame in frames]}
         print(json.dumps({"event": "finished", "best": run.best.id, "fitness": run.best.fitness, **products}))

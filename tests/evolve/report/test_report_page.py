@@ -10,10 +10,10 @@ from evolve.config.assemble import assemble
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
-from evolve.report import write
 from evolve.report.markup import exact, rounded
 from evolve.report.page import genes_section, render
 from evolve.report.tables import best_genes
+from evolve.report.write import write
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation

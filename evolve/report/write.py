@@ -1,0 +1,33 @@
+"""The report of a run: one HTML file that needs nothing but itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from evolve.analysis.episode import Episode
+    from evolve.store.directory import Run
+
+__all__ = ["write"]
+
+FILE = "report.html"
+
+
+def write(run: Run, episode: Episode | None = None) -> Path:
+    """Write `report.html` of a run, whole or not at all, with an episode of the best candidate (default: played now).
+
+    The same run gives the same bytes with the same versions of the libraries.
+
+    Raises:
+        ValueError: the best candidate's policy is missing or damaged.
+    """
+    from evolve.analysis.episode import record
+    from evolve.report.page import render
+    from evolve.store.atomic_files import write_whole
+
+    if episode is None and run.best is not None:
+        episode = record(run)
+    path = run.path / FILE
+    write_whole(path, render(run, episode))
+    return path
