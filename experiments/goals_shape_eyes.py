@@ -54,7 +54,8 @@ def page(store: Store) -> Page:
             f"the median and the range of 95 % of {SEEDS} searches that were told random numbers as fitness; only what "
             "leaves that range is selection's work. Eyes have perfect lenses, brains are given; navigators' eyes are "
             "one row of receptors, which is not evolved. The tasks also differ in how long is trained and in what "
-            "the learner does ([the task's settings](../design.md)). Placement counts where there is more than one eye."
+            "the learner does ([the task's settings](../explanation/learning.md)). Placement counts where there is "
+            "more than one eye."
         ),
         command=(
             "evolve run --preset bifurcation-navigation --seed 0    # and 1, 2\n"

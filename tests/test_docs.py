@@ -15,12 +15,12 @@ import pytest
 
 from evolve.cli.main import main
 from evolve.config.assemble import assemble
+from tests.source_names import missing
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 READ_ON_THE_SPOT = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 DOCUMENTS = [*READ_ON_THE_SPOT, *sorted(DOCS.rglob("*.md"))]
-OUTLINES = [DOCS / "design.md"]  # their code is signatures
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
 
 # Code, and what it prints where the page shows that.
@@ -80,7 +80,7 @@ def test_links_to_files_lead_somewhere(document):
 # --- code
 
 
-SESSIONS = [page for page in DOCUMENTS if page not in OUTLINES and CODE.search(page.read_text())]
+SESSIONS = [page for page in DOCUMENTS if CODE.search(page.read_text())]
 
 
 @pytest.mark.parametrize("document", SESSIONS, ids=name)
@@ -113,6 +113,43 @@ def test_example_runs(example, tmp_path):
     child = run(example, cwd=tmp_path)
     assert child.returncode == 0, child.stderr
     assert child.stdout.strip()
+
+
+# --- names
+
+
+@pytest.mark.parametrize("document", [*DOCUMENTS, ROOT / "CHANGELOG.md"], ids=name)
+def test_paths_and_names_exist(document):
+    assert missing(document.read_text()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("see `optics.methods.hankel` and optics/methods/hankel.py", []),
+        ("see `optics.methods.direct_sum`", ["optics.methods.direct_sum"]),
+        ("in optics/direct_sum.py", ["optics/direct_sum.py"]),
+        ("`textbook_of_optics.py`", ["textbook_of_optics.py"]),
+        ("`tests/optics/methods/test_*.py`, `tests/optics/test_no_*.py`", ["tests/optics/test_no_*.py"]),
+        ("`python -m validation.B0_planner --cases 9`", []),
+        ("    python -m validation.B0_planer", ["validation.B0_planer"]),
+        ("`optics.psf`, `sim.BatchedRenderer(world)`, `optics.torch.PointSpread`", []),
+        ("`optics.psff`", ["optics.psff"]),
+        ("`sim.Fidelity.light`, `Fidelity.light`, `Eye.kernel`, `Pupil.area`", []),
+        ("`sim.Fidelity.lights`, `Fidelity.colour`", ["Fidelity.colour", "sim.Fidelity.lights"]),
+        ("`lighting.onwards`, `lighting.backwards`", ["lighting.backwards"]),
+        ("`search.rungs=3`, `search.steps`", ["search.steps"]),
+        ("`genome.NAME.opens_at`, `genome.NAME.shuts_at`", ["genome.NAME.shuts_at"]),
+        ("`eye.in_bands(x)`, `eye.noise_sigma`, `eye.out_of_bands(x)`", ["eye.out_of_bands"]),
+        ("`NodeChoice`, `linear_weights`, `choose_fidelity(world, eyes)`", []),
+        ("`Sight`, `lit_in_bands`, `STEEPEST_SINE`", ["STEEPEST_SINE", "Sight", "lit_in_bands"]),
+        ("`mirror(model)`, `mirrored(model)`", ["mirrored"]),
+        ("`mujoco.Renderer`, `MjData.timer`, `config.toml`, `evolve genes`", []),
+        ("[B9](validation/B9.md), https://host/optics/none.py", []),  # links: see above
+    ],
+)
+def test_names_that_do_not_exist_are_noticed(text, wrong):
+    assert missing(text) == wrong
 
 
 # --- commands

@@ -20,8 +20,8 @@ fitness an upper bound.
 Settings are the task's defaults but for those named. "With tanh" are trainings with what the defaults were before: 64
 worlds x 64 steps, 4 epochs, a learning rate of 1e-3 that never fell, tanh, mini-batches of stretches of 32 steps (that
 of detection the last commit with them). Now it is 128 x 32, 10 epochs, 3e-3 falling as one over the steps after 75,000
-(in mazes 200,000), leaky rectifiers, stretches of 8. What else was tried is in `docs/design.md`, "Measured". A row of
-few steps is a training that was stopped there, not one that learnt so fast. Whatever is called "with tanh" but
+(in mazes 200,000), leaky rectifiers, stretches of 8. What else was tried is in `docs/measurements/learning.md`. A row
+of few steps is a training that was stopped there, not one that learnt so fast. Whatever is called "with tanh" but
 detection is older than the bounds on means of actions; in the maze contact then had its full price after 500,000 steps.
 
 Trainings are stored (`docs/validation/data/E0.csv`), because they take minutes each; the page comes from the store.

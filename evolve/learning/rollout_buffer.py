@@ -17,7 +17,7 @@ from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.type_aliases import DictRolloutBufferSamples
 from torch import Tensor
 
-SEGMENT_STEPS = 8  # at most: longer ones share more frames, shorter ones mix better (docs/design.md has 8 beside 32)
+SEGMENT_STEPS = 8  # at most: longer ones share more frames, shorter ones mix better (docs/measurements/learning.md)
 
 
 class FrameRolloutBuffer(RolloutBuffer):

@@ -136,7 +136,7 @@ def eye_positions(azimuths: np.ndarray) -> np.ndarray:
 def eye_rotations(azimuths: np.ndarray) -> np.ndarray:
     """Eye frames in the agent's frame, (n, 3, 3), columns (x right, y up, z optical axis, outwards).
 
-    x × y = -z: these are image coordinates, so the determinant is -1 (docs/design.md, "Coordinates").
+    x × y = -z: these are image coordinates, so the determinant is -1 (docs/architecture.md, "Coordinates").
     """
     cos, sin, zero, one = np.cos(azimuths), np.sin(azimuths), np.zeros_like(azimuths), np.ones_like(azimuths)
     right = np.stack([sin, -cos, zero], axis=-1)

@@ -169,7 +169,7 @@ def test_perfect_lens_is_the_default_of_the_same_contract():
 
 
 def test_rows_go_down_and_columns_right():
-    """docs/design.md: receptor (0, 0) looks up and to the left; x is right, y is up."""
+    """docs/architecture.md: receptor (0, 0) looks up and to the left; x is right, y is up."""
     e = eye(resolution=(3, 3))
     d = box_sensor(e, 16).directions.reshape(3, 3, 16, 3).mean(axis=2)
     assert d[0, 0, 0] < 0 < d[0, 0, 1]
