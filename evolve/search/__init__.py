@@ -3,6 +3,7 @@
 loop                propose, evaluate, write down, tell
 search              Search: proposals, phases, seeds
 optimizers          CMA-ES and others
+same_search         whether a search proposes what is on record
 successive_halving  who is trained further
 job                 what executors are given
 local_executor      processes on this machine

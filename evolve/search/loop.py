@@ -16,12 +16,12 @@ from typing import Protocol
 from evolve.genome.phenotype import develop
 from evolve.learning.training_stage import TrainingStage
 from evolve.search.job import Job, Progress
+from evolve.search.same_search import SameSearch
 from evolve.search.search import Proposal, Search, training_seed
 from evolve.search.successive_halving import budgets, reaching
 from evolve.store.candidate import Candidate
-from evolve.store.directory import Run, RunError
+from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
-from evolve.store.versions import present, recorded
 
 __all__ = ["Executor", "Watcher", "evolve"]
 
@@ -61,10 +61,11 @@ def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
 
 def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
     """Tell a generation, in the order of its candidates, once all of it is known: rung by rung, on a ladder."""
+    same = SameSearch(run)
     for generation in range(run.config.search.generations):
         proposals = {proposal.id: proposal for proposal in search.propose_generation()}
         for candidate in run.generation(generation):
-            _require_same(run, proposals[candidate.id], candidate)
+            same.require(proposals[candidate.id], candidate)
         for rung in range(run.config.search.rungs):
             missing = sorted(reaching(run, generation, rung) - run.on_rung(rung))
             jobs = deque(_job(run, proposals[identity], rung) for identity in missing)
@@ -84,9 +85,10 @@ def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) ->
         under_way.update((proposal.id, proposal) for proposal in proposals)
         return proposals
 
+    same = SameSearch(run)
     refill()
     for candidate in run.in_order_of_finish:
-        _require_same(run, under_way.pop(candidate.id, None), candidate)
+        same.require(under_way.pop(candidate.id, None), candidate)
         search.tell([(candidate.id, candidate.fitness)])
         refill()
     jobs = deque(_job(run, proposal) for proposal in under_way.values())
@@ -116,18 +118,3 @@ def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, wat
     run.append(candidate)
     watcher.evaluated(candidate)
     return candidate
-
-
-def _require_same(run: Run, proposal: Proposal | None, candidate: Candidate) -> None:
-    """The search must propose, bit for bit, what is on record; else it is another search than the one that began."""
-    if proposal is not None and candidate.genome == proposal.genome:
-        return
-    then, now = recorded(run.path), present()
-    names = ("nevergrad", "cma", "numpy")
-    before = ", ".join(f"{name} {then.get(name, '?')}" for name in names)
-    after = ", ".join(f"{name} {now[name]}" for name in names)
-    raise RunError(
-        f"{run.path} cannot be continued: candidate {candidate.id} is not what the search proposes here "
-        f"(started with {before}; here {after}). Continue it with the versions that began it, and an unchanged "
-        f"config.toml"
-    )

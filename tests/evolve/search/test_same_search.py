@@ -1,0 +1,49 @@
+"""A search may come to other last digits on another processor; another search is refused."""
+
+import pytest
+
+from evolve.search.same_search import ROUNDING, TAKEN_FOR_ANOTHERS, SameSearch
+from evolve.search.search import Proposal
+from evolve.store.directory import Run, RunError
+
+
+@pytest.fixture(scope="module")
+def run(finished):
+    return Run.open(finished)
+
+
+def off(candidate, by):
+    """What a search proposes that is `by` off the record in one coordinate."""
+    genome = (candidate.genome[0] + by, *candidate.genome[1:])
+    return Proposal(candidate.id, candidate.generation, candidate.index, genome, candidate.parents)
+
+
+def accepted(run, candidate, by):
+    try:
+        SameSearch(run).require(off(candidate, by), candidate)
+    except RunError:
+        return False
+    return True
+
+
+def test_rounding_is_no_other_search(run):
+    first, later = run.generation(0)[0], run.generation(1)[0]
+    for by, in_first, in_later in (
+        (0.0, True, True),
+        (ROUNDING / 2, True, True),
+        (ROUNDING * 2, False, True),
+        (TAKEN_FOR_ANOTHERS / 2, False, True),
+        (TAKEN_FOR_ANOTHERS * 2, False, False),
+    ):
+        assert (accepted(run, first, by), accepted(run, later, by)) == (in_first, in_later), by
+
+
+def test_other_libraries_must_come_to_the_same(run, monkeypatch):
+    monkeypatch.setattr("evolve.search.same_search.recorded", lambda path: {"nevergrad": "0"})
+    assert accepted(run, run.generation(1)[0], ROUNDING / 2)
+    assert not accepted(run, run.generation(1)[0], TAKEN_FOR_ANOTHERS / 2)
+
+
+def test_what_was_never_proposed_is_refused(run):
+    with pytest.raises(RunError, match="is not what the search proposes here"):
+        SameSearch(run).require(None, run.generation(0)[0])
