@@ -102,7 +102,7 @@ def _add_runs(commands: _Commands) -> None:
     run.add_argument("--workers", type=int, metavar="N", help="same as --set workers=N (0: one per core)")
     run.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/TASK-PRESET-N)")
     run.add_argument(
-        "--from", dest="ancestor", metavar="RUN[:ID]", help="start from an animal of another run (default: its best)"
+        "--from", dest="start_from", metavar="RUN[:ID]", help="start from an animal of another run (default: its best)"
     )
     run.add_argument(
         "--dry-run", action="store_true", help="print the plan, hours and disk that it takes, and begin nothing"

@@ -100,10 +100,12 @@ class SearchConfig:
         False, None, "propose the next candidate as soon as one is evaluated; off: generation by generation"
     )
     rungs: int = setting(
-        1, Interval(1, 10), "budgets on the way to a whole training, on each of which only the better ones go on"
+        1, Interval(1, 10), "budget stages of a training; after each, only the better candidates go on; 1: no halving"
     )
     promoted: float = setting(
-        0.5, Interval(0, 0.9, open_low=True), "part that goes on from a rung, and of the next one's budget a rung has"
+        0.5,
+        Interval(0, 0.9, open_low=True),
+        "share of candidates that go on after a budget stage; also a stage's budget as a share of the next one's",
     )
 
 

@@ -11,7 +11,7 @@ from evolve.cli.commands import INTERRUPTED
 from evolve.cli.progress import Bar, Events, Lines, Watchers, watcher
 from evolve.cli.run_plan import RunPlan
 from evolve.cli.start_from import starts_from
-from evolve.cli.tensorboard import Scalars
+from evolve.cli.tensorboard import TensorBoardWriter
 from evolve.config.assemble import assemble
 from evolve.config.lint import lint
 from evolve.config.run_config import ConfigError, RunConfig
@@ -34,7 +34,7 @@ def start(arguments: Namespace) -> int:
     """Begin a run and carry it to its end."""
     _require_scheduler(arguments)
     flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
-    starts = starts_from(arguments.ancestor) if arguments.ancestor else None
+    starts = starts_from(arguments.start_from) if arguments.start_from else None
     config = assemble(
         arguments.task, arguments.preset, arguments.config, [*arguments.set, *flags], starts, arguments.scale
     )
@@ -88,9 +88,9 @@ def _carry(run: Run, arguments: Namespace) -> int:
         with (
             _executor(run, arguments) as executor,
             _watcher(run, executor.count, arguments) as watch,
-            Scalars(run) if arguments.tensorboard else nullcontext() as scalars,
+            TensorBoardWriter(run) if arguments.tensorboard else nullcontext() as tensorboard,
         ):
-            evolve(run, executor, Watchers([watch, *([scalars] if scalars else [])]))
+            evolve(run, executor, Watchers([watch, *([tensorboard] if tensorboard else [])]))
     except KeyboardInterrupt:
         print(
             f"\nevolve: interrupted; {len(run.candidates)} of {run.config.candidates} candidates are on record. "
@@ -161,7 +161,7 @@ def _plan(config: RunConfig) -> str:
     genes = sum(use.open for use in config.genome.values())
     return (
         f"{config.task}, {search.generations} generations x {search.population} candidates x {steps:,} steps"
-        f"{f' on a ladder of {search.rungs} rungs' if search.rungs > 1 else ''}, "
+        f"{f' in {search.rungs} budget stages' if search.rungs > 1 else ''}, "
         f"{genes} genes open"
     )
 

@@ -7,7 +7,7 @@ import pytest
 
 import evolve.cli.run_plan
 from evolve.cli.main import main
-from evolve.cli.pace import Pace, calibrate
+from evolve.cli.pace import Pace, measure_pace
 from evolve.cli.run_plan import RunPlan
 from evolve.config.assemble import assemble
 from evolve.config.lint import idle_genes, idle_starts, lint
@@ -24,7 +24,9 @@ PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
 @pytest.fixture
 def paced(monkeypatch):
     """A machine of known pace."""
-    monkeypatch.setattr(evolve.cli.run_plan, "calibrate", lambda config, animals, workers: dict.fromkeys(animals, PACE))
+    monkeypatch.setattr(
+        evolve.cli.run_plan, "measure_pace", lambda config, animals, workers: dict.fromkeys(animals, PACE)
+    )
 
 
 def test_hours_count_rounds_of_workers_and_all_that_a_candidate_does(tmp_path, paced):
@@ -45,7 +47,7 @@ def test_animal_that_cannot_be_evaluated_is_named():
     rough = (0.53, 0.2, 0.7, 0.22, 0.59, 0.31, 0.53, 0.39, 0.25, 0.45, 0.67, 0.59, 0.88, 0.53, 0.24, 0.56)
     blurred = replace(PHENOTYPE, fov_deg=13.8, relative_aperture=0.243, relief=rough, refractive_index=1.85)
     with pytest.raises(ConfigError, match="an animal like the middle one cannot be evaluated here: tolerance"):
-        calibrate(config, {"middle": blurred}, 1)
+        measure_pace(config, {"middle": blurred}, 1)
 
 
 def test_disk_holds_policies_and_record_and_a_small_disk_is_noticed(tmp_path, paced, monkeypatch):
@@ -113,13 +115,13 @@ def test_bands_too_few_for_the_colours_of_a_world_are_named():
 
 def test_a_ladder_costs_what_its_rungs_cost(tmp_path, paced):
     settings = ("search.population=6", "search.generations=10", "learning.total_steps=100000", "workers=4")
-    climb = ("search.rungs=2", "search.promoted=0.25")
-    config = assemble("detection", assignments=[*settings, *climb, "learning.eval_interval=30000"])
+    stages = ("search.rungs=2", "search.promoted=0.25")
+    config = assemble("detection", assignments=[*settings, *stages, "learning.eval_interval=30000"])
     plan = RunPlan.of(config, tmp_path).measured()
     first, second = 10 + 25 + (1 + 1) * 5, 10 + 75 + (3 + 1) * 5
     assert plan.hours["start"] == pytest.approx(10 * (2 * first + 1 * second) / 3600), "6 and 2 on 4 workers"
     assert plan.record()["steps"] == 10 * (6 * 25_000 + 2 * 75_000)
-    assert "ladder         6 to 25,000 steps, 2 to 100,000 steps" in "\n".join(plan.lines())
+    assert "budget stages  6 to 25,000 steps, 2 to 100,000 steps" in "\n".join(plan.lines())
 
 
 def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, monkeypatch):
@@ -143,7 +145,7 @@ def test_pace_is_measured_with_the_real_thing(tmp_path, short_episodes):
     backend.require()
     config = small_config()
     animal = develop(Genotype(config.genome).start, config)
-    pace = calibrate(config, {"start": animal}, 1)["start"]
+    pace = measure_pace(config, {"start": animal}, 1)["start"]
     assert evaluate(animal, config, 0, tmp_path / "policy").failure is None
     assert pace.policy_bytes == (tmp_path / "policy").stat().st_size
     assert pace.steps_per_s > 0

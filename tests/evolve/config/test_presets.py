@@ -123,7 +123,9 @@ def test_scaling_spreads_candidates_evenly():
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("preset", EXPERIMENTS)
 def test_dry_run_predicts_hours(preset, scale, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(evolve.cli.run_plan, "calibrate", lambda config, animals, workers: dict.fromkeys(animals, PACE))
+    monkeypatch.setattr(
+        evolve.cli.run_plan, "measure_pace", lambda config, animals, workers: dict.fromkeys(animals, PACE)
+    )
     monkeypatch.chdir(tmp_path)
     assert main(["run", "--preset", preset, "--scale", scale, "--dry-run", "--json", "--workers", "2"]) == 0
     plan = json.loads(capsys.readouterr().out)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from evolve.config.numbering import Place
 from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
@@ -28,8 +29,9 @@ DIMENSION = Genotype(CONFIG.genome).dimension
 def candidate(identity, fitness=1.0, failure=None):
     genome = np.random.default_rng(identity).random(DIMENSION)
     outcome = Evaluation(fitness, (fitness, 1 / 3), 0.5, 4096, 0.1, ((2048, 0.1), (4096, math.pi)), failure)
-    place = (identity, identity // 4, identity % 4)
-    return Candidate.of(place, tuple(genome.tolist()), develop(genome, CONFIG), 2**32 - 1 - identity, outcome)
+    return Candidate.of(
+        Place.of(identity, 4), tuple(genome.tolist()), develop(genome, CONFIG), 2**32 - 1 - identity, outcome
+    )
 
 
 @pytest.fixture
@@ -50,7 +52,7 @@ def test_failures_have_the_worst_fitness_and_valid_json(run):
     run.append(candidate(0, -5.0))
     run.append(candidate(1, math.nan))
     run.append(
-        Candidate.of((2, 0, 2), (0.5,) * DIMENSION, run.candidates[0].phenotype, 1, Evaluation.failed("it\nbroke"))
+        Candidate.of(Place(2, 0, 2), (0.5,) * DIMENSION, run.candidates[0].phenotype, 1, Evaluation.failed("it\nbroke"))
     )
     lines = (run.path / "candidates.jsonl").read_text().splitlines()
     assert [json.loads(line, parse_constant=pytest.fail)["fitness"] for line in lines] == [-5.0, None, None]
