@@ -15,8 +15,8 @@ import sim
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from evolve.learning.policy import TrainingDiverged, save_policy
-from evolve.learning.ppo import Episodes, Progress, Training, play, train
+from evolve.learning.policy import Brain, TrainingDiverged, save_policy
+from evolve.learning.ppo import Episodes, Progress, Training, Worlds, play, train
 from evolve.learning.training_stage import TrainingStage
 from evolve.store.evaluation import Evaluation
 
@@ -108,10 +108,8 @@ def _live(
         **{**common, **coarsely, **config.world.training},
     )
     with closing(training_worlds), closing(evaluation_worlds):
-        brain: dict[str, Any] = {"neurons": phenotype.neurons, "layers": phenotype.layers, "begun": begun}
-        training = train(
-            training_worlds, evaluation_worlds, config=config.learning, seed=weights, progress=progress, **brain
-        )
+        brain = Brain(phenotype.neurons, phenotype.layers)
+        training = train(Worlds(training_worlds, evaluation_worlds), brain, config.learning, weights, progress, begun)
         return training, play(training.policy, evaluation_worlds, evaluation)
 
 
