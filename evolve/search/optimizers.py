@@ -16,8 +16,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.config.assemble import suggestion
-from evolve.config.run_config import ConfigError, SearchConfig
+from evolve.config.checks import ConfigError, suggestion
+from evolve.config.run_config import SearchConfig
 from evolve.genome.genes import Gene, GeneConfig
 
 __all__ = ["Optimizer", "Space", "build_optimizer"]

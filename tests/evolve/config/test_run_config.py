@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from evolve.config.assemble import assemble, from_toml, preset_names, to_toml
+from evolve.config.assemble import assemble, from_toml, to_toml
 from evolve.config.run_config import TASKS, ConfigError
+from evolve.config.sources import preset_names
 from evolve.genome.genotype import GENES, group_members
 
 
