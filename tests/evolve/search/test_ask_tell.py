@@ -23,13 +23,21 @@ def fitness(phenotype):
     return -abs(phenotype.fov_deg - 70.0) / 10 - abs(phenotype.n_eyes - 3) - phenotype.neurons / 100
 
 
+def coarse(phenotype):
+    """Many are equally fit, and CMA-ES ranks these in the order in which it is told."""
+    return float(round(fitness(phenotype)))
+
+
 class LastFirst:
     """An executor in closed form that hands the last candidate back first."""
+
+    def __init__(self, value):
+        self.value = value
 
     def run(self, jobs, progress) -> Iterator:
         while jobs:
             job = jobs.pop()
-            yield job, Evaluation(fitness(job.phenotype))
+            yield job, Evaluation(self.value(job.phenotype))
 
 
 def plainly(config, value):
@@ -38,13 +46,14 @@ def plainly(config, value):
     return [tuple(genome) for genomes, _ in found for genome in genomes]
 
 
-def test_the_loop_proposes_what_asking_and_telling_does(tmp_path):
+@pytest.mark.parametrize("value", [fitness, coarse])
+def test_the_loop_proposes_what_asking_and_telling_does(tmp_path, value):
     config = tiny(*SETTINGS)
     run = Run.create(tmp_path / "run", config)
-    evolve(run, LastFirst(), SilentWatcher())
-    genomes = plainly(config, lambda genome: fitness(develop(genome, config)))
+    evolve(run, LastFirst(value), SilentWatcher())
+    genomes = plainly(config, lambda genome: value(develop(genome, config)))
     assert [candidate.genome for candidate in run.candidates] == genomes
-    negated = plainly(config, lambda genome: -fitness(develop(genome, config)))
+    negated = plainly(config, lambda genome: -value(develop(genome, config)))
     assert negated[:6] == genomes[:6]
     assert negated[6:] != genomes[6:], "fitness must matter for this to show anything"
 
