@@ -8,7 +8,7 @@ from evolve.cli.tensorboard import TensorBoardWriter
 from evolve.store.directory import Run
 
 
-def test_scalars_are_the_records(finished, tmp_path):
+def test_numbers_are_the_records(finished, tmp_path):
     accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
     run = Run.open(shutil.copytree(finished, tmp_path / "run"))
     with TensorBoardWriter(run):
