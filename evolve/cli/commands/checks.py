@@ -11,7 +11,7 @@ from optics.numerics import backend
 
 __all__ = ["doctor", "validate"]
 
-CHECKOUT = Path(__file__).resolve().parents[2]
+CHECKOUT = Path(__file__).resolve().parents[3]
 
 
 def doctor(arguments: Namespace) -> int:
