@@ -102,7 +102,7 @@ class Tally:
         """Pace, and how busy the workers were."""
         return (
             f"{clock(self.seconds)} at {self.steps_per_second:,.0f} steps/s; "
-            f"{self._workers} workers were busy {self.utilisation:.0%} of the time"
+            f"the {self._workers} workers were busy {self.utilisation:.0%} of the time"
         )
 
 

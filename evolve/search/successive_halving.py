@@ -5,7 +5,8 @@ to the next, and the last stage ends a whole training. A stage takes a training 
 fresh worlds whose seeds follow from candidate and stage. What it becomes follows from seeds and the tensors left, so a
 run that was killed within a stage begins that stage again, and ends as if nothing had happened.
 
-Settings and records call stages rungs: `search.rungs` is their number, `rung` the stage that a line was written after.
+In settings and records a stage is called a rung: `search.rungs` says how many there are, and the `rung` of a record's
+line after which one it was written.
 """
 
 from __future__ import annotations
