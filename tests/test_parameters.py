@@ -89,8 +89,8 @@ def history(config, animal):
         return [(candidate.genome, candidate.phenotype, candidate.seed) for candidate in run.candidates]
 
 
-def ladder(config, animal):
-    """On which rungs candidates are evaluated, and how far each is trained."""
+def budget_stages(config, animal):
+    """After which budget stages candidates are evaluated, and how far each is trained."""
     with TemporaryDirectory() as folder:
         run = Run.create(Path(folder) / "run", config)
         carry(run, _ClosedForm(), mock.Mock())
@@ -113,7 +113,7 @@ class _ClosedForm:
     def run(self, jobs, progress) -> Iterator:
         while jobs:
             job = jobs.popleft()
-            steps = job.stretch.budgets[-1] if job.stretch else job.config.learning.total_steps
+            steps = job.stage.ends[-1] if job.stage else job.config.learning.total_steps
             yield job, Evaluation(fitness=-abs(job.phenotype.fov_deg - 70), steps=steps)
 
 
@@ -162,8 +162,8 @@ FIELDS = {
     "search.population": Case("search.population=4", history),
     "search.generations": Case("search.generations=3", history),
     "search.sigma": Case("search.sigma=0.1", history),
-    "search.rungs": Case("search.rungs=2", ladder),
-    "search.promoted": Case("search.promoted=0.7", ladder, ("search.rungs=2", *PERFECT)),
+    "search.rungs": Case("search.rungs=2", budget_stages),
+    "search.promoted": Case("search.promoted=0.7", budget_stages, ("search.rungs=2", *PERFECT)),
     "learning.total_steps": Case("learning.total_steps=96", life),
     "learning.n_envs": Case("learning.n_envs=2", life),
     "learning.n_steps": Case("learning.n_steps=16", life),

@@ -16,7 +16,8 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 
 import sim
 from evolve.config.run_config import LearningConfig
-from evolve.learning.ppo import learner, play
+from evolve.learning.policy import Brain
+from evolve.learning.ppo import AdaptingPPO, play
 from sim.tasks.reward import EVALUATION, TRAINING
 
 __all__ = ["Case", "Row", "read_rows", "steps_to", "watched", "wilson", "write_rows"]
@@ -103,7 +104,7 @@ def watched(case: Case, seed: int) -> Iterable[Row]:
     common: dict[str, Any] = {"memory": case.memory, "rays_per_receptor": case.rays_per_receptor}
     worlds = sim.make_vec_env(case.task, case.eyes, case.learning.n_envs, seed, **common)
     unseen = Journey(sim.make_vec_env(case.task, case.eyes, case.episodes, seed + UNSEEN, **common))
-    model = learner(worlds, case.neurons, case.learning, seed)
+    model = AdaptingPPO(worlds, Brain(case.neurons), case.learning, seed)
     cpu_seconds = update_seconds = 0.0
     update = model.train
 

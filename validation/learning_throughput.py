@@ -44,7 +44,8 @@ class Learner:
 def training_rate(learner: Learner, steps: int, seed: int) -> float:
     """Agent-steps per second of one training in this process."""
     import sim
-    from evolve.learning.ppo import train
+    from evolve.learning.policy import Brain
+    from evolve.learning.ppo import Worlds, train
 
     case = learner.case
     eyes = with_pupil(case.eyes) if learner.lens else case.eyes
@@ -60,7 +61,11 @@ def training_rate(learner: Learner, steps: int, seed: int) -> float:
     for attempt in (0, 1):  # the first one compiles kernels and imports what torch imports on first use
         marks.clear()
         train(
-            worlds, evaluation_worlds, NEURONS, config, attempt, lambda done, planned: marks.append(time.perf_counter())
+            Worlds(worlds, evaluation_worlds),
+            Brain(NEURONS),
+            config,
+            attempt,
+            lambda done, planned: marks.append(time.perf_counter()),
         )
     # From the first rollout's end to the last one's: whole updates and rollouts, no evaluation.
     return (len(marks) - 1) * config.n_envs * config.n_steps / (marks[-1] - marks[0])

@@ -16,7 +16,7 @@ def nearest_parent(candidate: Candidate, known: Mapping[int, Candidate]) -> Cand
 
     CMA-ES makes a generation from the mean of the better half of the last, so there each candidate has many.
     """
-    parents = [known[identity] for identity in sorted(candidate.parents) if identity in known]
+    parents = [known[candidate_id] for candidate_id in sorted(candidate.parents) if candidate_id in known]
     distances = [float(np.linalg.norm(candidate.vector - parent.vector)) for parent in parents]
     return parents[int(np.argmin(distances))] if parents else None
 

@@ -43,14 +43,14 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
     eyes = animal.eyes(config.eye)
     try:
         quality, contrast = eye_image_quality(animal, config.eye), _contrast(eyes.eye())
-        seen, perfect = views(eyes, config.task, config.world)
+        seen, perfect = seen_and_perfect(eyes, config.task, config.world)
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)
     gain = 1 / float(eyes.eye().throughput)
     return Vision(quality, contrast, psnr(seen, perfect, gain), ssim(gain * seen, perfect))
 
 
-def views(eyes: sim.Eyes, task: str, world: WorldConfig | None = None) -> tuple[Floats, Floats]:
+def seen_and_perfect(eyes: sim.Eyes, task: str, world: WorldConfig | None = None) -> tuple[Floats, Floats]:
     """Signals without noise of the eyes, and of the same behind a perfect lens, (scene, eye, channel, height, width);
     the scenes are the same for all eyes."""
     perfect = replace(eyes, optics=None)

@@ -6,6 +6,6 @@ progress     how a run is going
 run_plan     what a run is going to do
 pace         how fast this machine is
 start_from   starting from an animal of another run
-tensorboard  scalars
+tensorboard  fitness, learning and genes for TensorBoard
 doctor       does it work here?
 """

@@ -11,7 +11,7 @@ from importlib import metadata
 
 from optics.numerics import backend
 
-__all__ = ["examine", "main"]
+__all__ = ["examine", "print_findings"]
 
 PACKAGES = (
     "rhabdom",
@@ -93,7 +93,7 @@ def _render(variants: list[str], environment: dict[str, str]) -> dict[str, str]:
     return {name: seen.get(name, f"fails: {last_line}") for name in variants}
 
 
-def main(as_json: bool = False) -> int:
+def print_findings(as_json: bool = False) -> int:
     """Print the findings; 0 when everything that `evolve run` needs works, else 2."""
     findings = examine()
     if as_json:

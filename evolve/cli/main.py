@@ -73,74 +73,87 @@ def _parser() -> argparse.ArgumentParser:
     _add_runs(commands)
     _add_watching(commands)
     _add_products(commands)
-    _command(commands, "validate", "checks.validate", "compare the optics with closed forms (needs a checkout)")
-    doctor = _command(commands, "doctor", "checks.doctor", "what is installed, and whether it works")
+    _command(commands, "validate", "checks.validate", "compare the optics with closed forms; this needs a checkout")
+    doctor = _command(commands, "doctor", "checks.doctor", "say what is installed and whether it works")
     _command(commands, "tasks", "tables.tasks", "list the tasks")
     genes = _command(commands, "genes", "tables.genes", "list the genes")
     for command in (doctor, genes):
-        command.add_argument("--json", action="store_true", help="for machines")
+        command.add_argument("--json", action="store_true", help="print JSON")
     return parser
 
 
 def _add_runs(commands: _Commands) -> None:
     """Commands that carry a run on."""
-    run = _command(commands, "run", "run.start", "begin a run: evolve eyes and brains for a task")
+    run = _command(commands, "run", "run.start", "start a run: evolve eyes and brains for a task")
     run.add_argument(
-        "task", metavar="TASK", nargs="?", help="see: evolve tasks; may be left out where the preset has one of its own"
+        "task",
+        metavar="TASK",
+        nargs="?",
+        help="task to evolve for; not needed if the preset sets one (list: evolve tasks)",
     )
     run.add_argument(
         "--preset",
         metavar="NAME",
         default="paper",
-        help="settings to begin with: quick (minutes), paper (a day; default), or an experiment: "
+        help="settings to start from: quick (minutes), paper (a day; default), or an experiment: "
         "bifurcation-navigation, bifurcation-detection, lens, pupil, scaling, ultraviolet",
     )
-    run.add_argument("--scale", help="of an experiment: laptop (hours on two cores; default) or paper (days)")
-    run.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings; wins over the preset")
-    run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="one setting; wins over the file")
+    run.add_argument("--scale", help="size of an experiment: laptop (hours on two cores; default) or paper (days)")
+    run.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings; overrides the preset")
+    run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="one setting; overrides the file")
     run.add_argument("--seed", type=int, help="same as --set seed=N")
-    run.add_argument("--workers", type=int, metavar="N", help="same as --set workers=N (0: one per core)")
+    run.add_argument("--workers", type=int, metavar="N", help="same as --set workers=N (0: one worker per core)")
     run.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/TASK-PRESET-N)")
     run.add_argument(
-        "--from", dest="ancestor", metavar="RUN[:ID]", help="start from an animal of another run (default: its best)"
+        "--from",
+        dest="start_from",
+        metavar="RUN[:ID]",
+        help="start from an animal of another run (default: the best one)",
     )
     run.add_argument(
-        "--dry-run", action="store_true", help="print the plan, hours and disk that it takes, and begin nothing"
+        "--dry-run", action="store_true", help="print the plan with the hours and disk space it needs, then stop"
     )
-    resume = _command(commands, "resume", "run.resume", "continue a run that was interrupted", directory=True)
+    resume = _command(commands, "resume", "run.resume", "continue an interrupted run", directory=True)
     for command in (run, resume):
-        command.add_argument("--json", action="store_true", help="for machines: a line of JSON per event")
+        command.add_argument("--json", action="store_true", help="print one line of JSON per event")
         command.add_argument(
-            "--executor", choices=("local", "dask"), default="local", help="who evaluates candidates (default: local)"
+            "--executor",
+            choices=("local", "dask"),
+            default="local",
+            help="where candidates are evaluated (default: local)",
         )
-        command.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster: tcp://host:8786")
-        command.add_argument("--tensorboard", action="store_true", help="write scalars into DIR/tensorboard")
+        command.add_argument(
+            "--scheduler", metavar="ADDRESS", help="address of the Dask scheduler, such as tcp://host:8786"
+        )
+        command.add_argument(
+            "--tensorboard", action="store_true", help="also write TensorBoard files to DIR/tensorboard"
+        )
 
 
 def _add_watching(commands: _Commands) -> None:
     """Commands that read records."""
-    status = _command(commands, "status", "status.status", "how a run stands", directory=True)
-    status.add_argument("--json", action="store_true", help="for machines")
-    status.add_argument("--watch", action="store_true", help="again at every change, as long as the run goes on")
-    compare = _command(commands, "compare", "compare.compare", "put runs side by side")
+    status = _command(commands, "status", "status.status", "show the state of a run", directory=True)
+    status.add_argument("--json", action="store_true", help="print JSON")
+    status.add_argument("--watch", action="store_true", help="print again at every change until the run ends")
+    compare = _command(commands, "compare", "compare.compare", "compare runs side by side")
     compare.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories")
-    compare.add_argument("--json", action="store_true", help="for machines")
-    compare.add_argument("--html", type=Path, metavar="FILE", help="also write a page with their curves")
+    compare.add_argument("--json", action="store_true", help="print JSON")
+    compare.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page with their fitness curves")
 
 
 def _add_products(commands: _Commands) -> None:
     """Commands that make files of a run."""
     for name, meaning in (
-        ("replay", "play the best agent once more, and say how it fared"),
+        ("replay", "play one episode of the best agent, and print the result"),
         ("report", "write the HTML report"),
-        ("export", "write what the best agent saw as spectral EXR files"),
+        ("export", "write what the best agent sees as spectral EXR files"),
     ):
         product = _command(commands, name, f"products.{name}", meaning, directory=True)
         if name != "report":
-            product.add_argument("--candidate", type=int, metavar="ID", help="which candidate (default: the best)")
+            product.add_argument("--candidate", type=int, metavar="ID", help="candidate to play (default: the best)")
             product.add_argument("--seed", type=_seed, default=0, help="seed of the episode (default: 0)")
         if name == "replay":
-            product.add_argument("--rrd", action="store_true", help="also write a recording for rerun")
+            product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
 
 
 def _seed(text: str) -> int:

@@ -15,7 +15,7 @@ from evolve.config.run_config import ConfigError, RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.search.worker import evaluate_candidate, prepare_device
 
-__all__ = ["Pace", "calibrate"]
+__all__ = ["Pace", "measure_pace"]
 
 ROLLOUTS = 4  # that a short life learns from; an evaluation after the second and the fourth
 
@@ -37,15 +37,15 @@ class Pace:
 
     def candidate_s(self, config: RunConfig) -> float:
         """Seconds for one candidate that trains to the end in one go."""
-        return self.stretch_s(config.learning.total_steps, config.learning.eval_interval)
+        return self.stage_s(config.learning.total_steps, config.learning.eval_interval)
 
-    def stretch_s(self, steps: int, eval_interval: int) -> float:
-        """Seconds for a training of so many steps, and the evaluation after it."""
+    def stage_s(self, steps: int, eval_interval: int) -> float:
+        """Seconds for a budget stage of so many steps, and the evaluation after it."""
         plays = -(-steps // eval_interval) + 1
         return self.start_s + steps / self.steps_per_s + plays * self.play_s
 
 
-def calibrate(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
+def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
     """Pace with each animal, of the slowest worker that tried it; all workers try at the same time.
 
     Raises:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, TextIO
 
+from evolve.config.numbering import Place
 from evolve.search.successive_halving import evaluations
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
@@ -36,9 +37,9 @@ class Tally:
 
     def evaluated(self, candidate: Candidate) -> None:
         self._in_training.pop(candidate.id, None)
-        below = self._run.on_record(candidate.id, candidate.rung - 1)
-        self._steps_done += candidate.steps - (below.steps if below else 0)
-        self._busy += candidate.seconds - (below.seconds if below else 0.0)
+        before = self._run.on_record(candidate.id, candidate.rung - 1)
+        self._steps_done += candidate.steps - (before.steps if before else 0)
+        self._busy += candidate.seconds - (before.seconds if before else 0.0)
 
     @property
     def done(self) -> float:
@@ -48,7 +49,7 @@ class Tally:
 
     @property
     def planned(self) -> int:
-        """Evaluations in all: of every candidate, on every rung of a ladder that it reaches."""
+        """Evaluations in all: of every candidate, after every budget stage that it reaches."""
         return evaluations(self._run.config.search)
 
     @property
@@ -85,8 +86,9 @@ class Tally:
     def summary(self) -> str:
         """Generation, best and median fitness, pace and time left."""
         run = self._run
-        reached = min(len(run.candidates) // run.config.search.population + 1, run.config.search.generations)
-        parts = [f"generation {reached}/{run.config.search.generations}"]
+        search = run.config.search
+        reached = Place.of(len(run.candidates), search.population).generation + 1
+        parts = [f"generation {min(reached, search.generations)}/{search.generations}"]
         if run.best is not None:
             parts.append(f"best {run.best.fitness:.3g}")
         if run.best is not None and self.median is not None:
@@ -100,7 +102,7 @@ class Tally:
         """Pace, and how busy the workers were."""
         return (
             f"{clock(self.seconds)} at {self.steps_per_second:,.0f} steps/s; "
-            f"{self._workers} workers were busy {self.utilisation:.0%} of the time"
+            f"the {self._workers} workers were busy {self.utilisation:.0%} of the time"
         )
 
 

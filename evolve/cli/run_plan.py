@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from evolve.cli.pace import Pace, calibrate
+from evolve.cli.pace import Pace, measure_pace
 from evolve.config.lint import lint
+from evolve.config.numbering import Place
 from evolve.config.run_config import RunConfig
 from evolve.genome.genes import CLUSTERS
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import Phenotype, develop
 from evolve.search.local_executor import cores
-from evolve.search.successive_halving import budgets, evaluations, sizes, stretches
+from evolve.search.successive_halving import budgets, evaluations, sizes, stage_steps
 from evolve.search.successive_halving import steps as total_steps
 from evolve.store.candidate import Candidate
 from evolve.store.evaluation import Evaluation
@@ -43,7 +44,8 @@ class RunPlan:
 
     def measured(self) -> RunPlan:
         """With the paces of this machine, which takes some ten seconds."""
-        return RunPlan(self.config, self.directory, self.workers, calibrate(self.config, self.animals, self.workers))
+        paces = measure_pace(self.config, self.animals, self.workers)
+        return RunPlan(self.config, self.directory, self.workers, paces)
 
     @property
     def animals(self) -> dict[str, Phenotype]:
@@ -59,10 +61,10 @@ class RunPlan:
         if search.steady_state:
             rounds = -(-self.config.candidates // self.workers)
             return {name: rounds * pace.candidate_s(self.config) / 3600 for name, pace in self.paces.items()}
-        climb = list(zip(sizes(search), stretches(search, learning), strict=True))
+        stages = list(zip(sizes(search), stage_steps(search, learning), strict=True))
         return {
             name: search.generations
-            * sum(-(-size // self.workers) * pace.stretch_s(steps, learning.eval_interval) for size, steps in climb)
+            * sum(-(-size // self.workers) * pace.stage_s(steps, learning.eval_interval) for size, steps in stages)
             / 3600
             for name, pace in self.paces.items()
         }
@@ -81,12 +83,12 @@ class RunPlan:
         existing = next(path for path in (self.directory.resolve(), *self.directory.resolve().parents) if path.exists())
         return shutil.disk_usage(existing).free
 
-    def _ladder(self) -> list[str]:
-        """What a generation does on each rung."""
+    def _budget_stages(self) -> list[str]:
+        """How many of a generation are trained how far, where budgets are divided."""
         search = self.config.search
         ends = zip(sizes(search), budgets(search, self.config.learning), strict=True)
-        rungs = ", ".join(f"{size} to {steps:,} steps" for size, steps in ends)
-        return [f"ladder         {rungs}"] if search.rungs > 1 else []
+        stages = ", ".join(f"{size} to {steps:,} steps" for size, steps in ends)
+        return [f"budget stages  {stages}"] if search.rungs > 1 else []
 
     def _line_bytes(self) -> int:
         """A candidate's line in the record."""
@@ -97,7 +99,7 @@ class RunPlan:
         genome = (value / 4,) * genotype.dimension
         animal = self.animals["middle"]
         parents = tuple(range(config.search.population // 2))
-        return len(Candidate.of((1, 1, 1), genome, animal, 2**31, outcome, parents).to_line())
+        return len(Candidate.of(Place(1, 1, 1), genome, animal, 2**31, outcome, parents).to_line())
 
     def lines(self) -> list[str]:
         """The plan as text."""
@@ -108,7 +110,7 @@ class RunPlan:
             f"task           {config.task}, seed {config.seed}",
             f"search         {search.optimizer}, {order}, on {self.workers} workers",
             f"evaluations    {search.generations} generations x {search.population} candidates = {config.candidates:,}",
-            *self._ladder(),
+            *self._budget_stages(),
             f"steps          up to {learning.total_steps:,} each, {total_steps(config):,} in all",
             f"genes open     {genotype.dimension} of {len(config.genome)}",
             *_gene_lines(config),

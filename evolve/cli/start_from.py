@@ -23,9 +23,9 @@ def starts_from(text: str) -> Source:
     Raises:
         RunError: no such run, no such candidate, or none that succeeded.
     """
-    path, identity = _parsed(text)
+    path, candidate_id = _parsed(text)
     run = Run.open(path)
-    candidate = run.candidate(identity)
+    candidate = run.candidate(candidate_id)
     values = gene_values(candidate.phenotype)
     genome = {name: {"start": _exact(name, value)} for name, value in values.items() if not math.isnan(value)}
     tree: dict[str, Any] = {"genome": genome, "eye": {}}

@@ -18,12 +18,12 @@ from evolve.search.successive_halving import complete
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 
-__all__ = ["Scalars"]
+__all__ = ["TensorBoardWriter"]
 
 FOLDER = "tensorboard"
 
 
-class Scalars:
+class TensorBoardWriter:
     """Watcher that keeps a run's scalars; a context manager.
 
     Raises:
@@ -37,7 +37,7 @@ class Scalars:
         _writer_class()
         shutil.rmtree(run.path / FOLDER, ignore_errors=True)
 
-    def __enter__(self) -> Scalars:
+    def __enter__(self) -> TensorBoardWriter:
         for candidate in self._run.in_order_of_finish:
             self.evaluated(candidate)
         return self
@@ -50,7 +50,7 @@ class Scalars:
         """Nothing: what is not on record is not shown."""
 
     def evaluated(self, candidate: Candidate) -> None:
-        """The candidate's values over its id (on a ladder again on every rung), its generation's over the generation,
+        """The candidate's values over its id (again after every budget stage), its generation's over the generation,
         its learning over steps."""
         if candidate.failure is None:
             values = {"fitness": candidate.fitness, "success_rate": candidate.success_rate}

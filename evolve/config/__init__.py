@@ -2,9 +2,12 @@
 
 run_config     RunConfig
 sections       its sections: every setting, its range, what it does
-assemble       presets, files and options put together
+assemble       all sources put together, later ones winning
+sources        presets, tasks, files and options
 provenance     where a setting stands
 checks         one line that says what would be right
 lint           what is odd, though nothing forbids it
 relief_starts  where the genes of a relief start
+numbering      which id belongs to which generation
+tasks/         what a task sets unless a run says otherwise
 """

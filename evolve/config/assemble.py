@@ -1,47 +1,28 @@
-"""Where a run's configuration comes from: defaults, preset and its scale, task, TOML file, another run's animal,
-`--set key=value`; later ones win, but a preset made for the task wins over the task's settings."""
+"""A run's configuration put together from its sources: defaults, preset and its scale, task, TOML file, another run's
+animal, `--set key=value`. Later ones win, but a preset made for the task wins over the task's settings."""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import asdict, fields, replace
 from functools import reduce
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from evolve.config.checks import check_gene_value, check_value
+from evolve.config.checks import check_gene_value, check_value, suggestion
 from evolve.config.provenance import Source
 from evolve.config.relief_starts import no_such_gene, with_relief
 from evolve.config.run_config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
+from evolve.config.sources import preset_sources, read_assignment, read_toml, task_defaults
 from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, GeneConfig, group_members
-from optics.numerics.arguments import close_match
 
-__all__ = ["SCALES", "assemble", "from_toml", "parse_assignment", "preset_names", "suggestion", "to_toml"]
+__all__ = ["assemble", "from_text", "from_toml", "to_toml"]
 
 Tree = dict[str, Any]
 GENE_FIELDS = tuple(f.name for f in fields(GeneConfig))
 TOP_LEVEL = ("task", "seed", "workers")
-SCALES = ("laptop", "paper")  # of the presets that have scales; the first unless asked otherwise
 SETTINGS = (*TOP_LEVEL, *(f"{section}.{f.name}" for section, cls in SECTIONS.items() for f in fields(cls)))
-# A maze's walls say the same at every height, so navigators' eyes are one row of receptors unless told otherwise.
-# They begin slowly and may touch walls at first: else they learn to stand still before they have learnt to steer.
-# Until contact has its whole price what is to be learnt changes, so the learning rate falls only from then on.
-# A wall's picture is smooth: eyes of four receptors learn from eight rays each what they learn from sixty-four.
-TASK_TREES: Mapping[str, Tree] = {
-    "navigation": {
-        "genome": {"resolution_height": {"open": False, "low": 1, "high": 1, "start": 1}},
-        "learning": {
-            "first_speed": 0.25,
-            "contact_ramp": 200_000,
-            "decay_after": 200_000,
-            "gamma": 0.97,
-            "n_epochs": 8,
-            "rays_per_eye": 32.0,
-        },
-    }
-}
 
 
 def assemble(
@@ -62,11 +43,11 @@ def assemble(
         ConfigError: unknown key, wrong type, value out of range, contradiction, unreadable file; one line that names
             key, value, what is allowed, and where it was set.
     """
-    asked = [_read(file)] if file is not None else []
+    asked = [read_toml(file)] if file is not None else []
     if starts is not None:
         asked.append(starts)
-    asked += [Source(f"--set {text.strip()}", parse_assignment(text)) for text in assignments]
-    return _assembled(task, _preset(preset, scale), asked)
+    asked += [read_assignment(text) for text in assignments]
+    return _assembled(task, preset_sources(preset, scale), asked)
 
 
 def _assembled(task: str | None, below: list[Source], asked: list[Source]) -> RunConfig:
@@ -76,10 +57,10 @@ def _assembled(task: str | None, below: list[Source], asked: list[Source]) -> Ru
     known_task = [source.tree["task"] for source in (*below, *asked) if "task" in source.tree]
     if not known_task:
         raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
-    task_tree = Source("", TASK_TREES.get(str(known_task[-1]), {}))
+    of_task = task_defaults(known_task[-1])
     # A preset that is made for this task knows better than the task's own settings; one for any task does not.
     made_for_it = any(source.tree.get("task") == known_task[-1] for source in below)
-    layers = [task_tree, *below, *asked] if made_for_it else [*below, task_tree, *asked]
+    layers = [of_task, *below, *asked] if made_for_it else [*below, of_task, *asked]
     trees = [_checked(source) for source in layers]
     try:
         return _build(trees, layers)
@@ -106,71 +87,6 @@ def to_toml(config: RunConfig) -> str:
         if ALL_GENES[name].kind == "integer":
             use.update({key: int(use[key]) for key in ("low", "high", "start")})
     return tomli_w.dumps(tree)
-
-
-def parse_assignment(text: str) -> Tree:
-    """{"search": {"population": 8}} from "search.population=8"; the value is TOML, a bare word is text."""
-    key, equals, value = (part.strip() for part in text.partition("="))
-    parts = key.split(".")
-    if not equals or not all(parts) or not value:
-        raise ConfigError(f"--set {text!r}: must look like section.key=value")
-    try:
-        leaf: Any = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        leaf = value
-    return reduce(lambda inner, part: {part: inner}, reversed(parts), leaf)
-
-
-def preset_names() -> list[str]:
-    """Names that `preset` takes."""
-    folder = resources.files("evolve") / "presets"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
-
-
-def suggestion(word: str, known: Iterable[str]) -> str:
-    """ "did you mean X?" where a known word, or the last part of one, is near; else the list of them."""
-    known = list(known)
-    by_last = {name.rpartition(".")[2]: name for name in known}
-    last = close_match(word.rpartition(".")[2], by_last, cutoff=0.75)
-    close = close_match(word, known) or (by_last[last] if last else None)
-    return f"did you mean {close!r}?" if close else f"known: {', '.join(known)}"
-
-
-def _read(path: Path) -> Source:
-    """A TOML file.
-
-    Raises:
-        ConfigError: one line, naming file and, where there is one to name, line.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-        return Source(str(path), tomllib.loads(text), text)
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: is not UTF-8 text") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: is not valid TOML: {error}") from error
-
-
-def _preset(name: str | None, scale: str | None) -> list[Source]:
-    """A preset's settings, and over them those of its scale."""
-    if name is None:
-        return []
-    if name not in preset_names():
-        raise ConfigError(f"unknown preset {name!r}; {suggestion(name, preset_names())}")
-    text = (resources.files("evolve") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
-    tree = tomllib.loads(text)
-    scales = tree.pop("scales", {})
-    settings = Source(f"preset {name}", tree, text)
-    if not scales:
-        if scale is not None:
-            raise ConfigError(f"scale {scale!r}: preset {name} comes in one scale only")
-        return [settings]
-    chosen = scale or SCALES[0]
-    if chosen not in scales:
-        raise ConfigError(f"unknown scale {chosen!r} of preset {name}; {suggestion(chosen, scales)}")
-    return [settings, Source(f"preset {name} on {chosen} scale", scales[chosen])]
 
 
 def _checked(source: Source) -> Tree:

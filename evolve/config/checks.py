@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any
 
 from evolve.genome.genes import Gene
 from evolve.genome.interval import Interval
+from optics.numerics.arguments import close_match
 
-__all__ = ["AUTO", "ConfigError", "check_gene_value", "check_value"]
+__all__ = ["AUTO", "ConfigError", "check_gene_value", "check_value", "suggestion"]
 
 AUTO = "auto"  # in place of a number: chosen when it is needed
 
@@ -51,6 +53,15 @@ def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
     if name == "opens_at":
         return _checked(value, int, Interval(0, 100_000), key)
     return float(_checked(value, int if gene.kind == "integer" else float, gene.range, key))
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """ "did you mean X?" where a known word, or the last part of one, is near; else the list of them."""
+    known = list(known)
+    by_last = {name.rpartition(".")[2]: name for name in known}
+    last = close_match(word.rpartition(".")[2], by_last, cutoff=0.75)
+    close = close_match(word, known) or (by_last[last] if last else None)
+    return f"did you mean {close!r}?" if close else f"known: {', '.join(known)}"
 
 
 def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> Any:

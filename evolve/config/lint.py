@@ -1,4 +1,4 @@
-"""What is odd about a run's settings, though nothing forbids it: what changes nothing, and colours seen wrongly."""
+"""Lint: settings that are allowed but odd. They change nothing, or make eyes see colours wrongly."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LEAST_ERROR = 1e-3  # of white's signal: what the 64 bands that others are held 
 
 
 def lint(config: RunConfig) -> list[str]:
-    """One line each."""
+    """Lint messages, one line each."""
     return [*idle_genes(config), *idle_starts(config), *coarse_bands(config)]
 
 
@@ -33,10 +33,11 @@ def coarse_bands(config: RunConfig) -> list[str]:
     error, allowed = errors[config.eye.bands], max(config.eye.noise_sigma, LEAST_ERROR)
     if error <= allowed:
         return []
-    enough = next((f"{n} do not" for n, left in errors.items() if left <= allowed), f"even {max(errors)} do")
+    enough = next((f"{n} bands are enough" for n, left in errors.items() if left <= allowed), None)
+    remedy = enough or f"even {max(errors)} bands are not enough"
     return [
-        f"eye.bands = {config.eye.bands} misjudge what {config.task}'s objects reflect by up to {error:.2g} of white's "
-        f"signal, more than a receptor's noise, {allowed:g}; {enough}"
+        f"eye.bands = {config.eye.bands}: signals of {config.task}'s objects have errors up to {error:.2g} of "
+        f"white's signal, more than a receptor's noise, {allowed:g}; {remedy}"
     ]
 
 
@@ -68,30 +69,30 @@ def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
 
 
 def idle_genes(config: RunConfig) -> list[str]:
-    """Open genes that cannot change anything as the others are held, one line each."""
+    """Open genes that have no effect because of how other genes are fixed, one line each."""
     uses, table = config.genome, config.eye.genes
     notes = []
     if uses["placement_range_deg"].open and not uses["n_eyes"].open and uses["n_eyes"].start == 1:
-        notes.append("genome.placement_range_deg is open but changes nothing: genome.n_eyes is held at 1")
+        notes.append("genome.placement_range_deg is open but has no effect: genome.n_eyes is fixed at 1")
     relief = [name for name in table if name.startswith("doe_")]
     index = uses["refractive_index"]
     if not index.open and index.start == 1 and any(uses[name].open for name in (*relief, "dispersion")):
-        notes.append("the relief's open genes change nothing: genome.refractive_index is held at 1")
+        notes.append("the relief's open genes have no effect: genome.refractive_index is fixed at 1")
     flat = not any(uses[name].open for name in relief) and len({uses[name].start for name in relief}) == 1
     for name in ("refractive_index", "dispersion"):
         if flat and uses[name].open:
-            notes.append(f"genome.{name} is open but changes nothing: the relief is held flat")
+            notes.append(f"genome.{name} is open but has no effect: the relief is fixed and flat")
     if config.task in GREY_TASKS and any(uses[name].open for name in LAMBDA_MAX):
-        notes.append(f"genes of lambda_max are open but change nothing: the world of {config.task} is grey")
+        notes.append(f"genes of lambda_max are open but have no effect: the world of {config.task} is grey")
     types = uses["receptor_types"]
     most = int(types.high if types.open else types.start)
     for name in [name for name in list(LAMBDA_MAX)[most:] if uses[name].open]:
-        notes.append(f"genome.{name} is open but changes nothing: genome.receptor_types is at most {most}")
+        notes.append(f"genome.{name} is open but has no effect: genome.receptor_types is at most {most}")
     return notes
 
 
 def idle_starts(config: RunConfig) -> list[str]:
-    """Genes that were given a start though nothing reads them, one line per reason."""
+    """Genes whose start was set although nothing reads it, one line per reason."""
     unread = {"optical": f"eye.optics = {config.eye.optics}".lower()} if not config.eye.optics else {}
     if config.eye.receptors != INHERITED:
         unread["spectral"] = f"eye.receptors = {config.eye.receptors}, not {INHERITED}"
@@ -101,5 +102,5 @@ def idle_starts(config: RunConfig) -> list[str]:
         given = [g.name for g in genes if config.genome[g.name].start != g.default.start]
         if given:
             names = ", ".join(given if len(given) < SHOWN else [*given[: SHOWN - 1], "..."])
-            notes.append(f"what {names} start{'s' * (len(given) == 1)} with changes nothing: {why}")
+            notes.append(f"the start of {names} has no effect: {why}")
     return notes

@@ -87,7 +87,7 @@ class RunConfig:
                 f"learning.batch_size = {self.learning.batch_size}: must be at most n_envs x n_steps = {rollout}",
                 *("learning.batch_size", "learning.n_envs", "learning.n_steps"),
             )
-        self._check_ladder(rollout)
+        self._check_budget_stages(rollout)
         if (cramped := anatomy.contradiction(self.genome, self.eye)) is not None:
             message, keys = cramped
             raise ConfigError(message, *keys)
@@ -129,20 +129,20 @@ class RunConfig:
             keys = [f"genome.{name}.open" for name in self.genome]
             raise ConfigError("genome: every gene is frozen; open at least one (genome.NAME.open = true)", *keys)
 
-    def _check_ladder(self, rollout: int) -> None:
-        """A ladder is climbed by whole generations, and its first rung must teach something."""
+    def _check_budget_stages(self, rollout: int) -> None:
+        """Successive halving ranks whole generations, and its first budget stage must teach something."""
         search = self.search
         if search.rungs == 1:
             return
         if search.steady_state:
             raise ConfigError(
-                f"search.rungs = {search.rungs}: a ladder needs generations; set search.steady_state = false",
+                f"search.rungs = {search.rungs}: successive halving needs generations; set search.steady_state = false",
                 *("search.rungs", "search.steady_state"),
             )
         first = self.learning.total_steps * search.promoted ** (search.rungs - 1)
         if first < rollout:
             raise ConfigError(
-                f"search.rungs = {search.rungs}: the first rung's budget, {first:.0f} steps, is less than one rollout "
+                f"search.rungs = {search.rungs}: the first budget stage, {first:.0f} steps, is less than one rollout "
                 f"of {rollout} (learning.n_envs x n_steps)",
                 *("search.rungs", "search.promoted", "learning.total_steps"),
             )

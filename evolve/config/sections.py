@@ -30,34 +30,38 @@ def setting(default: Any, valid: Interval | None, meaning: str) -> Any:
 class EyeConfig:
     """What all eyes of a run have in common."""
 
-    optics: bool = setting(True, None, "see through pupil and relief; off: a perfect lens")
+    optics: bool = setting(True, None, "see through the pupil and its relief; if false, through a perfect lens")
     sensor_width: float = setting(200e-6, Interval(1e-6, 1e-2), "width of the retina [m]")
     noise_sigma: float = setting(0.01, Interval(0, 10), "standard deviation of a receptor's noise [signal]")
     illuminance: float = setting(
-        0.0, Interval(0, 1e6), "daylight on the scene [lx], whose photons receptors count; 0: no shot noise"
+        0.0, Interval(0, 1e6), "daylight on the scene [lx], of which receptors count the photons; 0: no shot noise"
     )
     integration_time: float = setting(
-        0.02, Interval(1e-6, 1e3), "time over which a receptor sums photons [s]; counts where illuminance does"
+        0.02, Interval(1e-6, 1e3), "time over which a receptor sums photons [s]; used only if illuminance is above 0"
     )
     receptors: str = setting(
-        "rgb", None, "types of receptor: rgb, lms, honeybee or goldfish; genes: as an animal's spectral genes say"
+        "rgb", None, "receptor types: rgb, lms, honeybee or goldfish; genes: each animal's spectral genes decide"
     )
     bands: int = setting(4, Interval(1, 64), "spectral bands")
-    relief_height: float = setting(100e-6, Interval(0, 1e-2, open_low=True), "height that a relief gene of 1 means [m]")
+    relief_height: float = setting(
+        100e-6, Interval(0, 1e-2, open_low=True), "height of the relief where its gene is 1 [m]"
+    )
     relief_points: int = setting(
-        4, RELIEF_POINTS, "genes of the relief along one side; 4: a bicubic patch, more: a cubic spline through as many"
+        4,
+        RELIEF_POINTS,
+        "relief genes along one side; 4 make a bicubic patch, more a cubic spline through their heights",
     )
     relief_symmetric: bool = setting(
-        False, None, "reliefs look the same mirrored and turned by a quarter; an eighth of their genes says how"
+        False, None, "reliefs stay the same when mirrored or turned by 90 degrees, so an eighth of the genes is enough"
     )
     rays_per_receptor: float | str = setting(
-        AUTO, Interval(0, 4096, open_low=True), "rays traced per receptor and frame; auto: as few as its noise allows"
+        AUTO, Interval(0, 4096, open_low=True), "rays traced per receptor and frame; auto: as few as the noise allows"
     )
     head_radius: float = setting(
         1e-3, Interval(0, 10, open_low=True), "radius of the head [m]; eyes on it do not overlap"
     )
     receptor_width: float = setting(
-        1e-6, Interval(0, 1e-2, open_low=True), "least width of a receptor [m]; receptors do not overlap"
+        1e-6, Interval(0, 1e-2, open_low=True), "smallest width of a receptor [m]; receptors do not overlap"
     )
 
     @property
@@ -70,11 +74,11 @@ class EyeConfig:
 class WorldConfig:
     """What the worlds of a run are like, beside its task."""
 
-    mazes: int = setting(1, Interval(1, 32), "mazes of navigation; episodes begin in any of them")
+    mazes: int = setting(1, Interval(1, 32), "number of mazes in navigation; an episode begins in any of them")
     unseen: bool = setting(
         False,
         None,
-        "evaluate in as many mazes that nobody trains in; off: in the same. The search, and when to stop, go by these",
+        "evaluate in other mazes than those trained in; selection and early stopping use them, so not held out",
     )
 
     @property
@@ -94,16 +98,18 @@ class SearchConfig:
 
     population: int = setting(16, Interval(2, 10_000), "candidates per generation")
     generations: int = setting(50, Interval(1, 100_000), "generations")
-    sigma: float = setting(0.2, Interval(0, 1, open_low=True), "initial step, as a part of each gene's range")
-    optimizer: str = setting("CMA", None, "CMA, mutation, or any optimizer of nevergrad by its name")
+    sigma: float = setting(0.2, Interval(0, 1, open_low=True), "initial step size, as a fraction of each gene's range")
+    optimizer: str = setting("CMA", None, "CMA, mutation, or the name of any nevergrad optimizer")
     steady_state: bool = setting(
-        False, None, "propose the next candidate as soon as one is evaluated; off: generation by generation"
+        False, None, "propose a new candidate as soon as one has been evaluated; if false, generation by generation"
     )
     rungs: int = setting(
-        1, Interval(1, 10), "budgets on the way to a whole training, on each of which only the better ones go on"
+        1, Interval(1, 10), "budget stages of a training; after each, only the better candidates go on; 1: no halving"
     )
     promoted: float = setting(
-        0.5, Interval(0, 0.9, open_low=True), "part that goes on from a rung, and of the next one's budget a rung has"
+        0.5,
+        Interval(0, 0.9, open_low=True),
+        "share of candidates that go on after a budget stage; also a stage's budget as a share of the next one's",
     )
 
 
@@ -112,25 +118,33 @@ class LearningConfig:
     """PPO, for each candidate."""
 
     total_steps: int = setting(1_000_000, Interval(1, 10**10), "agent steps to train for")
-    n_envs: int = setting(128, Interval(1, 65_536), "worlds simulated side by side")
+    n_envs: int = setting(128, Interval(1, 65_536), "worlds simulated in parallel")
     n_steps: int = setting(32, Interval(2, 10**6), "steps per world between updates")
     batch_size: int = setting(1024, Interval(2, 10**7), "samples per gradient step")
     n_epochs: int = setting(10, Interval(1, 1000), "passes over the samples per update")
-    learning_rate: float = setting(3e-3, Interval(0, 1, open_low=True), "Adam's step size at first")
-    decay_after: int = setting(75_000, Interval(1, 10**10), "steps after which it falls, as one over the steps")
+    learning_rate: float = setting(3e-3, Interval(0, 1, open_low=True), "initial step size of Adam")
+    decay_after: int = setting(
+        75_000, Interval(1, 10**10), "steps after which Adam's step size falls as one over the steps"
+    )
     gamma: float = setting(0.9, Interval(0, 1), "discount per step")
-    gae_lambda: float = setting(0.9, Interval(0, 1), "share of what follows in an action's advantage, per step")
-    value_weight: float = setting(4.0, Interval(0, 1000), "weight of the critic's loss beside the actor's")
+    gae_lambda: float = setting(
+        0.9, Interval(0, 1), "decay per step of the generalised advantage estimate (its lambda)"
+    )
+    value_weight: float = setting(4.0, Interval(0, 1000), "weight of the critic's loss relative to the actor's")
     first_speed: float = setting(
-        0.5, Interval(0, 1, open_low=True), "speed of the first actions, and twice its spread, as a part of the highest"
+        0.5,
+        Interval(0, 1, open_low=True),
+        "mean speed of the untrained policy, and twice its spread, as a fraction of the top speed",
     )
     contact_ramp: int = setting(
-        0, Interval(0, 10**10), "steps until contact costs its all: a tenth for a third of them, then evenly more"
+        0,
+        Interval(0, 10**10),
+        "steps until contact costs its full price: a tenth of it for a third of them, then rising exponentially",
     )
     rays_per_eye: float = setting(
         256.0,
         Interval(0, 10**7, open_low=True),
-        "rays per eye and frame of a training, at most; one per receptor at least",
+        "most rays per eye and frame in training; every receptor gets at least one",
     )
     eval_interval: int = setting(50_000, Interval(1, 10**10), "training steps between evaluations")
     patience: int = setting(5, Interval(1, 10**6), "evaluations without improvement before training stops")

@@ -1,10 +1,12 @@
 """One lifetime: an animal learns its task.
 
-fitness         evaluate: a candidate's whole life
-ppo             PPO, its settings' meaning, early stopping
-policy          the network
-rollout_buffer  frames kept once
-adam            the optimiser
-checkpoint      a training as it stands
-training_stage  how far a training goes
+fitness           evaluate: a candidate's whole life
+ppo               PPO, its settings' meaning, early stopping
+policy            actor and critic, stored and loaded
+eye_features      the network behind each eye
+training_rewards  rewards in the learner's units, contact at a share of its price
+rollout_buffer    frames kept once
+adam              the optimiser
+checkpoint        a training as it stands
+training_stage    how far a training goes
 """

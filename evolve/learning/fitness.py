@@ -15,8 +15,8 @@ import sim
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from evolve.learning.policy import TrainingDiverged, save_policy
-from evolve.learning.ppo import Episodes, Progress, Training, play, train
+from evolve.learning.policy import Brain, TrainingDiverged, save_policy
+from evolve.learning.ppo import Episodes, Progress, Training, Worlds, play, train
 from evolve.learning.training_stage import TrainingStage
 from evolve.store.evaluation import Evaluation
 
@@ -29,23 +29,23 @@ def evaluate(
     seed: int,
     policy_path: Path,
     progress: Progress | None = None,
-    stretch: TrainingStage | None = None,
+    stage: TrainingStage | None = None,
 ) -> Evaluation:
     """Train one candidate, write its policy, and measure its fitness; same arguments, same outcome on one machine.
 
     seed: of the policy's first weights, of all worlds and of all chance in learning
     policy_path: where the trained policy is written (safetensors); nothing is written if learning diverged
     progress: told (steps trained, steps planned) after every rollout
-    stretch: how far to train, and from where (`evolve.search.successive_halving`); None: a whole training
+    stage: how far to train, and from where (`evolve.search.successive_halving`); None: a whole training
 
     A training that diverges is a failed Evaluation, not an exception.
     """
     began = time.perf_counter()
     try:
-        if stretch is None:
+        if stage is None:
             training, episodes = _live(phenotype, config, seed, progress)
         else:
-            training, episodes = _climb(phenotype, config, seed, progress, stretch)
+            training, episodes = _live_until(stage, phenotype, config, seed, progress)
     except TrainingDiverged as error:
         return Evaluation.failed(str(error), time.perf_counter() - began)
     save_policy(training.policy, policy_path)
@@ -59,22 +59,22 @@ def evaluate(
     )
 
 
-def _climb(
-    phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress | None, stretch: TrainingStage
+def _live_until(
+    stage: TrainingStage, phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress | None
 ) -> tuple[Training, Episodes]:
-    """Up to the stretch's last rung, from the highest one below whose checkpoint there is."""
+    """Through all stages up to this one, from the latest whose checkpoint there is."""
     begun, first = None, 0
-    for rung in reversed(range(stretch.rung)):
-        if begun is None and (begun := load_checkpoint(stretch.checkpoints[rung])) is not None:
-            first = rung + 1
-    for rung in range(first, stretch.rung + 1):
-        learning = replace(config.learning, total_steps=stretch.budgets[rung])
-        # No ladder in a rung: a little budget, divided once more, may be too little for one.
+    for earlier in reversed(range(stage.number)):
+        if begun is None and (begun := load_checkpoint(stage.checkpoints[earlier])) is not None:
+            first = earlier + 1
+    for number in range(first, stage.number + 1):
+        learning = replace(config.learning, total_steps=stage.ends[number])
+        # A stage has none itself: a little budget, divided once more, may be too little for one.
         life = replace(config, learning=learning, search=replace(config.search, rungs=1))
-        entropy = [seed, rung] if rung else seed  # the first rung begins as a whole training does
+        entropy = [seed, number] if number else seed  # the first stage begins as a whole training does
         training, episodes = _live(phenotype, life, entropy, progress, begun)
         begun = training.end
-        save_checkpoint(begun, stretch.checkpoints[rung])
+        save_checkpoint(begun, stage.checkpoints[number])
     return training, episodes
 
 
@@ -108,10 +108,8 @@ def _live(
         **{**common, **coarsely, **config.world.training},
     )
     with closing(training_worlds), closing(evaluation_worlds):
-        brain: dict[str, Any] = {"neurons": phenotype.neurons, "layers": phenotype.layers, "begun": begun}
-        training = train(
-            training_worlds, evaluation_worlds, config=config.learning, seed=weights, progress=progress, **brain
-        )
+        brain = Brain(phenotype.neurons, phenotype.layers)
+        training = train(Worlds(training_worlds, evaluation_worlds), brain, config.learning, weights, progress, begun)
         return training, play(training.policy, evaluation_worlds, evaluation)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import torch
@@ -13,16 +12,15 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
-from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
+from stable_baselines3.common.vec_env import VecEnv
 
 from evolve.config.run_config import LearningConfig
 from evolve.learning.adam import Adam
 from evolve.learning.checkpoint import Checkpoint
-from evolve.learning.policy import EyePolicy, TrainingDiverged, learnt, set_learnt
+from evolve.learning.policy import Brain, EyePolicy, TrainingDiverged, learnt, set_learnt
 from evolve.learning.rollout_buffer import FrameRolloutBuffer
+from evolve.learning.training_rewards import RewardsInUnits, contact_share, reward_terms
 
-CONTACT_FIRST = 0.1  # of what contact costs in the end; with a third, agents turned on the spot
 UNIT_RATE = 0.2  # of the way to the spread of the last returns, per rollout
 FLAT = 1e-6  # spread of returns that all are the same
 
@@ -61,33 +59,38 @@ class Episodes:
         return self.first_events > 0
 
 
-class RewardsInUnits(VecEnvWrapper):
-    """Worlds whose rewards come in units that the learner sets, and in which contact costs a share of its price."""
-
-    def __init__(self, worlds: VecEnv) -> None:
-        super().__init__(worlds)
-        self.unit = self.contact_share = 1.0
-
-    def reset(self) -> dict[str, np.ndarray]:
-        observation: dict[str, np.ndarray] = self.venv.reset()
-        return observation
-
-    def step_wait(self) -> VecEnvStepReturn:
-        observation, reward, done, infos = self.venv.step_wait()
-        if self.contact_share < 1:
-            price = np.array([terms["contact"] for terms in map(_terms, infos)], np.float32)
-            reward = reward - np.float32(1 - self.contact_share) * price
-        return observation, reward / np.float32(self.unit), done, infos
-
-
 class AdaptingPPO(PPO):
     """PPO whose policy adapts to the signals it meets, and which stops at the first rollout or update that is not
-    finite, instead of learning nonsense from it."""
+    finite, instead of learning nonsense from it.
+
+    It sees rewards in units of the spread of its discounted returns, so that an agent's first minutes at a wall, a
+    hundred times as bad as anything later, do not swamp the critic.
+    """
 
     rollout_buffer: FrameRolloutBuffer
     policy: EyePolicy
-    contact_ramp = 0  # steps
-    decay_after = 1  # steps
+
+    def __init__(self, worlds: VecEnv, brain: Brain, config: LearningConfig, seed: int) -> None:
+        self.contact_ramp, self.decay_after = config.contact_ramp, config.decay_after
+        torch.set_num_threads(1)
+        seed = int(np.random.SeedSequence(seed).generate_state(1)[0])  # SB3 takes 32 bits
+        super().__init__(
+            EyePolicy,
+            RewardsInUnits(worlds),
+            n_steps=config.n_steps,
+            batch_size=config.batch_size,
+            n_epochs=config.n_epochs,
+            learning_rate=config.learning_rate,
+            gamma=config.gamma,
+            gae_lambda=config.gae_lambda,
+            vf_coef=config.value_weight,
+            seed=seed,
+            device="cpu",
+            policy_kwargs={"neurons": brain.neurons, "layers": brain.layers, "first_speed": config.first_speed},
+            rollout_buffer_class=FrameRolloutBuffer,
+            rollout_buffer_kwargs={"seed": seed},
+        )
+        self.set_logger(Logger(None, []))
 
     def _update_learning_rate(self, optimizers: Adam) -> None:
         """Not by the part of a plan that is done, as SB3 does: a training goes the same way whatever is planned."""
@@ -138,17 +141,6 @@ class AdaptingPPO(PPO):
         self.policy.optimizer.load_state_dict(begun.adam)
 
 
-def contact_share(steps: int, ramp: int) -> float:
-    """Of its whole price, what contact costs after so many steps: CONTACT_FIRST for a third of the ramp, then more by
-    the same factor each step.
-
-    Agents that pay for contact before they can steer learn to stand still, which costs nothing, and never steer.
-    """
-    if steps >= ramp:
-        return 1.0
-    return float(CONTACT_FIRST ** min(1.0, 1.5 * (1 - steps / ramp)))
-
-
 def _require_finite(name: str, values: np.ndarray, steps: int) -> None:
     if not np.isfinite(values).all():
         raise TrainingDiverged(f"{name} not finite after {steps} steps")
@@ -168,44 +160,24 @@ class _Report(BaseCallback):
         self.progress(self.num_timesteps, self.planned)
 
 
-def learner(worlds: VecEnv, neurons: int, config: LearningConfig, seed: int, layers: int = 2) -> AdaptingPPO:
-    """A learner that has learnt nothing yet. It sees rewards in units of the spread of its discounted returns, so
-    that an agent's first minutes at a wall, a hundred times as bad as anything later, do not swamp the critic."""
-    torch.set_num_threads(1)
-    seed = int(np.random.SeedSequence(seed).generate_state(1)[0])  # SB3 takes 32 bits
-    model = AdaptingPPO(
-        EyePolicy,
-        RewardsInUnits(worlds),
-        n_steps=config.n_steps,
-        batch_size=config.batch_size,
-        n_epochs=config.n_epochs,
-        learning_rate=config.learning_rate,
-        gamma=config.gamma,
-        gae_lambda=config.gae_lambda,
-        vf_coef=config.value_weight,
-        seed=seed,
-        device="cpu",
-        policy_kwargs={"neurons": neurons, "layers": layers, "first_speed": config.first_speed},
-        rollout_buffer_class=FrameRolloutBuffer,
-        rollout_buffer_kwargs={"seed": seed},
-    )
-    model.contact_ramp, model.decay_after = config.contact_ramp, config.decay_after
-    model.set_logger(Logger(None, []))
-    return model
+@dataclass(frozen=True)
+class Worlds:
+    """Where a training learns, and where it is evaluated meanwhile."""
+
+    training: VecEnv
+    evaluation: VecEnv
 
 
 def train(
-    worlds: VecEnv,
-    evaluation_worlds: VecEnv,
-    neurons: int,
+    worlds: Worlds,
+    brain: Brain,
     config: LearningConfig,
     seed: int,
     progress: Progress | None = None,
-    layers: int = 2,
     begun: Checkpoint | None = None,
 ) -> Training:
-    """Learn to act in `worlds`: same arguments, same policy, bit for bit (on one machine). A training `begun` goes on
-    from there, its steps counted.
+    """Learn to act: same arguments, same policy, bit for bit (on one machine). A training `begun` goes on from there,
+    its steps counted.
 
     After every `eval_interval` steps the policy plays one episode in each of the evaluation worlds; learning ends
     after `patience` such evaluations without a better mean return, or after `total_steps`. The policy returned
@@ -214,7 +186,7 @@ def train(
     Raises:
         TrainingDiverged: rewards, loss, weights or actions stop being finite.
     """
-    model = learner(worlds, neurons, config, seed, layers)
+    model = AdaptingPPO(worlds.training, brain, config, seed)
     report = _Report(progress, config.total_steps) if progress else None
     curve: list[tuple[int, float]] = []
     best: dict[str, torch.Tensor] = {}
@@ -222,9 +194,9 @@ def train(
         curve, best = list(begun.curve), dict(begun.best)
         model.restore(begun)
     while model.num_timesteps < config.total_steps and not stuck(curve, config.patience):
-        stretch = min(config.eval_interval, config.total_steps - model.num_timesteps)
-        model.learn(stretch, callback=report, reset_num_timesteps=False)
-        mean_return = float(play(model.policy, evaluation_worlds, seed).returns.mean())
+        steps = min(config.eval_interval, config.total_steps - model.num_timesteps)
+        model.learn(steps, callback=report, reset_num_timesteps=False)
+        mean_return = float(play(model.policy, worlds.evaluation, seed).returns.mean())
         if not curve or mean_return > max(value for _, value in curve):
             best = {name: tensor.detach().clone() for name, tensor in learnt(model.policy).items()}
         curve.append((model.num_timesteps, mean_return))
@@ -250,14 +222,9 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
         action, _ = policy.predict(observation, deterministic=True)
         observation, reward, done, infos = worlds.step(action)
         returns[playing] += reward[playing]
-        events = np.array([np.sign(terms["goal"] + terms["adversary"]) for terms in map(_terms, infos)])
+        events = np.array([np.sign(terms["goal"] + terms["adversary"]) for terms in map(reward_terms, infos)])
         first_event = np.where(playing & (first_event == 0), events, first_event)
         playing &= ~done
     if not math.isfinite(returns.sum()):
         raise TrainingDiverged("returns of the evaluation episodes not finite")
     return Episodes(returns, first_event)
-
-
-def _terms(info: dict[str, Any]) -> dict[str, float]:
-    terms: dict[str, float] = info["reward_terms"]
-    return terms

@@ -2,7 +2,7 @@
 
 SB3's own buffer keeps the stacked observation, `memory` copies of each frame (221 MB at 64 worlds x 64 steps of
 2 x 15 x 15 receptors with 10 frames), and PPO then encodes every copy. Here a mini-batch is a set of segments:
-stretches of consecutive steps of one world, whose windows of remembered frames overlap.
+consecutive steps of one world, whose windows of remembered frames overlap.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SEGMENT_STEPS = 8  # at most: longer ones share more frames, shorter ones mix be
 
 
 class FrameRolloutBuffer(RolloutBuffer):
-    """Rollout buffer that yields unstacked observations, as `evolve.learning.policy.EyeFeatures` understands them.
+    """Rollout buffer that yields unstacked observations, as `evolve.learning.eye_features` understands them.
 
     Frames before an episode's first repeat it, in the environment's stack as here.
     """

@@ -10,15 +10,16 @@ __all__ = ["TrainingStage"]
 
 @dataclass(frozen=True)
 class TrainingStage:
-    """A training from its beginning to one of its rungs.
+    """A training from its beginning to the end of one of its stages.
 
-    budgets: steps trained at the end of this rung, and of each below it, ascending
-    checkpoints: where the training is kept as it stands at each of them; those that are missing are trained again
+    ends: steps trained at the end of each stage up to this one, ascending
+    checkpoints: where the training is kept as it stands at each of these ends; those that are missing are trained again
     """
 
-    budgets: tuple[int, ...]
+    ends: tuple[int, ...]
     checkpoints: tuple[Path, ...]
 
     @property
-    def rung(self) -> int:
-        return len(self.budgets) - 1
+    def number(self) -> int:
+        """Of this stage, 0 the first: the `rung` of a record."""
+        return len(self.ends) - 1

@@ -14,12 +14,12 @@ from evolve.report.markup import document, figure, section, table, text
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run
 
-__all__ = ["differing_settings", "lines", "summary", "write_page"]
+__all__ = ["comparison_lines", "differing_settings", "run_summary", "write_page"]
 
 OF_THE_BEST = ("best candidate", "fitness", "95 % interval", "success rate", "acuity [cpd]")
 
 
-def summary(run: Run) -> dict[str, Any]:
+def run_summary(run: Run) -> dict[str, Any]:
     """One run as plain values, such as JSON has; those of the best candidate are None before one has succeeded, its
     interval also after a single episode."""
     best = run.best
@@ -52,9 +52,9 @@ def differing_settings(runs: Sequence[Run]) -> dict[str, list[Any]]:
     return {name: row for name, row in values.items() if any(value != row[0] for value in row)}
 
 
-def lines(runs: Sequence[Run]) -> list[str]:
+def comparison_lines(runs: Sequence[Run]) -> list[str]:
     """The comparison as a table for a terminal: a row per quantity, a column per run."""
-    columns = [_column(summary(run)) for run in runs]
+    columns = [_column(run_summary(run)) for run in runs]
     rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
     settings = [(name, *(_shown(value) for value in row)) for name, row in differing_settings(runs).items()]
     rows += [("settings that differ", *("" for _ in runs)), *settings] if settings else []
@@ -64,7 +64,7 @@ def lines(runs: Sequence[Run]) -> list[str]:
 
 def write_page(runs: Sequence[Run], path: Path) -> None:
     """An HTML page of best fitness over the generations and the table, whole or not at all."""
-    columns = [_column(summary(run)) for run in runs]
+    columns = [_column(run_summary(run)) for run in runs]
     rows = [[text(name), *(text(column[name]) for column in columns)] for name in list(columns[0])[1:]]
     rows += [[text(name), *(text(_shown(v)) for v in row)] for name, row in differing_settings(runs).items()]
     curves = {str(run.path): generation_statistics(run.candidates) for run in runs}

@@ -11,10 +11,10 @@ import sim
 from evolve.analysis.episode import Episode, record
 from evolve.store.directory import Run
 
-__all__ = ["export_episode", "main"]
+__all__ = ["export_episode", "export_run"]
 
 
-def main(run: Run, candidate_id: int | None = None, seed: int = 0) -> list[Path]:
+def export_run(run: Run, candidate_id: int | None = None, seed: int = 0) -> list[Path]:
     """Record an episode (default: of the best candidate) and write it under the run's `exr/`; returns the files.
 
     Raises:

@@ -23,8 +23,8 @@ from evolve.report.figures import (
 )
 from evolve.report.ground_plan import GroundPlan
 from evolve.report.markup import KEY, document, figure, rounded, section, text
-from evolve.report.player import player, summary
-from evolve.report.views import views
+from evolve.report.player import episode_sentence, player
+from evolve.report.views import what_it_sees
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 
@@ -162,13 +162,15 @@ def facts_section(run: Run) -> str:
 def best_section(run: Run, best: Candidate, episode: Episode) -> str:
     """The best candidate: its eye, what it sees, and its genes."""
     intro = f"<p>Candidate {best.id} of generation {best.generation}, fitness {rounded(best.fitness, 4)}.</p>\n"
-    seen = f"<h3>What it sees</h3>\n{views(episode, GroundPlan.of(episode))}"
+    seen = f"<h3>What it sees</h3>\n{what_it_sees(episode, GroundPlan.of(episode))}"
     genes = f"<h3>Its genes</h3>\n{tables.best_genes(run, best)}"
     return section("best", "The best eye", f"{intro}{eye_figures(best.phenotype, run.config.eye)}{seen}{genes}")
 
 
 def episode_section(run: Run, episode: Episode) -> str:
-    return section("episode", "An episode", f"<p>{summary(episode)}</p>\n{player(episode, GroundPlan.of(episode))}")
+    return section(
+        "episode", "An episode", f"<p>{episode_sentence(episode)}</p>\n{player(episode, GroundPlan.of(episode))}"
+    )
 
 
 def render(run: Run, episode: Episode | None) -> bytes:

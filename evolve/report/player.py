@@ -15,7 +15,7 @@ from evolve.store.atomic_files import write_whole
 from sim.envs.simulation import MAX_TURN
 from sim.worlds.world import MAX_SPEED
 
-__all__ = ["player", "write_player"]
+__all__ = ["episode_sentence", "player", "write_player"]
 
 LARGEST_FILM = 1_500_000  # bytes of pixels per sheet; noise hardly compresses, and the page should stay small
 TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # as in player.js
@@ -26,13 +26,13 @@ def write_player(episode: Episode, path: Path) -> Path:
     name = f"{episode.task.capitalize()}: candidate {episode.candidate_id} plays"
     body = (
         f'<header><p class="kicker">rhabdom · replay</p>\n<h1>{text(name)}</h1>\n'
-        f"<p>{summary(episode)}</p></header>\n{player(episode, GroundPlan.of(episode))}"
+        f"<p>{episode_sentence(episode)}</p></header>\n{player(episode, GroundPlan.of(episode))}"
     )
     write_whole(Path(path), document(name, body, ["player.js"]))
     return Path(path)
 
 
-def summary(episode: Episode) -> str:
+def episode_sentence(episode: Episode) -> str:
     """One sentence of HTML on how the episode went."""
     total = rounded(float(episode.reward.sum(dtype=np.float64)), 4)
     terms = ", ".join(f"{text(name)} {rounded(float(term.sum()))}" for name, term in episode.reward_terms.items())

@@ -9,10 +9,10 @@ from evolve.report.player import write_player
 from evolve.report.rerun_recording import require_rerun, write_recording
 from evolve.store.directory import Run
 
-__all__ = ["main", "summary"]
+__all__ = ["episode_table", "write_replay"]
 
 
-def main(run: Run, candidate_id: int | None = None, seed: int = 0, rrd: bool = False) -> list[Path]:
+def write_replay(run: Run, candidate_id: int | None = None, seed: int = 0, rrd: bool = False) -> list[Path]:
     """Record an episode (default: of the best candidate), print how it went, and write a page that plays it; with `rrd`
     a recording for rerun as well.
 
@@ -25,13 +25,13 @@ def main(run: Run, candidate_id: int | None = None, seed: int = 0, rrd: bool = F
     if rrd:
         require_rerun()
     episode = record(run, candidate_id, seed)
-    print(summary(episode))
+    print(episode_table(episode))
     path = run.path / f"replay_candidate{episode.candidate_id:06d}_seed{seed}.html"
     page = write_player(episode, path)
     return [page, write_recording(episode, path.with_suffix(".rrd"))] if rrd else [page]
 
 
-def summary(episode: Episode) -> str:
+def episode_table(episode: Episode) -> str:
     """How an episode went: return, what it is made of, and what was reached, one line each."""
     terms = {name: float(term.sum()) for name, term in episode.reward_terms.items()}
     events = {name: int((episode.reward_terms[name] != 0).sum()) for name in ("goal", "adversary")}

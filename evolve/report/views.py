@@ -11,13 +11,13 @@ from evolve.report.ground_plan import GroundPlan
 from evolve.report.markup import rounded, text
 from evolve.report.picture import data_uri, display
 
-__all__ = ["through", "views"]
+__all__ = ["through", "what_it_sees"]
 
 WIDTH = 120  # CSS pixels of one picture, where there are few eyes
 MOST_EYES = 6
 
 
-def views(episode: Episode, stage: GroundPlan) -> str:
+def what_it_sees(episode: Episode, stage: GroundPlan) -> str:
     """Pictures and their caption."""
     frame = _busiest(episode)
     time = int(episode.radiance_frames[frame])

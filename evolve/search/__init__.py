@@ -1,5 +1,6 @@
 """The search over generations.
 
+ask_tell            the whole idea in a page: read this first
 loop                propose, evaluate, write down, tell
 search              Search: proposals, phases, seeds
 optimizers          CMA-ES and others

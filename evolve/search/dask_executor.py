@@ -152,8 +152,8 @@ class DaskExecutor:
         trial.counter.delete()
         if policy:
             write_whole(trial.job.policy_path, policy)
-        if checkpoint and trial.job.stretch is not None:
-            write_whole(trial.job.stretch.checkpoints[-1], checkpoint)
+        if checkpoint and trial.job.stage is not None:
+            write_whole(trial.job.stage.checkpoints[-1], checkpoint)
         return outcome
 
     def _tell(self, progress: Progress | None) -> None:

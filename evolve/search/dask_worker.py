@@ -47,8 +47,8 @@ class Order:
     function: "module:name" of what evaluates it
     counter: name of the scheduler's variable that counts its attempts
     topic: under which it tells its progress
-    budgets: on the rungs of a ladder up to where it trains; () without one
-    begun: (rung, checkpoint): where its training stands, if it has begun
+    ends: of the budget stages up to where it trains; () where budgets are not divided
+    begun: (stage, checkpoint): where its training stands, if it has begun
     software: that the sender runs
     """
 
@@ -60,7 +60,7 @@ class Order:
     counter: str
     topic: str
     software: Mapping[str, str]
-    budgets: tuple[int, ...] = ()
+    ends: tuple[int, ...] = ()
     begun: tuple[int, bytes] | None = None
 
 
@@ -68,10 +68,10 @@ def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Orde
     """A job whose config is `toml`; `counter` and `topic` are names on the scheduler."""
     phenotype = json.dumps(job.phenotype.to_json())
     order = Order(function, job.id, phenotype, toml, job.seed, counter, topic, _software())
-    if job.stretch is None:
+    if job.stage is None:
         return order
-    kept = [(rung, path.read_bytes()) for rung, path in enumerate(job.stretch.checkpoints[:-1]) if path.exists()]
-    return replace(order, budgets=job.stretch.budgets, begun=kept[-1] if kept else None)
+    kept = [(number, path.read_bytes()) for number, path in enumerate(job.stage.checkpoints[:-1]) if path.exists()]
+    return replace(order, ends=job.stage.ends, begun=kept[-1] if kept else None)
 
 
 def evaluate(order: Order) -> Reply:
@@ -118,12 +118,12 @@ def _evaluate(function: Callable[..., Evaluation], order: Order, progress: Calla
     phenotype = Phenotype.from_json(json.loads(order.phenotype))
     with TemporaryDirectory() as folder:
         policy = Path(folder) / f"{order.id:06d}"
-        checkpoints = tuple(policy.with_name(f"{policy.name}-{rung}") for rung in range(len(order.budgets)))
+        checkpoints = tuple(policy.with_name(f"{policy.name}-{number}") for number in range(len(order.ends)))
         if order.begun is not None:
-            rung, content = order.begun
-            checkpoints[rung].write_bytes(content)
-        ladder = (TrainingStage(order.budgets, checkpoints),) if checkpoints else ()
-        outcome = evaluated(function, (phenotype, config, order.seed, policy, *ladder), progress)
+            number, content = order.begun
+            checkpoints[number].write_bytes(content)
+        stage = (TrainingStage(order.ends, checkpoints),) if checkpoints else ()
+        outcome = evaluated(function, (phenotype, config, order.seed, policy, *stage), progress)
         return _text(outcome), _content(policy), _content(checkpoints[-1]) if checkpoints else b""
 
 

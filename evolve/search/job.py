@@ -25,7 +25,7 @@ class ExecutorError(RuntimeError):
 class Job:
     """One candidate to evaluate: arguments of `evolve.learning.fitness.evaluate`, under the candidate's id.
 
-    stretch: how far it is trained, on a ladder; None: to the end
+    stage: how far it is trained, where budgets are divided; None: to the end
     """
 
     id: int
@@ -33,9 +33,9 @@ class Job:
     config: RunConfig
     seed: int
     policy_path: Path
-    stretch: TrainingStage | None = None
+    stage: TrainingStage | None = None
 
     @property
     def arguments(self) -> tuple[Any, ...]:
-        ladder = () if self.stretch is None else (self.stretch,)
-        return self.phenotype, self.config, self.seed, self.policy_path, *ladder
+        stage = () if self.stage is None else (self.stage,)
+        return self.phenotype, self.config, self.seed, self.policy_path, *stage

@@ -60,18 +60,18 @@ def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
 
 
 def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Tell a generation, in the order of its candidates, once all of it is known: rung by rung, on a ladder."""
+    """Tell a generation, in the order of its candidates, once all of it is known, all stages included."""
     same = SameSearch(run)
     for generation in range(run.config.search.generations):
         proposals = {proposal.id: proposal for proposal in search.propose_generation()}
         for candidate in run.generation(generation):
             same.require(proposals[candidate.id], candidate)
-        for rung in range(run.config.search.rungs):
-            missing = sorted(reaching(run, generation, rung) - run.on_rung(rung))
-            jobs = deque(_job(run, proposals[identity], rung) for identity in missing)
+        for stage in range(run.config.search.rungs):
+            missing = sorted(reaching(run, generation, stage) - run.evaluated_at(stage))
+            jobs = deque(_job(run, proposals[candidate_id], stage) for candidate_id in missing)
             for job, outcome in executor.run(jobs, watcher.training):
                 _write_down(run, proposals[job.id], job, outcome, watcher)
-        run.forget_trainings(generation)
+        run.forget_trainings(proposals)
         search.tell([(candidate.id, candidate.fitness) for candidate in run.generation(generation)])
 
 
@@ -98,21 +98,21 @@ def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) ->
         jobs.extend(_job(run, proposal) for proposal in refill())
 
 
-def _job(run: Run, proposal: Proposal, rung: int = 0) -> Job:
+def _job(run: Run, proposal: Proposal, stage: int = 0) -> Job:
     phenotype = develop(proposal.vector, run.config)
     seed = training_seed(run.config.seed, proposal.id)
-    stretch = None
+    training = None
     if run.config.search.rungs > 1:
-        ends = budgets(run.config.search, run.config.learning)[: rung + 1]
-        stretch = TrainingStage(ends, tuple(run.checkpoint_path(proposal.id, i) for i in range(rung + 1)))
-    return Job(proposal.id, phenotype, run.config, seed, run.policy_path(proposal.id), stretch)
+        ends = budgets(run.config.search, run.config.learning)[: stage + 1]
+        training = TrainingStage(ends, tuple(run.checkpoint_path(proposal.id, i) for i in range(stage + 1)))
+    return Job(proposal.id, phenotype, run.config, seed, run.policy_path(proposal.id), training)
 
 
 def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, watcher: Watcher) -> Candidate:
-    place = (proposal.id, proposal.generation, proposal.index)
-    candidate = Candidate.of(place, proposal.genome, job.phenotype, job.seed, outcome, proposal.parents)
-    if job.stretch is not None:
-        candidate = replace(candidate, rung=job.stretch.rung)
+    genome, parents = proposal.genome, proposal.parents
+    candidate = Candidate.of(proposal.place, genome, job.phenotype, job.seed, outcome, parents)
+    if job.stage is not None:
+        candidate = replace(candidate, rung=job.stage.number)
         if (before := run.on_record(candidate.id, candidate.rung - 1)) is not None:
             candidate = replace(candidate, seconds=before.seconds + candidate.seconds)
     run.append(candidate)

@@ -16,8 +16,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.config.assemble import suggestion
-from evolve.config.run_config import ConfigError, SearchConfig
+from evolve.config.checks import ConfigError, suggestion
+from evolve.config.run_config import SearchConfig
 from evolve.genome.genes import Gene, GeneConfig
 
 __all__ = ["Optimizer", "Space", "build_optimizer"]
@@ -37,10 +37,10 @@ class Space:
 class Optimizer(Protocol):
     """Someone who proposes genomes and learns from their fitness, which it maximises."""
 
-    def ask(self, identity: int) -> tuple[Floats, tuple[int, ...]]:
+    def ask(self, candidate_id: int) -> tuple[Floats, tuple[int, ...]]:
         """Genome for the candidate with this id, and the candidates it was made from."""
 
-    def tell(self, identity: int, fitness: float) -> None:
+    def tell(self, candidate_id: int, fitness: float) -> None:
         """Fitness of a candidate that was asked for; finite."""
 
 
@@ -69,8 +69,8 @@ class Mutation:
         self._told: deque[tuple[int, float]] = deque(maxlen=2 * search.population)
         self._genomes: dict[int, Floats] = {}
 
-    def ask(self, identity: int) -> tuple[Floats, tuple[int, ...]]:
-        chance = np.random.default_rng([*self._space.seed, identity])
+    def ask(self, candidate_id: int) -> tuple[Floats, tuple[int, ...]]:
+        chance = np.random.default_rng([*self._space.seed, candidate_id])
         parent = self._parent(chance)
         genome = self._space.start if parent is None else self._genomes[parent]
         normal, steps = chance.standard_normal(genome.size), chance.integers(-1, 2, genome.size)
@@ -78,11 +78,11 @@ class Mutation:
             gene.mutated(float(u), self._sigma, float(normal[i]), int(steps[i]), use)
             for i, ((gene, use), u) in enumerate(zip(self._space.genes, genome, strict=True))
         ]
-        self._genomes[identity] = np.array(child)
-        return self._genomes[identity], () if parent is None else (parent,)
+        self._genomes[candidate_id] = np.array(child)
+        return self._genomes[candidate_id], () if parent is None else (parent,)
 
-    def tell(self, identity: int, fitness: float) -> None:
-        self._told.append((identity, fitness))
+    def tell(self, candidate_id: int, fitness: float) -> None:
+        self._told.append((candidate_id, fitness))
 
     def _parent(self, chance: np.random.Generator) -> int | None:
         best = sorted(self._told, key=lambda told: (-told[1], told[0]))[: self._parents]
@@ -117,16 +117,16 @@ class Named:
                 f"search.optimizer = {name!r}: cannot be used here: {reason}", "search.optimizer"
             ) from error
 
-    def ask(self, identity: int) -> tuple[Floats, tuple[int, ...]]:
+    def ask(self, candidate_id: int) -> tuple[Floats, tuple[int, ...]]:
         with _quiet():
             candidate = self._optimizer.ask()
-        self._asked[identity], self._ids[candidate.uid] = candidate, identity
+        self._asked[candidate_id], self._ids[candidate.uid] = candidate, candidate_id
         genome = np.clip(candidate.value[: self._dimension], 0.0, 1.0)
         return genome, self._parents(candidate)
 
-    def tell(self, identity: int, fitness: float) -> None:
+    def tell(self, candidate_id: int, fitness: float) -> None:
         with _quiet():
-            self._optimizer.tell(self._asked.pop(identity), -fitness)
+            self._optimizer.tell(self._asked.pop(candidate_id), -fitness)
 
     def _parents(self, candidate: Any) -> tuple[int, ...]:
         return tuple(sorted(self._ids[uid] for uid in candidate.parents_uids if uid in self._ids))
@@ -157,12 +157,12 @@ class CMA(Named):
         # nevergrad shrinks the step in bounded spaces by a factor of its own choosing; it is divided out.
         return scaled(search.sigma / scaled(1.0).es.sigma)
 
-    def tell(self, identity: int, fitness: float) -> None:
-        super().tell(identity, fitness)
-        self._told.append((identity, fitness))
+    def tell(self, candidate_id: int, fitness: float) -> None:
+        super().tell(candidate_id, fitness)
+        self._told.append((candidate_id, fitness))
         if len(self._told) == self._population:
             best = sorted(self._told, key=lambda told: (-told[1], told[0]))[: self._population // 2]
-            self._better_half, self._told = tuple(sorted(identity for identity, _ in best)), []
+            self._better_half, self._told = tuple(sorted(candidate_id for candidate_id, _ in best)), []
 
     def _parents(self, candidate: Any) -> tuple[int, ...]:
         return self._better_half

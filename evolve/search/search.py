@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from evolve.config.numbering import Place
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import Genotype
 from evolve.search.optimizers import Optimizer, Space, build_optimizer
@@ -24,13 +25,21 @@ LOWEST = -1e9  # below any mean return: what a failure counts as while no candid
 
 @dataclass(frozen=True)
 class Proposal:
-    """A genome to try, (dimension,) in [0, 1]: candidate `id`, number `index` of `generation`, made from `parents`."""
+    """A genome to try.
 
-    id: int
-    generation: int
-    index: int
+    place: of the candidate in the search
+    genome: (dimension,) in [0, 1]
+    parents: ids of the candidates that it was made from
+    """
+
+    place: Place
     genome: tuple[float, ...]
     parents: tuple[int, ...]
+
+    @property
+    def id(self) -> int:
+        """The candidate's id."""
+        return self.place.id
 
     @property
     def vector(self) -> NDArray[np.float64]:
@@ -63,14 +72,13 @@ class Search:
 
     def propose(self) -> Proposal:
         """The next candidate."""
-        population = self._config.search.population
-        generation, index = divmod(self._next, population)
-        if index == 0 and generation > 0 and generation in self._genotype.phases:
-            self._begin_phase(generation)
+        place = Place.of(self._next, self._config.search.population)
+        if place.index == 0 and place.generation > 0 and place.generation in self._genotype.phases:
+            self._begin_phase(place.generation)
         part, parents = self._optimizer.ask(self._next)
         genome = self._base.copy()
         genome[self._varied] = part
-        proposal = Proposal(self._next, generation, index, tuple(genome.tolist()), parents)
+        proposal = Proposal(place, tuple(genome.tolist()), parents)
         self._asked[self._next] = self._optimizer, proposal
         self._next += 1
         return proposal
@@ -92,15 +100,15 @@ class Search:
         Raises:
             ValueError: a candidate was not proposed, or has been told already.
         """
-        for identity, value in fitness:
-            if identity not in self._asked:
-                raise ValueError(f"tell: candidate {identity} has not been proposed, or has been told already")
+        for candidate_id, value in fitness:
+            if candidate_id not in self._asked:
+                raise ValueError(f"tell: candidate {candidate_id} has not been proposed, or has been told already")
             if math.isfinite(value):
                 self._worst = min(self._worst, value)
         worst = self._worst if math.isfinite(self._worst) else LOWEST
-        for identity, value in fitness:
-            optimizer, proposal = self._asked.pop(identity)
-            optimizer.tell(identity, value if math.isfinite(value) else worst)
+        for candidate_id, value in fitness:
+            optimizer, proposal = self._asked.pop(candidate_id)
+            optimizer.tell(candidate_id, value if math.isfinite(value) else worst)
             if value > self._best:
                 self._best, self._fittest = value, proposal.vector
 

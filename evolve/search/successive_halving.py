@@ -1,9 +1,12 @@
-"""Budget ladders: successive halving within a generation (Jamieson and Talwalkar 2016, algorithm 1).
+"""Successive halving within a generation (Jamieson and Talwalkar 2016, algorithm 1).
 
-All of a generation is trained a little, on the first rung; the better part of each rung goes on to the next, and the
-last rung is a whole training. A rung takes a training up where the one below left it, in fresh worlds whose seeds
-follow from candidate and rung: what it becomes follows from seeds and the tensors left, so a run that was killed on a
-rung begins that rung again, and ends as if nothing had happened.
+A training has budget stages. All of a generation is trained through the first; after each stage the better part goes on
+to the next, and the last stage ends a whole training. A stage takes a training up where the one before left it, in
+fresh worlds whose seeds follow from candidate and stage. What it becomes follows from seeds and the tensors left, so a
+run that was killed within a stage begins that stage again, and ends as if nothing had happened.
+
+In settings and records a stage is called a rung: `search.rungs` says how many there are, and the `rung` of a record's
+line after which one it was written.
 """
 
 from __future__ import annotations
@@ -12,63 +15,65 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+from evolve.config.numbering import generation_ids
 from evolve.config.run_config import LearningConfig, RunConfig, SearchConfig
 from evolve.store.directory import Run
 
-__all__ = ["budgets", "complete", "evaluations", "finished", "promoted", "reaching", "sizes", "steps", "stretches"]
+__all__ = ["budgets", "complete", "evaluations", "finished", "promoted", "reaching", "sizes", "stage_steps", "steps"]
 
 
 def budgets(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
-    """Steps that a training has come to at the end of each rung, (rungs,); the last is a whole training."""
-    return tuple(math.ceil(learning.total_steps * search.promoted**above) for above in range(search.rungs - 1, -1, -1))
+    """Steps that a training has come to at the end of each stage, (stage,); the last is a whole training."""
+    return tuple(math.ceil(learning.total_steps * search.promoted**after) for after in range(search.rungs - 1, -1, -1))
 
 
-def stretches(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
-    """Steps from one rung to the next, (rungs,)."""
+def stage_steps(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
+    """Steps of each stage, (stage,)."""
     return tuple(after - before for before, after in pairwise((0, *budgets(search, learning))))
 
 
 def sizes(search: SearchConfig) -> tuple[int, ...]:
-    """Candidates of a generation that reach each rung, (rungs,), if none fails."""
-    return tuple(max(1, math.ceil(search.population * search.promoted**rung)) for rung in range(search.rungs))
+    """Candidates of a generation that are trained through each stage, (stage,), if none fails."""
+    return tuple(max(1, math.ceil(search.population * search.promoted**stage)) for stage in range(search.rungs))
 
 
 def steps(config: RunConfig) -> int:
     """Agent steps of the whole run, if all trainings take what they may."""
-    climb = zip(sizes(config.search), stretches(config.search, config.learning), strict=True)
-    return config.search.generations * sum(size * stretch for size, stretch in climb)
+    search = config.search
+    stages = zip(sizes(search), stage_steps(search, config.learning), strict=True)
+    return search.generations * sum(candidates * each for candidates, each in stages)
 
 
 def evaluations(search: SearchConfig) -> int:
-    """Evaluations in the whole run: every candidate's, on every rung that it reaches."""
+    """Evaluations in the whole run: every candidate's, after every stage that it reaches."""
     return search.generations * sum(sizes(search))
 
 
-def promoted(search: SearchConfig, rung: int, fitness: Sequence[tuple[int, float]]) -> set[int]:
-    """Ids that go on from a rung, given (id, fitness) of all that reached it: the fittest, the first of equals; none
+def promoted(search: SearchConfig, stage: int, fitness: Sequence[tuple[int, float]]) -> set[int]:
+    """Ids that go on after a stage, given (id, fitness) of all that reached it: the fittest, the first of equals; none
     that failed (-inf)."""
-    if rung + 1 >= search.rungs:
+    if stage + 1 >= search.rungs:
         return set()
     able = sorted((told for told in fitness if math.isfinite(told[1])), key=lambda told: (-told[1], told[0]))
-    return {identity for identity, _ in able[: sizes(search)[rung + 1]]}
+    return {candidate_id for candidate_id, _ in able[: sizes(search)[stage + 1]]}
 
 
-def reaching(run: Run, generation: int, rung: int) -> set[int]:
-    """Ids of a generation that reach a rung; all of it the first, {} any other before the one below is done."""
-    population = run.config.search.population
-    ids = set(range(generation * population, (generation + 1) * population))
-    for below in range(rung):
-        told = [(identity, run.on_record(identity, below)) for identity in ids]
-        known = [(identity, candidate.fitness) for identity, candidate in told if candidate is not None]
+def reaching(run: Run, generation: int, stage: int) -> set[int]:
+    """Ids of a generation that reach a stage: all of it the first; {} any later one until the one before is done."""
+    ids = set(generation_ids(generation, run.config.search.population))
+    for earlier in range(stage):
+        told = [run.on_record(candidate_id, earlier) for candidate_id in ids]
+        known = [(candidate.id, candidate.fitness) for candidate in told if candidate is not None]
         if len(known) < len(ids):
             return set()
-        ids = promoted(run.config.search, below, known)
+        ids = promoted(run.config.search, earlier, known)
     return ids
 
 
 def complete(run: Run, generation: int) -> bool:
-    """Whether all of a generation has been evaluated, on every rung that it reaches."""
-    return all(reaching(run, generation, rung) <= run.on_rung(rung) for rung in range(run.config.search.rungs))
+    """Whether all of a generation has been evaluated, after every stage that it reaches."""
+    stages = range(run.config.search.rungs)
+    return all(reaching(run, generation, stage) <= run.evaluated_at(stage) for stage in stages)
 
 
 def finished(run: Run) -> bool:

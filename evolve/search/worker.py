@@ -72,14 +72,14 @@ def evaluate_candidate(
     config: RunConfig,
     seed: int,
     policy_path: Path,
-    stretch: TrainingStage | None = None,
+    stage: TrainingStage | None = None,
     *,
     progress: Callable[[int, int], None],
 ) -> Evaluation:
     """`evolve.learning.fitness.evaluate`, whose libraries are loaded in workers alone."""
     from evolve.learning.fitness import evaluate
 
-    return evaluate(phenotype, config, seed, policy_path, progress, stretch)
+    return evaluate(phenotype, config, seed, policy_path, progress, stage)
 
 
 def evaluated(

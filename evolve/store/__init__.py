@@ -1,6 +1,7 @@
 """The run directory: it stores, and decides nothing.
 
 directory     Run
+record        Record: candidates.jsonl, read, checked, added to
 candidate     Candidate: one line of the record
 evaluation    Evaluation: what became of a candidate
 lock          one process at a time

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from evolve.config.numbering import Place
 from evolve.genome.phenotype import Phenotype
 from evolve.store.evaluation import Evaluation
 
@@ -21,7 +22,7 @@ class Candidate:
     """A genome, the animal it became, and how that one fared; see `Evaluation` for the fields it has in common.
 
     parents: ids of the candidates from which the search made it; () where it drew from none
-    rung: of the ladder, to which it was trained; steps and seconds are from the beginning
+    rung: budget stage after which it was evaluated, 0 the first; steps and seconds are from the beginning
     """
 
     id: int
@@ -41,6 +42,11 @@ class Candidate:
     rung: int = 0
 
     @property
+    def place(self) -> Place:
+        """Where it stands in the search."""
+        return Place(self.id, self.generation, self.index)
+
+    @property
     def vector(self) -> NDArray[np.float64]:
         """The genome as an array."""
         return np.array(self.genome)
@@ -48,18 +54,18 @@ class Candidate:
     @classmethod
     def of(
         cls,
-        place: tuple[int, int, int],
+        place: Place,
         genome: tuple[float, ...],
         phenotype: Phenotype,
         seed: int,
         outcome: Evaluation,
         parents: tuple[int, ...] = (),
     ) -> Candidate:
-        """Candidate at `place` (id, generation, index) with its outcome; a fitness that is no number is a failure."""
+        """Candidate at `place` with its outcome; a fitness that is no number is a failure."""
         if outcome.failure is None and not math.isfinite(outcome.fitness):
             outcome = Evaluation.failed(f"fitness is {outcome.fitness}", outcome.seconds)
         found = {f.name: getattr(outcome, f.name) for f in fields(Evaluation)}
-        return cls(*place, genome, phenotype, seed, **found, parents=parents)
+        return cls(**vars(place), genome=genome, phenotype=phenotype, seed=seed, **found, parents=parents)
 
     def to_line(self) -> str:
         """One line of JSON; numbers are written so that they read back bit for bit, and what is no number as null."""

@@ -68,20 +68,20 @@ def killed_always(phenotype, config, seed, policy_path, progress):
     return outcome
 
 
-def climbing(phenotype, config, seed, policy_path, stretch, progress):
+def in_stages(phenotype, config, seed, policy_path, stage, progress):
     """A training that is the text of all it went through; its fitness depends on every letter."""
     with (Path(os.environ["RHABDOM_TEST"]) / "calls.log").open("a") as log:
-        log.write(f"{int(policy_path.stem)} on {stretch.rung}\n")
+        log.write(f"{int(policy_path.stem)} in stage {stage.number}\n")
     text, first = "", 0
-    for rung in reversed(range(stretch.rung)):
-        if not text and stretch.checkpoints[rung].exists():
-            text, first = stretch.checkpoints[rung].read_text(), rung + 1
-    for rung in range(first, stretch.rung + 1):
-        progress(stretch.budgets[rung], stretch.budgets[rung])
-        text += f"{seed} to {stretch.budgets[rung]} on {rung}, "
-        write_whole(stretch.checkpoints[rung], text.encode())
+    for number in reversed(range(stage.number)):
+        if not text and stage.checkpoints[number].exists():
+            text, first = stage.checkpoints[number].read_text(), number + 1
+    for number in range(first, stage.number + 1):
+        progress(stage.ends[number], stage.ends[number])
+        text += f"{seed} to {stage.ends[number]} on {number}, "
+        write_whole(stage.checkpoints[number], text.encode())
     write_whole(policy_path, text.encode())
     luck = int.from_bytes(hashlib.sha256(text.encode()).digest()[:4]) / 2**32
     fitness = -abs(phenotype.fov_deg - 70.0) + 20 * luck
-    curve = tuple((steps, fitness) for steps in stretch.budgets)
-    return Evaluation(fitness, (fitness,) * config.evaluation.episodes, 0.5, stretch.budgets[-1], 0.01, curve)
+    curve = tuple((steps, fitness) for steps in stage.ends)
+    return Evaluation(fitness, (fitness,) * config.evaluation.episodes, 0.5, stage.ends[-1], 0.01, curve)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from evolve.config.numbering import Place
 from evolve.config.run_config import EvaluationConfig, EyeConfig, LearningConfig, RunConfig
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import Phenotype
@@ -36,5 +37,5 @@ def small_run(path, seed=5):
     run = Run.create(path, small_config())
     outcome = evaluate(PHENOTYPE, run.config, seed, run.policy_path(0))
     genome = (0.5,) * Genotype(run.config.genome).dimension
-    run.append(Candidate.of((0, 0, 0), genome, PHENOTYPE, seed, outcome))
+    run.append(Candidate.of(Place(0, 0, 0), genome, PHENOTYPE, seed, outcome))
     return run

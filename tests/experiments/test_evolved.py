@@ -8,6 +8,7 @@ import pytest
 import safetensors.numpy
 
 from evolve.config.assemble import assemble
+from evolve.config.numbering import Place
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.policy import PolicyConfig, build_policy, save_policy
@@ -41,9 +42,8 @@ def run_of(path, preset, settings, fitness):
     start = Genotype(config.genome).start
     for identity, value in enumerate(fitness):
         outcome = Evaluation.failed("too weak") if value is None else Evaluation(value, (value,) * 4, 0.25, 10, 1.0)
-        place = (identity, *divmod(identity, 2))
         genome = np.clip(start + 0.01 * identity, 0, 1)
-        run.append(Candidate.of(place, tuple(genome), develop(genome, config), identity, outcome))
+        run.append(Candidate.of(Place.of(identity, 2), tuple(genome), develop(genome, config), identity, outcome))
     return run
 
 

@@ -11,14 +11,14 @@ from optics.numerics import backend
 
 __all__ = ["doctor", "validate"]
 
-CHECKOUT = Path(__file__).resolve().parents[2]
+CHECKOUT = Path(__file__).resolve().parents[3]
 
 
 def doctor(arguments: Namespace) -> int:
     """Print what is installed and whether it works."""
-    from evolve.cli.doctor import main
+    from evolve.cli.doctor import print_findings
 
-    return main(as_json=arguments.json)
+    return print_findings(as_json=arguments.json)
 
 
 def validate(arguments: Namespace) -> int:

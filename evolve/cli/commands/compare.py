@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from argparse import Namespace
 
-from evolve.report.comparison import differing_settings, lines, summary, write_page
+from evolve.report.comparison import comparison_lines, differing_settings, run_summary, write_page
 from evolve.store.directory import Run
 
 __all__ = ["compare"]
@@ -15,10 +15,10 @@ def compare(arguments: Namespace) -> int:
     """Print runs side by side."""
     runs = [Run.open(directory) for directory in arguments.directories]
     if arguments.json:
-        found = {"runs": [summary(run) for run in runs], "settings": differing_settings(runs)}
+        found = {"runs": [run_summary(run) for run in runs], "settings": differing_settings(runs)}
         print(json.dumps(found, indent=1, allow_nan=False))
     else:
-        print("\n".join(lines(runs)))
+        print("\n".join(comparison_lines(runs)))
     if arguments.html:
         write_page(runs, arguments.html)
         if not arguments.json:

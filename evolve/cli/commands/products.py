@@ -13,9 +13,9 @@ __all__ = ["export", "replay", "report"]
 def replay(arguments: Namespace) -> int:
     """Let an agent play one episode again: a table here, and a page that plays it."""
     run = _open(arguments)
-    from evolve.report.replay import main
+    from evolve.report.replay import write_replay
 
-    for path in main(run, arguments.candidate, arguments.seed, arguments.rrd):
+    for path in write_replay(run, arguments.candidate, arguments.seed, arguments.rrd):
         print(f"replay: {path}")
     return 0
 
@@ -32,9 +32,9 @@ def report(arguments: Namespace) -> int:
 def export(arguments: Namespace) -> int:
     """Write what an agent saw, one EXR file per frame."""
     run = _open(arguments)
-    from evolve.report.exr_export import main
+    from evolve.report.exr_export import export_run
 
-    files = main(run, arguments.candidate, arguments.seed)
+    files = export_run(run, arguments.candidate, arguments.seed)
     print(f"EXR files: {len(files)} in {files[0].parent}, the first: {files[0].name}")
     return 0
 

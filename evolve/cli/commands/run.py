@@ -11,7 +11,7 @@ from evolve.cli.commands import INTERRUPTED
 from evolve.cli.progress import Bar, Events, Lines, Watchers, watcher
 from evolve.cli.run_plan import RunPlan
 from evolve.cli.start_from import starts_from
-from evolve.cli.tensorboard import Scalars
+from evolve.cli.tensorboard import TensorBoardWriter
 from evolve.config.assemble import assemble
 from evolve.config.lint import lint
 from evolve.config.run_config import ConfigError, RunConfig
@@ -34,7 +34,7 @@ def start(arguments: Namespace) -> int:
     """Begin a run and carry it to its end."""
     _require_scheduler(arguments)
     flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
-    starts = starts_from(arguments.ancestor) if arguments.ancestor else None
+    starts = starts_from(arguments.start_from) if arguments.start_from else None
     config = assemble(
         arguments.task, arguments.preset, arguments.config, [*arguments.set, *flags], starts, arguments.scale
     )
@@ -69,7 +69,10 @@ def resume(arguments: Namespace) -> int:
         _note_changes(run)
         record_start(run.path, len(run.candidates))
         if not arguments.json:
-            print(f"{run.path}: {len(run.candidates)} of {run.config.candidates} candidates are on record", flush=True)
+            print(
+                f"{run.path}: {len(run.candidates)} of {run.config.candidates} candidates are on record",
+                flush=True,
+            )
         return _carry(run, arguments)
 
 
@@ -88,9 +91,9 @@ def _carry(run: Run, arguments: Namespace) -> int:
         with (
             _executor(run, arguments) as executor,
             _watcher(run, executor.count, arguments) as watch,
-            Scalars(run) if arguments.tensorboard else nullcontext() as scalars,
+            TensorBoardWriter(run) if arguments.tensorboard else nullcontext() as tensorboard,
         ):
-            evolve(run, executor, Watchers([watch, *([scalars] if scalars else [])]))
+            evolve(run, executor, Watchers([watch, *([tensorboard] if tensorboard else [])]))
     except KeyboardInterrupt:
         print(
             f"\nevolve: interrupted; {len(run.candidates)} of {run.config.candidates} candidates are on record. "
@@ -116,14 +119,14 @@ def _executor(run: Run, arguments: Namespace) -> DaskExecutor | LocalExecutor:
 def _require_scheduler(arguments: Namespace) -> None:
     """Only Dask has one, and needs one."""
     if (arguments.executor == "dask") != (arguments.scheduler is not None):
-        raise ConfigError("--executor dask needs --scheduler ADDRESS, and nothing else takes one")
+        raise ConfigError("--executor dask needs --scheduler ADDRESS, and no other executor takes one")
 
 
 def _finish(run: Run, as_json: bool) -> int:
     """Write report and EXR files, and name them; 1 if no candidate could be evaluated."""
     failures = [candidate for candidate in run.candidates if candidate.failure]
     if run.best is None:
-        print(f"evolve: every candidate failed; the last: {failures[-1].failure}", file=sys.stderr)
+        print(f"evolve: every candidate failed; the last one: {failures[-1].failure}", file=sys.stderr)
         return 1
     if not as_json:
         print("\n".join(_outcome(run, run.best, failures)))
@@ -148,11 +151,15 @@ def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
     """The best candidate, how many failed, and how many genomes did not fit together as they were."""
     lines = [f"best: candidate {best.id}, fitness {best.fitness:.4g}, success rate {best.success_rate:.0%}"]
     if failures:
-        lines.append(f"failed: {len(failures)} of {len(run.candidates)} candidates; the last: {failures[-1].failure}")
+        lines.append(
+            f"failed: {len(failures)} of {len(run.candidates)} candidates; the last one: {failures[-1].failure}"
+        )
     changed = [names for candidate in run.candidates if (names := repaired(candidate.vector, run.config))]
     if changed:
         genes = ", ".join(sorted({name for names in changed for name in names}))
-        lines.append(f"repaired so that nothing overlaps: {len(changed)} of {len(run.candidates)} candidates ({genes})")
+        lines.append(
+            f"repaired, because parts would overlap: {len(changed)} of {len(run.candidates)} candidates ({genes})"
+        )
     return lines
 
 
@@ -161,7 +168,7 @@ def _plan(config: RunConfig) -> str:
     genes = sum(use.open for use in config.genome.values())
     return (
         f"{config.task}, {search.generations} generations x {search.population} candidates x {steps:,} steps"
-        f"{f' on a ladder of {search.rungs} rungs' if search.rungs > 1 else ''}, "
+        f"{f' in up to {search.rungs} budget stages' if search.rungs > 1 else ''}, "
         f"{genes} genes open"
     )
 
@@ -170,11 +177,11 @@ def _note_changes(run: Run) -> None:
     """Say which software differs from when the run began, and whether settings do; numbers may differ with them."""
     if altered(run.path):
         print(
-            f"note: config.toml has changed since the run was last carried on: candidates from {len(run.candidates)} "
-            "on are trained and evaluated by other settings than those before",
+            f"note: config.toml has changed since the last start. Candidates from {len(run.candidates)} on are "
+            "trained and evaluated with other settings than those before",
             file=sys.stderr,
         )
     then, now = recorded(run.path), present()
     changed = [f"{name} {now[name]} (was {then[name]})" for name in now if name in then and then[name] != now[name]]
     if changed:
-        print(f"note: other software than when the run began: {', '.join(changed)}", file=sys.stderr)
+        print(f"note: the software has changed since this run began: {', '.join(changed)}", file=sys.stderr)

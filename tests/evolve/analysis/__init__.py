@@ -1,0 +1,7 @@
+"""Which test covers which module of evolve/analysis.
+
+statistics: test_statistics.py, test_genealogy.py
+vision: test_vision.py
+genealogy: test_genealogy.py
+episode: test_episode.py
+"""

@@ -152,7 +152,7 @@ def test_exr_files_hold_what_the_eyes_saw(episode, tmp_path):
 
 
 def test_replay_sums_up_and_writes_a_page(run, episode, capsys):
-    (page,) = replay.main(run, seed=3)
+    (page,) = replay.write_replay(run, seed=3)
     printed = dict(line.split(None, 1) for line in capsys.readouterr().out.splitlines() if len(line.split()) == 2)
     assert float(printed["return"]) == pytest.approx(episode.reward.sum(), abs=0.01)
     assert sum(float(printed[name]) for name in ("progress", "goal", "adversary", "contact")) == pytest.approx(

@@ -17,7 +17,7 @@ def test_a_working_installation_is_good(findings, monkeypatch, capsys):
     assert findings["good"], findings
     assert findings["variants"] | {"scalar_spectral": "works", "llvm_ad_spectral": "works"} == findings["variants"]
     monkeypatch.setattr(doctor, "examine", lambda: findings)
-    assert doctor.main() == 0
+    assert doctor.print_findings() == 0
     printed = capsys.readouterr().out
     assert f"drjit               {findings['packages']['drjit']}" in printed
     assert printed.endswith("all good\n")
@@ -25,13 +25,13 @@ def test_a_working_installation_is_good(findings, monkeypatch, capsys):
 
 def test_json_is_the_same_findings(findings, monkeypatch, capsys):
     monkeypatch.setattr(doctor, "examine", lambda: findings)
-    doctor.main(as_json=True)
+    doctor.print_findings(as_json=True)
     assert json.loads(capsys.readouterr().out) == findings
 
 
 def test_bad_llvm_is_named_with_the_remedy(monkeypatch, capsys, tmp_path):
     monkeypatch.setenv(backend.VARIABLE, str(tmp_path / "libLLVM.so"))
-    assert doctor.main() == 2
+    assert doctor.print_findings() == 2
     printed = capsys.readouterr().out
     assert "missing: no such file" in printed
     assert backend.REMEDY in printed

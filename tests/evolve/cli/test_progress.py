@@ -10,6 +10,7 @@ import pytest
 
 from evolve.cli import progress
 from evolve.cli.progress import Bar, Events, Lines, Tally, watcher
+from evolve.config.numbering import Place
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.store.candidate import Candidate
@@ -42,13 +43,12 @@ def run(tmp_path):
 
 def add(run, identity, fitness, steps=1000, failure=None):
     outcome = Evaluation(fitness, steps=steps, failure=failure)
-    place = (identity, identity // 4, identity % 4)
-    run.append(Candidate.of(place, tuple(GENOME.tolist()), develop(GENOME, CONFIG), 1, outcome))
+    run.append(Candidate.of(Place.of(identity, 4), tuple(GENOME.tolist()), develop(GENOME, CONFIG), 1, outcome))
     return run.candidates[-1]
 
 
-def test_events_count_every_rung_of_a_ladder(tmp_path):
-    run = Run.create(tmp_path / "ladder", tiny("search.generations=1", "search.rungs=2", "learning.total_steps=8192"))
+def test_events_count_every_budget_stage(tmp_path):
+    run = Run.create(tmp_path / "halving", tiny("search.generations=1", "search.rungs=2", "learning.total_steps=8192"))
     out = io.StringIO()
     events = Events(run, out, 1)
     for identity in range(4):

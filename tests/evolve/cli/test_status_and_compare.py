@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from evolve.config.numbering import Place
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.store.candidate import Candidate
@@ -58,7 +59,7 @@ def failed(tmp_path):
     run = Run.create(tmp_path / "failed", tiny())
     genome = Genotype(run.config.genome).start
     outcome = Evaluation.failed("no luck")
-    run.append(Candidate.of((0, 0, 0), tuple(genome), develop(genome, run.config), 1, outcome))
+    run.append(Candidate.of(Place(0, 0, 0), tuple(genome), develop(genome, run.config), 1, outcome))
     return run
 
 
@@ -81,7 +82,7 @@ def test_what_is_no_number_is_null_for_machines(call, failed):
 def test_a_single_episode_has_no_interval(call, failed):
     genome = Genotype(failed.config.genome).start
     alone = Evaluation(1.5, (1.5,), 1.0)
-    failed.append(Candidate.of((1, 0, 1), tuple(genome), develop(genome, failed.config), 1, alone))
+    failed.append(Candidate.of(Place(1, 0, 1), tuple(genome), develop(genome, failed.config), 1, alone))
     (line,) = (line for line in call("compare", failed.path)[1].splitlines() if line.startswith("95 % interval"))
     assert line.split() == ["95", "%", "interval", "-"]
     assert json.loads(call("compare", failed.path, "--json")[1])["runs"][0]["fitness_interval"] is None

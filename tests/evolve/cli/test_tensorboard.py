@@ -1,17 +1,17 @@
-"""Scalars for TensorBoard: they are the record's."""
+"""What TensorBoard shows is what is on record."""
 
 import shutil
 
 import pytest
 
-from evolve.cli.tensorboard import Scalars
+from evolve.cli.tensorboard import TensorBoardWriter
 from evolve.store.directory import Run
 
 
-def test_scalars_are_the_records(finished, tmp_path):
+def test_numbers_are_the_records(finished, tmp_path):
     accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
     run = Run.open(shutil.copytree(finished, tmp_path / "run"))
-    with Scalars(run):
+    with TensorBoardWriter(run):
         pass
     shown = {}
     for name in ("candidates", "generations"):

@@ -1,0 +1,12 @@
+"""Which test covers which module of evolve/config.
+
+run_config: test_run_config.py
+sections: test_assemble.py, test_run_config.py, test_parameters.py
+assemble: test_assemble.py, test_presets.py
+sources: test_sources.py, test_assemble.py
+provenance: test_provenance.py
+checks: test_assemble.py, test_provenance.py
+lint: test_lint.py
+relief_starts: test_relief_starts.py
+numbering: test_numbering.py
+"""

@@ -10,10 +10,11 @@ import evolve.cli.run_plan
 import optics
 from evolve.cli.main import main
 from evolve.cli.pace import Pace
-from evolve.config.assemble import SCALES, assemble, preset_names
+from evolve.config.assemble import assemble
 from evolve.config.lint import lint
 from evolve.config.provenance import Source
 from evolve.config.run_config import ConfigError
+from evolve.config.sources import SCALES, preset_names
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.search.search import Search
@@ -123,7 +124,9 @@ def test_scaling_spreads_candidates_evenly():
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("preset", EXPERIMENTS)
 def test_dry_run_predicts_hours(preset, scale, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(evolve.cli.run_plan, "calibrate", lambda config, animals, workers: dict.fromkeys(animals, PACE))
+    monkeypatch.setattr(
+        evolve.cli.run_plan, "measure_pace", lambda config, animals, workers: dict.fromkeys(animals, PACE)
+    )
     monkeypatch.chdir(tmp_path)
     assert main(["run", "--preset", preset, "--scale", scale, "--dry-run", "--json", "--workers", "2"]) == 0
     plan = json.loads(capsys.readouterr().out)
@@ -153,7 +156,7 @@ def test_task_named_by_the_user_wins():
 def test_a_preset_made_for_a_task_wins_over_the_tasks_settings(monkeypatch):
     """And one for any task does not: navigators' eyes are one row of receptors whatever it says."""
     own = {"task": "navigation", "learning": {"gamma": 0.5}}
-    monkeypatch.setattr("evolve.config.assemble._preset", lambda name, scale: [Source("preset", own)])
+    monkeypatch.setattr("evolve.config.assemble.preset_sources", lambda name, scale: [Source("preset", own)])
     assert assemble(preset="any").learning.gamma == 0.5
     monkeypatch.undo()
     assert assemble("navigation", "quick").genome["resolution_height"].start == 1

@@ -1,0 +1,12 @@
+"""Which test covers which module of evolve/learning.
+
+fitness: test_fitness.py
+ppo: test_ppo.py, test_learning.py
+policy: test_policy.py
+eye_features: test_policy.py, test_learning.py
+training_rewards: test_ppo.py
+rollout_buffer: test_rollout_buffer.py
+adam: test_adam.py
+checkpoint: search/test_successive_halving.py
+training_stage: search/test_successive_halving.py
+"""

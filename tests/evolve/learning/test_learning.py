@@ -11,8 +11,9 @@ from torch import nn
 
 import sim
 from evolve.config.run_config import LearningConfig
-from evolve.learning.policy import EyeFeatures, PolicyConfig, build_policy
-from evolve.learning.ppo import play, train
+from evolve.learning.eye_features import EyeFeatures
+from evolve.learning.policy import Brain, PolicyConfig, build_policy
+from evolve.learning.ppo import Worlds, play, train
 from sim.worlds.state import WorldState
 
 SCENES, TRAINING_SCENES, BATCH = 256, 20, 512
@@ -83,6 +84,6 @@ def test_ppo_learns_to_reach_objects():
     torch.manual_seed(0)
     untrained = build_policy(PolicyConfig(worlds.observation_space["eyes"].shape, 64))
     before = play(untrained, others, 1000)
-    after = play(train(worlds, others, 64, config, seed=0).policy, others, 1000)
+    after = play(train(Worlds(worlds, others), Brain(64), config, seed=0).policy, others, 1000)
     assert after.returns.mean() > before.returns.mean() + 150, (before.returns.mean(), after.returns.mean())
     assert after.successes.mean() > before.successes.mean() + 0.1, (before.successes.mean(), after.successes.mean())

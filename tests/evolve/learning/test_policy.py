@@ -8,7 +8,8 @@ import pytest
 import torch
 from gymnasium import spaces
 
-from evolve.learning.policy import CONTRAST, EyePolicy, PolicyConfig, build_policy, learnt, load_policy, save_policy
+from evolve.learning.eye_features import CONTRAST
+from evolve.learning.policy import EyePolicy, PolicyConfig, build_policy, learnt, load_policy, save_policy
 
 CONFIG = PolicyConfig(eyes=(3, 2, 3, 2, 4), neurons=8)
 

@@ -7,15 +7,18 @@ import pytest
 import torch
 
 from evolve.config.run_config import LearningConfig
-from evolve.learning.policy import TrainingDiverged, learnt
-from evolve.learning.ppo import contact_share, learner, play, stuck, train
+from evolve.learning.policy import Brain, TrainingDiverged, learnt
+from evolve.learning.ppo import AdaptingPPO, Worlds, play, stuck, train
+from evolve.learning.training_rewards import contact_share
 from tests.evolve.learning.bright_spot import BrightSpot
 
 QUICK = LearningConfig(total_steps=8192, n_envs=16, n_steps=32, batch_size=128, eval_interval=2048, patience=100)
+SMALL = Brain(neurons=16)
 
 
 def learn(config=QUICK, seed=0, worlds=None, progress=None, **eyes):
-    return train(worlds or BrightSpot(config.n_envs, **eyes), BrightSpot(16, **eyes), 16, config, seed, progress)
+    both = Worlds(worlds or BrightSpot(config.n_envs, **eyes), BrightSpot(16, **eyes))
+    return train(both, SMALL, config, seed, progress)
 
 
 @pytest.mark.parametrize("memory", [1, 4])
@@ -52,7 +55,7 @@ def test_progress_is_told_after_every_rollout():
 def test_stops_when_evaluations_stop_improving():
     """The second evaluation is the best by far: `patience` more, and no further."""
     config = LearningConfig(total_steps=20_000, n_envs=16, n_steps=32, batch_size=128, eval_interval=512, patience=3)
-    training = train(BrightSpot(16), Favouring(kind_evaluation=2), 16, config, 0)
+    training = train(Worlds(BrightSpot(16), Favouring(kind_evaluation=2)), SMALL, config, 0)
     assert [steps for steps, _ in training.curve] == [512, 1024, 1536, 2048, 2560]
 
 
@@ -78,7 +81,7 @@ def test_rewards_that_are_no_numbers_end_the_training():
 @pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
 def test_a_loss_that_overflows_ends_the_training():
     """The critic's error squares to infinity; gradient clipping would turn it into a training that does nothing."""
-    model = learner(BrightSpot(16), 16, QUICK, 0)
+    model = AdaptingPPO(BrightSpot(16), SMALL, QUICK, 0)
     model.learn(512)
     model.rollout_buffer.returns[:] = 1e30
     with pytest.raises(TrainingDiverged, match="loss not finite after 512 steps"):
@@ -116,17 +119,17 @@ class Touching(BrightSpot):
 
 @pytest.mark.parametrize(("ramp", "cost"), [(0, 1.0), (10_000, 0.1)])
 def test_learners_pay_their_share_of_contact(ramp, cost):
-    model = learner(Touching(16), 16, replace(QUICK, contact_ramp=ramp), 0)
+    model = AdaptingPPO(Touching(16), SMALL, replace(QUICK, contact_ramp=ramp), 0)
     model.learn(512)
     # Truncated episodes have the critic's guess of what follows added to their last reward.
     assert np.median(-model.rollout_buffer.rewards) == pytest.approx(cost, rel=1e-6)
 
 
-@pytest.mark.parametrize("stretches", [(2048,), (512, 1536), (512,) * 4])
-def test_the_learning_rate_falls_with_steps_in_whatever_pieces(stretches):
+@pytest.mark.parametrize("pieces", [(2048,), (512, 1536), (512,) * 4])
+def test_the_learning_rate_falls_with_steps_in_whatever_pieces(pieces):
     """It stays for 1024 steps and then falls as one over the steps: 2/3 at 1536, half at 2048."""
     config = LearningConfig(n_envs=16, n_steps=32, batch_size=128, learning_rate=4e-3, decay_after=1024)
-    model = learner(BrightSpot(16), 16, config, 0)
+    model = AdaptingPPO(BrightSpot(16), SMALL, config, 0)
     update, rates = model.train, []
 
     def noted():
@@ -134,7 +137,7 @@ def test_the_learning_rate_falls_with_steps_in_whatever_pieces(stretches):
         rates.append(model.policy.optimizer.param_groups[0]["lr"])
 
     model.train = noted
-    for steps in stretches:
+    for steps in pieces:
         model.learn(steps, reset_num_timesteps=False)
     assert rates == pytest.approx([4e-3, 4e-3, 4e-3 * 2 / 3, 2e-3])
 
@@ -162,7 +165,7 @@ def test_the_best_policy_is_returned_not_the_last():
         config = LearningConfig(
             total_steps=512 * evaluations, n_envs=16, n_steps=32, batch_size=128, eval_interval=512, patience=100
         )
-        training = train(BrightSpot(16), Favouring(kind_evaluation), 16, config, 0)
+        training = train(Worlds(BrightSpot(16), Favouring(kind_evaluation)), SMALL, config, 0)
         assert training.steps == 512 * evaluations
         return torch.cat([tensor.flatten() for tensor in learnt(training.policy).values()])
 

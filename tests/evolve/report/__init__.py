@@ -1,0 +1,18 @@
+"""Which test covers which module of evolve/report.
+
+page: test_report_page.py
+markup: test_report_page.py
+tables: test_report_page.py
+figures: test_report_page.py
+svg: test_theme.py, test_report_page.py
+theme: test_theme.py
+eye_figures: test_eye_figures.py
+views: test_eye_figures.py
+picture: test_picture.py
+player: test_player.py
+ground_plan: test_player.py, analysis/test_episode.py
+replay: analysis/test_episode.py, test_rerun_recording.py
+rerun_recording: test_rerun_recording.py
+exr_export: analysis/test_episode.py
+comparison: cli/test_status_and_compare.py
+"""

@@ -11,6 +11,7 @@ from html.parser import HTMLParser
 import numpy as np
 from matplotlib.image import imread
 
+from evolve.config.numbering import Place
 from evolve.config.run_config import EyeConfig, RunConfig, SearchConfig
 from evolve.genome.genotype import Genotype
 from evolve.learning.fitness import evaluate
@@ -86,7 +87,7 @@ def make_run(path, fitness=FITNESS, failure=HOSTILE):
         if value is not None:
             outcome = replace(trained, fitness=value, returns=(value - 1, value + 1), seconds=90.0)
         phenotype = replace(SEEING, fov_deg=30.0 + i, neurons=16 + (i != BEST) * i)
-        run.append(Candidate.of((i, i // 3, i % 3), genome, phenotype, 1000 + i, outcome))
+        run.append(Candidate.of(Place.of(i, 3), genome, phenotype, 1000 + i, outcome))
     return run
 
 

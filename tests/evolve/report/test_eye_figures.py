@@ -9,14 +9,13 @@ import optics
 from evolve.analysis.episode import record
 from evolve.report.eye_figures import WhiteLight, diffraction_limit, relief_heights
 from evolve.report.views import through
-from evolve.store.directory import Run
 from optics.spectra.bands import daylight
 
 
 def test_noise_free_view_is_what_the_animal_sees(run):
     """Convolution of the fine picture against rays drawn from the receptive fields: two ways to the same signals."""
     calm = replace(run.config, eye=replace(run.config.eye, noise_sigma=0.0, rays_per_receptor=64))
-    episode = record(Run(run.path, calm, run.candidates), radiance_every=64)
+    episode = record(replace(run, config=calm), radiance_every=64)
     eye = episode.eyes.eye()
     views = np.array([[through(eye, one) for one in frame] for frame in episode.radiance])
     seen = episode.signals[episode.radiance_frames]

@@ -7,6 +7,7 @@ from collections import Counter
 import pytest
 
 from evolve.config.assemble import assemble
+from evolve.config.numbering import Place
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
@@ -115,7 +116,7 @@ def test_a_run_of_failures_is_reported(tmp_path):
     run = Run.create(tmp_path / "failed", RunConfig("detection"))
     genome = tuple(Genotype(run.config.genome).start.tolist())
     for i in range(2):
-        run.append(Candidate.of((i, 0, i), genome, SEEING, i, Evaluation.failed(f"reason {i}")))
+        run.append(Candidate.of(Place(i, 0, i), genome, SEEING, i, Evaluation.failed(f"reason {i}")))
     page = Page(write(run).read_text())
     assert [row[-1] for row in page.rows["failures"][1:]] == ["reason 0", "reason 1"]
     assert "No candidate has been evaluated successfully" in page.texts["all"]
@@ -153,7 +154,7 @@ def test_reliefs_of_more_genes_and_receptors_of_genes_are_reported(tmp_path):
     run = Run.create(tmp_path / "fine", config)
     genome = Genotype(config.genome).start
     animal = develop(genome, config)
-    run.append(Candidate.of((0, 0, 0), tuple(genome.tolist()), animal, 1, Evaluation(1.0, (0.5, 1.5), 0.5)))
+    run.append(Candidate.of(Place(0, 0, 0), tuple(genome.tolist()), animal, 1, Evaluation(1.0, (0.5, 1.5), 0.5)))
     genes = {row[0]: row[2] for row in Page(best_genes(run, run.best)).rows["genes-of-the-best"][1:]}
     assert genes["doe_40 … doe_44"].split() == ["0.500"] * 5
     assert genes["lambda_max_3_nm"] == "–", "three types have no fourth peak"
@@ -167,7 +168,7 @@ def test_symmetric_reliefs_are_reported_by_the_genes_that_they_have(tmp_path):
     run = Run.create(tmp_path / "symmetric", config)
     genome = Genotype(config.genome).start
     outcome = Evaluation(1.0, (0.5, 1.5), 0.5)
-    run.append(Candidate.of((0, 0, 0), tuple(genome.tolist()), develop(genome, config), 1, outcome))
+    run.append(Candidate.of(Place(0, 0, 0), tuple(genome.tolist()), develop(genome, config), 1, outcome))
     genes = {row[0]: row[2] for row in Page(best_genes(run, run.best)).rows["genes-of-the-best"][1:]}
     assert [name for name in genes if name.startswith("doe_")] == ["doe_00 … doe_01", "doe_11"]
     text = Page(genes_section(run)).texts["all"]

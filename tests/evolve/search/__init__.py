@@ -1,0 +1,14 @@
+"""Which test covers which module of evolve/search.
+
+ask_tell: test_ask_tell.py
+loop: test_loop.py, test_ask_tell.py, test_kill.py
+search: test_search.py
+optimizers: test_search.py, test_ask_tell.py
+same_search: test_same_search.py
+successive_halving: test_successive_halving.py
+job: test_local_executor.py, test_dask_executor.py
+local_executor: test_local_executor.py
+worker: test_local_executor.py
+dask_executor: test_dask_executor.py
+dask_worker: test_dask_executor.py
+"""

@@ -21,10 +21,10 @@ from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
 from tests.evolve.closed_form import tiny
-from tests.evolve.remote_form import climbing
+from tests.evolve.remote_form import in_stages
 
-LADDER = ("search.rungs=3", "learning.total_steps=16384")
-KINDS = ((), ("search.steady_state=true",), LADDER)  # of runs
+HALVING = ("search.rungs=3", "learning.total_steps=16384")
+KINDS = ((), ("search.steady_state=true",), HALVING)  # of runs
 
 
 class Here:
@@ -37,10 +37,10 @@ class Here:
         while jobs:
             job = jobs.popleft()
             with self.log.open("a") as log:
-                log.write(f"{job.id} {job.stretch.rung if job.stretch else 0}\n")
+                log.write(f"{job.id} {job.stage.number if job.stage else 0}\n")
             time.sleep(0.001)
-            if job.stretch is not None:
-                yield job, climbing(*job.arguments, lambda *steps: None)
+            if job.stage is not None:
+                yield job, in_stages(*job.arguments, lambda *steps: None)
                 continue
             write_whole(job.policy_path, f"policy {job.seed}".encode())
             fitness = -abs(job.phenotype.fov_deg - 70.0)
@@ -94,7 +94,7 @@ def history(run):
 
 
 def begun(log):
-    """How often each candidate's evaluation was begun, on each rung."""
+    """How often each candidate's evaluation was begun, in each budget stage."""
     names = log.read_text().splitlines()
     return {name: names.count(name) for name in names}
 

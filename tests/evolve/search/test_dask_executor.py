@@ -19,7 +19,7 @@ from evolve.search.successive_halving import finished
 from evolve.store.directory import Run
 from evolve.store.versions import present
 from tests.evolve.closed_form import tiny
-from tests.evolve.remote_form import bowl, climbing
+from tests.evolve.remote_form import bowl, in_stages
 from tests.evolve.search.test_local_executor import jobs
 from tests.evolve.search.test_loop import SilentWatcher, history
 
@@ -107,19 +107,19 @@ def test_history_is_the_local_one(tmp_path, cluster):
         assert far.policy_path(candidate.id).read_bytes() == f"policy {candidate.seed}".encode()
 
 
-def test_history_on_a_ladder_is_the_local_one(tmp_path, cluster, monkeypatch):
+def test_history_of_successive_halving_is_the_local_one(tmp_path, cluster, monkeypatch):
     """Trainings go from worker to worker, and a worker has no files of another's."""
     monkeypatch.setenv("RHABDOM_TEST", str(tmp_path))
     config = tiny("search.rungs=3", "learning.total_steps=16384")
-    far, _ = carried(tmp_path / "dask", config, cluster.executor("climbing"))
-    local, _ = carried(tmp_path / "local", config, LocalExecutor(climbing, 2))
+    far, _ = carried(tmp_path / "dask", config, cluster.executor("in_stages"))
+    local, _ = carried(tmp_path / "local", config, LocalExecutor(in_stages, 2))
     assert history(far) == history(local)
     assert finished(far)
     whole = [candidate for candidate in local.candidates if candidate.rung == 2]
     assert len(whole) == 3
     for candidate in whole:
         assert far.policy_path(candidate.id).read_bytes() == local.policy_path(candidate.id).read_bytes()
-    assert set(cluster.calls().values()) == {1, 2, 3}, "nobody begins a rung twice"
+    assert set(cluster.calls().values()) == {1, 2, 3}, "nobody begins a stage twice"
 
 
 def test_failures_and_infinities_come_through(tmp_path, cluster):

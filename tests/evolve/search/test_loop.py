@@ -5,11 +5,6 @@ import heapq
 import numpy as np
 import pytest
 
-from evolve.cli.start_from import starts_from
-from evolve.config.assemble import assemble
-from evolve.config.run_config import ConfigError
-from evolve.genome.genotype import Genotype
-from evolve.genome.phenotype import develop
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
 from evolve.search.search import training_seed
@@ -173,30 +168,3 @@ def test_steady_state_keeps_workers_busy_that_would_wait_for_a_generation(tmp_pa
         assert finished(run)
         found[steady] = executor.utilisation
     assert found == pytest.approx(UTILISATION[workers], abs=0.005)
-
-
-def test_animals_start_from_one_of_another_run(tmp_path, whole):
-    starts = starts_from(f"{whole.path}:7")
-    ancestor = whole.candidate(7).phenotype
-    config = assemble("detection", assignments=["search.population=2"], starts=starts)
-    assert develop(Genotype(config.genome).start, config) == ancestor
-    assert config.eye == whole.config.eye
-    assert starts_from(str(whole.path)).name == f"--from {whole.path}:{whole.best.id}"
-    with pytest.raises(RunError, match="there is no candidate 99; 12 have been evaluated"):
-        starts_from(f"{whole.path}:99")
-    fov = ancestor.fov_deg
-    narrow = [f"genome.fov_deg.high={fov / 2}"]
-    with pytest.raises(ConfigError, match=rf"genome\.fov_deg\.start = .*--from {whole.path}:7"):
-        assemble("detection", assignments=narrow, starts=starts)
-    wins = assemble("detection", assignments=[f"genome.fov_deg.start={fov / 2}"], starts=starts)
-    assert wins.genome["fov_deg"].start == fov / 2
-
-
-@pytest.mark.parametrize("optics", ["true", "false"])
-def test_an_animals_lens_keeps_its_size_in_another_run(tmp_path, optics):
-    sizes = ("eye.relief_height=50e-6", "eye.sensor_width=300e-6", f"eye.optics={optics}", "search.population=2")
-    settings = (*sizes, "search.generations=1", "genome.optical.open=false", "learning.total_steps=4096")
-    ancestor, _ = carry(tmp_path / "run", assemble("detection", assignments=settings))
-    eye = assemble("detection", starts=starts_from(f"{ancestor.path}:0")).eye
-    lengths = (50e-6, 300e-6) if optics == "true" else (100e-6, 200e-6)
-    assert (eye.relief_height, eye.sensor_width) == lengths, "a perfect lens has no size to keep"

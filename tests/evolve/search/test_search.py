@@ -1,4 +1,4 @@
-"""The search proposes by seed alone, spreads as asked, climbs, opens genes in time, and takes failures as worst."""
+"""The search proposes by seed alone, spreads as asked, improves, opens genes in time, and takes failures as worst."""
 
 import math
 
@@ -54,14 +54,14 @@ def test_first_generation_spreads_by_sigma_around_the_start(frozen):
     np.testing.assert_allclose(genomes.std(axis=0), 0.05, rtol=0.06)
 
 
-def test_search_climbs():
+def test_search_converges():
     """CMA-ES on a sphere converges log-linearly; a search told the wrong sign, or out of order, does not."""
     asked = history(tiny("search.population=12", "search.generations=40", "genome.fov_deg.open=false"))
     distance = np.linalg.norm(asked - 0.7, axis=2).mean(axis=1)
     assert distance[-1] < 0.05 * distance[0]
 
 
-def test_mutations_climb_to_within_their_own_step():
+def test_mutations_come_to_within_their_own_step():
     frozen = ("genome.neurons.open=false",)  # of 512 values, in steps of one
     settings = ("search.population=12", "search.generations=40", "search.optimizer=mutation", "search.sigma=0.05")
     distance = np.linalg.norm(history(tiny(*settings, *frozen)) - 0.7, axis=2).mean(axis=1)

@@ -1,4 +1,4 @@
-"""Budget ladders: who climbs, what it costs, and that a training in pieces is one training, whoever is killed when."""
+"""Successive halving: who is promoted, what it costs, and that a training in stages is one training."""
 
 import json
 from dataclasses import replace
@@ -12,21 +12,21 @@ from evolve.learning.fitness import evaluate
 from evolve.learning.training_stage import TrainingStage
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
-from evolve.search.successive_halving import budgets, evaluations, finished, promoted, sizes, steps, stretches
+from evolve.search.successive_halving import budgets, evaluations, finished, promoted, sizes, stage_steps, steps
 from evolve.store.directory import Run, RunError
 from tests.evolve.closed_form import tiny
-from tests.evolve.remote_form import climbing
+from tests.evolve.remote_form import in_stages
 from tests.evolve.search.test_loop import SilentWatcher
 from tests.evolve.small_run import PHENOTYPE, small_config
 
 THREE = SearchConfig(population=7, generations=5, rungs=3, promoted=0.5)
-LADDER = ("search.population=7", "search.rungs=3", "learning.total_steps=16384")
+HALVING = ("search.population=7", "search.rungs=3", "learning.total_steps=16384")
 
 
 def test_budgets_and_sizes_halve():
     learning = LearningConfig(total_steps=100_000)
     assert budgets(THREE, learning) == (25_000, 50_000, 100_000)
-    assert stretches(THREE, learning) == (25_000, 25_000, 50_000)
+    assert stage_steps(THREE, learning) == (25_000, 25_000, 50_000)
     assert sizes(THREE) == (7, 4, 2)
     assert evaluations(THREE) == 5 * 13
     quarters = replace(THREE, rungs=2, promoted=0.25)
@@ -37,13 +37,13 @@ def test_budgets_and_sizes_halve():
     assert (budgets(one, learning), sizes(one)) == ((100_000,), (7,))
 
 
-def test_steps_are_those_of_all_rungs():
-    config = tiny(*LADDER)
+def test_steps_are_those_of_all_stages():
+    config = tiny(*HALVING)
     assert steps(config) == 3 * (7 * 4096 + 4 * 4096 + 2 * 8192)
     assert steps(tiny()) == 12 * 4096
 
 
-def test_the_better_half_climbs_and_nobody_who_failed():
+def test_the_better_half_is_promoted_and_nobody_who_failed():
     fitness = [(0, 1.0), (1, 5.0), (2, 3.0), (3, 3.0), (4, -9.0), (5, 3.0), (6, 2.0)]
     assert promoted(THREE, 0, fitness) == {1, 2, 3, 5}
     assert promoted(THREE, 1, [(identity, told) for identity, told in fitness if identity in (1, 2, 3, 5)]) == {1, 2}
@@ -52,7 +52,7 @@ def test_the_better_half_climbs_and_nobody_who_failed():
     assert promoted(THREE, 0, [(identity, failed if identity else 1.0) for identity, _ in fitness]) == {0}
 
 
-def carry(path, config, monkeypatch, evaluate=climbing, until=None):
+def carry(path, config, monkeypatch, evaluate=in_stages, until=None):
     monkeypatch.setenv("RHABDOM_TEST", str(path.parent))
     run = Run.open(path) if path.exists() else Run.create(path, config)
     run.repair()
@@ -67,16 +67,16 @@ def lines(run):
     return sorted((c.id, c.rung, c.genome, c.fitness, c.steps, c.curve) for c in run.in_order_of_finish)
 
 
-def test_a_generation_climbs_and_the_search_is_told_how_far_each_came(tmp_path, monkeypatch):
-    run, onlooker = carry(tmp_path / "run", tiny(*LADDER), monkeypatch)
+def test_the_better_go_on_and_the_search_is_told_how_far_each_came(tmp_path, monkeypatch):
+    run, onlooker = carry(tmp_path / "run", tiny(*HALVING), monkeypatch)
     assert finished(run)
     assert len(onlooker.seen) == 3 * 13
     for generation in range(3):
         rungs = [c.rung for c in run.generation(generation)]
         assert (len(rungs), sum(r > 0 for r in rungs), sum(r > 1 for r in rungs)) == (7, 4, 2)
         first = {c.id: c.fitness for c in run.in_order_of_finish if c.rung == 0 and c.generation == generation}
-        climbed = [c.id for c in run.generation(generation) if c.rung > 0]
-        assert set(climbed) == set(sorted(first, key=first.get)[-4:])
+        gone_on = [c.id for c in run.generation(generation) if c.rung > 0]
+        assert set(gone_on) == set(sorted(first, key=first.get)[-4:])
     assert {c.rung: c.steps for c in run.candidates} == {0: 4096, 1: 8192, 2: 16384}
     trained = next(c for c in run.candidates if c.rung == 2)
     assert run.policy_path(trained.id).read_text().count(" to ") == 3
@@ -85,12 +85,12 @@ def test_a_generation_climbs_and_the_search_is_told_how_far_each_came(tmp_path, 
 
 def test_interrupted_anywhere_it_goes_on_to_the_same_history(tmp_path, monkeypatch):
     (tmp_path / "a").mkdir()
-    whole, _ = carry(tmp_path / "a" / "run", tiny(*LADDER), monkeypatch)
+    whole, _ = carry(tmp_path / "a" / "run", tiny(*HALVING), monkeypatch)
     for until in (3, 9, 12, 13, 20, 26):
         folder = tmp_path / str(until)
         folder.mkdir()
         with pytest.raises(KeyboardInterrupt):
-            carry(folder / "run", tiny(*LADDER), monkeypatch, until=until)
+            carry(folder / "run", tiny(*HALVING), monkeypatch, until=until)
         kept = (folder / "run" / "candidates.jsonl").read_bytes()
         run, _ = carry(folder / "run", None, monkeypatch)
         assert (folder / "run" / "candidates.jsonl").read_bytes().startswith(kept)
@@ -99,9 +99,9 @@ def test_interrupted_anywhere_it_goes_on_to_the_same_history(tmp_path, monkeypat
 
 def test_a_lost_checkpoint_is_trained_again(tmp_path, monkeypatch):
     (tmp_path / "a").mkdir()
-    whole, _ = carry(tmp_path / "a" / "run", tiny(*LADDER), monkeypatch)
+    whole, _ = carry(tmp_path / "a" / "run", tiny(*HALVING), monkeypatch)
     with pytest.raises(KeyboardInterrupt):
-        carry(tmp_path / "run", tiny(*LADDER), monkeypatch, until=9)
+        carry(tmp_path / "run", tiny(*HALVING), monkeypatch, until=9)
     lost = list((tmp_path / "run" / "trainings").iterdir())
     assert lost
     for path in lost:
@@ -110,7 +110,7 @@ def test_a_lost_checkpoint_is_trained_again(tmp_path, monkeypatch):
 
 
 def test_a_record_whose_rungs_do_not_follow_each_other_is_damaged(tmp_path, monkeypatch):
-    run, _ = carry(tmp_path / "run", tiny(*LADDER), monkeypatch)
+    run, _ = carry(tmp_path / "run", tiny(*HALVING), monkeypatch)
     record = run.path / "candidates.jsonl"
     written = [json.loads(line) for line in record.read_text().splitlines()]
     orphan = next(line for line in written if line["rung"] == 1)
@@ -118,35 +118,35 @@ def test_a_record_whose_rungs_do_not_follow_each_other_is_damaged(tmp_path, monk
     with pytest.raises(RunError, match=r"line 1: is damaged: .* is on rung 1, but has not been one below"):
         Run.open(run.path)
     record.write_text(json.dumps({**orphan, "rung": 3}) + "\n")
-    with pytest.raises(RunError, match="rung 3 is none of a ladder of 3"):
+    with pytest.raises(RunError, match=r"rung = 3: must be at least 0 and below search\.rungs = 3"):
         Run.open(run.path)
 
 
-def test_ladders_that_cannot_be_climbed_are_refused():
-    with pytest.raises(ConfigError, match=r"search\.rungs = 2: a ladder needs generations"):
+def test_stages_that_cannot_be_are_refused():
+    with pytest.raises(ConfigError, match=r"search\.rungs = 2: successive halving needs generations"):
         assemble("detection", assignments=["search.rungs=2", "search.steady_state=true"])
-    with pytest.raises(ConfigError, match="the first rung's budget, 3906 steps, is less than one rollout of 4096"):
+    with pytest.raises(ConfigError, match="the first budget stage, 3906 steps, is less than one rollout of 4096"):
         assemble("detection", assignments=["search.rungs=9"])
     with pytest.raises(ConfigError, match=r"search\.promoted = 1\.0: must be in \(0, 0\.9\]"):
         assemble("detection", assignments=["search.promoted=1.0"])
 
 
-def test_a_training_in_pieces_is_one_training(tmp_path, short_episodes):
-    """Bit for bit: whether each rung takes up what the one below has stored, or all is trained in one process."""
+def test_a_training_in_stages_is_one_training(tmp_path, short_episodes):
+    """Bit for bit: whether each stage takes up what the one before has stored, or all is trained in one process."""
     plain = small_config()
     whole_training = replace(plain.learning, total_steps=1024)
     config = replace(plain, learning=whole_training, search=replace(plain.search, rungs=3))  # as a run has it
 
     def life(name, ends):
-        kept = tuple(tmp_path / f"{name}-{rung}" for rung in range(len(ends)))
-        outcome = evaluate(PHENOTYPE, config, 5, tmp_path / name, stretch=TrainingStage(ends, kept))
+        kept = tuple(tmp_path / f"{name}-{number}" for number in range(len(ends)))
+        outcome = evaluate(PHENOTYPE, config, 5, tmp_path / name, stage=TrainingStage(ends, kept))
         return outcome, kept
 
     ends = (256, 512, 1024)
-    by_rung = [life("pieces", ends[: rung + 1])[0] for rung in range(3)]
+    by_stage = [life("pieces", ends[: number + 1])[0] for number in range(3)]
     whole, kept = life("whole", ends)
-    assert by_rung[2].returns == whole.returns
-    assert by_rung[2].curve == whole.curve
+    assert by_stage[2].returns == whole.returns
+    assert by_stage[2].curve == whole.curve
     assert [steps for steps, _ in whole.curve] == [256, 512, 1024]
     assert (tmp_path / "pieces").read_bytes() == (tmp_path / "whole").read_bytes()
     assert (tmp_path / "pieces-2").read_bytes() == kept[2].read_bytes()
@@ -154,13 +154,13 @@ def test_a_training_in_pieces_is_one_training(tmp_path, short_episodes):
     assert (end.steps, end.adam["steps"] > load_checkpoint(kept[1]).adam["steps"]) == (1024, True)
 
 
-def test_the_first_rung_is_a_short_training_and_the_next_goes_on_from_it(tmp_path, short_episodes):
+def test_the_first_stage_is_a_short_training_and_the_next_goes_on_from_it(tmp_path, short_episodes):
     config = small_config()
     short = replace(config, learning=replace(config.learning, total_steps=256))
     plain = evaluate(PHENOTYPE, short, 5, tmp_path / "plain")
     kept = (tmp_path / "0", tmp_path / "1")
-    rung = evaluate(PHENOTYPE, config, 5, tmp_path / "policy", stretch=TrainingStage((256,), kept[:1]))
-    assert (rung.returns, rung.curve) == (plain.returns, plain.curve)
+    first = evaluate(PHENOTYPE, config, 5, tmp_path / "policy", stage=TrainingStage((256,), kept[:1]))
+    assert (first.returns, first.curve) == (plain.returns, plain.curve)
     told = []
     goes_on = evaluate(
         PHENOTYPE, config, 5, tmp_path / "policy", lambda *s: told.append(s), TrainingStage((256, 512), kept)

@@ -1,0 +1,10 @@
+"""Which test covers which module of evolve/store.
+
+directory: test_directory.py
+record: test_record.py
+candidate: test_record.py
+evaluation: test_record.py
+lock: test_lock.py
+atomic_files: test_atomic_files.py
+versions: test_versions.py
+"""

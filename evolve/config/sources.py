@@ -1,0 +1,90 @@
+"""Where settings come from: presets and their scales, tasks, TOML files, `--set key=value`."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import reduce
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from evolve.config.checks import ConfigError, suggestion
+from evolve.config.provenance import Source
+from evolve.config.run_config import TASKS
+
+__all__ = ["SCALES", "preset_names", "preset_sources", "read_assignment", "read_toml", "task_defaults"]
+
+Tree = dict[str, Any]
+SCALES = ("laptop", "paper")  # of the presets that have scales; the first unless asked otherwise
+
+
+def preset_names() -> list[str]:
+    """Names that `preset` takes."""
+    folder = resources.files("evolve") / "presets"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def preset_sources(name: str | None, scale: str | None) -> list[Source]:
+    """A preset's settings, and over them those of its scale; [] without a preset.
+
+    Raises:
+        ConfigError: there is no such preset or scale.
+    """
+    if name is None:
+        return []
+    if name not in preset_names():
+        raise ConfigError(f"unknown preset {name!r}; {suggestion(name, preset_names())}")
+    text = (resources.files("evolve") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    tree = tomllib.loads(text)
+    scales = tree.pop("scales", {})
+    settings = Source(f"preset {name}", tree, text)
+    if not scales:
+        if scale is not None:
+            raise ConfigError(f"scale {scale!r}: preset {name} comes in one scale only")
+        return [settings]
+    chosen = scale or SCALES[0]
+    if chosen not in scales:
+        raise ConfigError(f"unknown scale {chosen!r} of preset {name}; {suggestion(chosen, scales)}")
+    return [settings, Source(f"preset {name} on {chosen} scale", scales[chosen])]
+
+
+def task_defaults(task: Any) -> Source:
+    """What a task sets unless a run says otherwise: evolve/config/tasks/TASK.toml, if there is one."""
+    file = resources.files("evolve") / "config" / "tasks" / f"{task}.toml"
+    known = isinstance(task, str) and task in TASKS
+    return Source("", tomllib.loads(file.read_text(encoding="utf-8")) if known and file.is_file() else {})
+
+
+def read_toml(path: Path) -> Source:
+    """A TOML file.
+
+    Raises:
+        ConfigError: one line, naming file and, where there is one to name, line.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        return Source(str(path), tomllib.loads(text), text)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 text") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: is not valid TOML: {error}") from error
+
+
+def read_assignment(text: str) -> Source:
+    """{"search": {"population": 8}} from "search.population=8"; the value is TOML, a bare word is text.
+
+    Raises:
+        ConfigError: it does not look like that.
+    """
+    key, equals, value = (part.strip() for part in text.partition("="))
+    parts = key.split(".")
+    if not equals or not all(parts) or not value:
+        raise ConfigError(f"--set {text!r}: must look like section.key=value")
+    try:
+        leaf: Any = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        leaf = value
+    tree: Tree = reduce(lambda inner, part: {part: inner}, reversed(parts), leaf)
+    return Source(f"--set {text.strip()}", tree)

@@ -1,0 +1,49 @@
+"""Rewards as a learner meets them: in units of its own, and with contact at a share of its price."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
+
+__all__ = ["RewardsInUnits", "contact_share", "reward_terms"]
+
+CONTACT_FIRST = 0.1  # of what contact costs in the end; with a third, agents turned on the spot
+
+
+class RewardsInUnits(VecEnvWrapper):
+    """Worlds whose rewards come in units that the learner sets, and in which contact costs a share of its price."""
+
+    def __init__(self, worlds: VecEnv) -> None:
+        super().__init__(worlds)
+        self.unit = self.contact_share = 1.0
+
+    def reset(self) -> dict[str, np.ndarray]:
+        observation: dict[str, np.ndarray] = self.venv.reset()
+        return observation
+
+    def step_wait(self) -> VecEnvStepReturn:
+        observation, reward, done, infos = self.venv.step_wait()
+        if self.contact_share < 1:
+            price = np.array([terms["contact"] for terms in map(reward_terms, infos)], np.float32)
+            reward = reward - np.float32(1 - self.contact_share) * price
+        return observation, reward / np.float32(self.unit), done, infos
+
+
+def contact_share(steps: int, ramp: int) -> float:
+    """Of its whole price, what contact costs after so many steps: CONTACT_FIRST for a third of the ramp, then more by
+    the same factor each step.
+
+    Agents that pay for contact before they can steer learn to stand still, which costs nothing, and never steer.
+    """
+    if steps >= ramp:
+        return 1.0
+    return float(CONTACT_FIRST ** min(1.0, 1.5 * (1 - steps / ramp)))
+
+
+def reward_terms(info: dict[str, Any]) -> dict[str, float]:
+    """What a step's reward is the sum of, by name."""
+    terms: dict[str, float] = info["reward_terms"]
+    return terms

@@ -1,0 +1,49 @@
+"""The search in its simplest form: ask CMA-ES for genomes, evaluate them, tell it their fitness, and again.
+
+`evolve.search.loop` does the same with animals that must be trained first: by many workers, through phases in which
+genes open, and so that a run that is killed goes on as if nothing had happened. A test holds it to these lines.
+
+    python -m evolve.search.ask_tell
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evolve.config.numbering import generation_ids
+from evolve.config.run_config import SearchConfig
+from evolve.search.optimizers import Space, build_optimizer
+
+__all__ = ["ask_tell"]
+
+Floats = NDArray[np.float64]
+
+
+def ask_tell(
+    fitness: Callable[[Floats], float], start: Floats, search: SearchConfig, seed: int
+) -> Iterator[tuple[list[Floats], list[float]]]:
+    """Genomes (dimension,) in [0, 1] of each generation, and their fitness, which the search maximises."""
+    optimizer = build_optimizer(Space(genes=(), start=start, seed=(seed,)), search)
+    for generation in range(search.generations):
+        ids = generation_ids(generation, search.population)
+        genomes = [optimizer.ask(candidate_id)[0] for candidate_id in ids]
+        values = [fitness(genome) for genome in genomes]
+        for candidate_id, value in zip(ids, values, strict=True):
+            optimizer.tell(candidate_id, value)
+        yield genomes, values
+
+
+def main() -> None:
+    """Find the top of a paraboloid at (0.7, 0.7, 0.7)."""
+    search = SearchConfig(population=8, generations=20)
+    generations = ask_tell(lambda genome: -float(np.sum((genome - 0.7) ** 2)), np.full(3, 0.5), search, seed=0)
+    for number, (genomes, values) in enumerate(generations):
+        best = int(np.argmax(values))
+        print(f"generation {number:2}  best fitness {values[best]:10.2e}  at {np.round(genomes[best], 3)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,11 @@
+"""A run to write to."""
+
+import pytest
+
+from evolve.store.directory import Run
+from tests.evolve.store.records import CONFIG
+
+
+@pytest.fixture
+def run(tmp_path):
+    return Run.create(tmp_path / "run", CONFIG)

@@ -1,0 +1,29 @@
+"""Files are written whole or not at all, and what a killed writer left is swept up."""
+
+import os
+
+import pytest
+
+from evolve.store.atomic_files import UNFINISHED, sweep, write_whole
+
+
+def test_a_writer_that_fails_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+    path = tmp_path / "folder" / "file"
+    write_whole(path, b"old")
+
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left") as caught:
+        write_whole(path, b"new, and longer")
+    assert caught.value.filename == str(path), "not the name of the file in between"
+    assert path.read_bytes() == b"old"
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_what_killed_writers_left_is_swept_up(tmp_path):
+    write_whole(tmp_path / "file", b"whole")
+    (tmp_path / f".file.77{UNFINISHED}").touch()
+    sweep(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

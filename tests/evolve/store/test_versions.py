@@ -1,0 +1,34 @@
+"""What a run was made with is recorded, and settings that change meanwhile are noticed."""
+
+import json
+
+from evolve.store.versions import altered, present, record_start, recorded
+
+
+def test_versions_are_recorded_at_each_start(run):
+    assert recorded(run.path) == present()
+    assert {"nevergrad", "cma", "torch", "drjit", "python"} <= present().keys()
+    record_start(run.path, 7)
+    starts = json.loads((run.path / "versions.json").read_text())
+    assert [start["candidates"] for start in starts] == [0, 7]
+
+
+def test_settings_that_change_meanwhile_are_noticed(run):
+    """What decides nothing may change: how many work, and for how long."""
+    config = run.path / "config.toml"
+    began = config.read_text()
+    changes = (
+        ("workers = ", "workers = 1", False),
+        ("generations = ", "generations = 1", False),
+        ("[eye]", "# what eyes have in common\n\n[eye]", False),
+        ("noise_sigma = ", "noise_sigma = 1", True),
+    )
+    for setting, other, noticed in changes:
+        changed = began.replace(setting, other)
+        assert changed != began
+        config.write_text(changed)
+        assert altered(run.path) == noticed
+    record_start(run.path, 3)
+    assert not altered(run.path), "it was told once"
+    (run.path / "versions.json").unlink()
+    assert not altered(run.path)
