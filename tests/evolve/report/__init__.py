@@ -1,6 +1,7 @@
 """Which test covers which module of evolve/report.
 
 page: test_report_page.py
+write: test_report_page.py
 markup: test_report_page.py
 tables: test_report_page.py
 figures: test_report_page.py
