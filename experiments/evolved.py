@@ -64,8 +64,8 @@ class Conduct:
 
 @dataclass(frozen=True)
 class Store:
-    """What a page is made from: rows, how their runs were conducted, the null model's drift, their origin, and the answer
-    that a person has given to the question."""
+    """What a page is made from: rows, how their runs were conducted, the drift of the null model, their origin, and the
+    answer that a person has given to the question."""
 
     rows: list[Row]
     conduct: list[Conduct]
