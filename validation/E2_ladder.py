@@ -202,12 +202,12 @@ class Halving:
     place: int
 
 
-def halving(rows: Sequence[Row], rungs: int, promoted: float, by: str = "fitness") -> Halving:
-    """Where budgets of the ladder are stored ones: promoted is 1/2, or 1/4 with every other rung. `by` is what decides
+def halving(rows: Sequence[Row], rungs: int, share: float, by: str = "fitness") -> Halving:
+    """A ladder whose budgets are stored ones: the share that goes on is 1/2, or 1/4 with every other rung. `by` decides
     who goes on: "fitness" or "fitness_many"."""
     fitness, many, spent = (columns(rows, name) for name in (by, "fitness_many", "cpu_seconds"))
-    search = replace(SearchConfig(), population=len(fitness), rungs=rungs, promoted=promoted)
-    stride = round(-np.log2(promoted))
+    search = replace(SearchConfig(), population=len(fitness), rungs=rungs, promoted=share)
+    stride = round(-np.log2(share))
     stored = [RUNGS - 1 - stride * above for above in range(rungs - 1, -1, -1)]
     reached, total, below = set(range(len(fitness))), 0.0, 0
     for rung, place in enumerate(stored):
@@ -217,7 +217,7 @@ def halving(rows: Sequence[Row], rungs: int, promoted: float, by: str = "fitness
         reached = promoted(search, rung, told) or reached
     best = max(reached, key=lambda number: (fitness[number, -1], -number))
     place = 1 + int((many[:, -1] > many[best, -1]).sum())
-    return Halving(rungs, promoted, total / spent.sum(), place)
+    return Halving(rungs, share, total / spent.sum(), place)
 
 
 def table(rows: Sequence[Row]) -> str:
@@ -230,9 +230,9 @@ def table(rows: Sequence[Row]) -> str:
         last = _shown(correlation(fitness[:, -1], many[:, -1])) + f"  ({FEW} against {MANY} episodes)"
         lines.append(f"{budget:9,}{share[rung]:10.0%}" + (cells if rung < RUNGS - 1 else last))
     lines += ["", f"{'ladder':26}{'CPU time':>10}{f'place of its best, by {FEW} episodes':>36}{f'by {MANY}':>8}"]
-    for rungs, promoted in LADDERS:
-        by_few, by_many = (halving(rows, rungs, promoted, by) for by in ("fitness", "fitness_many"))
-        name = f"{rungs} rungs, {promoted:g} goes on"
+    for rungs, share in LADDERS:
+        by_few, by_many = (halving(rows, rungs, share, by) for by in ("fitness", "fitness_many"))
+        name = f"{rungs} rungs, {share:g} goes on"
         lines.append(f"{name:26}{by_few.cost:10.0%}{by_few.place:36}{by_many.place:8}")
     return "\n".join(lines)
 
