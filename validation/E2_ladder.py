@@ -48,7 +48,7 @@ from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.learning.ppo import play
 from evolve.learning.training_stage import TrainingStage
-from evolve.search.successive_halving import budgets
+from evolve.search.successive_halving import budgets, promoted
 from evolve.search.worker import prepare_device
 from evolve.store.atomic_files import write_whole
 from validation.page import Page, parser
