@@ -16,7 +16,7 @@ from evolve.report.eye_figures import relief_heights
 from experiments import best_pupil, evolved
 from experiments.candidates import Row
 from experiments.drift import SEEDS, shade
-from experiments.evolved import Store, conduct_table, luck, luck_table
+from experiments.evolved import Store, conduct_table, null_model, null_table
 from experiments.glass import relief_of
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
@@ -46,55 +46,27 @@ def page(store: Store) -> Page:
     """The page of stored runs. Raises ValueError with more groups than there are colours."""
     return Page(
         name=NAME,
-        title="Eyes learn to bend light",
-        question=(
-            "Does a pupil that evolves alone close, and open again when the glass in it may become a lens? Published: "
-            "it does both. Control: an index held at 1, where no lens can be. How light moves the best hole is asked "
-            "of animals that do not evolve: [learning through holes](learning_through_holes.md)."
-        ),
-        answer=store.answer,
-        method=(
-            "Aperture, index, power, fitness and success are means over a generation's candidates, the other measures "
-            "those of its fittest, optics that cannot be computed left out; a line per seed, all seeds are shown; "
-            f"dotted: relief and index join. Tables have means of the phases' last {LAST} generations with 95 % "
-            "intervals, by a bootstrap over seeds and candidates; with few seeds they are too narrow, and hardly more "
-            f"than the range of the seeds. By chance: the median and the range of 95 % of {SEEDS} searches that were "
-            "told random numbers as fitness. Glass of power 1 brings far objects to focus, 0 is no lens, less than 0 "
-            "spreads light (the power of the paraboloid nearest to the relief; more than 2 counts as 2, since behind "
-            "narrow pupils great powers do little). What glass adds is the contrast above the noise less that behind a "
-            "hole as wide; Strehl ratios compare with a lens as wide, and a hole that closes has a better one too. "
-            "PSNR and SSIM compare with a perfect lens, without noise, brightness made equal."
-        ),
         command=(
             "evolve run --preset lens --seed 0    # and 1 and 2\n"
             "evolve run --preset lens --set genome.refractive_index.open=false --set genome.refractive_index.start=1"
             " --seed 0    # and 1\n"
             "python -m experiments.bending_light --runs lens=DIR lens=DIR lens=DIR index1=DIR index1=DIR"
         ),
+        values={
+            "answer": store.answer,
+            "legend": store.legend,
+            "last": str(LAST),
+            "searches": str(SEEDS),
+            "end_of_phase_1": table(store, 0),
+            "end_of_phase_2": table(store, 1),
+            "best_holes": prediction(store),
+            "p_of_phase_1": null_table(store, QUANTITIES, 0),
+            "p_of_phase_2": null_table(store, QUANTITIES, 1),
+            "runs": conduct_table(store),
+        },
         figures=[
-            Figure(
-                NAME,
-                lambda path: draw(store, path),
-                f"Generation by generation: {store.legend}. Shaded: by chance. Dashed: the best hole "
-                "by stripes two receptors wide.",
-            ),
-            Figure(
-                f"{NAME}_reliefs",
-                lambda path: draw_reliefs(store, path),
-                "Reliefs of the fittest and of the least fit of each seed's last generations, over the pupil: how much "
-                "longer than at its lowest place the way through the glass is [µm].",
-            ),
-        ],
-        tables=[
-            *(part for phase in (0, 1) for part in (f"End of phase {'I' * (phase + 1)}:", table(store, phase))),
-            "Phase I beside what is best for a hole:",
-            prediction(store),
-            *(
-                part
-                for phase in (0, 1)
-                for part in (f"Phase {'I' * (phase + 1)}:", luck_table(store, QUANTITIES, phase))
-            ),
-            conduct_table(store),
+            Figure(NAME, lambda path: draw(store, path)),
+            Figure(f"{NAME}_reliefs", lambda path: draw_reliefs(store, path)),
         ],
         origin=store.origin,
     )
@@ -117,21 +89,21 @@ def of_phase(store: Store, group: str, phase: int) -> list[Row]:
 
 def table(store: Store, phase: int) -> str:
     """A row per quantity, two columns per variant."""
-    header = ["", *(f"{group}{what}" for group in store.groups for what in ("", ", by chance"))]
+    header = ["", *(f"{group}{what}" for group in store.groups for what in ("", ", null model"))]
     lines = []
     for name, value in QUANTITIES.items():
         line = [name]
         for group in store.groups:
             rows = of_phase(store, group, phase)
             found = last_mean(rows, value)
-            chance = luck(store, group, name, rows)
-            line += ["-" if found is None else str(found), "" if chance is None or found is None else str(chance)]
+            drift = null_model(store, group, name, rows)
+            line += ["-" if found is None else str(found), "" if drift is None or found is None else str(drift)]
         lines.append(line)
     return markdown_table(header, lines)
 
 
 def prediction(store: Store) -> str:
-    """Where pupils that evolve alone end, beside where holes are best by each measure."""
+    """Where pupils that evolve alone end, and the best holes by each measure."""
     lines = []
     for group in store.groups:
         sigma = store.noise_sigma(group)
@@ -150,7 +122,7 @@ def draw(store: Store, path: Path) -> None:
     for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=False):
         for group, color in store.colors.items():
             rows = store.group(group)
-            shade(place, store.chance(group, name), color)
+            shade(place, store.drift_of(group, name), color)
             for seed in sorted({row.seed for row in rows}):
                 mine = [row for row in rows if row.seed == seed]
                 place.plot(*of_generation(mine, value), color=color, lw=1.2)

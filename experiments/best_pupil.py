@@ -140,7 +140,6 @@ def rayleigh() -> float:
 def page(rows: Sequence[Row], origin: Origin) -> Page:
     """The page of the stored numbers."""
     noises = sorted({row.noise_sigma for row in rows})
-    open_best = [best(rows, "hole", sigma, "contrast") for sigma in noises]
     cells = [
         [
             f"{s:g}",
@@ -151,46 +150,29 @@ def page(rows: Sequence[Row], origin: Origin) -> Page:
     ]
     widths = [best(rows, "hole", noises[0], f"stripes_{width}") for width in STRIPES]
     header = ["noise σ", *(f"hole: {name}" for name in MEASURES.values()), "lens: every measure"]
+    widths = [best(rows, "hole", noises[0], f"stripes_{width}") for width in STRIPES]
     return Page(
         name="best_pupil",
-        title="The best pupil: sharpness against light",
-        question=(
-            "How wide should a pupil be, without and with a lens, if a narrow one is sharp and a wide one bright? "
-            "Evolution's pupils can be held against this."
-        ),
-        answer=(
-            f"It depends on what reads the retina. By contrast above the noise a hole is best at a = "
-            f"{_shown(open_best[0])} where σ = {noises[0]:g} and at {open_best[-1]:.2f} where σ = {noises[-1]:g}; at "
-            f"the default σ = 0.01 at {_shown(best(rows, 'hole', 0.01, 'contrast'))}. With little noise that is near "
-            f"Rayleigh's sharpest pinhole, a = {rayleigh():.2f}; noise opens it. Stripes of one width leave most in "
-            f"the signals where they are neither dark nor blurred, behind a hole about four fifths of such a pair "
-            f"of stripes wide whatever the noise: a = {', '.join(map(_shown, widths))} for stripes of "
-            f"{', '.join(map(str, STRIPES))} receptors. By bits, and by image quality as `optics.image_quality` has "
-            "it, contrast times throughput, the widest hole that was tried is best at every noise. With a lens in "
-            "focus the widest pupil is best by every measure."
-        ),
-        method=(
-            f"Eyes 200 µm wide, {FOV_DEG:g}°, {RESOLUTION} x {RESOLUTION} receptors, in white daylight; hole and ideal "
-            "lens; exact wave optics. σ is a receptor's noise in units of what white gives at a = 1. With f in units "
-            "of the receptors' Nyquist frequency and T = a²: *contrast* is C = ∫ max(MTF - σ/T, 0) df; *image quality* "
-            "is T C; *stripes* are T MTF where one stripe is 1, 2 or 4 receptors wide, up to the MTF's first zero "
-            "(beyond it they are seen reversed, which the other measures count as well); *bits* per receptor are "
-            "what noise leaves of a scene of black and white stripes "
-            f"(reflectances {materials.BLACK:g} and {materials.WHITE:g}) of all frequencies alike, "
-            "(π/2) ∫ ½ log2(1 + (c T MTF / σ)²) f df with c half their difference (Snyder, Laughlin and Stavenga "
-            f"1977). {len({row.relative_aperture for row in rows})} apertures, optima by parabolas."
-        ),
         command="python -m experiments.best_pupil --compute",
-        figures=[
-            Figure(
-                "best_pupil",
-                lambda path: draw(rows, path),
-                f"Left: contrast above the noise over the pupil's width at three noises (σ = "
-                f"{', '.join(f'{s:g}' for s in shades(noises))}, pale to strong); dots are the peaks. Middle: bits per "
-                "receptor at the same. Right: the pupil of most contrast over the noise; dotted: Rayleigh's pinhole.",
-            )
-        ],
-        tables=["Best relative aperture a (pupil diameter / retina width):", markdown_table(header, cells)],
+        values={
+            "least_noise": f"{noises[0]:g}",
+            "most_noise": f"{noises[-1]:g}",
+            "best_in_least_noise": _shown(best(rows, "hole", noises[0], "contrast")),
+            "best_in_default_noise": _shown(best(rows, "hole", 0.01, "contrast")),
+            "best_in_most_noise": _shown(best(rows, "hole", noises[-1], "contrast")),
+            "rayleigh": _shown(rayleigh()),
+            "best_by_stripes": ", ".join(map(_shown, widths)),
+            "stripes": ", ".join(map(str, STRIPES)),
+            "drawn_noises": ", ".join(f"{s:g}" for s in shades(noises)),
+            "optima": markdown_table(header, cells),
+            "width_um": f"{1e6 * optics.Eye().sensor_width:g}",
+            "fov_deg": f"{FOV_DEG:g}",
+            "resolution": str(RESOLUTION),
+            "black": f"{materials.BLACK:g}",
+            "white": f"{materials.WHITE:g}",
+            "apertures": str(len({row.relative_aperture for row in rows})),
+        },
+        figures=[Figure("best_pupil", lambda path: draw(rows, path))],
         origin=origin,
     )
 

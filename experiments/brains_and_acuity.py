@@ -26,10 +26,6 @@ COLORS = {"navigation": "#D55E00", "detection": "#0072B2", "tracking": "#009E73"
 PUBLISHED = {"navigation": 0.69, "detection": 0.74, "tracking": 0.59}
 CLASSES = 4  # of acuity
 TICKS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.2, 0.3, 0.5, 0.7, 1)
-CAPTION = (
-    "Each dot is a candidate. Above: darker for finer acuity, with the power law. Below: darker for more parameters "
-    "and memory; lines are the best quarter of each class of acuity."
-)
 Size = Callable[[Row], float]
 FACTORS: dict[str, Size] = {
     "acuity": lambda row: row.cpd,
@@ -68,30 +64,20 @@ def page(store: Store) -> Page:
     """The page of stored runs."""
     return Page(
         name=NAME,
-        title="Brains and acuity",
-        question=(
-            "How does error fall with acuity, parameters and memory? Published: as a power of their product, with "
-            "exponents 0.69 for navigation, 0.74 for detection, 0.59 for tracking, and with ceilings for each acuity."
-        ),
-        answer=store.answer,
-        method=(
-            "Candidates are spread evenly over receptors, memory and neurons, each trained once from its own seed. "
-            "Error: the share of evaluation episodes in which the goal did not come first; in navigation, where within "
-            "such budgets it is never reached, the share that is missing of what a straight way to it without any "
-            "contact would return. Power laws by least "
-            "squares in logarithms, of the product and of its three factors each; 95 % intervals by a bootstrap over "
-            "candidates. Parameters are all of a policy's, "
-            "critic included. The best of an acuity is the mean of its best quarter, "
-            "chosen by the same episodes and so told a little too good."
-        ),
         command=(
             "evolve run --preset scaling\n"
             "evolve run tracking --preset scaling\n"
             "evolve run navigation --preset scaling\n"
             "python -m experiments.brains_and_acuity --runs detection=DIR navigation=DIR tracking=DIR"
         ),
-        figures=[Figure(NAME, lambda path: draw(store, path), CAPTION)],
-        tables=[exponents(store), factors(store), ceilings(store), conduct_table(store)],
+        values={
+            "answer": store.answer,
+            "exponents": exponents(store),
+            "factors": factors(store),
+            "ceilings": ceilings(store),
+            "runs": conduct_table(store),
+        },
+        figures=[Figure(NAME, lambda path: draw(store, path))],
         origin=store.origin,
     )
 

@@ -1,7 +1,7 @@
-"""What chance alone makes of a search: the same one, with fitness drawn at random.
+"""The null model of a search: the same search with random fitness.
 
-Genes that begin near one end of their range can only move away from it, and selection that sees nothing but luck moves
-them too. What a run did counts as selection's work only where it leaves what is found here.
+A gene that begins near one end of its range can only move away from it, and selection by random fitness moves genes
+too. A result counts as the work of selection only where it lies outside the range of the null model.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from experiments.means import LAST
 __all__ = ["SEEDS", "Drift", "drifted", "of_the_end", "shade"]
 
 SEEDS = 1000
-POOLS = 20_000  # of searches drawn together, where several runs are held against luck as one
+POOLS = 20_000  # of searches drawn together, where several runs are compared with the null model as one
 FIRST_SEED = 10_000  # none that anybody takes for a run
 
 
@@ -85,7 +85,7 @@ def of_the_end(drift: list[Drift], generation: int) -> Drift | None:
 
 
 def shade(axes: Any, drift: list[Drift], color: str) -> None:
-    """Shade what chance alone makes, over generations; nothing where a gene is held."""
+    """Shade the range of the null model over generations; nothing where a gene is held."""
     rows = [one for one in drift if not one.ends and not one.held]
     if rows:
         x, low, high = ([getattr(one, name) for one in rows] for name in ("generation", "low", "high"))

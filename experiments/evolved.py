@@ -17,9 +17,9 @@ from experiments.means import last_mean
 from experiments.page import Page, markdown_table, parser
 from experiments.store import Origin, read_rows, write_rows
 
-__all__ = ["Conduct", "Quantities", "Store", "conduct_table", "luck", "luck_table", "main", "stored"]
+__all__ = ["Conduct", "Quantities", "Store", "conduct_table", "main", "null_model", "null_table", "stored"]
 
-Quantities = Mapping[str, Callable[[Row], float]]  # of which it is asked what chance alone makes
+Quantities = Mapping[str, Callable[[Row], float]]  # that are compared with the null model
 NOT_JUDGED = "Not judged yet."
 COLORS = {
     "blue": "#0072B2",
@@ -64,8 +64,8 @@ class Conduct:
 
 @dataclass(frozen=True)
 class Store:
-    """What a page is made from: rows, how their runs were conducted, what chance alone would have made, their origin,
-    and the answer that a person has given to the question."""
+    """What a page is made from: rows, how their runs were conducted, the drift of the null model, their origin, and the
+    answer that a person has given to the question."""
 
     rows: list[Row]
     conduct: list[Conduct]
@@ -99,8 +99,8 @@ class Store:
         """Of the receptors in a group's runs."""
         return next(one.noise_sigma for one in self.conduct if one.group == group)
 
-    def chance(self, group: str, quantity: str) -> list[Drift]:
-        """What chance alone makes of a quantity, by generation; [] where it was not asked."""
+    def drift_of(self, group: str, quantity: str) -> list[Drift]:
+        """A quantity under the null model, by generation; [] where it was not computed."""
         return [one for one in self.drift if (one.group, one.quantity) == (group, quantity)]
 
 
@@ -117,10 +117,10 @@ def conduct_table(store: Store) -> str:
     return markdown_table(header, lines)
 
 
-def luck_table(store: Store, quantities: Quantities, phase: int | None = None) -> str:
-    """A row per run, and one for the runs of a group together: the p of what they came to, against searches by luck
-    alone; of the end of a phase, or of the run."""
-    names = [n for n in quantities if any(not one.held for g in store.groups for one in store.chance(g, n))]
+def null_table(store: Store, quantities: Quantities, phase: int | None = None) -> str:
+    """A row per run, and one for the runs of a group together: the p of what they came to under the null model, at the
+    end of a phase or of the run."""
+    names = [n for n in quantities if any(not one.held for g in store.groups for one in store.drift_of(g, n))]
     lines = []
     for group in store.groups:
         rows = [row for row in store.group(group) if phase in (None, row.phase)]
@@ -129,7 +129,7 @@ def luck_table(store: Store, quantities: Quantities, phase: int | None = None) -
         if len(runs) > 1:
             lines.append([f"{group}, {len(runs)} seeds together", *_ps(store, runs, quantities, names)])
     searches = max((len(one.ends.split()) for one in store.drift), default=0)
-    return markdown_table([f"p by chance (two-sided, {2 / (searches + 1):.2g} at the least)", *names], lines)
+    return markdown_table([f"p under the null model (two-sided, at least {2 / (searches + 1):.2g})", *names], lines)
 
 
 def _ps(store: Store, runs: Sequence[list[Row]], quantities: Quantities, names: Sequence[str]) -> list[str]:
@@ -137,16 +137,16 @@ def _ps(store: Store, runs: Sequence[list[Row]], quantities: Quantities, names: 
     shown = []
     for name in names:
         found = [last_mean(run, quantities[name]) for run in runs]
-        ends = [luck(store, run[0].group, name, run) for run in runs]
+        ends = [null_model(store, run[0].group, name, run) for run in runs]
         values = [one.mean for one, end in zip(found, ends, strict=True) if one and end and not end.held]
         together = len(values) == len(runs) and len({end.generation for end in ends if end}) == 1
         shown.append(f"{ends[0].p(*values):.2g}" if ends[0] and together else "-")
     return shown
 
 
-def luck(store: Store, group: str, quantity: str, rows: Sequence[Row]) -> Drift | None:
-    """What chance alone makes of a quantity by the last generation of these rows; None where no phase ends there."""
-    return of_the_end(store.chance(group, quantity), max((row.generation for row in rows), default=-1))
+def null_model(store: Store, group: str, quantity: str, rows: Sequence[Row]) -> Drift | None:
+    """A quantity under the null model at the last generation of these rows; None where no phase ends there."""
+    return of_the_end(store.drift_of(group, quantity), max((row.generation for row in rows), default=-1))
 
 
 def main(
@@ -156,7 +156,7 @@ def main(
     arguments: Sequence[str] | None = None,
     quantities: Quantities | None = None,
 ) -> int:
-    """Collect runs if asked, and what chance alone would have made of the quantities; make the page from the store."""
+    """Collect runs if asked, and the null model of the quantities; make the page from the store."""
     options = parser(text)
     options.add_argument("--runs", nargs="+", metavar="GROUP=DIR", help="collect these run directories anew")
     options.add_argument("--answer", help="what came out, in Markdown; kept until another is given or numbers change")

@@ -116,33 +116,24 @@ def page(views: Sequence[View], perfect: View, origin: Origin) -> Page:
         for s, v in zip(STAGES, views, strict=True)
     ]
     header = ["", "a", "Strehl ratio", f"PSNR [dB], {FINE} x {FINE}", "SSIM", f"PSNR [dB], {COARSE} x {COARSE}, noise"]
-    _, cup, closed, blurred, focused = views
+    _, cup, pinhole, blurred, focused = views
+    named = {"cup": cup, "pinhole": pinhole, "blurred": blurred, "focused": focused}
     return Page(
         name="five_eyes",
-        title="What the eye sees, at five stages on the way to a lens",
-        question="What does an eye see of one scene while its pupil closes and glass in it becomes a lens?",
-        answer=(
-            f"A pinhole shows the scene sharper than a lens out of focus (SSIM {closed.ssim:.2f} beside "
-            f"{blurred.ssim:.2f}), less sharply than one in focus ({focused.ssim:.2f}), and loses it in the noise: "
-            f"{closed.noisy_psnr_db:.0f} dB beside {focused.noisy_psnr_db:.0f} dB on a retina of {COARSE} x {COARSE}. "
-            f"The lens out of focus is the cup (SSIM {cup.ssim:.2f}) with glass that bends light 0.6 times as strongly "
-            "as it should."
-        ),
-        method=(
-            "A scene of detection, path-traced; goal on the left, an adversary on the right, another behind. Eyes "
-            f"{1e6 * SENSOR_WIDTH:g} µm wide, {FOV_DEG:g}°; glass of n = {INDEX:g} whose heights are one bicubic "
-            f"patch, as genes have it. Signals are divided by a², and compared with the perfect lens's. Noise: σ = "
-            f"{NOISE:g} of what white gives at a = 1, per receptor."
-        ),
         command="python -m experiments.five_eyes",
-        figures=[
-            Figure(
-                "five_eyes",
-                lambda path: draw(views, perfect, path),
-                f"Above: {FINE} x {FINE} receptors without noise. Below: {COARSE} x {COARSE} with noise.",
-            )
-        ],
-        tables=[markdown_table(header, rows)],
+        values={
+            **{f"ssim_of_{name}": f"{one.ssim:.2f}" for name, one in named.items()},
+            "noisy_psnr_of_pinhole": f"{pinhole.noisy_psnr_db:.0f}",
+            "noisy_psnr_of_focused": f"{focused.noisy_psnr_db:.0f}",
+            "stages": markdown_table(header, rows),
+            "fine": str(FINE),
+            "coarse": str(COARSE),
+            "width_um": f"{1e6 * SENSOR_WIDTH:g}",
+            "fov_deg": f"{FOV_DEG:g}",
+            "index": f"{INDEX:g}",
+            "noise": f"{NOISE:g}",
+        },
+        figures=[Figure("five_eyes", lambda path: draw(views, perfect, path))],
         origin=origin,
     )
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from experiments import evolved
 from experiments.candidates import Row
 from experiments.drift import SEEDS, shade
-from experiments.evolved import Store, conduct_table, luck, luck_table
+from experiments.evolved import Store, conduct_table, null_model, null_table
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 
@@ -40,37 +40,22 @@ def page(store: Store) -> Page:
     """The page of stored runs."""
     return Page(
         name=NAME,
-        title="Goals shape eyes",
-        question=(
-            "From one eye with one photoreceptor, do finding the way through a maze and telling a goal from its "
-            "doubles make different eyes? Published: many narrow eyes around the body for navigation, two with many "
-            "receptors that look ahead for detection."
-        ),
-        answer=store.answer,
-        method=(
-            "Lines are means over the candidates of a generation, one line per seed; all seeds are shown. The table "
-            f"has means of the last {LAST} generations, over seeds, with 95 % intervals by a bootstrap over seeds and "
-            "candidates; with few seeds they are too narrow, and hardly more than the range of the seeds. By chance: "
-            f"the median and the range of 95 % of {SEEDS} searches that were told random numbers as fitness; only what "
-            "leaves that range is selection's work. Eyes have perfect lenses, brains are given; navigators' eyes are "
-            "one row of receptors, which is not evolved. The tasks also differ in how long is trained and in what "
-            "the learner does ([the task's settings](../explanation/learning.md)). Placement counts where there is "
-            "more than one eye."
-        ),
         command=(
             "evolve run --preset bifurcation-navigation --seed 0    # and 1, 2\n"
             "evolve run --preset bifurcation-detection --seed 0\n"
             "python -m experiments.goals_shape_eyes --runs navigation=DIR detection=DIR"
         ),
-        figures=[
-            Figure(
-                NAME,
-                lambda path: draw(store, path),
-                f"Generation by generation: {_legend(store)}. Shaded: by chance. Dots with bars: the table's means and "
-                "intervals.",
-            ),
-        ],
-        tables=[table(store), "Every seed:", seeds_table(store), luck_table(store, QUANTITIES), conduct_table(store)],
+        values={
+            "answer": store.answer,
+            "legend": _legend(store),
+            "last": str(LAST),
+            "searches": str(SEEDS),
+            "means": table(store),
+            "seeds": seeds_table(store),
+            "p_of_runs": null_table(store, QUANTITIES),
+            "runs": conduct_table(store),
+        },
+        figures=[Figure(NAME, lambda path: draw(store, path))],
         origin=store.origin,
     )
 
@@ -81,15 +66,15 @@ def _legend(store: Store) -> str:
 
 
 def table(store: Store) -> str:
-    """A row per quantity: what came out, what chance would have made, and what was published, group by group."""
-    kinds = ("", ", by chance", ", published")
+    """A row per quantity: what came out, the null model, and what was published, group by group."""
+    kinds = ("", ", null model", ", published")
     header = ["mean of the last generations", *(f"{g}{what}" for g in store.groups for what in kinds)]
     lines = []
     for place, (name, value) in enumerate(QUANTITIES.items()):
         line = [name]
         for g in store.groups:
-            chance = luck(store, g, name, store.group(g))
-            line += [_shown(store.group(g), value), str(chance or ""), PUBLISHED[g][place] if g in PUBLISHED else ""]
+            drift = null_model(store, g, name, store.group(g))
+            line += [_shown(store.group(g), value), str(drift or ""), PUBLISHED[g][place] if g in PUBLISHED else ""]
         lines.append(line)
     return markdown_table(header, lines)
 
@@ -116,7 +101,7 @@ def draw(store: Store, path: Path) -> None:
     for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=True):
         for i, group in enumerate(store.groups):
             rows, color = store.group(group), COLORS.get(group, "#777777")
-            shade(place, store.chance(group, name), color)
+            shade(place, store.drift_of(group, name), color)
             for seed in sorted({row.seed for row in rows}):
                 place.plot(*of_generation([row for row in rows if row.seed == seed], value), color=color, lw=1.2)
             found = last_mean(rows, value)

@@ -31,7 +31,6 @@ RESAMPLES = 2000
 SURE = 0.05  # p below which a best width is one
 BINS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65)
 CHANCE = 1 / 3
-CAPTION = "Dots are animals. Upright: the best hole by contrast (dotted), by stripes two receptors wide (dashed). σ: "
 Floats = NDArray[np.float64]
 
 
@@ -39,35 +38,22 @@ def page(store: Store) -> Page:
     """The page of stored runs. Raises ValueError with more groups than there are colours."""
     return Page(
         name=NAME,
-        title="Learning through holes",
-        question=(
-            "How wide a hole do animals learn best behind, and does more light narrow it, as contrast above the noise "
-            "predicts, or not, as the signal of stripes of one width does ([the best pupil](best_pupil.md))?"
-        ),
-        answer=store.answer,
-        method=(
-            "Two eyes of 15 x 15 receptors, 45° wide; every animal is trained once from its own seed, behind an open "
-            "hole of its own width. Curves: local lines with weights that fall with the distance in log a (Gaussian, "
-            f"{BANDWIDTH:g}); the best width is where the curve peaks, with a 95 % interval by a bootstrap over "
-            "animals, each curve between its own animals' widths. p: of a curve that explains as much where success "
-            f"has nothing to do with the width, by {RESAMPLES} permutations; above {SURE:g} no best width is given. "
-            "Dotted: of three objects one that is reached by luck is the goal; who reaches none scores less. Objects "
-            "are spheres 1 m wide with stripes of 30°: from 2.5 m away a stripe in the middle is two receptors wide, "
-            "from 5 m one."
-        ),
         command=(
             "evolve run --preset pupil\n"
             "evolve run --preset pupil --set eye.noise_sigma=0.003    # and others\n"
             f"python -m experiments.{NAME} --runs 0.001=DIR 0.003=DIR"
         ),
-        figures=[Figure(NAME, lambda path: draw(store, path), CAPTION + store.legend + ".")],
-        tables=[
-            "Best relative aperture a:",
-            table(store),
-            "Goal first, by width:",
-            by_width(store),
-            conduct_table(store),
-        ],
+        values={
+            "answer": store.answer,
+            "legend": store.legend,
+            "best_widths": table(store),
+            "success_by_width": by_width(store),
+            "runs": conduct_table(store),
+            "bandwidth": f"{BANDWIDTH:g}",
+            "permutations": str(RESAMPLES),
+            "significance": f"{SURE:g}",
+        },
+        figures=[Figure(NAME, lambda path: draw(store, path))],
         origin=store.origin,
     )
 
@@ -113,7 +99,7 @@ def _tried(place: Floats) -> Floats:
 
 
 def table(store: Store) -> str:
-    """A row per noise: what animals tell, and what optics predicts."""
+    """A row per noise: the best hole for animals, and those that optics predicts."""
     lines = []
     for group in store.groups:
         sigma = store.noise_sigma(group)

@@ -5,216 +5,126 @@ python -m experiments.lens_search [--run SEED ...] [--methods METHOD ...] [--doc
 
 from __future__ import annotations
 
-import math
+import statistics
 import sys
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from itertools import product
-from typing import Any
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import minimize
 
-import optics
-from evolve.config.run_config import SearchConfig
-from evolve.genome.genes import GENES
-from evolve.search.optimizers import Space, build_optimizer
-from experiments.page import parser
+from experiments.lens_optimizers import (
+    BOUNDS,
+    METHODS,
+    POPULATION,
+    RADIUS,
+    RELIEF_HEIGHT,
+    SPOTS,
+    WAVELENGTH,
+    Row,
+    best_lens,
+    searched,
+)
+from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
 from experiments.store import Origin, read_rows, write_rows
 
-__all__ = ["METHODS", "Row", "best_lens", "searched", "strehl"]
+__all__ = ["found_after", "page"]
 
-Floats = NDArray[np.float64]
-WAVELENGTH, RADIUS, RELIEF_HEIGHT = 550e-9, 25e-6, 100e-6
-RETINA = 200e-6 / (2 * math.tan(math.radians(45) / 2))  # of the default eye, which this pupil covers to a quarter
-SPOTS = (16e-6, 6e-6, 2e-6)  # standard deviations of the spot that light is gathered into, one after the other [m]
-SPREAD = 0.1  # standard deviation of the genes where searches begin, around flat glass of n = 1.5
-POPULATION, GENERATIONS, STEP = 16, 126, 0.2
-MOST_GRADIENTS = 300
-FIRST_STEP = 0.05  # of L-BFGS, over all genes; with 1, its default, some searches begin and end in a corner
-RECORDED = tuple(sorted({round(1.15**i) for i in range(80)}))
-TOLERANCE = 1e-2
-BOUNDS = ("paraboloid", "paraboloid, then gradient")  # what the genes can hold
-GENE_NAMES = (*(f"doe_{i}{j}" for i in range(4) for j in range(4)), "refractive_index")
+GOOD = 0.8  # Strehl ratio from which an image counts as diffraction-limited (Maréchal)
+COMPARED = ("gradient, shrinking spot", "gradient, Strehl ratio", "CMA-ES, Strehl ratio")
+COLORS = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00")
 
 
-@dataclass(frozen=True)
-class Row:
-    """Strehl ratio of the best lens after so many PSFs and so much time of one thread; gradients count as one PSF."""
-
-    method: str
-    seed: int
-    evaluations: int
-    cpu_seconds: float
-    strehl: float
+def searches(rows: Sequence[Row], method: str) -> list[list[Row]]:
+    """A method's searches, seed by seed, in the order in which they went."""
+    seeds = sorted({row.seed for row in rows if row.method == method})
+    return [sorted((r for r in rows if (r.method, r.seed) == (method, s)), key=lambda r: r.evaluations) for s in seeds]
 
 
-def lens(genome: Any) -> optics.Pupil:
-    """The pupil of a genome (17,), NumPy's or a Dr.Jit array that carries derivatives."""
-    if isinstance(genome, np.ndarray):
-        return optics.Pupil(RADIUS, optics.BSplineRelief(RELIEF_HEIGHT * genome[:16].reshape(4, 4)), n=1 + genome[16])
-    import drjit as dr
-    from drjit.auto.ad import Float64, TensorXf64, UInt32
-
-    heights = TensorXf64(RELIEF_HEIGHT * dr.gather(Float64, genome, dr.arange(UInt32, 16)), (4, 4))
-    return optics.Pupil(RADIUS, optics.BSplineRelief(heights), n=1 + dr.gather(Float64, genome, UInt32(16)))
-
-
-def loss(genome: Any, spot: float | None) -> Any:
-    """-log of the Strehl ratio near the axis (spot None) or of the light in a Gaussian spot on it."""
-    import drjit as dr
-    from drjit.auto.ad import Float64
-
-    dx, side = (0.5e-6, 33) if spot is None else (spot / 4, _side(spot))
-    result = optics.psf(lens(genome), [WAVELENGTH], RETINA, dx=dx, shape=(side, side), tolerance=TOLERANCE)
-    if spot is None:
-        value = optics.strehl_ratio(result)
-        return -math.log(value[0]) if isinstance(value, np.ndarray) else -dr.log(value.array)
-    weight = np.exp(-(result.x[None, :] ** 2 + result.y[:, None] ** 2) / (2 * spot**2)) * dx**2
-    if isinstance(genome, np.ndarray):
-        return -math.log(float(np.sum(result.psf[0] * weight)))
-    return -dr.log(dr.sum(Float64(result.tensor.array) * Float64(weight.ravel())))
+def found_after(search: Sequence[Row]) -> Row | None:
+    """Where on the record a search has a good lens and keeps it; None if it has none in the end."""
+    kept = None
+    for row in reversed(search):
+        if row.strehl < GOOD:
+            break
+        kept = row
+    return kept
 
 
-def _side(spot: float) -> int:
-    return 2 * math.ceil(min(3 * spot, 1.2 * RADIUS) / (spot / 4)) + 1
+def page(rows: Sequence[Row], origin: Origin) -> Page:
+    """The page of stored searches."""
+    paraboloid, refined = (next(row.strehl for row in rows if row.method == bound) for bound in BOUNDS)
+    ours, direct, theirs = (searches(rows, method) for method in COMPARED)
+    (pictures, seconds), (their_pictures, their_seconds) = (_medians(runs) for runs in (ours, theirs))
+    return Page(
+        name="lens_search",
+        command="python -m experiments.lens_search --run 0 1 2 3 4",
+        values={
+            "gradient_pictures": f"{pictures:.0f}",
+            "gradient_seconds": f"{seconds:.1f}",
+            "cma_pictures": f"{their_pictures:.0f}",
+            "cma_seconds": f"{their_seconds:.0f}",
+            "seeds": str(len(ours)),
+            "good": f"{GOOD:g}",
+            "stuck": str(sum(found_after(search) is None for search in direct)),
+            "direct": str(len(direct)),
+            "methods": table(rows),
+            "paraboloid": f"{paraboloid:.5f}",
+            "bound": f"{refined:.5f}",
+            "radius_um": f"{1e6 * RADIUS:g}",
+            "wavelength_nm": f"{1e9 * WAVELENGTH:g}",
+            "relief_um": f"{1e6 * RELIEF_HEIGHT:g}",
+            "spots_um": ", ".join(f"{1e6 * s:g}" for s in SPOTS),
+            "population": str(POPULATION),
+        },
+        figures=[Figure("lens_search", lambda path: draw(rows, path))],
+        origin=origin,
+    )
 
 
-def gradient(genome: Floats, spot: float | None) -> tuple[float, Floats]:
-    """Loss and its derivative by every gene."""
-    import drjit as dr
-    from drjit.auto.ad import Float64
-
-    tracked = Float64(genome)
-    dr.enable_grad(tracked)
-    value = loss(tracked, spot)
-    dr.backward(value)
-    return float(value[0]), np.array(dr.grad(tracked).numpy(), np.float64)
+def _medians(runs: Sequence[Sequence[Row]]) -> tuple[float, float]:
+    """Evaluations and seconds to a good lens, over the searches that found one."""
+    found = [row for search in runs if (row := found_after(search))]
+    if not found:
+        return float("nan"), float("nan")
+    return statistics.median(row.evaluations for row in found), statistics.median(row.cpu_seconds for row in found)
 
 
-def strehl(genome: Floats) -> float:
-    """Strehl ratio, wherever within 12 µm of the axis the light has its peak."""
-    result = optics.psf(lens(genome), [WAVELENGTH], RETINA, dx=0.25e-6, shape=(97, 97), tolerance=1e-3)
-    return float(optics.strehl_ratio(result)[0])
+def table(rows: Sequence[Row]) -> str:
+    """A row per method."""
+    lines = []
+    for method in METHODS:
+        runs = searches(rows, method)
+        if not runs:
+            continue
+        evaluations, seconds = _medians(runs)
+        good = sum(found_after(search) is not None for search in runs)
+        of = "" if good == len(runs) else f" (of the {good})"
+        ends = ", ".join(f"{search[-1].strehl:.3f}" for search in runs)
+        lines.append([method, f"{good} of {len(runs)}", f"{evaluations:.0f}{of}", f"{seconds:.1f}{of}", ends])
+    header = ["method", f"above {GOOD:g}", "pictures until then", "core seconds", "Strehl ratio in the end, all seeds"]
+    return markdown_table(header, lines)
 
 
-def start(seed: int) -> Floats:
-    """Where a search begins: rough glass of an index near 1.5."""
-    return np.clip(0.5 + SPREAD * np.random.default_rng(seed).standard_normal(17), 0.0, 1.0)
-
-
-@dataclass
-class Watch:
-    """Counts PSFs and time of a search, and measures its best lens now and then, off the clock."""
-
-    method: str
-    seed: int
-    rows: list[Row] = field(default_factory=list)
-    evaluations: int = 0
-    seconds: float = 0.0
-    best: float = math.inf
-    genome: Floats | None = None
-    _since: float = field(default_factory=time.process_time)
-
-    def begin_stage(self) -> None:
-        """Losses of another stage are not comparable."""
-        self.best = math.inf
-
-    def saw(self, genome: Floats, value: float) -> None:
-        """A search tried a genome."""
-        self.seconds += time.process_time() - self._since
-        self.evaluations += 1
-        if value < self.best:
-            self.best, self.genome = value, np.array(genome)
-        if self.evaluations in RECORDED:
-            self.record()
-        self._since = time.process_time()
-
-    def record(self) -> None:
-        """Write down how far the search has come."""
-        assert self.genome is not None
-        done = (self.method, self.seed, self.evaluations)
-        if not self.rows or self.rows[-1].evaluations != self.evaluations:
-            self.rows.append(Row(*done, self.seconds, strehl(self.genome)))
-
-
-def by_gradient(watch: Watch, spots: Sequence[float | None]) -> None:
-    """L-BFGS-B within the genes' bounds, stage after stage."""
-    genome = start(watch.seed)
-    for spot in spots:
-        watch.begin_stage()
-
-        def tried(u: Floats, spot: float | None = spot) -> tuple[float, Floats]:
-            value, slope = gradient(u, spot)
-            watch.saw(u, value)
-            return value, slope
-
-        _descend(tried, genome, MOST_GRADIENTS // len(spots))
-        assert watch.genome is not None
-        genome = watch.genome
-
-
-def _descend(tried: Callable[[Floats], tuple[float, Floats]], genome: Floats, most: int) -> Floats:
-    """L-BFGS-B, in units of its first step."""
-
-    def scaled(v: Floats) -> tuple[float, Floats]:
-        value, slope = tried(np.clip(FIRST_STEP * v, 0.0, 1.0))
-        return value, FIRST_STEP * slope
-
-    bounds = [(0, 1 / FIRST_STEP)] * genome.size
-    options = {"maxfun": most, "maxiter": most}
-    found = minimize(scaled, genome / FIRST_STEP, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
-    return np.clip(FIRST_STEP * found.x, 0.0, 1.0)
-
-
-def by_cma(watch: Watch, spots: Sequence[float | None]) -> None:
-    """CMA-ES as evolution uses it; stages share its generations evenly."""
-    genes = [(GENES[name], GENES[name].default) for name in GENE_NAMES]
-    search = SearchConfig(population=POPULATION, generations=GENERATIONS, sigma=STEP)
-    optimizer = build_optimizer(Space(genes, start(watch.seed), (watch.seed,)), search)
-    for generation in range(GENERATIONS):
-        stage, within = divmod(generation * len(spots), GENERATIONS)
-        if within < len(spots):
-            watch.begin_stage()
-        asked = range(generation * POPULATION, (generation + 1) * POPULATION)
-        genomes = {identity: optimizer.ask(identity)[0] for identity in asked}
-        losses = {identity: float(loss(genome, spots[stage])) for identity, genome in genomes.items()}
-        for identity, value in losses.items():
-            optimizer.tell(identity, -value)
-            watch.saw(genomes[identity], value)
-
-
-METHODS: dict[str, tuple[Callable[[Watch, Sequence[float | None]], None], Sequence[float | None]]] = {
-    "gradient, shrinking spot": (by_gradient, SPOTS),
-    "gradient, Strehl ratio": (by_gradient, (None,)),
-    "CMA-ES, shrinking spot": (by_cma, SPOTS),
-    "CMA-ES, Strehl ratio": (by_cma, (None,)),
-}
-
-
-def searched(method: str, seed: int) -> list[Row]:
-    """One search from its start to its end."""
-    watch = Watch(method, seed)
-    run, spots = METHODS[method]
-    run(watch, spots)
-    watch.record()
-    return watch.rows
-
-
-def best_lens(index: float = 1.5) -> tuple[float, float]:
-    """Strehl ratios of the paraboloid in focus, and of what a gradient makes of it within the gene space."""
-    curvature = 1 / ((index - 1) * RETINA)
-    points = optics.BSplineRelief.paraboloid(0.0, curvature, RADIUS).control_points / RELIEF_HEIGHT
-    genome = np.append(points.ravel() - points.mean() + 0.5, index - 1)
-    return strehl(genome), strehl(_descend(lambda u: gradient(u, None), genome, 60))
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """Strehl ratio over pictures and over time."""
+    figure, axes = new_figure(10, 3.8, columns=2, sharey=True)
+    for method, color in zip(METHODS, COLORS, strict=True):
+        for number, search in enumerate(searches(rows, method)):
+            strehl = np.array([row.strehl for row in search])
+            for place, cost in zip(axes[0], ("evaluations", "cpu_seconds"), strict=True):
+                spent = [getattr(row, cost) for row in search]
+                place.semilogx(spent, strehl, color=color, lw=1.3, label=method if number == 0 else None)
+    for place in axes[0]:
+        place.axhline(GOOD, color="#777777", ls=":", lw=1)
+    axes[0, 0].set(xlabel="pictures computed", ylabel="Strehl ratio", ylim=(0, 1.03))
+    axes[0, 1].set(xlabel="time of one core [s]", xlim=(0.3, None))
+    axes[0, 0].legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(0.0, 0.77))
+    save(figure, path)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Search, store, and make the page from the store."""
-    from experiments.lens_search_page import page
-
     options = parser(__doc__ or "")
     options.add_argument("--run", type=int, nargs="+", metavar="SEED", help="search anew from these seeds")
     options.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS), help="by these (default: all)")

@@ -1,11 +1,13 @@
-"""A page of docs/results: question, answer, figures and table, and how to make them again."""
+"""A page of docs/results: a template of prose, filled in with what an experiment computed."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from string import Template
 from typing import Any
 
 from evolve.store.atomic_files import write_whole
@@ -14,47 +16,45 @@ from experiments.store import Origin
 __all__ = ["Figure", "Page", "markdown_table", "new_figure", "parser", "save"]
 
 DPI = 130
+TEMPLATES = Path(__file__).parent / "pages"
 
 
 @dataclass(frozen=True)
 class Figure:
-    """name: of its file, without ".png". draw: writes it. caption: Markdown on one line."""
+    """name: of its file, without ".png". draw: writes it."""
 
     name: str
     draw: Callable[[Path], None]
-    caption: str
 
 
 @dataclass(frozen=True)
 class Page:
-    """name: of the page's file. answer: begins with "Reproduced", "Partly", "Not" or what was found. method: prose.
-    command: makes numbers and page anew. tables: Markdown.
+    """A page of results, made from the template of the same name in experiments/pages.
+
+    name      of the template and of the page's file
+    command   makes numbers and page anew: the template's $command
+    values    numbers, tables and other text, by the template's placeholders
+    figures   drawn beside the page; the template shows each of them and holds its caption
+    origin    of the numbers: the template's $origin
     """
 
     name: str
-    title: str
-    question: str
-    answer: str
-    method: str
     command: str
+    values: Mapping[str, str]
     figures: Sequence[Figure]
-    tables: Sequence[str]
     origin: Origin
 
     @property
     def markdown(self) -> str:
-        pictures = [f"![{self.title}: {f.name}](figures/{f.name}.png)\n\n{f.caption}" for f in self.figures]
-        parts = [
-            f"# {self.title}",
-            f"**Question.** {self.question}",
-            f"**Answer.** {self.answer}",
-            *pictures,
-            *self.tables,
-            f"**How.** {self.method}",
-            f"```sh\n{self.command}\n```",
-            f"Made in {self.origin.sentence()}",
-        ]
-        return "\n\n".join(parts) + "\n"
+        """The template filled in. Raises KeyError where a placeholder has no value, and ValueError where a value or a
+        figure has no place: a number that nobody shows is a mistake in one or the other."""
+        template = Template((TEMPLATES / f"{self.name}.md").read_text(encoding="utf-8"))
+        values = {**self.values, "command": self.command, "origin": self.origin.sentence()}
+        places = {*template.get_identifiers(), *re.findall(r"\(figures/(\w+)\.png\)", template.template)}
+        lost = sorted({*values, *(figure.name for figure in self.figures)} - places)
+        if lost:
+            raise ValueError(f"pages/{self.name}.md has no place for {', '.join(lost)}")
+        return template.substitute(values)
 
     def publish(self, folder: Path) -> None:
         """Draws the figures and writes the page, each whole or not at all."""

@@ -18,7 +18,7 @@ import optics
 from experiments import evolved
 from experiments.candidates import NO_NUMBER, Row
 from experiments.drift import SEEDS, shade
-from experiments.evolved import Store, conduct_table, luck, luck_table
+from experiments.evolved import Store, conduct_table, null_model, null_table
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from sim.worlds.foraging import ULTRAVIOLET, petal
@@ -84,54 +84,33 @@ def page(store: Store) -> Page:
     """The page of stored runs."""
     return Page(
         name=NAME,
-        title="Seeing ultraviolet",
-        question=(
-            "Goal and adversaries of `foraging` are alike but for what they reflect below 400 nm. Do the peaks of an "
-            "eye's pigments move there? (With three channels for red, green and blue the question cannot be asked.)"
-        ),
-        answer=store.answer,
-        method=(
-            "Three types of receptor begin at 600, 520 and 460 nm; nothing but their peaks evolves. Left: what a "
-            "receptor's signals of goal and adversary differ by in daylight, computed for every peak, and where each "
-            f"seed's candidates of the last {LAST} generations have theirs. Pigments of long peaks have a second, "
-            "weak band in the ultraviolet (Govardovskii et al. 2000), so that even the first eyes are not quite blind "
-            "to it. Lines are means over the candidates of a generation, one per seed; the table compares the first "
-            f"generation's with the last {LAST} generations', over all seeds, with 95 % intervals by a bootstrap over "
-            "seeds and candidates; with two seeds they are too narrow, and hardly more than the range of the seeds. By "
-            f"chance: the median and the range of 95 % of {SEEDS} searches that were told random numbers as fitness."
-        ),
         command=(
             "evolve run --preset ultraviolet --seed 0    # and others\n"
             "python -m experiments.seeing_ultraviolet --runs foraging=DIR foraging=DIR"
         ),
-        figures=[
-            Figure(
-                NAME,
-                lambda path: draw(store, path),
-                "Violet: the type with the shortest peak; green: the middle one; orange: the one with the longest. All "
-                "seeds are shown. Goal and adversaries reflect differently below the dashed line; shaded: where luck "
-                "leads the types; dotted: one goal among three objects.",
-            )
-        ],
-        tables=[
-            table(store),
-            f"By shortest peak, all candidates (rank correlation with fitness {rank_correlation(store.rows):.2f}):",
-            table_by_peak(store.rows),
-            luck_table(store, QUANTITIES),
-            conduct_table(store),
-        ],
+        values={
+            "answer": store.answer,
+            "last": str(LAST),
+            "searches": str(SEEDS),
+            "means": table(store),
+            "rank_correlation": f"{rank_correlation(store.rows):.2f}",
+            "by_peak": table_by_peak(store.rows),
+            "p_of_runs": null_table(store, QUANTITIES),
+            "runs": conduct_table(store),
+        },
+        figures=[Figure(NAME, lambda path: draw(store, path))],
         origin=store.origin,
     )
 
 
 def table(store: Store) -> str:
-    """First generation and last ones, and what chance would have made of these."""
+    """The first generation, the last ones, and the null model of these."""
     first = [row for row in store.rows if row.generation == 0]
-    header = ["mean", "first generation", f"last {LAST} generations", "by chance"]
+    header = ["mean", "first generation", f"last {LAST} generations", "null model"]
     lines = []
     for name, value in QUANTITIES.items():
-        chance = luck(store, store.groups[0], name, store.rows)
-        lines.append([name, str(last_mean(first, value)), str(last_mean(store.rows, value)), str(chance or "")])
+        drift = null_model(store, store.groups[0], name, store.rows)
+        lines.append([name, str(last_mean(first, value)), str(last_mean(store.rows, value)), str(drift or "")])
     return markdown_table(header, lines)
 
 
@@ -161,7 +140,7 @@ def draw(store: Store, path: Path) -> None:
     seen.semilogy(nm, [difference(float(peak)) for peak in nm], color="#222222", lw=1.2)
     seen.set(xlabel="peak of the pigment [nm]", title="difference of goal and adversary")
     for name, color in zip(QUANTITIES, COLORS.values(), strict=False):
-        shade(moved, store.chance(store.groups[0], name), color)
+        shade(moved, store.drift_of(store.groups[0], name), color)
     for seed in sorted({row.seed for row in rows}):
         mine = [row for row in rows if row.seed == seed]
         last = [row for row in mine if row.generation > max(r.generation for r in mine) - LAST]

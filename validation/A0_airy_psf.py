@@ -1,9 +1,9 @@
 """A0: the PSF of an ideal lens, from f/2 to f/16 at the scale of a small eye, against two oracles.
 
-1. The exact first Rayleigh-Sommerfeld integral, by quadrature in float64: the angular spectrum must agree with it.
-2. The Airy pattern, which is what that integral tends to for small apertures far away. The exact PSF departs from it
-   by O(NA²), and by O(1/Fresnel number²) where the lens is small: so Airy must *not* fit at f/2, its misfit must fall
-   like NA², and a slow lens of large Fresnel number must show Airy itself.
+1. The exact first Rayleigh-Sommerfeld integral, by quadrature in float64. The angular spectrum must agree with it.
+2. The Airy pattern, the limit of that integral for small apertures far away. The exact PSF departs from it by O(NA²),
+   and by O(1/Fresnel number²) where the lens is small. So Airy must *not* fit at f/2, its misfit must fall like NA²,
+   and a slow lens of large Fresnel number must show Airy itself.
 
     python -m validation.A0_airy_psf [--out DIR]      prints the table, draws the figure, exits 1 if a bound is broken
 """

@@ -1,8 +1,9 @@
 """A1: how far the exact PSF of an ideal lens departs from Airy's pattern, over the numerical aperture.
 
-The exact first Rayleigh-Sommerfeld integral, by quadrature, less the Airy pattern, at constant Fresnel number 100, so
-that nothing but the angle changes: the departure must be O(NA²) = O((R/f)²), for both ways to read Airy at an angle
-(tan: v = kRr/f; sin: v = kr NA). `optics.psf` is measured at the same lenses and must stay with the exact one.
+The table shows the exact first Rayleigh-Sommerfeld integral, by quadrature, minus the Airy pattern. The Fresnel
+number is 100 throughout, so only the angle changes. The departure must be O(NA²) = O((R/f)²), for both ways to read
+Airy at an angle (tan: v = kRr/f; sin: v = kr NA). `optics.psf` is measured with the same lenses and must agree with
+the exact one.
 
     python -m validation.A1_departure_from_airy [--out DIR]   prints the table, draws the figure, exits 1 if one breaks
 """

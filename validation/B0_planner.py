@@ -1,16 +1,16 @@
 """B0: does the predicted error hold? Random pupils, distances, windows, tolerances and reliefs
 
-Fresnel number 0.01 to 1000, NA 0.01 to 0.7, reliefs to 40 µm (none, ideal lens, B-spline, both, height map), windows
-of 17 to 129 samples a side, tolerances 1e-5 (float32) or 1e-8 (float64) to 3e-2. The actual error is the relative L2
-of intensity against the direct Rayleigh-Sommerfeld sum in float64, asked for a thousandth of the tolerance and a
-thirtieth of the prediction, whichever is less. Cases whose direct sum would take more than 5 s are drawn anew, and
-counted.
+Cases are drawn at random: Fresnel number 0.01 to 1000, NA 0.01 to 0.7, reliefs up to 40 µm (none, ideal lens,
+B-spline, both, height map), windows of 17 to 129 samples a side, tolerances 1e-5 (float32) or 1e-8 (float64) to 3e-2.
+The actual error is the relative L2 of intensity against the direct Rayleigh-Sommerfeld sum in float64. That sum is
+asked for a thousandth of the tolerance or a thirtieth of the prediction, whichever is less. A case whose direct sum
+would take more than 5 s is drawn again, and counted.
 
-Bounds: actual <= predicted in 99 % of the cases and never above 3 times; predicted <= 30 times actual in 80 %, so
-that no digits are bought that nobody asked for. With --methods every method runs on every case, and the chosen one
-must take at most twice the time of the fastest whose actual error meets the tolerance, in 80 %.
+Bounds: actual <= predicted in 99 % of the cases, and never above 3 times; predicted <= 30 times actual in 80 %, so
+that no time goes into digits that nobody asked for. With --methods every method runs on every case. The chosen one
+must then take at most twice the time of the fastest one whose actual error meets the tolerance, in 80 % of the cases.
 
-Where no method can meet the tolerance, an `AccuracyError` says what can: the table counts those by reason.
+Where no method can meet the tolerance, an `AccuracyError` says what can. The table counts those cases by reason.
 
     python -m validation.B0_planner [--cases N] [--seed N] [--methods N] [--out DIR] [--docs DIR]
 """

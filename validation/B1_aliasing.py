@@ -1,19 +1,20 @@
 """B1: aliasing beyond the critical distance, and wrap-around: where the plain angular spectrum stops converging
 
-A circular aperture of R = 50 µm, 550 nm, sampled N x N over a period of 4R; the light is looked at over |x|, |y| <= R
-and held against the direct Rayleigh-Sommerfeld sum. The textbook's angular spectrum (`validation/textbook.py`)
-multiplies the samples' spectrum by the transfer function on the samples' own period. Beyond the critical distance z =
-N dx²/λ the steepest light that the samples hold walks past the period's edge and comes back on the other side: more
-samples then buy nothing, and further away the error reaches 100 %. In the frequency domain the same thing is a
+A circular aperture of R = 50 µm at 550 nm is sampled N x N over a period of 4R. The light over |x|, |y| <= R is
+compared with the direct Rayleigh-Sommerfeld sum. The textbook's angular spectrum (`validation/textbook.py`)
+multiplies the spectrum of the samples by the transfer function, on the samples' own period. Beyond the critical
+distance z = N dx²/λ the steepest light that the samples hold leaves the period at one edge and comes back at the
+other. More samples then do not help, and further away the error reaches 100 %. In the frequency domain this is a
 transfer function that turns by more than half a wave from sample to sample.
 
-`optics.propagate`, given the same hard-edged samples, chooses its own period, fades out light that would land far
-outside the window, and converges with N at any distance: what is left is the pixelated edge. `optics.psf` has no N to
-choose at all: it low-passes the edge and plans by itself; its choice and error stand at the foot of the map.
+`optics.propagate`, given the same hard-edged samples, chooses its own period and fades out light that would land far
+outside the window. It converges with N at any distance; what remains is the error of the pixelated edge. `optics.psf`
+has no N to choose: it low-passes the edge and plans by itself. The last columns show its error and the method it
+chose.
 
-The second chart shrinks the period around a beam that has spread to the radius w (1/e² of intensity). In the
-textbook's the beam meets its own repetition, by about exp(-(P/2w)²) on the period's edge; `optics.propagate` of the
-same samples does not care: what is left there is rounding and the tolerance.
+The second table shrinks the period around a beam that has spread to the radius w (1/e² of intensity). In the
+textbook's method the beam meets its own repetition, with about exp(-(P/2w)²) at the edge of the period.
+`optics.propagate` of the same samples is not affected: only rounding and the tolerance remain.
 
     python -m validation.B1_aliasing [--out DIR] [--docs DIR]
 """

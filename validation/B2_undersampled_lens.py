@@ -1,17 +1,18 @@
 """B2: an undersampled lens: noise that looks like a PSF
 
-The published setting: a pupil of a few mm on 51 or 101 samples, here f = 4 mm, 550 nm and a grid of 2 mm, with lenses
-of f/2, f/8 and f/13.5 on it. The phase of a lens turns by half a wave from sample to sample at its rim if the pitch
-is λ / (2 NA); on 51 samples the pitch is 35, 9 and 5 times that. The samples then describe not a lens but a pattern
-of many false ones; most light goes elsewhere, and the picture is a regular speckle with a bright middle. Nothing in
-it says so: it is finite, positive and keeps the power.
+The published setting is a pupil of a few mm on 51 or 101 samples; here f = 4 mm and 550 nm, on a grid of 2 mm, with
+lenses of f/2, f/8 and f/13.5. The phase of a lens turns by half a wave from sample to sample at its rim if the pitch
+is λ / (2 NA). On 51 samples the pitch is 35, 9 and 5 times that. The samples then do not describe a lens but a
+pattern of many false ones. Most light goes elsewhere, and the picture is a regular speckle with a bright middle.
+Nothing in it shows the mistake: it is finite and positive, and it keeps the power.
 
-Measured is the energy inside Airy's first dark ring, as a share of the light through the pupil, by the textbook's
-angular spectrum on the samples' own grid (band-limited interpolation between its points), beside the exact
-Rayleigh-Sommerfeld integral. It jumps to the right value as the pitch falls below λ / (2 NA), and not before.
+The table shows the energy inside Airy's first dark ring, as a share of the light through the pupil. It compares the
+textbook's angular spectrum on the samples' own grid (with band-limited interpolation between its points) with the
+exact Rayleigh-Sommerfeld integral. The energy jumps to the right value once the pitch falls below λ / (2 NA), and not
+before.
 
-`optics.psf` takes no samples of the pupil, but chooses them from the slope of the phase, or uses a method that needs
-none; the same pupils come out right to the tolerance asked.
+`optics.psf` takes no samples of the pupil. It chooses them from the slope of the phase, or uses a method that needs
+none. The same pupils come out right to the tolerance asked for.
 
     python -m validation.B2_undersampled_lens [--out DIR] [--docs DIR]
 """

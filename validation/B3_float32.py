@@ -1,18 +1,18 @@
 """B3: float32: phases that lose their digits, and dark windows
 
 A phase kz is rounded to float32 within kz 2^-24: at 550 nm that is 7e-4 rad at 1 mm and 0.7 rad at 1 m. Lenses of
-Fresnel number 20 focus at 0.1 mm to 10 m. The textbook's angular spectrum in float32 throughout (phases too) is held
-against the same in float64, so that rounding is all that differs. Its error passes 1e-5 near 2 mm, 1e-3 near 0.1 m
+Fresnel number 20 focus at 0.1 mm to 10 m. The textbook's angular spectrum in float32 throughout (phases too) is
+compared with the same in float64, so they differ only by rounding. Its error passes 1e-5 near 2 mm, 1e-3 near 0.1 m
 and 1 near 3 m.
 
-Phases in rhabdom are optical paths in float64; they lose their whole waves there, and only the rest, below one wave,
-becomes float32. So `optics.psf` in float32 stays below 1e-5 at every distance, and float32 is never given up for kz.
+Phases in rhabdom are optical paths in float64. They lose their whole waves there, and only the rest, below one wave,
+becomes float32. So `optics.psf` in float32 stays below 1e-5 at every distance, and no phase kz forces it to float64.
 
-What float32 cannot do is darkness: rounding is a fixed share of the pupil's light, and a window far off the focus
-holds little of it. Here an ideal lens (R = 50 µm, f = 0.5 mm) sees a source farther and farther off the axis while
-the window stays on it. Every PSF is held against the direct sum at a few of its points; where the tolerance is
-missed, it is computed again with more digits, and where that does not help, refused with an `AccuracyError` that
-names the dtype. float64 goes on.
+The limit of float32 is darkness. Rounding is a fixed share of the pupil's light, and a window far off the focus holds
+little of that light. Here the source of an ideal lens (R = 50 µm, f = 0.5 mm) moves off the axis while the window
+stays on it. Every PSF is compared with the direct sum at a few of its points. Where it misses the tolerance, it is
+computed again with more digits. Where that does not help, it is refused with an `AccuracyError` that names the dtype.
+float64 still works there.
 
     python -m validation.B3_float32 [--out DIR] [--docs DIR]
 """

@@ -1,20 +1,19 @@
 """B4: backwards: the inverse of a decay
 
-Behind a plane, waves finer than the wavelength decay like exp(-2πz √(f² - 1/λ²)). The textbook's angular spectrum run
-backwards lets them grow as they decayed, and with them the rounding of the samples: a wave of f = 2.8/λ, which a
-pitch of λ/4 holds on its diagonal, by 7 decades per wavelength of distance. Float32's digits are gone after one
-wavelength, float64's after two, and far enough the numbers overflow.
+Behind a plane, waves finer than the wavelength decay like exp(-2πz √(f² - 1/λ²)). Run backwards, the textbook's
+angular spectrum lets them grow as they decayed, and the rounding errors of the samples grow with them. A wave of f =
+2.8/λ, which a pitch of λ/4 holds on its diagonal, grows by 7 decades per wavelength of distance. The digits of
+float32 are gone after one wavelength, those of float64 after two, and still farther the numbers overflow.
 
-`optics.propagate` with a negative distance undoes phases only. Waves beyond 1/λ are dropped, and
-`result.evanescent_power` says which share of the input's power they were. What cannot come back is what decayed: the
-recovered field misses the evanescent part of the original, an error of √(evanescent share), neither more nor less.
-Forwards the same number tells in advance how much that will be.
+`optics.propagate` with a negative distance only undoes phases. Waves beyond 1/λ are dropped, and
+`result.evanescent_power` says which share of the input's power they were. What has decayed cannot come back: the
+recovered field lacks the evanescent part of the original, so its error is √(evanescent share), neither more nor less.
+Run forwards, the same number predicts that error.
 
-Both charts are Gaussian spots exp(-r²/w²) whose exact field at z is summed from their closed-form spectrum. On the
-left w = 2 λ, which has no evanescent part to speak of, so that nothing but the method errs; on the right z = λ/2 and
-spots of 1 λ down to 0.2 λ, of which 45 % is evanescent. What leaves the window, or is too near to grazing for it,
-cannot come back either; `propagate` counts the second into its predicted error and refuses where that breaks the
-tolerance.
+Both tables use Gaussian spots exp(-r²/w²), whose exact field at z is summed from their closed-form spectrum. The
+first has w = 2 λ and almost no evanescent part, so only the method errs. The second has z = λ/2 and spots of 1 λ down
+to 0.2 λ, of which 45 % is evanescent. Light that leaves the window, or is too near to grazing for it, cannot come
+back either. `propagate` counts the second into its predicted error, and refuses where that breaks the tolerance.
 
     python -m validation.B4_backward [--out DIR] [--docs DIR]
 """

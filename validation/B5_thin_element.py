@@ -1,21 +1,22 @@
 """B5: the thin element: what a relief as a phase mask cannot know
 
-A relief of height h is the phase k(n - 1)h in one plane. That is a model, chosen before any propagation starts, and
-no predicted error covers it: `predicted_error` is that of propagating the mask. What the mask leaves out is told here
-by rays through the real surface (Snell's law, glass of n = 1.5 first, `validation/refraction.py`):
+A relief of height h is modelled as the phase k(n - 1)h in one plane. The model is chosen before any propagation
+starts, and no predicted error covers it: `predicted_error` is that of propagating the mask. Rays through the real
+surface show what the mask leaves out (Snell's law, light from inside the glass of n = 1.5,
+`validation/refraction.py`):
 
-- refraction at a slope: a prism of angle α deviates by arcsin(n sin α) - α, the mask by arcsin((n - 1) tan α), the
-  same whichever side the light comes from. The mask is 1 % off at α = 11° and 10 % at 30°;
-- total reflection: beyond 41.8° nothing leaves, while the mask goes on to 63°. A lens made of one relief ends there,
-  at NA = 0.45; the mask knows no such end;
-- Fresnel reflection: 4 % at normal incidence, 10 % at 36°, 25 % at 40°, not in any PSF here;
-- thickness: rays bend at the surface, not in the plane. A relief whose mask is an ideal lens is none: its Strehl
-  ratio falls below 0.8 at NA = 1.16 (λ/f)^¼, 0.25 for f = 240 µm; and the focus spreads along the axis by many depths
-  of field;
-- neighbours: a corrugation of sine shape starts to reflect totally where its depth is 0.28 of its period, and from
-  0.30 some rays that have left meet the next ridge.
+- refraction at a slope: a prism of angle α deviates by arcsin(n sin α) - α, the mask by arcsin((n - 1) tan α), which
+  is the same whichever side the light comes from. The mask is 1 % off at α = 11° and 10 % at 30°;
+- total reflection: beyond 41.8° no light leaves, while the mask goes on to 63°. A lens made of one relief ends there,
+  at NA = 0.45; the mask has no such limit;
+- Fresnel reflection: 4 % at normal incidence, 10 % at 36°, 25 % at 40°. No PSF here includes it;
+- thickness: rays bend at the surface, not in the plane. A relief whose mask is an ideal lens is not an ideal lens
+  itself. Its Strehl ratio falls below 0.8 at NA = 1.16 (λ/f)^¼, 0.25 for f = 240 µm; and the focus spreads along the
+  axis by many depths of field;
+- neighbours: a sinusoidal corrugation starts to reflect totally where its depth is 0.28 of its period. From 0.30 on,
+  some rays that have left meet the next ridge.
 
-rhabdom uses the mask throughout, and says so here. Slopes below 10° and lenses below NA = 1.16 (λ/f)^¼ are safe.
+rhabdom uses the mask throughout. Slopes below 10° and lenses below NA = 1.16 (λ/f)^¼ are safe.
 
     python -m validation.B5_thin_element [--out DIR] [--docs DIR]
 """

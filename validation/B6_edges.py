@@ -1,16 +1,16 @@
 """B6: the edges of the domain: a closed form, or one line that says what is wrong
 
-Every row asks for something at the edge of what makes sense, and states what must come: a value known in closed form,
-met to the tolerance given, or an error that names the argument, its value and the valid range. Nothing else may
-happen: no NaN, no warning that scrolls by, no picture of noise.
+Every row asks for something at the edge of what makes sense, and states what must come. Either a value known in
+closed form is met to the tolerance given, or an error names the argument, its value and the valid range. Nothing else
+may happen: no NaN, no warning that scrolls by, no picture of noise.
 
-What works: pupils far below the wavelength (Rayleigh-Sommerfeld's cos²θ lobe), a relief of the medium's index, a DOE
+These work: pupils far below the wavelength (Rayleigh-Sommerfeld's cos²θ lobe), a relief of the medium's index, a DOE
 of one pixel (a plate: no change), a source in the focal plane (collimated: the bare aperture's shadow), a window of
 one sample, windows far off the axis, sources at grazing incidence, a plane at distance 0 in `optics.propagate`.
 
-What does not: lengths of 0, NaN or beyond 1e±15 m, wavelengths outside the colour tables (360 to 780 nm) or where a
-dispersion curve falls below 1, more digits than the dtype has, windows so close that light reaches them at grazing
-angles only, more samples than 4096 across. The last three are an `AccuracyError`, which is a `ValueError`.
+These are refused: lengths of 0, NaN or beyond 1e±15 m, wavelengths outside the colour tables (360 to 780 nm) or where
+a dispersion curve falls below 1, more digits than the dtype has, windows so close that light reaches them at grazing
+angles only, more samples than 4096 across. The last three raise an `AccuracyError`, which is a `ValueError`.
 
     python -m validation.B6_edges [--out DIR] [--docs DIR]
 """

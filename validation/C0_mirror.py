@@ -1,16 +1,16 @@
 """C0: the mirror against MuJoCo's own renderer, on models that others made
 
-Every model is put into five random poses, and each pose is seen twice: from a random direction, and by one of the
-model's own cameras, if it has one (fixed or tracking). For each picture, the geom seen through every pixel's
-centre is compared with MuJoCo's segmentation renderer, and the depth of the pixels that agree with MuJoCo's ray caster
-(its renderer draws round things as polygons, here of 96 slices; the ray caster knows their exact shapes).
+Every model is put into five random poses. Each pose is seen twice: from a random direction, and by one of the model's
+own cameras, if it has one (fixed or tracking). In each picture, the geom seen through the centre of every pixel is
+compared with MuJoCo's segmentation renderer. Where they agree, depth is compared with MuJoCo's ray caster. (The
+renderer draws round things as polygons, here of 96 slices; the ray caster knows their exact shapes.)
 
-The bars: at least 99.5 % of the pixels of every model show the same geom, and of those at least 99.9 % have the same
-depth to 1e-3; the rest are pixels at the limb of what the mirror tessellates. What a model has that its mirror lacks
-is named by the mirror, and counted here in words.
+Bounds: at least 99.5 % of the pixels of every model show the same geom, and of those at least 99.9 % have the same
+depth to 1e-3. The rest are pixels at the limb of what the mirror tessellates. The mirror names what a model has that
+it lacks, and the last column counts these in words.
 
-Models come from dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium, those that
-compile by themselves. They are no part of rhabdom: `pip install 'rhabdom[validation]'`, or, where pins conflict,
+The models are those in dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium that
+compile by themselves. They are not part of rhabdom: `pip install 'rhabdom[validation]'`, or, where pins conflict,
 `pip install --no-deps --target DIR dm_control gymnasium-robotics` and DIR in PYTHONPATH.
 
     python -m validation.C0_mirror [--only WORD] [--out DIR] [--docs DIR]

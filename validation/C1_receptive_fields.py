@@ -1,17 +1,18 @@
 """C1: receptive fields sampled by rays, against the padded-image convolution
 
-Behind a pupil, all receptors of an eye share one set of rays, drawn from the mixture of their receptive fields, and a
-receptor's signal is a weighted sum. The reference is the published way: a picture of the tangent plane, wider than the
-retina by the kernel's reach, convolved with the PSF (`Eye.see`). Its cells are another grid than the one on which the
-rays' fields are tabulated, each with many rays of its own, of the same light, so that what remains is the sampling's.
+Behind a pupil, all receptors of an eye share one set of rays, drawn from the mixture of their receptive fields, and
+the signal of a receptor is a weighted sum. The reference is the published way: a picture of the tangent plane, wider
+than the retina by the reach of the kernel, convolved with the PSF (`Eye.see`). Its cells are another grid than the
+one on which the fields of the rays are tabulated, and each has many rays of its own. The light is the same, so only
+the sampling differs.
 
-Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection world,
-in units of the receptors' noise, σ = 0.01 of what white is worth behind a wide-open pupil. Pupils: none (the perfect
-lens), a pinhole (a = 0.04 of the retina's width), open without a lens, a relief drawn at random, a lens in focus
-(a = 0.25). The last column is what `rays_per_receptor = "auto"` takes and how far it is off; it is bound to be
-below half of the noise. It takes 24 states to see that for the perfect lens, whose errors differ much between views,
-and 4 behind pupils. Errors are bound to fall at least like n^-0.5, as of independent rays, down to the 0.01 σ that two
-tables of one PSF may differ by; no slope is given where less than three errors are above that.
+Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection
+world. They are in units of the receptors' noise, σ = 0.01 of the signal of white behind a wide-open pupil. The pupils
+are: none (the perfect lens), a pinhole (a = 0.04 of the retina's width), open without a lens, a relief drawn at
+random, and a lens in focus (a = 0.25). The last column is what `rays_per_receptor = "auto"` takes and how far it is
+off; the bound is half of the noise. The perfect lens needs 24 states to show that, because its errors differ much
+between views; pupils need 4. Errors must fall at least like n^-0.5, as with independent rays, down to the 0.01 σ by
+which two tables of one PSF may differ. No slope is given where fewer than three errors are above that.
 
     python -m validation.C1_receptive_fields [--out DIR] [--docs DIR]
 """

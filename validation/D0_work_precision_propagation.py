@@ -1,9 +1,9 @@
-"""D0: error against time of `optics.psf` beside other diffraction codes, on ideal lenses and a near-field aperture.
+"""D0: error against time of `optics.psf` and other diffraction codes, on ideal lenses and a near-field aperture.
 
-Exact is the first Rayleigh-Sommerfeld integral. A peer starts from a sampled field, prepares what it can before the
-clock starts, and its overall scale is fitted; ours starts from radius and focal length, and is taken as it comes.
-Without --peers they are the points stored with their date and machine, and the goals, which are ratios of times, are
-only indicative.
+The reference is the first Rayleigh-Sommerfeld integral. A peer starts from a sampled field, prepares what it can before
+the clock starts, and its overall scale is fitted. Ours starts from radius and focal length, and is not fitted. Without
+--peers the peers' points are the stored ones, with their date and machine. The goals are ratios of times, so they are
+then only indicative.
 
     python -m validation.D0_work_precision_propagation [--peers [PEER ...] [--write]] [--rounds N] [--cases f/2 ...]
 

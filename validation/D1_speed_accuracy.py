@@ -1,21 +1,21 @@
 """D1: speed against accuracy of what agents see
 
-Every way to render a world for its agents' eyes, by its error and its speed. The error is the root mean square, over
-receptors, channels, eyes and states that agents got into, of the difference to a reference: Mitsuba's path tracer in 8
-bands, then the convolution `Eye.see`; it is in units of the photoreceptors' noise, σ = 0.01. Errors below σ/2 are
-little beside the noise of one receptor (one that many receptors share could still be learnt). Speed is agent-steps
-(all eyes of one agent, once) per second of one core's CPU time, the best of several interleaved rounds, behind the
-pupil, without physics.
+Every way to render a world for its agents' eyes is shown by its error and its speed. The error is the root mean
+square difference from a reference, over receptors, channels, eyes and states that agents got into. The reference is
+Mitsuba's path tracer in 8 bands, followed by the convolution `Eye.see`. Errors are in units of the photoreceptors'
+noise, σ = 0.01. Errors below σ/2 are small compared with the noise of one receptor (but an agent could still learn
+one that many receptors share). Speed is agent-steps (all eyes of one agent, once) per second of one core's CPU time,
+the best of several interleaved rounds, behind the pupil, without physics.
 
 The eyes are those of the published experiments, behind lenses in focus. Levels: back end (closed form, Mitsuba's ray
-tracing in the batched renderer, the reference renderer with few samples), rays per receptor, bands, light (direct; with
-one bounce, light that is reflected twice; paths of any length), depth layers. All of it is float32, the only arithmetic
-that Mitsuba's spectral variants are built with, so that there is no level to choose.
+tracing in the batched renderer, the reference renderer with few samples), rays per receptor, bands, light (direct;
+with one bounce, light that is reflected twice; paths of any length), depth layers. Everything is float32, the only
+arithmetic that Mitsuba's spectral variants are built with, so precision is not a level.
 
-"auto" is what `choose_fidelity` picks by itself, bands included. It is bound to be as exact as it promises, σ/2 (and
-what the reference's own noise adds), beside path-traced light; and to be on the Pareto front, or within 20 % of the
-speed that the front has at its error. It was tuned on none of these worlds. The table also tells the error beside the
-same light rendered to the end, where rays and bands are all that is missing.
+"auto" is what `choose_fidelity` picks by itself, bands included. Compared with path-traced light, its error must not
+exceed the promised σ/2 (plus the noise of the reference). It must also be on the Pareto front, or within 20 % of the
+speed that the front has at its error. It was tuned on none of these worlds. The last column is the error against the
+same light rendered to the end, where only rays and bands are missing.
 
     python -m validation.D1_speed_accuracy [--out DIR] [--docs DIR] [--scenes N]
 """

@@ -1,28 +1,29 @@
 """E0: what is learnt, how soon, and with which settings
 
-Detection is solved if the goal comes first in 80 % of the episodes; one that reaches objects without telling them apart
-finds it first in a third. Every row is a training with `evolve.learning.ppo` in sim's worlds, watched every 50,000
-steps: 100 episodes of the policy as it is, without exploration, in worlds it never saw. CPU seconds are those of one
-thread, rollouts and updates, without these evaluations; "update" is the optimiser's share of them. In brackets: the 95
-% interval of the last evaluation (Wilson). Returns are undiscounted training returns per episode.
+Detection is solved if the goal comes first in 80 % of the episodes. An agent that reaches objects without telling
+them apart finds it first in a third. Every row is a training with `evolve.learning.ppo` in sim's worlds. Every 50,000
+steps 100 episodes test the policy as it is, without exploration, in worlds that it never saw. CPU seconds are those
+of one thread for rollouts and updates, without these tests; "update" is the share of the updates. In brackets: the 95
+% confidence interval of the last test (Wilson). Returns are undiscounted training returns per episode.
 
-One receptor stays at chance: where it reaches something at all, that is the goal in one of three cases. Eyes of many
-receptors are sampled with one ray for each (in navigation 4), the lone receptor with 96.
+One receptor stays at chance: where it reaches an object at all, that is the goal in one of three cases. Eyes of many
+receptors are sampled with one ray per receptor (in navigation 4), the single receptor with 96.
 
-In navigation the goal is not reached within such budgets; what counts is how far an episode ends from its start, and
-what it earned: 0.25 per metre, less 1 for every action in contact with a wall; as fitness, 1.5 and 2. Standing still
-earns 0, and one eye learns to do little else. Ten eyes travel, further than a controller written by hand that knows the
-walls' true distances in eleven directions and steers to where it is widest (21.8 m at 1.5 m/s with 2.6 actions in
-contact, a return of 2.8 ± 0.9; 25.6 m and -14 at 5 m/s). Their return is about 0, since every action in contact costs
-as much as four metres earn; their fitness, which they are selected by, is not. Means with 95 % intervals, that of the
-fitness an upper bound.
+In navigation the goal is not reached within such budgets. There the table gives how far an episode ends from its
+start, and what it earned: 0.25 per metre, minus 1 for every action in contact with a wall; as fitness, 1.5 and 2.
+Standing still earns 0, and an animal with one eye learns little more than that. Animals with ten eyes travel. They
+get farther than a hand-written controller that knows the true distances of the walls in eleven directions and steers
+to where it is widest (21.8 m at 1.5 m/s with 2.6 actions in contact, a return of 2.8 ± 0.9; 25.6 m and -14 at 5 m/s).
+Their return is about 0, because every action in contact costs as much as four metres earn. Their fitness, by which
+they are selected, is above 0. Means have 95 % confidence intervals; that of the fitness is an upper bound.
 
-Settings are the task's defaults but for those named. "With tanh" are trainings with what the defaults were before: 64
-worlds x 64 steps, 4 epochs, a learning rate of 1e-3 that never fell, tanh, mini-batches of stretches of 32 steps (that
-of detection the last commit with them). Now it is 128 x 32, 10 epochs, 3e-3 falling as one over the steps after 75,000
-(in mazes 200,000), leaky rectifiers, stretches of 8. What else was tried is in `docs/measurements/learning.md`. A row
-of few steps is a training that was stopped there, not one that learnt so fast. Whatever is called "with tanh" but
-detection is older than the bounds on means of actions; in the maze contact then had its full price after 500,000 steps.
+Settings are the defaults of the task except for those named. "With tanh" are trainings with the earlier defaults: 64
+worlds x 64 steps, 4 epochs, a constant learning rate of 1e-3, tanh, mini-batches of stretches of 32 steps (the one of
+detection is from the last commit with them). Now it is 128 x 32, 10 epochs, 3e-3 falling as one over the steps after
+75,000 (in mazes 200,000), leaky rectifiers, stretches of 8. `docs/measurements/learning.md` lists what else was tried.
+A row of few steps is a training that was stopped there, not one that learnt so fast. All trainings "with tanh" except
+detection are older than the bounds on means of actions; in the maze contact then had its full price after 500,000
+steps.
 
 Trainings are stored (`docs/validation/data/E0.csv`), because they take minutes each; the page comes from the store.
 

@@ -1,19 +1,19 @@
 """E1: goal and adversary are equally bright to one receptor
 
-The kinds of objects in detection and tracking differ in the direction of their stripes alone. Light comes from above,
-so that level bands of equal width would make adversaries brighter or darker than goals, and one photoreceptor could
-tell them apart. The bands' edges are fitted, by least squares, to take that difference away: over all directions and
-distances from which an eye of 45° sees (nearly) all of an object, while the bands stay near 30°, as wide as a goal's
-sectors. The two lowest edges can hardly be seen and are not fitted.
+The kinds of objects in detection and tracking differ only in the direction of their stripes. Light comes from above,
+so level bands of equal width would make adversaries brighter or darker than goals, and one photoreceptor could tell
+them apart. The edges of the bands are therefore fitted by least squares to remove that difference, over all
+directions and distances from which an eye of 45° sees (nearly) all of an object. The bands stay near 30°, as wide as
+a goal's sectors. The two lowest edges can hardly be seen and are not fitted.
 
-The table: adversary less goal, in units of the receptors' noise (a standard deviation of 0.01), as one receptor that
-looks straight ahead sees them; mean and root mean square over 24 directions. Here rays are cast at one lit sphere,
-without the renderer; `tests/sim/worlds/test_balance.py` holds the renderer to the same.
+The table gives adversary minus goal, in units of the receptors' noise (a standard deviation of 0.01), as seen by one
+receptor that looks straight ahead; mean and root mean square over 24 directions. Rays are cast here at one lit
+sphere, without the renderer; `tests/sim/worlds/test_balance.py` compares the renderer with the same.
 
-Bounds, from 2 m on: the mean difference is below a fifth of the noise, and at most a tenth of it worse than with the
-fitted edges (which may shift by some degrees together: the shipped ones were rounded from such a fit). Nearer than 2 m
-an eye misses the top of an object, and the difference grows to several times the noise; but so does the difference
-between the light's side and the other of either kind.
+Bounds, from 2 m on: the mean difference is below a fifth of the noise, and at most a tenth of the noise worse than
+with the fitted edges. (All edges may shift by some degrees together; the shipped ones were rounded from such a fit.)
+Nearer than 2 m an eye misses the top of an object, and the difference grows to several times the noise. But so does
+the difference between the lit side and the other side of either kind.
 
     python -m validation.E1_balance [--out DIR] [--docs DIR]
 """

@@ -1,23 +1,24 @@
 """E2: does little training tell who will be good?
 
-Budget ladders (`search.rungs`, `evolve.search.successive_halving`) train all of a generation a little and only the
-better part on. That saves time only if the order after little training is the order after a whole one. Here animals
-drawn from the genome, one to four eyes with 1 x 1 to 15 x 15 receptors behind a perfect lens, learn detection up a
-ladder of four rungs, none held back, as a run would train them; the table compares their order on each rung with that
-on the last (Spearman's rank correlation, and its 90 % interval by bootstrap over animals).
+Budget ladders (`search.rungs`, `evolve.search.successive_halving`) train the whole generation a little and only the
+better part on. That saves time only if the order after little training is the order after all of it. Here animals are
+drawn from the genome, with one to four eyes of 1 x 1 to 15 x 15 receptors behind a perfect lens. They learn detection
+up a ladder of four rungs as a run would train them, except that none is held back. The table compares their order on
+each rung with that on the last (Spearman's rank correlation, and its 90 % confidence interval from a bootstrap over
+animals).
 
-"32 episodes" is what a run sees: each rung's fitness by its own evaluation episodes. "128 episodes" measures each
-rung's policy longer, in other worlds; the last line compares the last rung's own two measurements.
+"32 episodes" is what a run sees: the fitness on each rung, from its own evaluation episodes. "128 episodes" measures
+the policy of each rung longer, in other worlds; the last line compares the two measurements on the last rung.
 
-Ladders: what halving (or quartering) these animals as one generation would have cost in CPU seconds, against training
-all of them to the end; and which place, in the order of the last rung by 128 episodes, the animal has that it declares
-the best.
+The second table gives what halving (or quartering) these animals as one generation would have cost in CPU seconds,
+relative to training all of them to the end. It also gives the place, in the order of the last rung by 128 episodes,
+of the animal that the ladder declares the best.
 
-What was found: half of the training foretold the whole one (0.86). Of less, 16 animals tell nothing clear: an eighth
-fared better (0.64) than a quarter (-0.33), and the interval of neither is narrow. A ladder of two rungs saves a fifth
-of the time; lower rungs save more and may lose the best. Ladders are off unless asked for. Thirty-two episodes measure
-fitness well enough (0.99 with what 128 find). With six, and the learner of that time, which had not learnt the task by
-the end, a fitness said nothing of what 48 episodes found (0.02).
+Result: half of the training predicted the result of the whole (0.86). Less training predicted little; 16 animals are
+too few to say more: an eighth did better (0.64) than a quarter (-0.33), and neither interval is narrow. A ladder of
+two rungs saves a fifth of the time; lower rungs save more and may lose the best. Ladders are off by default.
+Thirty-two episodes measure fitness well enough (0.99 with the result of 128). Fitness from six episodes, of an
+earlier learner that had not learnt the task by the end, predicted nothing about the result of 48 episodes (0.02).
 
 Trainings are stored (`docs/validation/data/E2.csv`), because they take minutes each; the page comes from the store.
 
@@ -129,7 +130,7 @@ def climbed(number: int, animal: Phenotype) -> list[Row]:
         ends = budgets(run.search, run.learning)
         for rung in range(RUNGS):
             began = time.process_time()
-            outcome = evaluate(animal, run, number, policy, stage=TrainingStage(ends[: rung + 1], kept[: rung + 1]))
+            outcome = evaluate(animal, run, number, policy, stretch=TrainingStage(ends[: rung + 1], kept[: rung + 1]))
             spent = time.process_time() - began
             if outcome.failure is not None:
                 raise RuntimeError(f"animal {number}: {outcome.failure}")
@@ -202,8 +203,8 @@ class Halving:
 
 
 def halving(rows: Sequence[Row], rungs: int, share: float, by: str = "fitness") -> Halving:
-    """Where budgets of the ladder are stored ones: the share that goes on is 1/2, or 1/4 with every other rung. `by` is
-    what decides who goes on: "fitness" or "fitness_many"."""
+    """A ladder whose budgets are stored ones: the share that goes on is 1/2, or 1/4 with every other rung. `by` decides
+    who goes on: "fitness" or "fitness_many"."""
     fitness, many, spent = (columns(rows, name) for name in (by, "fitness_many", "cpu_seconds"))
     search = replace(SearchConfig(), population=len(fitness), rungs=rungs, promoted=share)
     stride = round(-np.log2(share))

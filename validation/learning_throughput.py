@@ -1,11 +1,11 @@
-"""How fast agents learn: PPO training, environment and optimiser together, beside MuJoCo's renderer merely drawing.
+"""How fast agents learn: PPO training with environment and optimiser, against MuJoCo's renderer that only draws.
 
     python -m validation.learning_throughput [--steps 24576] [--json]
 
-Agent-steps per second of the whole machine: as many trainings side by side as it has cores, as an evolution has them,
-each in a process with one thread of its own (after a training to warm up; rollouts and updates, without evaluations);
-and of `mujoco.Renderer` drawing the same eyes of one world without shadows, in the same run. Settings of learning are
-the task's defaults. A training's bar holds for one remembered frame and a perfect lens.
+Agent-steps per second of the whole machine: as in an evolution, as many trainings run in parallel as there are cores,
+each in a process with one thread (after a training to warm up; rollouts and updates, without evaluations). In the same
+run `mujoco.Renderer` draws the same eyes of one world without shadows. Settings of learning are the defaults of the
+task. The bound on training holds for one remembered frame and a perfect lens.
 """
 
 from __future__ import annotations

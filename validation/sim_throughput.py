@@ -1,4 +1,4 @@
-"""How fast agents see: the batched renderer and environment beside MuJoCo's own renderer, in one process.
+"""How fast agents see: the batched renderer and environment against MuJoCo's own renderer, in one process.
 
     python -m validation.sim_throughput --json
 
@@ -64,8 +64,8 @@ BARS = {
     "detection": {"render_optics": 18.0, "step": 14.0},
 }
 OVERHEAD = 0.15
-# A loop of steps beside a loop of their parts, each with the caches that it leaves itself, so short that the machine is
-# the same for both.
+# Steps of a loop of steps, and of a loop of their parts right after it: each with caches warmed by its own previous
+# pass, and so short that the machine is in the same state for both.
 BLOCK = 8
 WARM_UP = 3  # calls
 SETTLED = 256  # steps: an episode. Before, physics meets walls for the first time, and makes models of them

@@ -58,8 +58,8 @@ def fitness_section(run: Run) -> str:
         f"<b>Fitness over generations.</b> {KEY.format('accent')} best so far and, pale, the 95 % bootstrap interval "
         f"of its mean return; {POPULATION}; a dot per candidate, "
         f'<span class="vermillion">×</span> failed. Fitness is the mean return of {run.config.evaluation.episodes} '
-        "evaluation episodes after training; that of the best of many owes part of its height to luck, which the "
-        "interval does not know."
+        "evaluation episodes after training. The best of many candidates is partly best by chance (selection bias); "
+        "the interval does not include that."
     )
     figures = figure(fitness_figure(rows, run.candidates), caption)
     caption = (
@@ -125,9 +125,9 @@ def _acuity(run: Run) -> str:
 
 def _relief(run: Run, genes: list[Gene]) -> str:
     paths = {g.name: trajectory(run.candidates, lambda p, name=g.name: gene_values(p)[name]) for g in genes}  # type: ignore[misc]
-    left_out = "Frozen genes" + (", and what mirrors others," if run.config.eye.relief_symmetric else "")
+    left_out = "Frozen genes" + (", and genes that mirror others," if run.config.eye.relief_symmetric else "")
     caption = (
-        f"<b>{genes[0].name} … {genes[-1].name}</b>: the relief, each panel where its gene lies over the pupil "
+        f"<b>{genes[0].name} … {genes[-1].name}</b>: the relief, with each panel where its gene lies over the pupil "
         f"(x to the right, y up). {left_out} are left out."
     )
     return f'<div class="wide">{figure(relief_figure(paths), caption)}</div>\n'

@@ -170,8 +170,8 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float) -> st
     width = 2 * problem.window.half_width
     if not found and problem.pixelated is not None:
         return (
-            "a relief of pixels jumps, which asks for nodes fitted to them, and not too many: this cannot be; ask for "
-            f"method='auto' or one of {', '.join(FOR_PIXELS)}"
+            "this method cannot sample a pixelated relief within its limits; ask for method='auto' or one of "
+            f"{', '.join(FOR_PIXELS)}"
         )
     if not found:
         return (

@@ -1,4 +1,4 @@
-"""What luck makes of a search, and what a run is held against."""
+"""The null model of a search, and the p of runs under it."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 from evolve.config.assemble import assemble
 from experiments.candidates import Row
 from experiments.drift import Drift, drifted, of_the_end
-from experiments.evolved import Conduct, Store, luck_table
+from experiments.evolved import Conduct, Store, null_table
 from experiments.store import Origin
 
 SEARCHES = 60
@@ -21,7 +21,7 @@ def few_searches(monkeypatch):
 ROW = Row(*("a", 0, 0, 0, 0, 0, 1.0, 0.5, 4, 2, 60.0, 45.0, 8, 8, 0.1, 5, 64, 1000))
 
 
-def test_chance_moves_genes_that_are_open_and_no_others():
+def test_random_fitness_moves_genes_that_are_open_and_no_others():
     config = assemble("navigation", "bifurcation-navigation", assignments=("search.generations=6",))
     quantities = {"fov": lambda row: row.fov_deg, "up": lambda row: row.height, "fitness": lambda row: row.fitness}
     drift = drifted(config, "navigation", quantities, 4)
@@ -56,24 +56,24 @@ def test_p_counts_searches_that_came_as_far_on_either_side():
     assert end.p(5.0) == end.p(95.0) == pytest.approx(2 * 6 / 100)
 
 
-def test_runs_that_agree_are_less_like_luck_than_one():
-    """Uniform luck in [0, 1]: of two means of it, the p is that of a triangle's corner, 2 x 2 m² for a mean m."""
+def test_runs_that_agree_have_a_smaller_p_than_one():
+    """A null model uniform in [0, 1]: the mean of two draws is triangular, and a mean m has p = 2 x 2 m²."""
     end = Drift("a", "x", 5, 0.0, 0.5, 1.0, " ".join(f"{(i + 0.5) / 1000:.4f}" for i in range(1000)))
     assert end.p(0.1, 0.1) == pytest.approx(4 * 0.1**2, rel=0.15), "three standard errors of so many draws"
     assert end.p(0.1) == pytest.approx(2 * 0.1, rel=0.02)
-    assert end.p(0.05, 0.95) == pytest.approx(1.0, abs=0.03), "runs that part are like luck together"
-    assert end.p(-1.0, -1.0) == pytest.approx(2 / 1001), "no surer than so many searches make it"
+    assert end.p(0.05, 0.95) == pytest.approx(1.0, abs=0.03), "runs that part cancel each other"
+    assert end.p(-1.0, -1.0) == pytest.approx(2 / 1001), "no smaller than so many searches allow"
 
 
-def test_runs_are_held_against_luck_where_it_was_computed():
-    """The run that went further has its p; one that stopped before would be held against more drift than it had."""
+def test_runs_are_compared_where_the_null_model_was_computed():
+    """The run that went further has its p; one that stopped earlier would be compared with more drift than it had."""
     rows = [
         replace(ROW, seed=seed, generation=g, fov_deg=10.0) for seed, last in ((0, 5), (1, 3)) for g in range(last + 1)
     ]
     conduct = [Conduct("a", seed, 6, n, 6, 1.0, "", 0.01, 1e-4) for seed, n in ((0, 6), (1, 4))]
     drift = [Drift("a", "fov", 5, 20.0, 45.0, 80.0, "20 45 80"), Drift("a", "fov", 5, 20.0, 45.0, 80.0)]
     store = Store(rows, conduct, drift, Origin.here(1.0), "")
-    table = luck_table(store, {"fov": lambda row: row.fov_deg}).splitlines()
+    table = null_table(store, {"fov": lambda row: row.fov_deg}).splitlines()
     assert table[2:] == ["| a, seed 0 | 0.5 |", "| a, seed 1 | - |", "| a, 2 seeds together | - |"]
     both = replace(store, rows=[replace(row, seed=seed) for row in rows if row.seed == 0 for seed in (0, 1)])
-    assert luck_table(both, {"fov": lambda row: row.fov_deg}).splitlines()[-1] == "| a, 2 seeds together | 0.5 |"
+    assert null_table(both, {"fov": lambda row: row.fov_deg}).splitlines()[-1] == "| a, 2 seeds together | 0.5 |"

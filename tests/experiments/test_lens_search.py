@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import experiments.lens_search as lens_search
-from experiments.lens_search import RELIEF_HEIGHT, Row, gradient, loss, searched, strehl
-from experiments.lens_search_page import found_after, page
+import experiments.lens_optimizers as lens_optimizers
+from experiments.lens_optimizers import RELIEF_HEIGHT, Row, gradient, loss, searched, strehl
+from experiments.lens_search import found_after, page
 from experiments.store import Origin, read_rows
 from optics import BSplineRelief
 from optics.numerics import backend
@@ -22,7 +22,7 @@ def dr_jit():
 
 def blurred():
     """Genes of a lens of 0.8 times the power it should have."""
-    points = BSplineRelief.paraboloid(0.0, 0.8 / (0.5 * lens_search.RETINA), lens_search.RADIUS).control_points
+    points = BSplineRelief.paraboloid(0.0, 0.8 / (0.5 * lens_optimizers.RETINA), lens_optimizers.RADIUS).control_points
     return np.append(points.ravel() / RELIEF_HEIGHT + 0.8, 0.5)
 
 
@@ -40,11 +40,11 @@ def test_gradient_is_that_of_the_loss(spot):
 
 @pytest.mark.parametrize("method", ["gradient, shrinking spot", "CMA-ES, Strehl ratio"])
 def test_searches_begin_at_the_start_and_improve(method, monkeypatch):
-    monkeypatch.setattr(lens_search, "start", lambda seed: blurred())
-    monkeypatch.setattr(lens_search, "GENERATIONS", 3)
-    monkeypatch.setattr(lens_search, "STEP", 0.01)
-    monkeypatch.setattr(lens_search, "MOST_GRADIENTS", 30)
-    monkeypatch.setattr(lens_search, "RECORDED", (1, 8))
+    monkeypatch.setattr(lens_optimizers, "start", lambda seed: blurred())
+    monkeypatch.setattr(lens_optimizers, "GENERATIONS", 3)
+    monkeypatch.setattr(lens_optimizers, "STEP", 0.01)
+    monkeypatch.setattr(lens_optimizers, "MOST_GRADIENTS", 30)
+    monkeypatch.setattr(lens_optimizers, "RECORDED", (1, 8))
     rows = searched(method, 0)
     assert [row.evaluations for row in rows[:2]] == [1, 8]
     assert rows[-1].strehl > 1.5 * strehl(blurred())

@@ -172,4 +172,4 @@ def test_symmetric_reliefs_are_reported_by_the_genes_that_they_have(tmp_path):
     genes = {row[0]: row[2] for row in Page(best_genes(run, run.best)).rows["genes-of-the-best"][1:]}
     assert [name for name in genes if name.startswith("doe_")] == ["doe_00 … doe_01", "doe_11"]
     text = Page(genes_section(run)).texts["all"]
-    assert "Frozen genes, and what mirrors others, are left out." in text
+    assert "Frozen genes, and genes that mirror others, are left out." in text
