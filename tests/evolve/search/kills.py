@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 
 from evolve.search.loop import evolve
 from evolve.search.search import Search
+from evolve.search.successive_halving import finished
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
@@ -100,10 +101,10 @@ def begun(log):
 
 def endure(kills, seed, folder):
     """Runs that are killed `kills` times in all; asserts what a week-long run relies on. Returns runs finished."""
-    chance, done, finished = random.Random(seed), 0, 0
+    chance, done, runs = random.Random(seed), 0, 0
     while done < kills:
-        config = tiny(f"seed={finished}", *KINDS[finished % len(KINDS)])
-        whole, path = folder / f"whole-{finished}", folder / f"run-{finished}"
+        config = tiny(f"seed={runs}", *KINDS[runs % len(KINDS)])
+        whole, path = folder / f"whole-{runs}", folder / f"run-{runs}"
         began = time.monotonic()
         assert not child_killed_after(60.0, whole, config)
         longest = 0.7 * (time.monotonic() - began)
@@ -123,8 +124,8 @@ def endure(kills, seed, folder):
         places = (path, path / "policies", path / "trainings")
         left = [entry.name for place in places if place.exists() for entry in place.glob(".*")]
         assert not left, f"files half written are left: {left}"
-        done, finished = done + deaths, finished + 1
-    return finished
+        done, runs = done + deaths, runs + 1
+    return runs
 
 
 def main(kills, seed=None):
@@ -133,8 +134,8 @@ def main(kills, seed=None):
     print(f"seed {seed}", flush=True)
     with TemporaryDirectory() as folder:
         os.environ["RHABDOM_TEST"] = folder
-        finished = endure(kills, seed, Path(folder))
-    print(f"{kills} kills at least, {finished} runs finished as if nothing had happened")
+        runs = endure(kills, seed, Path(folder))
+    print(f"{kills} kills at least, {runs} runs finished as if nothing had happened")
 
 
 if __name__ == "__main__":
