@@ -17,7 +17,7 @@ from evolve.search.worker import evaluate_candidate, prepare_device
 
 __all__ = ["Pace", "measure_pace"]
 
-ROLLOUTS = 4  # that a short life learns from; an evaluation after the second and the fourth
+ROLLOUTS = 4  # chosen, the fewest that tell start, step and evaluation apart; evaluations follow the second and fourth
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,9 @@ from evolve.store.evaluation import Evaluation
 
 __all__ = ["RunPlan"]
 
-REPORT_BYTES = 5_000_000  # report and replay pages together
-EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60  # of the episode that is exported: see evolve.analysis.episode
+REPORT_BYTES = 5_000_000  # chosen: an allowance for pages; the report of eight candidates has 0.6 MB (`evolve report`)
+# The exported episode as evolve.analysis.episode records it, which would load torch; tests hold these to it.
+EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,18 @@
 """The plan: what it counts, and what it predicts from a pace."""
 
+import inspect
 import json
 from dataclasses import replace
 
 import pytest
 
 import evolve.cli.run_plan
+from evolve.analysis.episode import FINE_PIXELS, record
 from evolve.cli.main import main
 from evolve.cli.pace import Pace
 from evolve.cli.run_plan import RunPlan
 from evolve.config.assemble import assemble
+from sim.envs.simulation import EPISODE_STEPS
 
 PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
 
@@ -54,6 +57,13 @@ def test_successive_halving_costs_what_its_stages_cost(tmp_path, paced):
     assert plan.hours["start"] == pytest.approx(10 * (2 * first + 1 * second) / 3600), "6 and 2 on 4 workers"
     assert plan.record()["steps"] == 10 * (6 * 25_000 + 2 * 75_000)
     assert "budget stages  6 to 25,000 steps, 2 to 100,000 steps" in "\n".join(plan.lines())
+
+
+def test_the_exported_episode_is_the_recorded_one():
+    planned = evolve.cli.run_plan
+    assert planned.EPISODE_ACTIONS == EPISODE_STEPS
+    assert inspect.signature(record).parameters["radiance_every"].default == planned.EXR_EVERY
+    assert planned.EXR_PIXELS == FINE_PIXELS
 
 
 def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, monkeypatch):
