@@ -86,6 +86,11 @@ class Aperture(ABC):
         """Whether the aperture is the same seen from every side."""
 
     @property
+    def inner_radius(self) -> float:
+        """Of a rotationally symmetric aperture: the radius of the disk about the axis that is closed, in R."""
+        return 0.0
+
+    @property
     @abstractmethod
     def half_widths(self) -> tuple[float, float]:
         """Half the width and height of the smallest centred rectangle that holds the aperture."""

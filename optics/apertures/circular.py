@@ -73,6 +73,10 @@ class Annulus(Aperture):
         return True
 
     @property
+    def inner_radius(self) -> float:
+        return self.inner
+
+    @property
     def half_widths(self) -> tuple[float, float]:
         return 1.0, 1.0
 

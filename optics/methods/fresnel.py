@@ -34,6 +34,7 @@ class ParaxialSampling:
     pupil: Grid
     seconds: float
     model_error: float
+    padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""

@@ -34,6 +34,7 @@ class RaySampling:
     model_error: float
     seconds: float
     method: str = "geometric"
+    padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
         """Power per area over the window for unit intensity at the pupil, a flat Dr.Jit array."""
@@ -69,6 +70,7 @@ class PinholeSampling:
     method: str = "pinhole"
     samples: tuple[int, int] = (1, 1)
     largest: int = 1
+    padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
         """Power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.

@@ -42,6 +42,7 @@ class HankelSampling:
     seconds: float
     method: str = "hankel"
     model_error: float = 0.0
+    padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
@@ -95,7 +96,7 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
     import drjit as dr
 
     nodes, weights = gauss_legendre(how.radii)
-    inner = getattr(problem.aperture, "inner", 0.0)
+    inner = problem.aperture.inner_radius
     nodes, weights = inner + (1 - inner) * nodes, (1 - inner) * weights
     r = types.Float64(nodes) * opaque(types, beam.radius)
     zero = dr.zeros(types.Float64, how.radii)

@@ -37,6 +37,7 @@ class LowRankSampling:
     seconds: float
     method: str = "low_rank"
     model_error: float = 0.0
+    padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""

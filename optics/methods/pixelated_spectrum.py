@@ -36,6 +36,7 @@ class PixelSpectrum(SpectrumSampling):
     output_period: int
     seconds: float = 0.0
     model_error: float = 0.0
+    padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""

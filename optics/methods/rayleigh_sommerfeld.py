@@ -54,6 +54,7 @@ class NodeSampling:
     seconds: float
     method: str = "rayleigh_sommerfeld"
     model_error: float = 0.0
+    padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""

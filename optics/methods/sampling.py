@@ -25,6 +25,10 @@ class Sampling(Protocol):
         """(y, x) samples of the pupil, or (radial, angular) nodes, or (nodes, 1)."""
 
     @property
+    def padding(self) -> float:
+        """Period of the pupil's transform over its samples; 1 where nothing is periodic."""
+
+    @property
     def largest(self) -> int:
         """Side of the largest square array."""
 

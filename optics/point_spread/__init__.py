@@ -1,7 +1,9 @@
 """The point spread function of a pupil, and what it is worth.
 
 psf            psf, plan
+request        what is asked of a PSF
 planner        the cheapest method within the tolerance
+pictures       requests answered, and what becomes of a wrong picture
 spot_check     a picture held against the direct sum
 batch          psf_batch: many eyes at once
 image_quality  mtf, strehl_ratio, encircled_energy, image_quality

@@ -9,16 +9,15 @@ from functools import cached_property
 
 import numpy as np
 
-from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
-from optics.methods.problem import Problem
 from optics.numerics.accuracy import Plan
 from optics.numerics.arguments import shown, vacuum_wavelength
 from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.point_spread.psf import pictures
+from optics.point_spread.pictures import pictures
+from optics.point_spread.request import View
 
 __all__ = ["PSFBatch", "psf_batch"]
 
@@ -69,16 +68,15 @@ def psf_batch(
     for name, values in (("pupils", pupils), ("wavelengths", wavelengths), ("source_distances", source_distances)):
         if not isinstance(values, Sized) or len(values) == 0:
             raise ValueError(f"{name} = {shown(values)}: must be a sequence of at least one")
-    beams = [
-        Beam(pupil, PointSource(depth), vacuum_wavelength(wavelength), sensor_distance)
+    window = Grid(shape, dx)
+    views = [View(sensor_distance, PointSource(depth), window, tolerance, method, dtype) for depth in source_distances]
+    requests = [
+        view.request(pupil, vacuum_wavelength(wavelength))
         for pupil in pupils
-        for depth in source_distances
+        for view in views
         for wavelength in wavelengths
     ]
-    window = Grid(shape, dx)
-    flat, plans = zip(
-        *pictures(beams, [Problem.of(beam, window, tolerance, dtype) for beam in beams], method), strict=True
-    )
+    flat, plans = zip(*pictures(requests), strict=True)
     whole = flat[0] if len(flat) == 1 else dr.concat(flat)
     sizes = len(pupils), len(source_distances), len(wavelengths), *window.shape
     return PSFBatch(precision(dtype).Tensor(whole, sizes), window.dx, tuple(plans))

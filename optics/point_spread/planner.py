@@ -150,8 +150,7 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None],
         + ("cheapest of those that meet the tolerance" if len(weighed) > 1 else "asked for")
     )
     error = _sampling_error(problem) + best.model_error
-    padding = getattr(best, "padding", 1.0)
-    return Plan(best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), padding)
+    return Plan(best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), best.padding)
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:
