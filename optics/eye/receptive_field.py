@@ -161,8 +161,8 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
         sine = outermost / math.hypot(outermost, z) + diffracted * wavelength
         half = min(half, z * sine / math.sqrt(1 - sine * sine) - off_axis if sine < 1 else math.inf)
     band = pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.wavelength + diffracted
-    # |U|² holds the differences of the field's frequencies. At a point of the sensor, to which light comes from all over
-    # the pupil, these span 2R/(λz); and no two within the band differ by more than twice the band.
+    # |U|² holds the differences of the field's frequencies. At a point of the sensor, lit from all over the pupil,
+    # these span 2R/(λz); and no two within the band differ by more than twice the band.
     detail = min(2 * radius / (wavelength * z), 2 * band)
     finer = max(1.0, (SPLINE_TOLERANCE / retina.tolerance) ** (1 / SPLINE_ORDER))
     return _WindowNeeds(half, 1 / (SAMPLES_PER_CYCLE * finer * detail), band)

@@ -182,6 +182,6 @@ def _fourier(
     rank, xi = how.rank, how.pupil.at
     waves = np.tile(np.outer(at, xi) / (-problem.wavelength * how.scale), rank)
     weight = np.repeat(lagrange(at - middle, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
-    wheel = weight * np.exp(2j * np.pi * waves)
-    re, im = (padded_for_packets(part.astype(types.dtype)) for part in (wheel.real, wheel.imag))
-    return types.Tensor(re, wheel.shape), types.Tensor(im, wheel.shape)
+    matrix = weight * np.exp(2j * np.pi * waves)
+    re, im = (padded_for_packets(part.astype(types.dtype)) for part in (matrix.real, matrix.imag))
+    return types.Tensor(re, matrix.shape), types.Tensor(im, matrix.shape)

@@ -44,11 +44,11 @@ def _series(rounding: str) -> tuple[list[float], list[float], list[float]]:
     from scipy.special import hankel1e, j0
 
     inner, outer = TERMS[rounding]
-    wheel = np.exp(1j * pi / 4)
+    eighth_turn = np.exp(1j * pi / 4)
 
     def beyond(above: np.ndarray) -> np.ndarray:
         x = SPLIT / np.maximum(above, 1e-3)
-        return np.sqrt(pi * x / 2) * hankel1e(0, x) * wheel
+        return np.sqrt(pi * x / 2) * hankel1e(0, x) * eighth_turn
 
     return (
         _fit(lambda y: j0(SPLIT * y), inner),

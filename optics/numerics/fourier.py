@@ -55,9 +55,8 @@ def dft2(
 ) -> Field:
     """Fourier sum of a field onto `shape` samples (formula above), on a grid of the given output pitch.
 
-    centre: where the output's centre sample lies (x, y), in units of the pitch times its index (k = centre / pitch).
-
     sign: -1 forward (exp(-2πi...)), +1 inverse; neither is normalised.
+    centre: (x, y) of the output's centre sample, in the unit of `pitch`.
     """
     grid = Grid(shape, pitch, centre)
     if centre != (0.0, 0.0):
@@ -81,16 +80,23 @@ def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int)
 
 @lru_cache(maxsize=16)
 def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> np.ndarray:
-    """exp(±2πi k j / period) as a (k, j) matrix."""
-    waves = np.outer(np.arange(n_out) - n_out // 2, np.arange(n_in) - n_in // 2) / period
+    """The sum along one axis as a matrix, exp(±2πi k j / period) in row k and column j, both counted from n//2.
+
+    Whole waves are dropped before they lose digits of the rest.
+    """
+    k, j = np.arange(n_out) - n_out // 2, np.arange(n_in) - n_in // 2
+    waves = np.outer(k, j) / period
     return np.exp(2j * np.pi * sign * (waves - np.round(waves))).astype(dtype)
 
 
 def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
-    """Field times exp(2πi j·by / period), which moves the sum's centre."""
+    """The field whose sum onto samples k is that of `field` onto samples k + c: u[j] exp(±2πi j·c / period).
+
+    by: ±c, (x, y) in samples of the output; need not be whole.
+    """
     types = field.types
-    x, y = Grid(field.grid.shape, 1.0).coordinates(types)
-    waves = (x * opaque(types, by[0]) + y * opaque(types, by[1])) / opaque(types, period)
+    j_x, j_y = Grid(field.grid.shape, 1.0).coordinates(types)
+    waves = (j_x * opaque(types, by[0]) + j_y * opaque(types, by[1])) / opaque(types, period)
     return field * Field.from_waves(1.0, waves, field.grid, types)
 
 
@@ -152,22 +158,23 @@ def _fft_seconds(shape_in: tuple[int, int], period: int, shape_out: tuple[int, i
 
 
 def _fourier_matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) -> tuple[Array, Array]:
-    """cos and sin of ±2π k j / period as (k, j) tensors; the product k j loses whole periods in float64."""
-    matrix = Grid((n_out, n_in), 1.0)
-    j, k = matrix.coordinates(types)
+    """The same matrix in Dr.Jit: two tensors (k, j), real and imaginary part; a period may carry a derivative."""
+    entries = Grid((n_out, n_in), 1.0)
+    j, k = entries.coordinates(types)
     waves = j * k / opaque(types, sign * period)
-    wheel = Field.from_waves(1.0, waves, matrix, types)
-    return types.Tensor(wheel.re, matrix.shape), types.Tensor(wheel.im, matrix.shape)
+    matrix = Field.from_waves(1.0, waves, entries, types)
+    return types.Tensor(matrix.re, entries.shape), types.Tensor(matrix.im, entries.shape)
 
 
 def _matrix_dft(field: Field, period: Scalar, shape: tuple[int, int], sign: int) -> tuple[Array, Array]:
+    """A_y u A_xᵀ, one matrix per axis."""
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
     u = types.Tensor(field.re, (ny, nx)), types.Tensor(field.im, (ny, nx))
-    wheel = _fourier_matrix(types, mx, nx, period, sign)
-    u = complex_matmul(u, wheel, transposed=True)
+    along_x = along_y = _fourier_matrix(types, mx, nx, period, sign)
+    u = complex_matmul(u, along_x, transposed=True)
     if (my, ny) != (mx, nx):
-        wheel = _fourier_matrix(types, my, ny, period, sign)
-    re, im = complex_matmul(wheel, u)
+        along_y = _fourier_matrix(types, my, ny, period, sign)
+    re, im = complex_matmul(along_y, u)
     return re.array, im.array
 
 

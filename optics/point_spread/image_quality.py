@@ -61,9 +61,7 @@ class MTF:
         f = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
         angle = 2 * np.pi * (np.arange(ORIENTATIONS) + 0.5) / ORIENTATIONS
         side, waves = self.fx.size, self.tensor.shape[0]
-        places = [
-            np.outer(f, wheel) / (self.fx[1] - self.fx[0]) + side // 2 for wheel in (np.sin(angle), np.cos(angle))
-        ]
+        places = [np.outer(f, part) / (self.fx[1] - self.fx[0]) + side // 2 for part in (np.sin(angle), np.cos(angle))]
         y, x = (np.tile(place.ravel(), waves) for place in places)
         inside = (y >= 0) & (y <= side - 1) & (x >= 0) & (x <= side - 1)
         row, column = (np.clip(np.floor(place), 0, side - 2).astype(np.int64) for place in (y, x))
