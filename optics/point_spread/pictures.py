@@ -42,8 +42,8 @@ class _Attempt:
         problem, beam = request.problem, request.beam
         types = precision(problem.dtype)
         radius = opaque(types, beam.radius)
-        pupil_area = types.Float(beam.pupil.aperture.area * radius * radius)
-        return cls(request, plan, sampling, sampling.intensity(beam, problem) / pupil_area)
+        intensity = sampling.intensity(beam, problem)
+        return cls(request, plan, sampling, intensity / types.Float(beam.pupil.aperture.area * radius * radius))
 
     @property
     def approximates(self) -> bool:
