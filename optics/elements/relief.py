@@ -15,6 +15,7 @@ import numpy as np
 
 from optics.numerics.arguments import reals
 from optics.numerics.autodiff import Array, is_differentiable, plain
+from optics.numerics.interpolation import cubic_bsplines
 from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision
 
@@ -93,7 +94,7 @@ class BSplineRelief(Relief):
         points = types.Float64(
             dr.ravel(self.control_points) if is_differentiable(self.control_points) else self.control_points.ravel()
         )
-        across, along = _cubic_basis((x + 1) / 2), _cubic_basis((y + 1) / 2)
+        across, along = cubic_bsplines((x + 1) / 2), cubic_bsplines((y + 1) / 2)
         total = types.Float64(0)
         for i in range(4):
             row = types.Float64(0)
@@ -186,7 +187,7 @@ class HeightMap(Relief):
         half, shift = dr.opaque(types.Float64, n / 2), dr.opaque(types.Float64, self._margin - 0.5)
         place = position * half + half + shift
         cell = dr.clip(dr.floor(place), 1, dr.opaque(types.Float64, width - 3))
-        return types.Index(cell) - 1, _cubic_basis(place - cell)
+        return types.Index(cell) - 1, cubic_bsplines(place - cell)
 
     def bandwidth(self, level: float) -> float:
         """From the samples' spectrum. A cubic spline repeats content of frequency f around multiples of the sampling
@@ -227,12 +228,6 @@ def square_heights(samples: Any) -> np.ndarray:
         raise ValueError("height holds NaN or infinity: must be finite heights [m]")
     heights.setflags(write=False)
     return heights
-
-
-def _cubic_basis(t: Array) -> list[Array]:
-    """The four uniform cubic B-splines that act on a knot interval, at t in [0, 1]."""
-    s = 1 - t
-    return [s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6]
 
 
 def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:

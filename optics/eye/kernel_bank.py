@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from optics.eye.kernel_interpolation import Choice, NodeChoice, linear_weights, nodes
+from optics.eye.kernel_interpolation import Choice, NodeChoice, nodes
 from optics.numerics.arguments import positive, shown, whole
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, plain
+from optics.numerics.interpolation import linear_weights
 
 __all__ = ["KernelBank", "prepare"]
 
@@ -54,9 +55,7 @@ class KernelBank:
         depth = (2 / np.broadcast_to(plain(z), shape) - near - far) / ((near - far) or 1.0)
         down, across = ((np.arange(n) - (n - 1) / 2) / half for n, half in zip(shape, self.field, strict=True))
         by_depth, by_row, by_column = (
-            linear_weights(depth, layers),
-            linear_weights(down, rows),
-            linear_weights(across, columns),
+            linear_weights(at, nodes(n)) for at, n in ((depth, layers), (down, rows), (across, columns))
         )
         return [by_depth[i] * by_row[j][:, None] * by_column[k] for i, j, k in self.kernels]
 

@@ -16,8 +16,9 @@ import numpy as np
 
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.autodiff import Array, plain
+from optics.numerics.interpolation import linear_weights
 
-__all__ = ["Choice", "NodeChoice", "linear_weights", "nodes", "worst_difference"]
+__all__ = ["Choice", "NodeChoice", "nodes", "worst_difference"]
 
 MOST_CHECKS = 8  # kernels that tell a rung's error
 CAUTION = 1.3  # of that error: the worst place may lie between
@@ -42,13 +43,6 @@ class Choice:
 def nodes(count: int) -> np.ndarray:
     """Positions in [-1, 1]."""
     return np.linspace(-1, 1, count) if count > 1 else np.zeros(1)
-
-
-def linear_weights(position: np.ndarray, count: int) -> np.ndarray:
-    """Linear interpolation between nodes, constant beyond: (node, ...)."""
-    if count == 1:
-        return np.ones((1, *position.shape))
-    return np.stack([np.interp(position, nodes(count), row) for row in np.eye(count)])
 
 
 def checks(rung: tuple[int, ...]) -> list[Place]:
@@ -97,7 +91,7 @@ class NodeChoice:
         coarse = _places(nodes(n) for n in rung)
         worst = 0.0
         for place in checks(rung):
-            by_axis = [linear_weights(np.asarray(at), n) for at, n in zip(place, rung, strict=True)]
+            by_axis = [linear_weights(np.asarray(at), nodes(n)) for at, n in zip(place, rung, strict=True)]
             shares = [math.prod(map(float, share)) for share in itertools.product(*by_axis)]
             between = [(s, self._kernel(node)) for s, node in zip(shares, coarse, strict=True) if s > 0]
             worst = max(worst, worst_difference([*between, (-1, self._kernel(place))], self.samples_per_receptor))

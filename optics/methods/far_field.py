@@ -13,7 +13,7 @@ from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
-from optics.numerics.interpolation import TAPS, chebyshev_points, lagrange, lagrange_weights
+from optics.numerics.interpolation import TAPS, chebyshev_points, lagrange_basis, lagrange_weights
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["FarFieldSampling", "far_field"]
@@ -98,7 +98,7 @@ def _nodes_needed(problem: Problem, error: float) -> int | None:
     test = half_angle * np.linspace(-1, 1, 41)
     for n in CHEBYSHEV_NODES:
         places = half_angle * chebyshev_points(n)
-        weights = lagrange(test, places)
+        weights = lagrange_basis(test, places)
         worst = 0.0
         for across in (0.0, problem.window.half_width):
             exact, known = (_slow_part(problem, rim_x, rim_y, angles, across) for angles in (test, places))
@@ -135,7 +135,7 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
     nodes = how.half_angle * chebyshev_points(how.nodes)
     edge = math.asin(min(float(s[-1]), 0.999))  # a margin beyond the window, for the interpolation that follows
     angle = np.clip(np.arctan2(s[None, :], cosine), -edge, edge)
-    along_x = lagrange(angle, nodes)
+    along_x = lagrange_basis(angle, nodes)
     total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
     for a, across in enumerate(np.tan(nodes)):
         for b, along in enumerate(np.tan(nodes)):

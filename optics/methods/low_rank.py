@@ -13,7 +13,7 @@ from optics.methods.pupil_sampling import PupilSamples, samples_of
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
-from optics.numerics.interpolation import chebyshev_points, lagrange
+from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 from optics.numerics.matrices import complex_matmul
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
@@ -88,7 +88,7 @@ def _rank(problem: Problem, outermost: float, half: float, scale: float, most: i
         if rank > most:
             return None
         points = half * chebyshev_points(rank)
-        weights = lagrange(test, points)
+        weights = lagrange_basis(test, points)
         worst = 0.0
         for along, across in places:
             exact, known = (_rest(problem, scale, rim, _line(centre, along, at, across)) for at in (test, points))
@@ -181,7 +181,7 @@ def _fourier(
     """A[x, (a, ξ)] = L_a(x) e^{-ik ξ x/c} as two tensors."""
     rank, xi = how.rank, how.pupil.at
     waves = np.tile(np.outer(at, xi) / (-problem.wavelength * how.scale), rank)
-    weight = np.repeat(lagrange(at - middle, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
+    weight = np.repeat(lagrange_basis(at - middle, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
     matrix = weight * np.exp(2j * np.pi * waves)
     re, im = (padded_for_packets(part.astype(types.dtype)) for part in (matrix.real, matrix.imag))
     return types.Tensor(re, matrix.shape), types.Tensor(im, matrix.shape)

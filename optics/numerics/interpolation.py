@@ -1,4 +1,8 @@
-"""A smooth function of one variable as equidistant samples that Dr.Jit interpolates."""
+"""Interpolation between samples: linear, by Lagrange's polynomials, by cubic B-splines; and a function kept as a table.
+
+Functions of arrays that stand for places take Dr.Jit's arrays and NumPy's alike, but for `linear_weights` and
+`lagrange_basis`, which are NumPy's.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,15 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["TAPS", "Interpolant", "chebyshev_points", "lagrange", "lagrange_weights"]
+__all__ = [
+    "TAPS",
+    "Interpolant",
+    "chebyshev_points",
+    "cubic_bsplines",
+    "lagrange_basis",
+    "lagrange_weights",
+    "linear_weights",
+]
 
 # Samples beyond either end that six-point interpolation reads.
 MARGIN = 2
@@ -88,13 +100,25 @@ def lagrange_weights(t: Array) -> list[Array]:
     return [before[i] * after[TAPS - 1 - i] * sign[i] for i in range(TAPS)]
 
 
+def linear_weights(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """(node, *x.shape): linear interpolation between rising nodes, constant beyond."""
+    return np.stack([np.interp(x, nodes, row) for row in np.eye(len(nodes))])
+
+
+def cubic_bsplines(t: Array) -> list[Array]:
+    """The four uniform cubic B-splines that act on a knot interval, at t in [0, 1] (Piegl & Tiller, The NURBS Book,
+    ch. 2)."""
+    s = 1 - t
+    return [s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6]
+
+
 def chebyshev_points(n: int) -> np.ndarray:
     """Chebyshev points of the first kind on [-1, 1]."""
     return np.cos(np.pi * (np.arange(n) + 0.5) / n)
 
 
-def lagrange(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """(node, *x.shape): the Lagrange polynomials of the nodes at x."""
+def lagrange_basis(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """(node, *x.shape): the Lagrange polynomials of any nodes at x."""
     basis = np.ones((len(nodes), *np.shape(x)))
     for i, node in enumerate(nodes):
         for other in np.delete(nodes, i):

@@ -10,7 +10,8 @@ import pytest
 from optics import AccuracyError, BSplineRelief, Eye, Pupil
 from optics.eye.eye import LIGHT_FROM
 from optics.eye.kernel_bank import KernelBank
-from optics.eye.kernel_interpolation import NodeChoice, checks, linear_weights, worst_difference
+from optics.eye.kernel_interpolation import NodeChoice, checks, nodes, worst_difference
+from optics.numerics.interpolation import linear_weights
 
 S = 2
 NEAR, FAR = 0.6e-3, 5e-3
@@ -178,7 +179,7 @@ class TestLadder:
     def test_hats_sum_to_one(self):
         at = np.linspace(-1.5, 1.5, 31)
         for count in (1, 2, 3, 5):
-            np.testing.assert_allclose(linear_weights(at, count).sum(axis=0), 1)
+            np.testing.assert_allclose(linear_weights(at, nodes(count)).sum(axis=0), 1)
 
     def test_the_worst_scene_reaches_the_worst_difference(self):
         """Light only where the receptive field grew."""
