@@ -179,7 +179,7 @@ def _onto_window(squared: Array, beam: Beam, problem: Problem, how: FarFieldSamp
         place = position / rho * pitch + middle
         cell = dr.clip(dr.floor(place), TAPS // 2 - 1, dr.opaque(types.Float64, side - TAPS // 2 - 1))
         cells.append(types.Index(cell) - (TAPS // 2 - 1))
-        weights.append(lagrange_weights(types.Float(place - cell)))
+        weights.append(lagrange_weights(types.Float(place - cell), TAPS))
     image, columns = types.Float(0), dr.opaque(types.Index, side)
     for i, down in enumerate(weights[0]):
         start, line = (cells[0] + i) * columns + cells[1], types.Float(0)

@@ -26,8 +26,11 @@ __all__ = [
     "linear_weights",
 ]
 
-# Samples beyond either end that six-point interpolation reads.
-MARGIN = 2
+# Choice: samples that interpolation onto a grid takes, along an axis. Its error falls with the eighth power of their
+# distance; a function's table, which costs its samples only once, does with the sixth.
+TAPS = 8
+TABLE_TAPS = 6
+MARGIN = TABLE_TAPS // 2 - 1  # samples beyond either end of a table that it reads
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,36 +71,28 @@ class Interpolant:
         t = dr.clip((place - opaque(types, self.first)) * opaque(types, 1 / self.step), 0, last)
         cell = dr.minimum(dr.floor(t), last - 1)
         samples, first = types.Float64(self.samples), types.Index(cell)
-        values = [dr.gather(types.Float64, samples, first + i) for i in range(6)]
-        return sum((w * v for w, v in zip(_lagrange6(t - cell), values, strict=True)), types.Float64(0))
+        values = [dr.gather(types.Float64, samples, first + i) for i in range(TABLE_TAPS)]
+        return sum(
+            (w * v for w, v in zip(lagrange_weights(t - cell, TABLE_TAPS), values, strict=True)), types.Float64(0)
+        )
 
 
-def _lagrange6(t: Array) -> list[Array]:
-    """Weights of six-point Lagrange interpolation at nodes -2 ... 3, t in [0, 1]."""
-    a, b, c, d, e, f = t + 2, t + 1, t, t - 1, t - 2, t - 3
-    ab, cd, ef = a * b, c * d, e * f
-    return [
-        b * cd * ef / -120,
-        a * cd * ef / 24,
-        ab * d * ef / -12,
-        ab * c * ef / 12,
-        ab * cd * f / -24,
-        ab * cd * e / 120,
-    ]
+def lagrange_weights(t: Array, taps: int) -> list[Array]:
+    """Lagrange interpolation between `taps` samples 1 apart, an even number: the weights, t in [0, 1] being the place
+    between the middle two.
 
+        L_i(t) = Π_{j≠i} (t - x_j) / (x_i - x_j),   x_i = i + 1 - taps/2,   i = 0 ... taps - 1,
 
-TAPS = 8
-
-
-def lagrange_weights(t: Array) -> list[Array]:
-    """Eight-point Lagrange interpolation at nodes -3 ... 4, t in [0, 1]."""
-    steps = [t + (TAPS // 2 - 1 - i) for i in range(TAPS)]
+    the product over the nodes before i times that over those after, over (-1)^(taps-1-i) i! (taps-1-i)!.
+    """
+    last = taps - 1
+    steps = [t + (taps // 2 - 1 - i) for i in range(taps)]
     before, after = [1.0], [1.0]
-    for i in range(TAPS - 1):
+    for i in range(last):
         before.append(before[-1] * steps[i])
-        after.append(after[-1] * steps[TAPS - 1 - i])
-    sign = [(-1) ** (TAPS - 1 - i) / (math.factorial(i) * math.factorial(TAPS - 1 - i)) for i in range(TAPS)]
-    return [before[i] * after[TAPS - 1 - i] * sign[i] for i in range(TAPS)]
+        after.append(after[-1] * steps[last - i])
+    scale = [(-1) ** (last - i) / (math.factorial(i) * math.factorial(last - i)) for i in range(taps)]
+    return [before[i] * after[last - i] * scale[i] for i in range(taps)]
 
 
 def linear_weights(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:

@@ -73,7 +73,7 @@ class RadialProfile:
         place = dr.minimum(place, rim)
         cell = dr.floor(place)
         first = types.Index(cell)
-        weights = lagrange_weights(types.Float(place - cell))
+        weights = lagrange_weights(types.Float(place - cell), TAPS)
         total = sum((w * dr.gather(types.Float, table, first + i) for i, w in enumerate(weights)), types.Float(0))
         return dr.select(within, dr.maximum(total, 0), 0)
 
