@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from optics.eye.kernel_bank import KernelBank, prepare
 from optics.eye.photoreceptor import gaussian_noise, own_type, photon_noise, quantum_catch, throughput
 from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
 from optics.eye.retinal_image import blur, centred, receptor_average
+from optics.eye.summary import Description, describe
 from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, plain, to_user
 from optics.numerics.precision import precision
@@ -21,9 +22,6 @@ from optics.point_spread.psf import PSFResult
 from optics.spectra.bands import SpectralBands
 from optics.spectra.photon_budget import PhotonBudget
 from optics.spectra.receptors import receptors_of
-
-if TYPE_CHECKING:
-    from optics.eye.summary import Description
 
 __all__ = ["Eye"]
 
@@ -272,9 +270,7 @@ class Eye:
         return self.spectral_bands.of(radiance, self.receptors)
 
     def describe(self, z: Scalar = math.inf) -> Description:
-        """What limits the eye, as a table: see `description.Description`."""
-        from optics.eye.summary import describe
-
+        """What limits the eye, as a table: see `summary.Description`."""
         return describe(self, z)
 
 

@@ -1,5 +1,6 @@
 """Ways to evaluate one diffraction integral, each with its samples, time and error.
 
+textbook             the angular spectrum in plain NumPy: start here
 problem              Problem: the integral in numbers
 sampling             what every method offers
 rayleigh_sommerfeld  the direct sum: the reference
