@@ -234,7 +234,7 @@ class Eye:
             outside.
         rng: None for signals without noise. Noise carries no derivative.
         z: distance of the scene along the axis [m], a number or one per cell (Y, X).
-        sight: what `sight` made for these samples_per_receptor; None makes it.
+        sight: the kernels, as `Eye.sight` makes them for these samples_per_receptor; None makes them.
 
         Raises:
             ValueError: radiance of another shape, or not finite.
@@ -245,10 +245,10 @@ class Eye:
         shape = self.resolution[0] * s, self.resolution[1] * s
         scene = radiance_cube(radiance, self.bands, shape)
         centred(scene, shape)
-        prepared = self.sight(s, z) if sight is None else sight.of(shape)
+        bank = self.sight(s, z) if sight is None else sight.of(shape)
         types = precision(self.dtype)
-        scenes = [scene * share for share in prepared.shares(scene.shape[1:], z)]
-        image = blur(scenes, list(prepared.kernels.values()), shape, types)
+        scenes = [scene * share for share in bank.shares(scene.shape[1:], z)]
+        image = blur(scenes, list(bank.kernels.values()), shape, types)
         irradiance = receptor_average(image, s, types)
         signal = quantum_catch(irradiance, self.spectral_bands.weights, self.throughput, types)
         if self.mosaic is not None:
