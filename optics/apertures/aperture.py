@@ -17,6 +17,7 @@ from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.arguments import LARGEST, in_range, positive
 from optics.numerics.autodiff import Array
+from optics.numerics.cost import SOFT_EDGE_SAMPLE
 from optics.numerics.precision import Precision
 
 __all__ = ["EDGE_REACH", "Aperture", "Nodes", "SoftAperture"]
@@ -53,7 +54,7 @@ class SoftAperture(ABC):
     @property
     def seconds_per_point(self) -> float:
         """What `transmittance` takes for a point, roughly."""
-        return 1e-8
+        return SOFT_EDGE_SAMPLE
 
     @abstractmethod
     def transmittance(self, x: Array, y: Array, types: Precision) -> Array:

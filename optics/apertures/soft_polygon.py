@@ -17,6 +17,7 @@ import numpy as np
 from optics.apertures.aperture import SoftAperture
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.autodiff import Array
+from optics.numerics.cost import SOFT_EDGE_SAMPLE
 from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision, opaque
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
@@ -36,7 +37,7 @@ class SoftPolygon(SoftAperture):
 
     @property
     def seconds_per_point(self) -> float:
-        return len(self.vertices) * 1e-8 * (1 + self.edge.cycles)
+        return len(self.vertices) * SOFT_EDGE_SAMPLE * (1 + self.edge.cycles)
 
     def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
         import drjit as dr

@@ -10,6 +10,7 @@ from optics.methods.fresnel import paraxial_integral
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.spectral_taper import Taper, tapers
 from optics.numerics.autodiff import Array
+from optics.numerics.cost import CALL, PUPIL_SAMPLE, SPECTRUM_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
@@ -145,7 +146,8 @@ def _timed(sampling: GridSampling, problem: Problem) -> GridSampling:
     pupil, spectrum = sampling.pupil.shape, sampling.spectrum.shape
     last = sampling.seconds_from_spectrum(problem.window)
     seconds = predicted_seconds(pupil, sampling.pupil_period, spectrum) + last
-    seconds += pupil[0] ** 2 * (5e-8 + sampling.edge.seconds_per_point) + spectrum[0] ** 2 * 2e-8 + 2e-3
+    points = pupil[0] ** 2 * (PUPIL_SAMPLE + sampling.edge.seconds_per_point) + spectrum[0] ** 2 * SPECTRUM_SAMPLE
+    seconds += points + CALL["angular_spectrum"]
     return replace(sampling, seconds=seconds)
 
 

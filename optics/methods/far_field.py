@@ -10,6 +10,7 @@ import numpy as np
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.numerics.autodiff import Array
+from optics.numerics.cost import CALL, PUPIL_SAMPLE, SPECTRUM_SAMPLE, WINDOW_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
@@ -79,9 +80,12 @@ def far_field(problem: Problem) -> list[FarFieldSampling]:
     period = fast_length(max(4 * oversampling * problem.radius, finest) / pitch)  # a whole number, for the FFT
     step = problem.wavelength / (period * pitch)
     directions = Grid.square(2 * (math.ceil(sine / step) + TAPS) + 1, step)
-    once = predicted_seconds(pupil.shape, period, directions.shape) + 2e-3
-    once += pupil.shape[0] ** 2 * (5e-8 + edge.seconds_per_point / nodes**2) + directions.shape[0] ** 2 * 2e-8
-    seconds = nodes**2 * once + math.prod(problem.window.shape) * 1e-7
+    once = predicted_seconds(pupil.shape, period, directions.shape) + CALL["far_field"]
+    once += (
+        pupil.shape[0] ** 2 * (PUPIL_SAMPLE + edge.seconds_per_point / nodes**2)
+        + directions.shape[0] ** 2 * SPECTRUM_SAMPLE
+    )
+    seconds = nodes**2 * once + math.prod(problem.window.shape) * WINDOW_SAMPLE
     return [FarFieldSampling(edge, pupil, directions, period, nodes, math.atan2(half, problem.distance), seconds)]
 
 

@@ -12,6 +12,7 @@ from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.rays import MARGIN, Rays, brightness, disk_area, mismatch
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
+from optics.numerics.cost import CALL, PUPIL_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, predicted_seconds
 from optics.numerics.grid import Grid
@@ -80,9 +81,9 @@ def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSam
     pitch = 1 / (turning + edge.stopband)
     pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
     seconds = (
-        3e-4
+        CALL["fresnel"]
         + predicted_seconds(pupil.shape, 0.5, problem.window.shape)
-        + pupil.shape[0] ** 2 * (5e-8 + edge.seconds_per_point)
+        + pupil.shape[0] ** 2 * (PUPIL_SAMPLE + edge.seconds_per_point)
     )
     return [ParaxialSampling(method, edge, pupil, seconds, model_error(problem, method == "fresnel"))]
 

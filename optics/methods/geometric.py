@@ -13,6 +13,7 @@ from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import cached_nodes, node_count
 from optics.methods.rays import brightness, mismatch
 from optics.numerics.autodiff import Array, is_differentiable
+from optics.numerics.cost import CALL, RAY
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["PinholeSampling", "RaySampling", "geometric", "pinhole"]
@@ -66,7 +67,7 @@ class PinholeSampling:
     """All light in the cell where the ray through the pupil's centre ends."""
 
     model_error: float
-    seconds: float = 1e-4
+    seconds: float = CALL["pinhole"]
     method: str = "pinhole"
     samples: tuple[int, int] = (1, 1)
     largest: int = 1
@@ -111,7 +112,7 @@ def geometric(problem: Problem) -> list[RaySampling]:
     cycles = problem.radius * stretch / (math.pi * problem.window.dx) * error ** (-1 / 3)
     cycles = 2 ** (math.ceil(4 * math.log2(max(cycles, 1.0))) / 4)  # few different rules, so that they are found again
     count = node_count(problem.aperture, cycles, DIGITS)
-    seconds = 1e-3 + count * 1e-7
+    seconds = CALL["geometric"] + count * RAY
     return [RaySampling((problem.aperture, cycles, DIGITS), count, model, seconds)]
 
 

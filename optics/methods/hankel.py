@@ -18,6 +18,7 @@ from optics.methods.problem import Problem
 from optics.methods.spectral_taper import Taper, tapers
 from optics.numerics.autodiff import Array
 from optics.numerics.bessel import bessel_j0
+from optics.numerics.cost import BESSEL_PAIR, CALL, PROFILE_ENTRY, PROFILE_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
@@ -81,7 +82,8 @@ def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
     band = min(2 * taper.end, 2 * problem.radius / (problem.wavelength * problem.distance) + 2 / taper.blur)
     line = RadialProfile.resolving(outermost, band, problem.distance, problem.ripple)
     pairs = radii * angles + angles * line.points
-    seconds = 1e-3 + pairs * 1e-8 + line.points * line.table * 1e-9 + math.prod(problem.window.shape) * 1.5e-8
+    seconds = CALL["hankel"] + pairs * BESSEL_PAIR + line.points * line.table * PROFILE_ENTRY
+    seconds += math.prod(problem.window.shape) * PROFILE_SAMPLE
     return HankelSampling(taper, _round_up(radii), _round_up(angles), line, seconds)
 
 

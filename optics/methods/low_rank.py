@@ -11,6 +11,7 @@ from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples, samples_of
 from optics.numerics.autodiff import Array
+from optics.numerics.cost import CALL, FOURIER_ENTRY, KERNEL_ENTRY, MATMUL_FLOPS
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
@@ -20,7 +21,6 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 __all__ = ["LowRankSampling", "low_rank"]
 
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
-FLOPS = {"float32": 45e9, "float64": 22e9}
 MOST_ENTRIES = 4_000_000  # of the matrix between pupil and window
 MOST_PIXEL_ENTRIES = 16_000_000  # for them only the direct sum is left
 
@@ -71,7 +71,11 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
     height, width = problem.window.shape
     flops = 8 * (inner * inner * width + height * inner * width)
     seconds = (
-        1.5e-3 + flops / FLOPS[problem.dtype] + inner * inner * 2e-8 + pupil.seconds + inner * (height + width) * 1e-8
+        CALL["low_rank"]
+        + flops / MATMUL_FLOPS[problem.dtype]
+        + inner * inner * KERNEL_ENTRY
+        + pupil.seconds
+        + inner * (height + width) * FOURIER_ENTRY
     )
     return [LowRankSampling(pupil, rank, half, scale, seconds)]
 

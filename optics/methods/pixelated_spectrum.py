@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 
 from optics.elements.beam import Beam
 from optics.methods.angular_spectrum import SpectrumSampling, arrived, split_period, whole_period
-from optics.methods.low_rank import FLOPS
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PixelSamples, pixel_samples
 from optics.methods.rayleigh_sommerfeld import node_rule
 from optics.methods.spectral_taper import Taper, tapers
 from optics.numerics.autodiff import Array
+from optics.numerics.cost import CALL, MATMUL_FLOPS, NODE_FOURIER_ENTRY, PIXEL_NODE, SPECTRUM_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.matrices import complex_matmul
@@ -84,9 +84,11 @@ def _nodes(problem: Problem, taper: Taper) -> PixelSamples | None:
 
 def _timed(sampling: PixelSpectrum, problem: Problem) -> PixelSpectrum:
     nodes, kept = len(sampling.pupil.at), sampling.spectrum.shape[0]
-    sums = 8 * nodes * kept * (nodes + kept) / FLOPS[problem.dtype]
-    points = nodes * nodes * 6e-8 + kept * kept * 2e-8 + nodes * kept * 4e-8
-    return replace(sampling, seconds=2e-3 + sums + points + sampling.seconds_from_spectrum(problem.window))
+    sums = 8 * nodes * kept * (nodes + kept) / MATMUL_FLOPS[problem.dtype]
+    points = nodes * nodes * PIXEL_NODE + kept * kept * SPECTRUM_SAMPLE + nodes * kept * NODE_FOURIER_ENTRY
+    return replace(
+        sampling, seconds=CALL["angular_spectrum"] + sums + points + sampling.seconds_from_spectrum(problem.window)
+    )
 
 
 def _spectrum(u: Field, beam: Beam, how: PixelSpectrum, types: Precision) -> Field:

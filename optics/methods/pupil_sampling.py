@@ -16,6 +16,7 @@ from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.rayleigh_sommerfeld import node_rule
 from optics.numerics.autodiff import Array
+from optics.numerics.cost import PIXEL_NODE_GEOMETRY
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque
@@ -92,7 +93,7 @@ class PixelSamples:
 
     @property
     def seconds(self) -> float:
-        return (self.aperture.count * self.across) ** 2 * 1e-8
+        return (self.aperture.count * self.across) ** 2 * PIXEL_NODE_GEOMETRY
 
     def places(self, index: Array, beam: Beam, types: Precision) -> Array:
         import drjit as dr

@@ -12,6 +12,7 @@ from optics.apertures.aperture import Aperture, Nodes
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.numerics.autodiff import Array
+from optics.numerics.cost import CALL, NODE, PAIRS_PER_SECOND
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
@@ -19,7 +20,6 @@ from optics.numerics.radial_profile import RadialProfile
 
 __all__ = [
     "MOST_DIGITS",
-    "PAIRS_PER_SECOND",
     "NodeSampling",
     "cached_nodes",
     "direct_sum",
@@ -29,7 +29,6 @@ __all__ = [
     "turns",
 ]
 
-PAIRS_PER_SECOND = 2.5e8
 MOST_DIGITS = 14.0  # of float64 sums
 SPARE_DIGITS = 0.5  # the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
 ON_AXIS = 1e-9  # of the radius
@@ -93,7 +92,7 @@ def nodes(problem: Problem) -> list[NodeSampling]:
         line = line if line.pays(outputs) else None
         outputs = line.points if line else outputs
         count = count if line is None else math.ceil(count / 2)
-    seconds = 1e-3 + count * outputs / PAIRS_PER_SECOND + count * 4e-9
+    seconds = CALL["rayleigh_sommerfeld"] + count * outputs / PAIRS_PER_SECOND + count * NODE
     return [NodeSampling(problem.aperture, cycles, digits, count, line, seconds)]
 
 

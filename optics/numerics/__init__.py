@@ -5,6 +5,7 @@ arguments       bad input ends in one line
 autodiff        values that carry derivatives
 backend         the LLVM library that Dr.Jit compiles with
 bessel          J0 on Dr.Jit arrays
+cost            what operations cost: how methods predict their time
 field           a sampled complex field
 fourier         centred Fourier sums of any size and period
 grid            sample positions

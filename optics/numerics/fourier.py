@@ -5,8 +5,8 @@ One function, `dft2`, stands for all transforms of this package:
     U[k] = Σ_j u[j] exp(± 2πi j·k / period),   j and k counted from the centre sample n//2.
 
 The period is free (a matrix DFT evaluates any output pitch); a whole period may go through the FFT. Which of the two
-runs is decided here by predicted time on one core: Dr.Jit's matrix product does about 45 Gflop/s, SciPy's FFT about
-12 Gflop/s less the copies, so matrices win for small windows and the FFT for large ones. Both are differentiable.
+runs is decided here by predicted time (optics.numerics.cost): Dr.Jit's matrix product does more operations per second,
+SciPy's FFT needs fewer, so matrices win for small windows and the FFT for large ones. Both are differentiable.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.autodiff import Array, Scalar, is_differentiable
+from optics.numerics.cost import DFT_CALL, FFT_COPY, FFT_FLOPS, FFT_LINE_SAMPLE, MATMUL_FLOPS
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.matrices import complex_matmul
@@ -135,7 +136,7 @@ def kept_indices(period: int, across: int) -> np.ndarray:
 
 
 def predicted_seconds(shape_in: tuple[int, int], period: float, shape_out: tuple[int, int]) -> float:
-    """Time one `dft2` takes on one core, roughly."""
+    """Time one `dft2` takes, roughly."""
     if _fft_wins(shape_in, period, shape_out):
         return _fft_seconds(shape_in, int(period), shape_out)
     return _matrix_seconds(shape_in, shape_out)
@@ -149,12 +150,12 @@ def _fft_wins(shape_in: tuple[int, int], period: float, shape_out: tuple[int, in
 
 def _matrix_seconds(shape_in: tuple[int, int], shape_out: tuple[int, int]) -> float:
     (ny, nx), (my, mx) = shape_in, shape_out
-    return 8 * (ny * nx * mx + ny * mx * my) / 45e9 + 2e-4
+    return 8 * (ny * nx * mx + ny * mx * my) / MATMUL_FLOPS["float32"] + DFT_CALL
 
 
 def _fft_seconds(shape_in: tuple[int, int], period: int, shape_out: tuple[int, int]) -> float:
     lines, copied = shape_in[0] + shape_out[1], shape_in[0] * shape_in[1] + shape_out[0] * shape_out[1]
-    return lines * period * (5 * log2(period + 1) / 12e9 + 5e-9) + copied * 8e-9 + 2e-4
+    return lines * period * (5 * log2(period + 1) / FFT_FLOPS + FFT_LINE_SAMPLE) + copied * FFT_COPY + DFT_CALL
 
 
 def _fourier_matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) -> tuple[Array, Array]:

@@ -10,8 +10,9 @@ import numpy as np
 
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
-from optics.methods.rayleigh_sommerfeld import MOST_DIGITS, PAIRS_PER_SECOND, direct_sum, node_count, turns
+from optics.methods.rayleigh_sommerfeld import MOST_DIGITS, direct_sum, node_count, turns
 from optics.numerics.accuracy import FLOAT_NOISE
+from optics.numerics.cost import PAIRS_PER_SECOND
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 
