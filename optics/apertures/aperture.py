@@ -22,7 +22,7 @@ from optics.numerics.precision import Precision
 
 __all__ = ["EDGE_REACH", "Aperture", "Nodes", "SoftAperture"]
 
-# The soft edge reaches at most this far beyond the aperture, in radii.
+# Choice. The soft edge reaches at most this far beyond the aperture, in radii.
 EDGE_REACH = 0.25
 
 

@@ -126,6 +126,7 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
     rho = np.maximum(np.abs(np.asarray(distance, dtype=np.float64)), 1e-9 * radius)[:, None]
     lower = np.abs(rho - radius)
     span = np.maximum(np.minimum(edge.reach, rho + radius) - lower, 0)
+    # Choice: more nodes than the kernel's cycles and its window's steepness ask for.
     u, weight = gauss_legendre(int(24 + 4 * edge.cycles + 2 * edge.beta))
     r = np.maximum(lower + span * np.sin(pi * u / 2) ** 2, 1e-300)
     cosine = np.clip((rho**2 + r**2 - radius**2) / (2 * rho * r), -1, 1)
@@ -140,7 +141,7 @@ def _ring_nodes(inner: float, cycles: float, digits: float) -> Nodes:
 
     Over the full disk the mean around a ring is a smooth function of r², which pays for few cycles.
     """
-    digits += 0.3  # half the error to each of the two rules
+    digits += 0.3  # log10 2: half the error to each of the two rules
     u, weight = gauss_legendre(gauss_legendre_count(cycles * (1 - inner), digits))
     rings = [(inner + (1 - inner) * u, (1 - inner) * weight)]
     if inner == 0:

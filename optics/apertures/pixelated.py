@@ -24,11 +24,12 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, har
 
 __all__ = ["PixelatedAperture"]
 
-EDGE_DEGREE = 4  # more than the digits asked for: of the polynomials that a curved edge is to these digits
+EDGE_DEGREE = 4  # choice: more than the digits asked for: of the polynomials that a curved edge is to these digits
 ROUNDING = 1e-12
-STEEPNESS = 3.0  # of panels' lengths beside a square root
-MOMENT_DIGITS = 8.0  # of what is left of a cut pixel
-MOST_NODES = 32  # along a pixel: beyond, what is left of pixels that the edge cuts is a matter of too many moments
+STEEPNESS = 3.0  # choice: of panels' lengths beside a square root
+MOMENT_DIGITS = 8.0  # choice: of what is left of a cut pixel
+# Choice, along a pixel: beyond, what is left of pixels that the edge cuts is a matter of too many moments.
+MOST_NODES = 32
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from optics.numerics.precision import Precision
 
 __all__ = ["PixelRelief"]
 
-REPETITIONS = 32  # of the pixels' frequencies; all beyond have 1/(π² 32) of the light at most
+REPETITIONS = 32  # choice: of the pixels' frequencies; all beyond have 1/(π² 32) of the light at most
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,12 +14,15 @@ from optics.numerics.cost import CALL, PUPIL_SAMPLE, SPECTRUM_SAMPLE, WINDOW_SAM
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
-from optics.numerics.interpolation import TAPS, chebyshev_points, lagrange_basis, lagrange_weights
+from optics.numerics.interpolation import LAGRANGE_8, TAPS, chebyshev_points, lagrange_basis, lagrange_weights
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["FarFieldSampling", "far_field"]
 
-MOST_DIRECTIONS = 4096
+MOST_DIRECTIONS = 4096  # choice: along an axis, by memory
+STEEPEST_CORNER = 0.95  # choice: sine towards a window's corner
+GRAZING = 0.98  # choice: sine that interpolation beyond the window's rim may reach
+# Choice: counts to try.
 CHEBYSHEV_NODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16)
 
 
@@ -73,9 +76,11 @@ def far_field(problem: Problem) -> list[FarFieldSampling]:
     oversampling = math.pi / _step(problem.ripple)  # of the intensity's Nyquist rate
     sine = half / math.hypot(half, problem.distance)
     corner = math.sqrt(2) * half / math.hypot(half, half, problem.distance)
+    if corner >= STEEPEST_CORNER:
+        return []
     # Interpolation reaches over the window's rim, but must not reach grazing incidence.
-    finest = problem.wavelength * max(TAPS / (0.98 - sine), TAPS / (0.98 - corner)) if corner < 0.95 else math.inf
-    if not finest / pitch < MOST_DIRECTIONS:
+    finest = problem.wavelength * max(TAPS / (GRAZING - sine), TAPS / (GRAZING - corner))
+    if finest / pitch >= MOST_DIRECTIONS:
         return []
     period = fast_length(max(4 * oversampling * problem.radius, finest) / pitch)  # a whole number, for the FFT
     step = problem.wavelength / (period * pitch)
@@ -90,8 +95,8 @@ def far_field(problem: Problem) -> list[FarFieldSampling]:
 
 
 def _step(error: float) -> float:
-    """Radians per sample at which eight-point Lagrange interpolation errs by 1.07e-3 step⁸ = error."""
-    return min(1.5, (error / 1.07e-3) ** 0.125)
+    """Radians per sample at which eight-point Lagrange interpolation of a unit wave errs by `error`; at most 1.5."""
+    return min(1.5, (error / LAGRANGE_8) ** 0.125)
 
 
 def _nodes_needed(problem: Problem, error: float) -> int | None:
@@ -99,7 +104,7 @@ def _nodes_needed(problem: Problem, error: float) -> int | None:
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim_x, rim_y = problem.radius * np.cos(angle), problem.radius * np.sin(angle)
     half_angle = math.atan2(problem.window.half_width, problem.distance)
-    test = half_angle * np.linspace(-1, 1, 41)
+    test = half_angle * np.linspace(-1, 1, 41)  # choice: 41 places between, 8 on the rim
     for n in CHEBYSHEV_NODES:
         places = half_angle * chebyshev_points(n)
         weights = lagrange_basis(test, places)

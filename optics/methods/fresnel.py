@@ -20,10 +20,10 @@ from optics.numerics.precision import opaque, precision
 
 __all__ = ["ParaxialSampling", "fraunhofer", "fresnel", "paraxial_integral"]
 
-RAYS, ENDS = 48, 24  # from whose origins, and at whose ends, the neglected phase is looked at
-# Of a ray's first Fresnel zone: how far from its origin light still adds up coherently at its end.
+RAYS, ENDS = 48, 24  # choice: from whose origins, and at whose ends, the neglected phase is looked at
+# Choice. Of a ray's first Fresnel zone: how far from its origin light still adds up coherently at its end.
 ZONES = 3.0
-MUCH = 0.7  # a field that errs by more is another field
+MUCH = 0.7  # choice: a field that errs by more is another field
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def _misplaced(problem: Problem) -> float:
 
 def _places(problem: Problem, ends: Rays) -> tuple[np.ndarray, np.ndarray]:
     """Where light is looked at: the ends of rays, and a diffraction width beside them; drawn into the window."""
-    width = 0.6 * problem.wavelength * problem.distance / problem.radius
+    width = 0.6 * problem.wavelength * problem.distance / problem.radius  # about Airy's first dark ring, at 0.61
     window = problem.window
     x = np.concatenate([ends.to_x + step * width for step in (0, 1, 0, -1, 0)])
     y = np.concatenate([ends.to_y + step * width for step in (0, 0, 1, 0, -1)])

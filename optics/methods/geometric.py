@@ -18,9 +18,10 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 
 __all__ = ["PinholeSampling", "RaySampling", "geometric", "pinhole"]
 
-# Step of the central differences that give the local slope, in pupil radii: they err by its square times a cubic term.
+# Choice. Step of the central differences that give the local slope, in pupil radii: they err by its square times a
+# cubic term.
 STEP = 1e-4
-DIGITS = 1.0  # of the rule of nodes, for the fastest that the splats' spectra turn
+DIGITS = 1.0  # choice: of the rule of nodes, for the fastest that the splats' spectra turn
 # Relative L2 of Fresnel's fringes behind an edge, over a disk of Fresnel number 1: they fall with its fourth root.
 FRINGES = 0.75
 SPLAT_CELLS = 3.3  # area of a splat, as its inverse mean square: (∫β²)⁻² of the quadratic B-spline β

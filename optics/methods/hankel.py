@@ -27,8 +27,8 @@ from optics.numerics.radial_profile import RadialProfile
 
 __all__ = ["HankelSampling", "hankel"]
 
-MOST_NODES = 3000
-# From this tolerance on J₀ need not be right to the last digit.
+MOST_NODES = 3000  # choice: beyond, a transform of so many pairs is no longer cheap
+# Choice. From this tolerance on J₀ need not be right to the last digit.
 LOOSE = 1e-8
 
 
@@ -74,7 +74,7 @@ def hankel(problem: Problem) -> list[HankelSampling]:
 
 
 def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
-    digits = 0.5 - math.log10(problem.tolerance)
+    digits = 0.5 - math.log10(problem.tolerance)  # choice: a third of the tolerance to each of the two rules
     radii = gauss_legendre_count(problem.radius * (problem.phase_band_inside + taper.end), digits)
     outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
     steepest = math.hypot(problem.distance, problem.radius + outermost) / problem.wavelength

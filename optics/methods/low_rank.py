@@ -20,8 +20,9 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 
 __all__ = ["LowRankSampling", "low_rank"]
 
+# Choice: ranks to try.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
-MOST_ENTRIES = 4_000_000  # of the matrix between pupil and window
+MOST_ENTRIES = 4_000_000  # choice, by memory: of the matrix between pupil and window
 MOST_PIXEL_ENTRIES = 16_000_000  # for them only the direct sum is left
 
 
@@ -62,6 +63,7 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
     if pupil is None:
         return []
     half = max(problem.window.own_half_width, problem.window.dx)
+    # Fourier's kernel for a distance between that to the window's centre and that to its sides. Choice: where between.
     scale = math.hypot(problem.distance, 0.6 * half, *problem.window.centre)
     most = math.isqrt(MOST_ENTRIES if problem.pixelated is None else MOST_PIXEL_ENTRIES) // len(pupil.at)
     rank = _rank(problem, pupil.outermost, half, scale, most)

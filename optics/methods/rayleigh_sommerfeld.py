@@ -29,10 +29,10 @@ __all__ = [
     "turns",
 ]
 
-MOST_DIGITS = 14.0  # of float64 sums
-SPARE_DIGITS = 0.5  # the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
-ON_AXIS = 1e-9  # of the radius
-FAR = 0.25  # radius over distance below which the kernel is smooth enough for any nodes
+MOST_DIGITS = 14.0  # choice: of float64 sums, which carry 16
+SPARE_DIGITS = 0.5  # choice: the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
+ON_AXIS = 1e-9  # rounding, of the radius
+FAR = 0.25  # choice: radius over distance below which the kernel is smooth enough for any nodes
 
 
 Rule = tuple[Aperture, float, float, bool]

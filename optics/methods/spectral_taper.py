@@ -11,9 +11,9 @@ from optics.numerics.precision import Precision, opaque
 
 __all__ = ["FADES", "TAPER_END_SINE", "Taper", "tapers"]
 
-# The taper must end this far from grazing incidence, where z tan θ has no bound.
+# Choice. The taper must end this far from grazing incidence, where z tan θ has no bound.
 TAPER_END_SINE = 0.9995
-FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)  # blurs to try, in units of the problem's size
+FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)  # choice: blurs to try, in units of the problem's size
 
 
 @dataclass(frozen=True)

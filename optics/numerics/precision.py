@@ -12,7 +12,7 @@ from optics.numerics.autodiff import Array, Scalar, is_differentiable
 
 __all__ = ["Precision", "opaque", "padded_for_packets", "precision"]
 
-ROOM = 64  # elements: more than any processor takes at once
+ROOM = 64  # choice, elements: more than any processor takes at once
 
 
 @dataclass(frozen=True)

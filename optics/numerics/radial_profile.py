@@ -10,14 +10,14 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from optics.numerics.grid import Grid
-from optics.numerics.interpolation import TAPS, lagrange_weights
+from optics.numerics.interpolation import LAGRANGE_8, TAPS, lagrange_weights
 from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision
 from optics.numerics.quadrature import harmonics
 
 __all__ = ["RadialProfile"]
 
-# Entries of the matrix from points to table: 128 MB in float64.
+# Choice. Entries of the matrix from points to table: 128 MB in float64.
 LARGEST_MATRIX = 2**24
 
 
@@ -40,11 +40,11 @@ class RadialProfile:
         """Points that carry intensity frequencies up to `band` [1/m] with a relative error of about `error`.
 
         A wave of r over [-R, R] has the Chebyshev coefficients 2 J_m(2πbR); obliquity has poles at ±i distance, whose
-        coefficients fall like e^{-m asinh(distance / R)}. Eight-point Lagrange interpolation errs by 1.07e-3 (2πbh)⁸.
+        coefficients fall like e^{-m asinh(distance / R)}. Eight-point interpolation errs by LAGRANGE_8 (2πbh)⁸.
         """
         digits = -math.log10(error)
         turns = 2 * math.pi * band * rim + 2 * rim / distance
-        step = min(1.0, (error / 1.07e-3) ** 0.125) / max(turns, 1.0)
+        step = min(1.0, (error / LAGRANGE_8) ** 0.125) / max(turns, 1.0)
         table = math.ceil(1 / step) + TAPS
         radius = rim * (1 + TAPS / (2 * (table - 1)))
         degree = int(harmonics(np.array(2 * math.pi * band * radius), digits))

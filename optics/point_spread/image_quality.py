@@ -23,8 +23,8 @@ from optics.point_spread.psf import PSFResult
 
 __all__ = ["MTF", "encircled_energy", "image_quality", "mtf", "strehl_ratio"]
 
-ORIENTATIONS = 64
-HELD_TOO_MUCH = 1e-2  # above all that arrives, by which sums over coarse samples may err
+ORIENTATIONS = 64  # choice: over which a profile is a mean
+HELD_TOO_MUCH = 1e-2  # choice: above all that arrives, by which sums over coarse samples may err
 
 
 @dataclass(frozen=True, eq=False)

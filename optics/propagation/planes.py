@@ -15,6 +15,7 @@ from optics.apertures.aperture import EDGE_REACH, SoftAperture
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
+from optics.methods.problem import SLOPE_MARGIN
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
@@ -22,6 +23,8 @@ from optics.propagation.propagate import WRAP_RIPPLE_PER_TOLERANCE, PropagationR
 from optics.propagation.transfer_function import kept_band, kept_square
 
 __all__ = ["PlaneField", "PupilSampling", "StepSettings", "Stop"]
+
+REACH_MARGIN = 1.02  # choice, over the planes' half widths: `propagate` adds a sample to each of them
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class StepSettings:
         if z == 0:
             return math.inf
         round_, square = (
-            kept(1.02 * widths, wavelength, z, self.ripple)
+            kept(REACH_MARGIN * widths, wavelength, z, self.ripple)
             for kept, widths in ((kept_band, math.sqrt(2) * half_widths), (kept_square, half_widths))
         )
         if math.isfinite(round_.kept):
@@ -121,7 +124,7 @@ class PupilSampling:
             raise ValueError(
                 "elements: a PixelRelief jumps, which the grids between planes cannot carry: use psf for one"
             )
-        slope = 1.02 * pupil.slopes(settings.wavelength, source).steepest / settings.wavelength
+        slope = SLOPE_MARGIN * pupil.slopes(settings.wavelength, source).steepest / settings.wavelength
         turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.ripple)
         band = settings.reaching(stop.half_width + following.half_width, following.distance)
         if math.isinf(band):

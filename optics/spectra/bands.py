@@ -16,8 +16,8 @@ from optics.spectra.spectrum import Spectrum, cie_1931, daylight
 
 __all__ = ["SpectralBands", "cie_1931", "daylight", "pigment_absorptance"]
 
-FINEST = 64
-CATCHES_FIRST = 1e4  # how much more than means they weigh in least squares
+FINEST = 64  # choice
+CATCHES_FIRST = 1e4  # choice: how much more than means they weigh in least squares
 
 
 @dataclass(frozen=True)
