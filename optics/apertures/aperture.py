@@ -1,4 +1,4 @@
-"""An aperture's face: its shape, softened so that a grid can carry it, or as edge-fitted quadrature nodes.
+"""What every aperture offers: its shape, a soft edge that a grid can carry, and quadrature nodes fitted to its edge.
 
 A hard edge has no band limit: sampled on a Cartesian grid, its error falls only like N⁻¹ to N⁻¹·⁵. Here the aperture is
 convolved with a low-pass kernel of compact support (optics.apertures.soft_edge), so that sums over samples (the

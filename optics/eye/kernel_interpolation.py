@@ -1,4 +1,4 @@
-"""How many kernels stand for a whole range of them: the fewest whose interpolation a receptor cannot tell from all.
+"""How many kernels stand for a whole range of them: the fewest between which a receptor cannot tell interpolation.
 
 Kernels are computed at nodes, evenly spaced over [-1, 1] along every axis, and interpolated linearly between them: the
 error falls with the square of the nodes' distance. The error of a node count is told by kernels between its nodes; most

@@ -1,4 +1,4 @@
-"""The directions that a receptor sees through a pupil: how wide a window holds them, and the PSF summed over cells."""
+"""Which directions a receptor sees through a pupil: how wide a window their light needs, the PSF summed over cells."""
 
 from __future__ import annotations
 
