@@ -1,7 +1,7 @@
 """Ways to evaluate one diffraction integral, Rayleigh and Sommerfeld's first, or an approximation to it.
 
-All but the textbook's take a `Problem` and give `Sampling`s: how they would sample it, with the time and the error to expect, and the
-picture if asked (`optics.point_spread.planner` chooses).
+All but the textbook's take a `Problem` and give `Sampling`s: how they would sample it, with the time and the error to
+expect, and the picture if asked. `optics.point_spread.planner` chooses.
 
 textbook             the angular spectrum in plain NumPy: start here
 problem              Problem: what is to be computed, in numbers

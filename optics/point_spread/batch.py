@@ -17,7 +17,7 @@ from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.point_spread.pictures import pictures
-from optics.point_spread.request import View
+from optics.point_spread.request import Setup
 
 __all__ = ["PSFBatch", "psf_batch"]
 
@@ -69,11 +69,13 @@ def psf_batch(
         if not isinstance(values, Sized) or len(values) == 0:
             raise ValueError(f"{name} = {shown(values)}: must be a sequence of at least one")
     window = Grid(shape, dx)
-    views = [View(sensor_distance, PointSource(depth), window, tolerance, method, dtype) for depth in source_distances]
+    setups = [
+        Setup(sensor_distance, PointSource(depth), window, tolerance, method, dtype) for depth in source_distances
+    ]
     requests = [
-        view.request(pupil, vacuum_wavelength(wavelength))
+        setup.request(pupil, vacuum_wavelength(wavelength))
         for pupil in pupils
-        for view in views
+        for setup in setups
         for wavelength in wavelengths
     ]
     flat, plans = zip(*pictures(requests), strict=True)

@@ -17,7 +17,7 @@ from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.point_spread.pictures import pictures
-from optics.point_spread.request import Request, View
+from optics.point_spread.request import Request, Setup
 
 __all__ = ["PSFResult", "plan", "psf", "spread"]
 
@@ -89,13 +89,13 @@ def psf(
         AccuracyError: no method meets the tolerance within the limits on memory and time.
     """
     source = PointSource(source_distance, source_angle)
-    view = View(sensor_distance, source, Grid(shape, dx, centre), tolerance, method, dtype)
+    setup = Setup(sensor_distance, source, Grid(shape, dx, centre), tolerance, method, dtype)
     lambdas = np.atleast_1d(vacuum_wavelengths(wavelengths))
     if lambdas.size == 0:
         raise ValueError("wavelengths is empty: must hold at least one wavelength [m]")
     if lambdas.ndim > 1:
         raise ValueError(f"wavelengths has shape {lambdas.shape}: must be one wavelength [m], or a row of them")
-    return spread([view.request(pupil, float(wavelength)) for wavelength in lambdas])
+    return spread([setup.request(pupil, float(wavelength)) for wavelength in lambdas])
 
 
 def plan(
@@ -113,8 +113,8 @@ def plan(
 ) -> Plan:
     """What `psf` would do at one wavelength, without doing it: see there for arguments and errors."""
     source = PointSource(source_distance, source_angle)
-    view = View(sensor_distance, source, Grid(shape, dx, centre), tolerance, method, dtype)
-    return view.request(pupil, vacuum_wavelength(wavelength)).planned()[0]
+    setup = Setup(sensor_distance, source, Grid(shape, dx, centre), tolerance, method, dtype)
+    return setup.request(pupil, vacuum_wavelength(wavelength)).planned()[0]
 
 
 def spread(requests: Sequence[Request]) -> PSFResult:

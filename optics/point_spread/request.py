@@ -14,7 +14,7 @@ from optics.numerics.autodiff import Scalar
 from optics.numerics.grid import Grid
 from optics.point_spread.planner import choose
 
-__all__ = ["Request", "View"]
+__all__ = ["Request", "Setup"]
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Request:
 
 
 @dataclass(frozen=True)
-class View:
+class Setup:
     """Where a pupil's light comes from, where it is looked at and how exactly: all but the pupil and the wavelength.
 
     sensor_distance: [m] behind the pupil. window: the samples on the sensor. See `optics.psf` for the others.
