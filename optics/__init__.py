@@ -1,4 +1,18 @@
-"""Light to photoreceptor signal by wave optics. SI units; arrays are (wavelength, y, x)."""
+"""Light to photoreceptor signal by wave optics. SI units; arrays are (wavelength, y, x).
+
+Begin with `optics.psf`, the image of a point behind a `Pupil`, and `optics.Eye`, a pupil before receptors. The folders,
+each of which imports only what stands above it:
+
+numerics      arrays, transforms, interpolation: nothing about light
+apertures     shapes of a pupil's opening
+spectra       light and receptors over wavelength
+elements      source, pupil and relief
+methods       the diffraction integral, evaluated in ten ways (methods/textbook.py is the one to read first)
+point_spread  psf and plan: which method, and whether it was right
+propagation   sampled fields from plane to plane
+eye           Eye: what its receptors see
+torch         psf inside a PyTorch graph
+"""
 
 from importlib import import_module
 from typing import Any

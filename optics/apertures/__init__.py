@@ -1,4 +1,4 @@
-"""Openings of a pupil: their shape, softened for grids or as nodes of a quadrature.
+"""Shapes of a pupil's opening, made ready for sums: with a soft edge for samples on a grid, or as quadrature nodes.
 
 aperture       Aperture: what every shape offers
 circular       Circle, Annulus

@@ -1,4 +1,4 @@
-"""An aperture's face: its shape, softened so that a grid can carry it, or as edge-fitted quadrature nodes.
+"""What every aperture offers: its shape, a soft edge that a grid can carry, and quadrature nodes fitted to its edge.
 
 A hard edge has no band limit: sampled on a Cartesian grid, its error falls only like N⁻¹ to N⁻¹·⁵. Here the aperture is
 convolved with a low-pass kernel of compact support (optics.apertures.soft_edge), so that sums over samples (the
@@ -10,18 +10,19 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.arguments import LARGEST, in_range, positive
+from optics.numerics.autodiff import Array
+from optics.numerics.cost import SOFT_EDGE_SAMPLE
 from optics.numerics.precision import Precision
 
 __all__ = ["EDGE_REACH", "Aperture", "Nodes", "SoftAperture"]
 
-# The soft edge reaches at most this far beyond the aperture, in radii.
+# Choice. The soft edge reaches at most this far beyond the aperture, in radii.
 EDGE_REACH = 0.25
 
 
@@ -53,10 +54,10 @@ class SoftAperture(ABC):
     @property
     def seconds_per_point(self) -> float:
         """What `transmittance` takes for a point, roughly."""
-        return 1e-8
+        return SOFT_EDGE_SAMPLE
 
     @abstractmethod
-    def transmittance(self, x: Any, y: Any, types: Precision) -> Any:
+    def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
         """At points (x, y), flat Dr.Jit Float64 arrays; differentiable in both."""
 
 
@@ -84,6 +85,11 @@ class Aperture(ABC):
     @abstractmethod
     def rotationally_symmetric(self) -> bool:
         """Whether the aperture is the same seen from every side."""
+
+    @property
+    def inner_radius(self) -> float:
+        """Of a rotationally symmetric aperture: the radius of the disk about the axis that is closed, in R."""
+        return 0.0
 
     @property
     @abstractmethod

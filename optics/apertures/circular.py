@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, pi
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from optics.apertures.aperture import Aperture, Nodes, SoftAperture
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.arguments import in_range, shown
+from optics.numerics.autodiff import Array
 from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
@@ -73,6 +73,10 @@ class Annulus(Aperture):
         return True
 
     @property
+    def inner_radius(self) -> float:
+        return self.inner
+
+    @property
     def half_widths(self) -> tuple[float, float]:
         return 1.0, 1.0
 
@@ -98,7 +102,7 @@ class SoftAnnulus(SoftAperture):
     edge: SoftEdge
     inner: float
 
-    def transmittance(self, x: Any, y: Any, types: Precision) -> Any:
+    def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
         import drjit as dr
 
         distance = dr.sqrt(x * x + y * y + 1e-40)  # differentiable on the axis
@@ -122,6 +126,7 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
     rho = np.maximum(np.abs(np.asarray(distance, dtype=np.float64)), 1e-9 * radius)[:, None]
     lower = np.abs(rho - radius)
     span = np.maximum(np.minimum(edge.reach, rho + radius) - lower, 0)
+    # Choice: more nodes than the kernel's cycles and its window's steepness ask for.
     u, weight = gauss_legendre(int(24 + 4 * edge.cycles + 2 * edge.beta))
     r = np.maximum(lower + span * np.sin(pi * u / 2) ** 2, 1e-300)
     cosine = np.clip((rho**2 + r**2 - radius**2) / (2 * rho * r), -1, 1)
@@ -136,7 +141,7 @@ def _ring_nodes(inner: float, cycles: float, digits: float) -> Nodes:
 
     Over the full disk the mean around a ring is a smooth function of r², which pays for few cycles.
     """
-    digits += 0.3  # half the error to each of the two rules
+    digits += 0.3  # log10 2: half the error to each of the two rules
     u, weight = gauss_legendre(gauss_legendre_count(cycles * (1 - inner), digits))
     rings = [(inner + (1 - inner) * u, (1 - inner) * weight)]
     if inner == 0:

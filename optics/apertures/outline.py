@@ -1,4 +1,4 @@
-"""Where lines cross the edge of an opening: the geometry behind quadrature that ends exactly there."""
+"""The edge of an opening: where lines cross it, so that quadrature can end exactly there."""
 
 from __future__ import annotations
 

@@ -19,16 +19,17 @@ import numpy as np
 from optics.apertures.aperture import Aperture, Nodes, SoftAperture
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
-from optics.numerics.interpolation import lagrange
+from optics.numerics.interpolation import lagrange_basis
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
 
 __all__ = ["PixelatedAperture"]
 
-EDGE_DEGREE = 4  # more than the digits asked for: of the polynomials that a curved edge is to these digits
+EDGE_DEGREE = 4  # choice: more than the digits asked for: of the polynomials that a curved edge is to these digits
 ROUNDING = 1e-12
-STEEPNESS = 3.0  # of panels' lengths beside a square root
-MOMENT_DIGITS = 8.0  # of what is left of a cut pixel
-MOST_NODES = 32  # along a pixel: beyond, what is left of pixels that the edge cuts is a matter of too many moments
+STEEPNESS = 3.0  # choice: of panels' lengths beside a square root
+MOMENT_DIGITS = 8.0  # choice: of what is left of a cut pixel
+# Choice, along a pixel: beyond, what is left of pixels that the edge cuts is a matter of too many moments.
+MOST_NODES = 32
 
 
 @dataclass(frozen=True)
@@ -189,7 +190,9 @@ def _weights(aperture: PixelatedAperture, across: int) -> np.ndarray:
         # Exact for the Lagrange polynomials of the nodes, which have degree across - 1 in x and in y.
         total = np.zeros((across, across))
         for x, y, size in aperture._pieces(np.array([row, column]), 0.0, MOMENT_DIGITS, across - 1):
-            in_x, in_y = (lagrange((at - aperture._centres[k]) / pitch + 0.5, u) for at, k in ((x, column), (y, row)))
+            in_x, in_y = (
+                lagrange_basis((at - aperture._centres[k]) / pitch + 0.5, u) for at, k in ((x, column), (y, row))
+            )
             total += in_y * size @ in_x.T
         weights[row, :, column, :] = total
     side = count * across

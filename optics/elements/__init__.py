@@ -1,4 +1,4 @@
-"""What light passes: a source, a pupil, and the relief on it.
+"""What light comes from and passes: a source, a pupil, and the relief on it.
 
 source            PointSource
 pupil             Pupil: aperture, relief, ideal lens

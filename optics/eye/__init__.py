@@ -1,8 +1,8 @@
-"""Eyes: a pupil before a retina.
+"""Eyes: a pupil before a retina of photoreceptors.
 
 eye                   Eye
-receptive_field       which directions a receptor sees
-kernel_interpolation  how few kernels stand for a range of them
+receptive_field       which directions a receptor sees: the kernel
+kernel_interpolation  how few kernels stand for a range of distances and directions
 kernel_bank           the kernels of an eye for a scene
 band_choice           how few spectral bands will do
 retinal_image         a scene convolved with a kernel

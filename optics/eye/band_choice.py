@@ -17,6 +17,7 @@ from optics.spectra.spectrum import daylight
 
 __all__ = ["choose_bands"]
 
+# Choice: numbers of bands to try, up to half of `FINEST`, with which they are compared.
 CANDIDATES = (1, 2, 4, 8, 16, 32)
 
 

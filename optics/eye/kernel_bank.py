@@ -1,7 +1,7 @@
 """The kernels of an eye for a scene in depth and over its field of view: as few as the tolerance allows.
 
 A kernel depends on where the light comes from. It is computed at nodes, evenly spaced in vergence 1/z (defocus is
-linear in it) and over the tangent plane, and interpolated linearly between them (see `ladder`):
+linear in it) and over the tangent plane, and interpolated linearly between them (see `kernel_interpolation`):
 
     signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene.
 """
@@ -16,14 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from optics.eye.kernel_interpolation import Choice, NodeChoice, linear_weights, nodes
+from optics.eye.kernel_interpolation import Choice, NodeChoice, nodes
 from optics.numerics.arguments import positive, shown, whole
-from optics.numerics.autodiff import is_differentiable, number, plain
+from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, plain
+from optics.numerics.interpolation import linear_weights
 
 __all__ = ["KernelBank", "prepare"]
 
-MOST_NODES = 64
-DEPTH_RUNGS, FIELD_RUNGS = (1, 3, 5, 9, 17), (1, 3, 5, 9)
+MOST_NODES = 64  # choice: of a stage, if asked for
+# Choice: node counts to try; each has the nodes of those before it.
+DEPTH_COUNTS, FIELD_COUNTS = (1, 3, 5, 9, 17), (1, 3, 5, 9)
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class KernelBank:
 
     vergence: tuple[float, float]
     field: tuple[float, float]
-    kernels: dict[tuple[int, int, int], Any]
+    kernels: dict[tuple[int, int, int], Array]
     choices: tuple[Choice, ...]
 
     def shares(self, shape: tuple[int, int], z: Any) -> list[Any]:
@@ -54,9 +56,7 @@ class KernelBank:
         depth = (2 / np.broadcast_to(plain(z), shape) - near - far) / ((near - far) or 1.0)
         down, across = ((np.arange(n) - (n - 1) / 2) / half for n, half in zip(shape, self.field, strict=True))
         by_depth, by_row, by_column = (
-            linear_weights(depth, layers),
-            linear_weights(down, rows),
-            linear_weights(across, columns),
+            linear_weights(at, nodes(n)) for at, n in ((depth, layers), (down, rows), (across, columns))
         )
         return [by_depth[i] * by_row[j][:, None] * by_column[k] for i, j, k in self.kernels]
 
@@ -76,7 +76,7 @@ class _Range:
     """Distances from nearest to farthest, by their vergence; a Dr.Jit distance stands for itself."""
 
     vergence: tuple[float, float]
-    only: Any
+    only: Scalar
 
     @classmethod
     def of(cls, z: Any) -> _Range:
@@ -87,7 +87,7 @@ class _Range:
         near, far = float(distances.min()), float(distances.max())
         return cls((1 / near, 1 / far), near if near == far else None)
 
-    def distance(self, place: float) -> Any:
+    def distance(self, place: float) -> Scalar:
         """[m], at a place from -1 (farthest) to 1 (nearest)."""
         if self.only is not None:
             return self.only
@@ -97,7 +97,7 @@ class _Range:
 
 
 def prepare(
-    kernel_at: Callable[[Any, float, float], Any],
+    kernel_at: Callable[[Scalar, float, float], Array],
     resolution: tuple[int, int],
     samples_per_receptor: int,
     z: Any,
@@ -111,9 +111,9 @@ def prepare(
         None if count == "auto" else whole(name, count, 1, MOST_NODES)
         for name, count in zip(("depth_layers", "field_zones"), counts, strict=True)
     )
-    along = NodeChoice("depth", lambda at: kernel_at(depths.distance(at[0]), 0.0, 0.0), [(n,) for n in DEPTH_RUNGS], s)
+    along = NodeChoice("depth", lambda at: kernel_at(depths.distance(at[0]), 0.0, 0.0), [(n,) for n in DEPTH_COUNTS], s)
     across = NodeChoice(
-        "field", lambda at: kernel_at(depths.distance(0), at[1], at[0]), [_grid(n, resolution) for n in FIELD_RUNGS], s
+        "field", lambda at: kernel_at(depths.distance(0), at[1], at[0]), [_grid(n, resolution) for n in FIELD_COUNTS], s
     )
     if depths.only is not None:
         depth = Choice("depth", (1,), 0.0, "all at one distance")
@@ -126,12 +126,13 @@ def prepare(
     return KernelBank(depths.vergence, (resolution[0] * s / 2, resolution[1] * s / 2), kernels, (depth, wide))
 
 
-def _chosen(ladder: NodeChoice, asked: tuple[int, ...] | None, tolerance: float) -> Choice:
-    return ladder.choose(tolerance) if asked is None else Choice(ladder.stage, asked, None, "as asked")
+def _chosen(stage: NodeChoice, asked: tuple[int, ...] | None, tolerance: float) -> Choice:
+    return stage.choose(tolerance) if asked is None else Choice(stage.stage, asked, None, "as asked")
 
 
 def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:
-    """(rows, columns) of nodes over the field, no denser one way than the other; rungs stay within each other."""
+    """(rows, columns) of nodes over the field, no denser one way than the other. Higher counts have the nodes of lower
+    ones."""
     height, width = resolution
     finest = max(across - 1, 0)
 

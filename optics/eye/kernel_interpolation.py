@@ -1,8 +1,8 @@
-"""How many kernels stand for a whole range of them: the fewest whose interpolation a receptor cannot tell from all.
+"""How many kernels stand for a whole range of them: the fewest between which a receptor cannot tell interpolation.
 
 Kernels are computed at nodes, evenly spaced over [-1, 1] along every axis, and interpolated linearly between them: the
-error falls with the square of the nodes' distance. A rung's own is told by kernels between its nodes; most of them are
-nodes of the next rung.
+error falls with the square of the nodes' distance. The error of a node count is told by kernels between its nodes; most
+of them are nodes of the next higher count.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.autodiff import plain
+from optics.numerics.autodiff import Array, plain
+from optics.numerics.interpolation import linear_weights
 
-__all__ = ["Choice", "NodeChoice", "linear_weights", "nodes", "worst_difference"]
+__all__ = ["Choice", "NodeChoice", "nodes", "worst_difference"]
 
-MOST_CHECKS = 8  # kernels that tell a rung's error
-CAUTION = 1.3  # of that error: the worst place may lie between
+MOST_CHECKS = 8  # choice: kernels that tell the error of a node count
+CAUTION = 1.3  # choice, over that error: the worst place may lie between
 Place = tuple[float, ...]
 
 
@@ -45,19 +45,12 @@ def nodes(count: int) -> np.ndarray:
     return np.linspace(-1, 1, count) if count > 1 else np.zeros(1)
 
 
-def linear_weights(position: np.ndarray, count: int) -> np.ndarray:
-    """Linear interpolation between nodes, constant beyond: (node, ...)."""
-    if count == 1:
-        return np.ones((1, *position.shape))
-    return np.stack([np.interp(position, nodes(count), row) for row in np.eye(count)])
-
-
-def checks(rung: tuple[int, ...]) -> list[Place]:
-    """Where a rung errs most: at the far ends if it has one node, else halfway between nodes along every axis. Of many
-    places a few, corners among them."""
-    if max(rung) == 1:
-        return [place for place in _places([nodes(3)] * len(rung)) if any(place)]
-    found = _places((nodes(n)[1:] + nodes(n)[:-1]) / 2 if n > 1 else nodes(1) for n in rung)
+def checks(counts: tuple[int, ...]) -> list[Place]:
+    """Where so many nodes along each axis err most: at the far ends if there is one, else halfway between nodes along
+    every axis. Of many places a few, corners among them."""
+    if max(counts) == 1:
+        return [place for place in _places([nodes(3)] * len(counts)) if any(place)]
+    found = _places((nodes(n)[1:] + nodes(n)[:-1]) / 2 if n > 1 else nodes(1) for n in counts)
     if len(found) <= MOST_CHECKS:
         return found
     return [found[round(at)] for at in np.linspace(0, len(found) - 1, MOST_CHECKS)]
@@ -69,36 +62,39 @@ def _places(axes: Iterable[np.ndarray]) -> list[Place]:
 
 @dataclass(frozen=True)
 class NodeChoice:
-    """One stage: rungs are numbers of nodes along each of its axes; kernel_at a place in [-1, 1]^axes."""
+    """One stage: how many nodes along each of its axes.
+
+    kernel_at: the kernel at a place in [-1, 1]^axes. candidates: node counts to try, from the fewest on.
+    """
 
     stage: str
-    kernel_at: Callable[[Place], Any]
-    rungs: Sequence[tuple[int, ...]]
+    kernel_at: Callable[[Place], Array]
+    candidates: Sequence[tuple[int, ...]]
     samples_per_receptor: int
     known: dict[Place, np.ndarray] = field(default_factory=dict)
 
     def choose(self, tolerance: float) -> Choice:
-        """The lowest rung whose predicted error is within the tolerance.
+        """The first candidate whose predicted error is within the tolerance.
 
         Raises:
-            AccuracyError: the highest is not.
+            AccuracyError: the last is not.
         """
         error = math.inf
-        for rung in self.rungs:
-            error = CAUTION * self.error(rung)
+        for counts in self.candidates:
+            error = CAUTION * self.error(counts)
             if error <= tolerance:
-                return Choice(self.stage, rung, error, f"fewest within the tolerance of {tolerance:g}")
+                return Choice(self.stage, counts, error, f"fewest within the tolerance of {tolerance:g}")
         raise AccuracyError(
-            f"tolerance = {tolerance:g}: {' x '.join(map(str, self.rungs[-1]))} {self.stage} nodes leave {error:.1e} "
-            "of white's signal; widen the tolerance or give a number of nodes"
+            f"tolerance = {tolerance:g}: {' x '.join(map(str, self.candidates[-1]))} {self.stage} nodes leave "
+            f"{error:.1e} of white's signal; widen the tolerance or give a number of nodes"
         )
 
-    def error(self, rung: tuple[int, ...]) -> float:
-        """Worst signal error, at `checks`, of what is interpolated from this rung's nodes."""
-        coarse = _places(nodes(n) for n in rung)
+    def error(self, counts: tuple[int, ...]) -> float:
+        """Worst signal error, at `checks`, of what is interpolated between so many nodes."""
+        coarse = _places(nodes(n) for n in counts)
         worst = 0.0
-        for place in checks(rung):
-            by_axis = [linear_weights(np.asarray(at), n) for at, n in zip(place, rung, strict=True)]
+        for place in checks(counts):
+            by_axis = [linear_weights(np.asarray(at), nodes(n)) for at, n in zip(place, counts, strict=True)]
             shares = [math.prod(map(float, share)) for share in itertools.product(*by_axis)]
             between = [(s, self._kernel(node)) for s, node in zip(shares, coarse, strict=True) if s > 0]
             worst = max(worst, worst_difference([*between, (-1, self._kernel(place))], self.samples_per_receptor))

@@ -1,11 +1,10 @@
-"""The directions that a receptor sees through a pupil: how wide a window holds them, and the PSF summed over cells."""
+"""Which directions a receptor sees through a pupil: how wide a window their light needs, the PSF summed over cells."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -14,24 +13,29 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.methods.problem import Problem
 from optics.numerics.accuracy import AccuracyError, Plan
-from optics.numerics.autodiff import is_differentiable, number
+from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
+from optics.numerics.matrices import matmul
 from optics.numerics.precision import precision
 from optics.point_spread.psf import PSFResult, spread
+from optics.point_spread.request import Request
 
 __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 
-# Light from further off a receptor's direction counts as screened by the eye's rim: half the widest field of view.
+# Choice: light from further off a receptor's direction counts as screened by the eye's rim.
 WIDEST_TANGENT = math.tan(math.radians(50))
-MOST_CELLS = 2049
-MOST_SECONDS = 3.0  # per band
+MOST_CELLS = 2049  # choice: of a kernel, along an axis
+MOST_SECONDS = 3.0  # choice: per band
+# A spline of degree seven through three samples per cycle errs by 4e-6 (see `_cell_integrals`), enough for tolerances
+# down to 1e-4. For smaller ones samples lie closer: the error falls with the eighth power of their distance.
+SAMPLES_PER_CYCLE, SPLINE_TOLERANCE, SPLINE_ORDER = 3, 1e-4, 8
 
 
 @dataclass(frozen=True)
 class Retina:
     """Where the PSF is wanted: distance behind the pupil [m], wavelengths [m], cell size [m], tolerance, dtype."""
 
-    distance: Any
+    distance: Scalar
     wavelengths: np.ndarray
     cell: float
     tolerance: float
@@ -39,9 +43,9 @@ class Retina:
 
 
 @dataclass(frozen=True)
-class _View:
-    """What one wavelength asks of the grid: half the window [m] around the geometric image, the pitch that resolves
-    the PSF [m], the band [1/m] beyond which the hard edge's light is less than the tolerance."""
+class _WindowNeeds:
+    """What one wavelength needs: half the window [m] around the geometric image, the pitch [m] that resolves the PSF,
+    and the band [1/m] beyond which there is less light than the tolerance."""
 
     half_window: float
     pitch: float
@@ -51,12 +55,12 @@ class _View:
 @dataclass(frozen=True)
 class _Spot:
     """Where the light of a source lands: its geometric image (x, y) [m] on the sensor, half the side [m] of the square
-    around it that holds the light, the pitch that resolves it, one view per wavelength."""
+    around it that holds the light, the pitch that resolves it, and what each wavelength needs."""
 
     centre: tuple[float, float]
     half: float
     pitch: float
-    views: tuple[_View, ...]
+    needs: tuple[_WindowNeeds, ...]
 
     @property
     def window(self) -> Grid:
@@ -69,8 +73,8 @@ class _Spot:
 
 
 def visual_kernel(
-    pupil: Pupil, retina: Retina, z: Any, direction: tuple[float, float] = (0.0, 0.0), from_cell: bool = False
-) -> Any:
+    pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0), from_cell: bool = False
+) -> Array:
     """PSF integrated over the retina's cells around the geometric image and turned by 180°: Dr.Jit (band, k, k), k odd.
 
     direction: (right, down) from the axis in the visual field, tangents; the image lies on the other side.
@@ -80,7 +84,6 @@ def visual_kernel(
 
     if is_differentiable(retina.distance) and direction != (0.0, 0.0):
         raise ValueError("fov_deg is a Dr.Jit array: must be a number off the axis, where it turns the light as well")
-    matmul: Any = dr.matmul
     beams = _beams(pupil, retina, z, (-direction[0], -direction[1]))
     spot = _spot(beams, retina)
     result = _spread(beams, spot, retina)
@@ -89,10 +92,10 @@ def visual_kernel(
         types.Tensor(_cell_integrals(n, result.dx, tiles, at)[::-1].copy())
         for n, at in zip(result.tensor.shape[:0:-1], spot.centre, strict=True)
     )
-    return dr.maximum(matmul(along, matmul(result.tensor, across, Bt=True)), 0)
+    return dr.maximum(matmul(along, matmul(result.tensor, across, transposed=True)), 0)
 
 
-def retinal_psf(pupil: Pupil, retina: Retina, z: Any) -> PSFResult:
+def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar) -> PSFResult:
     """PSF of an axial point at distance z on the window that loses less than the tolerance at every wavelength.
 
     Raises:
@@ -102,7 +105,7 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Any) -> PSFResult:
     return _spread(beams, _spot(beams, retina), retina)
 
 
-def _beams(pupil: Pupil, retina: Retina, z: Any, tangents: tuple[float, float]) -> list[Beam]:
+def _beams(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, float]) -> list[Beam]:
     source = PointSource(z, (math.atan(tangents[0]), math.atan(tangents[1])))
     return [Beam(pupil, source, float(wavelength), retina.distance) for wavelength in retina.wavelengths]
 
@@ -110,24 +113,24 @@ def _beams(pupil: Pupil, retina: Retina, z: Any, tangents: tuple[float, float]) 
 def _spot(beams: list[Beam], retina: Retina) -> _Spot:
     distance = number(retina.distance)
     centre_x, centre_y = (distance * math.tan(angle) for angle in beams[0].source.angle)
-    views = tuple(_view(beam, retina, (centre_x, centre_y)) for beam in beams)
-    half, pitch = max(view.half_window for view in views), min(view.pitch for view in views)
+    needs = tuple(_needs(beam, retina, (centre_x, centre_y)) for beam in beams)
+    half, pitch = max(need.half_window for need in needs), min(need.pitch for need in needs)
     if _cells_within(half, retina.cell) > MOST_CELLS:
         raise AccuracyError(
             f"the light spreads over {2 * half:.3g} m, {2 * half / retina.cell:.0f} cells of {retina.cell:.3g} m: "
             f"at most {MOST_CELLS}; widen the field of view or the cells, or flatten the relief"
         )
     half = retina.cell * (_cells_within(half, retina.cell) + 1) / 2
-    return _Spot((centre_x, centre_y), half, pitch, views)
+    return _Spot((centre_x, centre_y), half, pitch, needs)
 
 
 def _spread(beams: list[Beam], spot: _Spot, retina: Retina) -> PSFResult:
     reach = spot.half + math.hypot(*spot.centre)
-    tasks = [
-        replace(Problem.of(beam, spot.window, retina.tolerance, retina.dtype), widest_band=view.band, reach=reach)
-        for beam, view in zip(beams, spot.views, strict=True)
+    problems = [
+        replace(Problem.of(beam, spot.window, retina.tolerance, retina.dtype), widest_band=need.band, reach=reach)
+        for beam, need in zip(beams, spot.needs, strict=True)
     ]
-    return spread(beams, tasks, most_seconds=MOST_SECONDS)
+    return spread([Request(*each, most_seconds=MOST_SECONDS) for each in zip(beams, problems, strict=True)])
 
 
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:
@@ -139,28 +142,46 @@ def perfect_psf(retina: Retina, radius: float) -> PSFResult:
     return PSFResult(image, retina.cell, retina.wavelengths, retina.distance, pupil, (plan,))
 
 
-def _view(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _View:
-    """Half the loss goes to rays outside the window, half to what the hard edge sends further than δ [1/m] off its
-    geometric direction: 1/(π²Rδ) of the light, as in the Airy pattern (1 - 2/(πv), v = 2πRδ; Born & Wolf §8.5.2).
-    Pixels send light off it, too, and lose as much beyond what is counted."""
-    pupil, wavelength = beam.pupil, beam.wavelength
-    lam, z, radius = wavelength / pupil.medium_n, number(retina.distance), pupil.radius
-    slopes = pupil.slopes(wavelength, beam.source)
-    x, y = slopes.rays(z, pupil.medium_n)
-    shadow = float(
-        np.quantile(np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1])), 1 - retina.tolerance / 2, method="higher")
-    )
-    tail = 2 / (math.pi**2 * radius * retina.tolerance) + pupil.scatter(wavelength, retina.tolerance / 4)
+def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNeeds:
+    """What of a retina the light of one wavelength needs; centre: its geometric image (x, y) [m].
+
+    The window may lose a share of the light, the tolerance: half of that as rays that end outside it, half as what the
+    pupil's edge diffracts off them. Diffraction adds frequencies, and frequencies are sines over λ: from a ray's end
+    the sine goes on by λ times the edge's frequencies, and z tan θ says where that lands.
+    """
+    pupil, z, radius = beam.pupil, number(retina.distance), beam.pupil.radius
+    wavelength = beam.wavelength / pupil.medium_n
+    # Pixels send light off its direction, too, and lose as much beyond what is counted.
+    diffracted = _beyond_edge(radius, retina.tolerance / 2) + pupil.scatter(beam.wavelength, retina.tolerance / 4)
     half = WIDEST_TANGENT * z + radius
+    shadow = _shadow(beam, retina, centre)
     if math.isfinite(shadow):
-        off = max(abs(at) for at in centre)
-        sine = (off + shadow) / math.hypot(off + shadow, z) + tail * lam
-        half = min(half, z * sine / math.sqrt(1 - sine * sine) - off if sine < 1 else math.inf)
-    steepest = slopes.steepest_inside / wavelength
-    # The field's local bandwidth on the sensor is 2R/(λz); the intensity has twice that. Splines want a margin.
-    detail = min(2 * radius / (lam * z), 2 * (steepest + tail))
-    per_cycle = 3 * max(1.0, (1e-4 / retina.tolerance) ** (1 / 8))  # see _cell_integrals
-    return _View(half, 1 / (per_cycle * detail), steepest + tail)
+        off_axis = max(abs(at) for at in centre)
+        outermost = off_axis + shadow
+        sine = outermost / math.hypot(outermost, z) + diffracted * wavelength
+        half = min(half, z * sine / math.sqrt(1 - sine * sine) - off_axis if sine < 1 else math.inf)
+    band = pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.wavelength + diffracted
+    # |U|² holds the differences of the field's frequencies. At a point of the sensor, lit from all over the pupil,
+    # these span 2R/(λz); and no two within the band differ by more than twice the band.
+    detail = min(2 * radius / (wavelength * z), 2 * band)
+    finer = max(1.0, (SPLINE_TOLERANCE / retina.tolerance) ** (1 / SPLINE_ORDER))
+    return _WindowNeeds(half, 1 / (SAMPLES_PER_CYCLE * finer * detail), band)
+
+
+def _shadow(beam: Beam, retina: Retina, centre: tuple[float, float]) -> float:
+    """Half side [m] of the square about `centre` in which all rays end, but for half the tolerance."""
+    x, y = beam.pupil.slopes(beam.wavelength, beam.source).rays(number(retina.distance), beam.pupil.medium_n)
+    farthest = np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1]))
+    return float(np.quantile(farthest, 1 - retina.tolerance / 2, method="higher"))
+
+
+def _beyond_edge(radius: float, share: float) -> float:
+    """Frequency δ [1/m] off its geometric direction beyond which an aperture's hard edge sends a share of the light.
+
+    Airy's pattern has J0²(v) + J1²(v) of its light beyond v = 2πRδ (Born & Wolf, §8.5.2), which falls like 2/(πv). That
+    is 1/(π²Rδ), and equal to the share.
+    """
+    return 1 / (math.pi**2 * radius * share)
 
 
 def _cells_within(half: float, cell: float) -> int:

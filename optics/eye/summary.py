@@ -4,24 +4,52 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Protocol
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
+from optics.elements.pupil import Pupil
 from optics.numerics.accuracy import Plan
-from optics.numerics.autodiff import number, plain
+from optics.numerics.autodiff import Scalar, number, plain
 from optics.point_spread.image_quality import image_quality, mtf, strehl_ratio
 from optics.point_spread.psf import PSFResult
+from optics.spectra.bands import SpectralBands
 from optics.spectra.spectrum import daylight
 
-if TYPE_CHECKING:
-    from optics.eye.eye import Eye
+__all__ = ["DescribedEye", "Description", "describe", "noise_of"]
 
-__all__ = ["Description", "describe"]
+FREQUENCIES = 513  # choice: between 0 and the cut-off, at which the MTF is held against the noise
+FINER = 16  # choice: steps per sample of the PSF, where a receptor's angular sensitivity is measured
 
-FREQUENCIES = 513
-FINER = 16  # steps per sample of the PSF, where a receptor's angular sensitivity is measured
+
+class DescribedEye(Protocol):
+    """What a description reads of an eye: see `optics.Eye`, which is one."""
+
+    @property
+    def pupil(self) -> Pupil | None: ...
+
+    @property
+    def noise_sigma(self) -> float: ...
+
+    @property
+    def spectral_bands(self) -> SpectralBands: ...
+
+    @property
+    def sensor_distance(self) -> Scalar: ...
+
+    @property
+    def receptor_pitch(self) -> float: ...
+
+    @property
+    def relative_aperture(self) -> Scalar: ...
+
+    @property
+    def throughput(self) -> Scalar: ...
+
+    @property
+    def photons(self) -> np.ndarray | None: ...
+
+    def psf(self, z: Scalar) -> PSFResult: ...
 
 
 @dataclass(frozen=True)
@@ -32,7 +60,7 @@ class Description:
     diffraction_cpd: cut-off of an aperture this wide, 2 sin θ/λ on the retina. sampling_cpd: Nyquist frequency of the
         receptors, 1/(2 Δφ). noise_cpd: where the contrast that the optics leave first sinks below the noise.
     acuity_cpd: the least of the three; binding: which.
-    strehl_ratio: of the band nearest `wavelength`; image_quality: see `quality.image_quality`.
+    strehl_ratio: of the band nearest `wavelength`; image_quality: see `optics.image_quality`.
     noise: standard deviation of a receptor that looks at white, of all sources, in units of the signal.
     photons: absorbed by it per integration time, mean of the channels (None: no photon budget).
     acceptance_angle_deg: full width at half height of a receptor's angular sensitivity, horizontally;
@@ -89,7 +117,7 @@ class Description:
         return self.acceptance_angle_deg / self.interommatidial_angle_deg
 
 
-def noise_of(eye: Eye) -> float:
+def noise_of(eye: DescribedEye) -> float:
     """Standard deviation of a receptor's signal where it sees white in daylight: its own noise, and that of photons."""
     if eye.photons is None:
         return float(eye.noise_sigma)
@@ -97,7 +125,7 @@ def noise_of(eye: Eye) -> float:
     return math.hypot(eye.noise_sigma, light / math.sqrt(float(eye.photons.mean()) * light))
 
 
-def describe(eye: Eye, z: Any) -> Description:
+def describe(eye: DescribedEye, z: Scalar) -> Description:
     """The eye's limits for a scene at distance z [m].
 
     Raises:
@@ -134,7 +162,7 @@ def describe(eye: Eye, z: Any) -> Description:
     )
 
 
-def _white(eye: Eye, result: PSFResult) -> tuple[PSFResult, float]:
+def _white(eye: DescribedEye, result: PSFResult) -> tuple[PSFResult, float]:
     """The PSF of white daylight as the mean of the channels weighs it, and its mean wavelength [m]."""
     worth = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
     image = np.tensordot(worth / worth.sum(), result.psf.astype(np.float64), axes=1)
@@ -157,7 +185,7 @@ def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
     return float(frequency[at - 1] + share * (frequency[at] - frequency[at - 1]))
 
 
-def _acceptance(eye: Eye, white: PSFResult) -> float:
+def _acceptance(eye: DescribedEye, white: PSFResult) -> float:
     """Full width [m] at half height, along x through its peak, of PSF ⊗ receptor aperture in white daylight."""
     if eye.pupil is None:
         return eye.receptor_pitch
@@ -174,6 +202,8 @@ def _acceptance(eye: Eye, white: PSFResult) -> float:
 
 def _within(x: np.ndarray, image: np.ndarray, at: np.ndarray, half: float) -> np.ndarray:
     """Integrals along the first axis, of the spline through an image's samples at x, over at ± half."""
+    from scipy.interpolate import CubicSpline
+
     primitive = CubicSpline(x, image).antiderivative()
     found: np.ndarray = primitive(np.clip(at + half, x[0], x[-1])) - primitive(np.clip(at - half, x[0], x[-1]))
     return found

@@ -1,16 +1,20 @@
-"""Ways to evaluate one diffraction integral, each with its samples, time and error.
+"""Ways to evaluate one diffraction integral, Rayleigh and Sommerfeld's first, or an approximation to it.
 
-problem              Problem: the integral in numbers
-sampling             what every method offers
+All but the textbook's take a `Problem` and give `Sampling`s: how they would sample it, with the time and the error to
+expect, and the picture if asked. `optics.point_spread.planner` chooses.
+
+textbook             the angular spectrum in plain NumPy: start here
+problem              Problem: what is to be computed, in numbers
+sampling             Sampling: what every method offers
 rayleigh_sommerfeld  the direct sum: the reference
-angular_spectrum     on grids, whole or split
-pixelated_spectrum   of pupils made of pixels
-hankel               of symmetric pupils
-low_rank             one matrix product
-far_field            directions for each of a few nodes
-fresnel              Fresnel and Fraunhofer, and how wrong they are
-geometric            density of rays; the pinhole
+angular_spectrum     by transforms on grids, whole or with its paraxial part split off
+pixelated_spectrum   the same for pupils made of pixels
+hankel               the same for symmetric pupils, along one radius
+low_rank             by one matrix product
+far_field            by one transform onto directions for each of a few nodes of the window
+fresnel              approximate: Fresnel and Fraunhofer, and how wrong they are
+geometric            approximate: density of rays; the pinhole
 rays                 where geometrical optics sends the light
-pupil_sampling       grid or nodes in the pupil
+pupil_sampling       where matrix products sample the pupil
 spectral_taper       how a spectrum ends before grazing incidence
 """

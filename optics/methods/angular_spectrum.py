@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 from optics.elements.beam import Beam
 from optics.methods.fresnel import paraxial_integral
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.spectral_taper import Taper, tapers
+from optics.numerics.autodiff import Array
+from optics.numerics.cost import CALL, PUPIL_SAMPLE, SPECTRUM_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
 
-__all__ = ["GridSampling", "SpectrumSampling", "arrived", "split", "whole"]
+__all__ = [
+    "GridSampling",
+    "SpectrumSampling",
+    "arrived",
+    "split_period",
+    "split_spectrum",
+    "whole_period",
+    "whole_spectrum",
+]
 
 
 class SpectrumSampling:
@@ -32,6 +41,11 @@ class SpectrumSampling:
     output_period: int
 
     @property
+    def is_whole(self) -> bool:
+        """Whether no paraxial part is split off."""
+        return self.method == "angular_spectrum"
+
+    @property
     def spectrum(self) -> Grid:
         return Grid.square(2 * math.ceil(self.taper.end * self.period) + 1, 1 / self.period)
 
@@ -39,10 +53,16 @@ class SpectrumSampling:
     def relay(self) -> Grid:
         return Grid.square(self.output_period, self.period / self.output_period)
 
+    def seconds_from_spectrum(self, window: Grid) -> float:
+        """What the transforms from the spectrum to the window take."""
+        if self.is_whole:
+            return predicted_seconds(self.spectrum.shape, self.output_period, window.shape)
+        to_relay = predicted_seconds(self.spectrum.shape, self.output_period, self.relay.shape)
+        return to_relay + predicted_seconds(self.relay.shape, 0.5, window.shape)  # no whole period: a matrix
+
     def plane(self, problem: Problem) -> float:
         """Width [m] over which rounding spreads the pupil's light."""
-        whole = self.method == "angular_spectrum"
-        return self.period if whole else problem.wavelength * problem.distance / self.relay.dx
+        return self.period if self.is_whole else problem.wavelength * problem.distance / self.relay.dx
 
 
 @dataclass(frozen=True)
@@ -65,7 +85,7 @@ class GridSampling(SpectrumSampling):
         across = 2 * math.ceil(self.edge.outermost / pitch) + 1
         return Grid.square(min(self.pupil_period, across), pitch)
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _angular_spectrum(beam, problem, self, precision(problem.dtype)).intensity
 
@@ -81,52 +101,53 @@ class GridSampling(SpectrumSampling):
     def largest(self) -> int:
         """Side of the largest square array."""
         arrays = [self.pupil.shape[0], self.spectrum.shape[0]]
-        return max([*arrays, self.output_period] if self.method.startswith("split") else arrays)
+        return max(arrays if self.is_whole else [*arrays, self.output_period])
 
 
-def whole(problem: Problem) -> list[GridSampling]:
+def whole_spectrum(problem: Problem) -> list[GridSampling]:
     """Samplings by which the whole spectrum meets the problem's tolerance."""
-    return [_whole(problem, taper) for taper in tapers(problem)]
+    return [_sampling(problem, taper, "angular_spectrum") for taper in tapers(problem)]
 
 
-def split(problem: Problem) -> list[GridSampling]:
+def split_spectrum(problem: Problem) -> list[GridSampling]:
     """Samplings by which the split spectrum meets the problem's tolerance."""
-    return [_split(problem, taper) for taper in tapers(problem)]
+    return [_sampling(problem, taper, "split_angular_spectrum") for taper in tapers(problem)]
 
 
-def _whole(problem: Problem, taper: Taper) -> GridSampling:
-    """One period holds the window and all light that could wrap around into it."""
+def _sampling(problem: Problem, taper: Taper, method: str) -> GridSampling:
     edge = problem.soft_edge(taper.end + problem.phase_band)
-    beam = edge.outermost + taper.blur + problem.distance * taper.tangent
+    find = whole_period if method == "angular_spectrum" else split_period
+    period, output_period = find(problem, taper, edge.outermost)
+    pupil_period = fast_length(period * (taper.end + edge.stopband + problem.phase_band))
+    return _timed(GridSampling(method, edge, taper, period, pupil_period, output_period), problem)
+
+
+def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[float, int]:
+    """Period [m], and its samples at the window's pitch, that holds the window and all light that could wrap around
+    into it from a pupil that ends `outermost` [m] from the axis."""
+    beam = outermost + taper.blur + problem.distance * taper.tangent
     if problem.reach is not None:  # what lies beyond the reach is negligible: it may wrap around to the window's rim
-        beam = min(beam, problem.reach + edge.outermost)
+        beam = min(beam, problem.reach + outermost)
     pitch = problem.window.dx
-    output_period = fast_length(max(problem.window.half_width + beam, 2 * (edge.outermost)) / pitch)
-    period = output_period * pitch
-    pupil_period = fast_length(period * (taper.end + edge.stopband + problem.phase_band))
-    sampling = GridSampling("angular_spectrum", edge, taper, period, pupil_period, output_period)
-    last = predicted_seconds(sampling.spectrum.shape, output_period, problem.window.shape)
-    return _timed(sampling, last)
+    samples = fast_length(max(problem.window.half_width + beam, 2 * outermost) / pitch)
+    return samples * pitch, samples
 
 
-def _split(problem: Problem, taper: Taper) -> GridSampling:
-    """One period holds the pupil and the non-paraxial walk-off z (tan θ - sin θ)."""
-    edge = problem.soft_edge(taper.end + problem.phase_band)
-    relay = edge.outermost + taper.blur + problem.distance * (taper.tangent - taper.sine)
+def split_period(problem: Problem, taper: Taper, outermost: float) -> tuple[float, int]:
+    """Period [m] that holds the pupil and the non-paraxial walk-off z (tan θ - sin θ); and its samples, so close that
+    Fresnel's integral, which repeats every λz over their pitch, keeps its copies off the window."""
+    relay = outermost + taper.blur + problem.distance * (taper.tangent - taper.sine)
     period = 2 * relay
-    pupil_period = fast_length(period * (taper.end + edge.stopband + problem.phase_band))
     reached = problem.window.half_width + relay + problem.distance * taper.sine
-    relay_period = fast_length(period * reached / (problem.wavelength * problem.distance))
-    sampling = GridSampling("split_angular_spectrum", edge, taper, period, pupil_period, relay_period)
-    last = predicted_seconds(sampling.spectrum.shape, relay_period, sampling.relay.shape)
-    last += predicted_seconds(sampling.relay.shape, 0.5, problem.window.shape)  # no whole period: a matrix
-    return _timed(sampling, last)
+    return period, fast_length(period * reached / (problem.wavelength * problem.distance))
 
 
-def _timed(sampling: GridSampling, last: float) -> GridSampling:
+def _timed(sampling: GridSampling, problem: Problem) -> GridSampling:
     pupil, spectrum = sampling.pupil.shape, sampling.spectrum.shape
+    last = sampling.seconds_from_spectrum(problem.window)
     seconds = predicted_seconds(pupil, sampling.pupil_period, spectrum) + last
-    seconds += pupil[0] ** 2 * (5e-8 + sampling.edge.seconds_per_point) + spectrum[0] ** 2 * 2e-8 + 2e-3
+    points = pupil[0] ** 2 * (PUPIL_SAMPLE + sampling.edge.seconds_per_point) + spectrum[0] ** 2 * SPECTRUM_SAMPLE
+    seconds += points + CALL["angular_spectrum"]
     return replace(sampling, seconds=seconds)
 
 
@@ -140,7 +161,7 @@ def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Pr
 def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
     """Over the window, of light that has this spectrum at the pupil; up to a phase that intensity forgets."""
     spectrum = spectrum * _transfer(beam, problem, how, precision(problem.dtype))
-    if how.method == "angular_spectrum":
+    if how.is_whole:
         window = problem.window
         return dft2(spectrum, how.output_period, window.shape, +1, window.dx, window.centre)
     return _paraxial_rest(spectrum, beam, problem, how)
@@ -158,7 +179,7 @@ def _transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precis
     f = dr.sqrt(fx * fx + fy * fy)
     s2 = dr.minimum(dr.square(f * opaque(types, problem.wavelength)), 1)
     q = s2 / (1 + dr.sqrt(1 - s2))
-    sag = q if how.method == "angular_spectrum" else q * q / 2
+    sag = q if how.is_whole else q * q / 2
     waves = -opaque(types, beam.distance) / opaque(types, problem.wavelength) * sag
     return Field.from_waves(how.taper.fade(f, types), waves, how.spectrum, types)
 

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
+from optics.numerics.autodiff import Array
+from optics.numerics.cost import CALL, PUPIL_SAMPLE, SPECTRUM_SAMPLE, WINDOW_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
-from optics.numerics.interpolation import TAPS, chebyshev_points, lagrange, lagrange_weights
+from optics.numerics.interpolation import LAGRANGE_8, TAPS, chebyshev_points, lagrange_basis, lagrange_weights
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["FarFieldSampling", "far_field"]
 
-MOST_DIRECTIONS = 4096
+MOST_DIRECTIONS = 4096  # choice: along an axis, by memory
+STEEPEST_CORNER = 0.95  # choice: sine towards a window's corner
+GRAZING = 0.98  # choice: sine that interpolation beyond the window's rim may reach
+# Choice: counts to try.
 CHEBYSHEV_NODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16)
 
 
@@ -39,7 +43,7 @@ class FarFieldSampling:
     method: str = "far_field"
     model_error: float = 0.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _far_field(beam, problem, self, precision(problem.dtype))
 
@@ -72,22 +76,27 @@ def far_field(problem: Problem) -> list[FarFieldSampling]:
     oversampling = math.pi / _step(problem.ripple)  # of the intensity's Nyquist rate
     sine = half / math.hypot(half, problem.distance)
     corner = math.sqrt(2) * half / math.hypot(half, half, problem.distance)
+    if corner >= STEEPEST_CORNER:
+        return []
     # Interpolation reaches over the window's rim, but must not reach grazing incidence.
-    finest = problem.wavelength * max(TAPS / (0.98 - sine), TAPS / (0.98 - corner)) if corner < 0.95 else math.inf
-    if not finest / pitch < MOST_DIRECTIONS:
+    finest = problem.wavelength * max(TAPS / (GRAZING - sine), TAPS / (GRAZING - corner))
+    if finest / pitch >= MOST_DIRECTIONS:
         return []
     period = fast_length(max(4 * oversampling * problem.radius, finest) / pitch)  # a whole number, for the FFT
     step = problem.wavelength / (period * pitch)
     directions = Grid.square(2 * (math.ceil(sine / step) + TAPS) + 1, step)
-    once = predicted_seconds(pupil.shape, period, directions.shape) + 2e-3
-    once += pupil.shape[0] ** 2 * (5e-8 + edge.seconds_per_point / nodes**2) + directions.shape[0] ** 2 * 2e-8
-    seconds = nodes**2 * once + math.prod(problem.window.shape) * 1e-7
+    once = predicted_seconds(pupil.shape, period, directions.shape) + CALL["far_field"]
+    once += (
+        pupil.shape[0] ** 2 * (PUPIL_SAMPLE + edge.seconds_per_point / nodes**2)
+        + directions.shape[0] ** 2 * SPECTRUM_SAMPLE
+    )
+    seconds = nodes**2 * once + math.prod(problem.window.shape) * WINDOW_SAMPLE
     return [FarFieldSampling(edge, pupil, directions, period, nodes, math.atan2(half, problem.distance), seconds)]
 
 
 def _step(error: float) -> float:
-    """Radians per sample at which eight-point Lagrange interpolation errs by 1.07e-3 step⁸ = error."""
-    return min(1.5, (error / 1.07e-3) ** 0.125)
+    """Radians per sample at which eight-point Lagrange interpolation of a unit wave errs by `error`; at most 1.5."""
+    return min(1.5, (error / LAGRANGE_8) ** 0.125)
 
 
 def _nodes_needed(problem: Problem, error: float) -> int | None:
@@ -95,10 +104,10 @@ def _nodes_needed(problem: Problem, error: float) -> int | None:
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim_x, rim_y = problem.radius * np.cos(angle), problem.radius * np.sin(angle)
     half_angle = math.atan2(problem.window.half_width, problem.distance)
-    test = half_angle * np.linspace(-1, 1, 41)
+    test = half_angle * np.linspace(-1, 1, 41)  # choice: 41 places between, 8 on the rim
     for n in CHEBYSHEV_NODES:
         places = half_angle * chebyshev_points(n)
-        weights = lagrange(test, places)
+        weights = lagrange_basis(test, places)
         worst = 0.0
         for across in (0.0, problem.window.half_width):
             exact, known = (_slow_part(problem, rim_x, rim_y, angles, across) for angles in (test, places))
@@ -118,7 +127,7 @@ def _slow_part(problem: Problem, rim_x: np.ndarray, rim_y: np.ndarray, angle: np
     return np.exp(2j * np.pi / problem.wavelength * (distance + along))
 
 
-def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Any:
+def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Array:
     """Rayleigh-Sommerfeld's integral with the plane wave of each direction split off:
 
     U(x) = z/(λρ²) ∫ P(ξ) G(ξ; x) e^{-ik s·ξ} dξ,  G = (ρ/D)² (1/(kD) - i) e^{ik(D - ρ + s·ξ)},
@@ -135,7 +144,7 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
     nodes = how.half_angle * chebyshev_points(how.nodes)
     edge = math.asin(min(float(s[-1]), 0.999))  # a margin beyond the window, for the interpolation that follows
     angle = np.clip(np.arctan2(s[None, :], cosine), -edge, edge)
-    along_x = lagrange(angle, nodes)
+    along_x = lagrange_basis(angle, nodes)
     total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
     for a, across in enumerate(np.tan(nodes)):
         for b, along in enumerate(np.tan(nodes)):
@@ -166,7 +175,7 @@ def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Prec
     )
 
 
-def _onto_window(squared: Any, beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Any:
+def _onto_window(squared: Array, beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Array:
     """Eight-point Lagrange interpolation from direction cosines to the window."""
     import drjit as dr
 
@@ -179,7 +188,7 @@ def _onto_window(squared: Any, beam: Beam, problem: Problem, how: FarFieldSampli
         place = position / rho * pitch + middle
         cell = dr.clip(dr.floor(place), TAPS // 2 - 1, dr.opaque(types.Float64, side - TAPS // 2 - 1))
         cells.append(types.Index(cell) - (TAPS // 2 - 1))
-        weights.append(lagrange_weights(types.Float(place - cell)))
+        weights.append(lagrange_weights(types.Float(place - cell), TAPS))
     image, columns = types.Float(0), dr.opaque(types.Index, side)
     for i, down in enumerate(weights[0]):
         start, line = (cells[0] + i) * columns + cells[1], types.Float(0)

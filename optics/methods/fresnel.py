@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,8 @@ from optics.apertures.aperture import EDGE_REACH
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.rays import MARGIN, Rays, brightness, disk_area, mismatch
-from optics.numerics.autodiff import is_differentiable, number
+from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
+from optics.numerics.cost import CALL, PUPIL_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, predicted_seconds
 from optics.numerics.grid import Grid
@@ -20,10 +20,10 @@ from optics.numerics.precision import opaque, precision
 
 __all__ = ["ParaxialSampling", "fraunhofer", "fresnel", "paraxial_integral"]
 
-RAYS, ENDS = 48, 24  # from whose origins, and at whose ends, the neglected phase is looked at
-# Of a ray's first Fresnel zone: how far from its origin light still adds up coherently at its end.
+RAYS, ENDS = 48, 24  # choice: from whose origins, and at whose ends, the neglected phase is looked at
+# Choice. Of a ray's first Fresnel zone: how far from its origin light still adds up coherently at its end.
 ZONES = 3.0
-MUCH = 0.7  # a field that errs by more is another field
+MUCH = 0.7  # choice: a field that errs by more is another field
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,9 @@ class ParaxialSampling:
     pupil: Grid
     seconds: float
     model_error: float
+    padding: float = 1.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         u = beam.behind(self.edge.aperture, self.pupil, precision(problem.dtype))
         curved = self.method == "fresnel"
@@ -80,9 +81,9 @@ def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSam
     pitch = 1 / (turning + edge.stopband)
     pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
     seconds = (
-        3e-4
+        CALL["fresnel"]
         + predicted_seconds(pupil.shape, 0.5, problem.window.shape)
-        + pupil.shape[0] ** 2 * (5e-8 + edge.seconds_per_point)
+        + pupil.shape[0] ** 2 * (PUPIL_SAMPLE + edge.seconds_per_point)
     )
     return [ParaxialSampling(method, edge, pupil, seconds, model_error(problem, method == "fresnel"))]
 
@@ -130,14 +131,14 @@ def _misplaced(problem: Problem) -> float:
 
 def _places(problem: Problem, ends: Rays) -> tuple[np.ndarray, np.ndarray]:
     """Where light is looked at: the ends of rays, and a diffraction width beside them; drawn into the window."""
-    width = 0.6 * problem.wavelength * problem.distance / problem.radius
+    width = 0.6 * problem.wavelength * problem.distance / problem.radius  # about Airy's first dark ring, at 0.61
     window = problem.window
     x = np.concatenate([ends.to_x + step * width for step in (0, 1, 0, -1, 0)])
     y = np.concatenate([ends.to_y + step * width for step in (0, 0, 1, 0, -1)])
     return np.clip(x, window.x[0], window.x[-1]), np.clip(y, window.y[0], window.y[-1])
 
 
-def paraxial_integral(u: Field, distance: Any, wavelength: float, window: Grid, curved: bool = True) -> Field:
+def paraxial_integral(u: Field, distance: Scalar, wavelength: float, window: Grid, curved: bool = True) -> Field:
     """Field over the window at `distance`, up to a phase that intensity forgets:
 
     U(x) = 1/(iλz) ∫ u(ξ) e^{iπξ²/λz} e^{-2πi x·ξ/λz} dξ   (Goodman, Introduction to Fourier Optics, eq. 4-17);

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -13,14 +12,16 @@ from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import cached_nodes, node_count
 from optics.methods.rays import brightness, mismatch
-from optics.numerics.autodiff import is_differentiable
+from optics.numerics.autodiff import Array, is_differentiable
+from optics.numerics.cost import CALL, RAY
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["PinholeSampling", "RaySampling", "geometric", "pinhole"]
 
-# Step of the central differences that give the local slope, in pupil radii: they err by its square times a cubic term.
+# Choice. Step of the central differences that give the local slope, in pupil radii: they err by its square times a
+# cubic term.
 STEP = 1e-4
-DIGITS = 1.0  # of the rule of nodes, for the fastest that the splats' spectra turn
+DIGITS = 1.0  # choice: of the rule of nodes, for the fastest that the splats' spectra turn
 # Relative L2 of Fresnel's fringes behind an edge, over a disk of Fresnel number 1: they fall with its fourth root.
 FRINGES = 0.75
 SPLAT_CELLS = 3.3  # area of a splat, as its inverse mean square: (∫β²)⁻² of the quadratic B-spline β
@@ -35,8 +36,9 @@ class RaySampling:
     model_error: float
     seconds: float
     method: str = "geometric"
+    padding: float = 1.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """Power per area over the window for unit intensity at the pupil, a flat Dr.Jit array."""
         import drjit as dr
 
@@ -66,12 +68,13 @@ class PinholeSampling:
     """All light in the cell where the ray through the pupil's centre ends."""
 
     model_error: float
-    seconds: float = 1e-4
+    seconds: float = CALL["pinhole"]
     method: str = "pinhole"
     samples: tuple[int, int] = (1, 1)
     largest: int = 1
+    padding: float = 1.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """Power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
 
         Raises:
@@ -110,7 +113,7 @@ def geometric(problem: Problem) -> list[RaySampling]:
     cycles = problem.radius * stretch / (math.pi * problem.window.dx) * error ** (-1 / 3)
     cycles = 2 ** (math.ceil(4 * math.log2(max(cycles, 1.0))) / 4)  # few different rules, so that they are found again
     count = node_count(problem.aperture, cycles, DIGITS)
-    seconds = 1e-3 + count * 1e-7
+    seconds = CALL["geometric"] + count * RAY
     return [RaySampling((problem.aperture, cycles, DIGITS), count, model, seconds)]
 
 
@@ -123,7 +126,7 @@ def pinhole(problem: Problem) -> list[PinholeSampling]:
     return [PinholeSampling(mismatch(1 / cell, _brightness(problem)))]
 
 
-def _landings(beam: Beam, x: Any, y: Any, types: Precision) -> tuple[Any, Any, Any]:
+def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, Array, Array]:
     """Where rays from points (x, y) of the pupil meet the sensor: x + z p/√(1 - p²), p the gradient of the path; and
     which of them propagate."""
     import drjit as dr
@@ -138,7 +141,7 @@ def _landings(beam: Beam, x: Any, y: Any, types: Precision) -> tuple[Any, Any, A
     return x + tangent * px, y + tangent * py, propagates
 
 
-def _splat(x: Any, y: Any, weight: Any, problem: Problem, types: Precision) -> Any:
+def _splat(x: Array, y: Array, weight: Array, problem: Problem, types: Precision) -> Array:
     """Sum of weights over the window's cells per area, each under a quadratic B-spline three cells wide: its nine
     shares add up to 1, so that no power is lost but over the window's rim."""
     import drjit as dr
@@ -162,7 +165,7 @@ def _splat(x: Any, y: Any, weight: Any, problem: Problem, types: Precision) -> A
     return types.Float(image * opaque(types, 1 / window.dx**2))
 
 
-def _quadratic_basis(t: Any) -> tuple[Any, Any, Any]:
+def _quadratic_basis(t: Array) -> tuple[Array, Array, Array]:
     """The three uniform quadratic B-splines that act within half a cell of a sample, t in [-1/2, 1/2]."""
     return (0.5 - t) * (0.5 - t) / 2, 0.75 - t * t, (0.5 + t) * (0.5 + t) / 2
 

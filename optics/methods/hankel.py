@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.spectral_taper import Taper, tapers
+from optics.numerics.autodiff import Array
 from optics.numerics.bessel import bessel_j0
+from optics.numerics.cost import BESSEL_PAIR, CALL, PROFILE_ENTRY, PROFILE_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
@@ -26,8 +27,8 @@ from optics.numerics.radial_profile import RadialProfile
 
 __all__ = ["HankelSampling", "hankel"]
 
-MOST_NODES = 3000
-# From this tolerance on J₀ need not be right to the last digit.
+MOST_NODES = 3000  # choice: beyond, a transform of so many pairs is no longer cheap
+# Choice. From this tolerance on J₀ need not be right to the last digit.
 LOOSE = 1e-8
 
 
@@ -42,8 +43,9 @@ class HankelSampling:
     seconds: float
     method: str = "hankel"
     model_error: float = 0.0
+    padding: float = 1.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         types = precision(problem.dtype)
         profile = _hankel(beam, problem, self, types).intensity
@@ -72,7 +74,7 @@ def hankel(problem: Problem) -> list[HankelSampling]:
 
 
 def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
-    digits = 0.5 - math.log10(problem.tolerance)
+    digits = 0.5 - math.log10(problem.tolerance)  # choice: a third of the tolerance to each of the two rules
     radii = gauss_legendre_count(problem.radius * (problem.phase_band_inside + taper.end), digits)
     outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
     steepest = math.hypot(problem.distance, problem.radius + outermost) / problem.wavelength
@@ -80,7 +82,8 @@ def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
     band = min(2 * taper.end, 2 * problem.radius / (problem.wavelength * problem.distance) + 2 / taper.blur)
     line = RadialProfile.resolving(outermost, band, problem.distance, problem.ripple)
     pairs = radii * angles + angles * line.points
-    seconds = 1e-3 + pairs * 1e-8 + line.points * line.table * 1e-9 + math.prod(problem.window.shape) * 1.5e-8
+    seconds = CALL["hankel"] + pairs * BESSEL_PAIR + line.points * line.table * PROFILE_ENTRY
+    seconds += math.prod(problem.window.shape) * PROFILE_SAMPLE
     return HankelSampling(taper, _round_up(radii), _round_up(angles), line, seconds)
 
 
@@ -95,7 +98,7 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
     import drjit as dr
 
     nodes, weights = gauss_legendre(how.radii)
-    inner = getattr(problem.aperture, "inner", 0.0)
+    inner = problem.aperture.inner_radius
     nodes, weights = inner + (1 - inner) * nodes, (1 - inner) * weights
     r = types.Float64(nodes) * opaque(types, beam.radius)
     zero = dr.zeros(types.Float64, how.radii)
@@ -116,7 +119,7 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
     return _transform(spectrum, f, types.Float64(how.line.positions), types, exactly)
 
 
-def _transform(field: Field, at: Any, to: Any, types: Precision, exactly: bool) -> Field:
+def _transform(field: Field, at: Array, to: Array, types: Precision, exactly: bool) -> Field:
     """Σ_j u_j J₀(2π at_j to_k) for every k."""
     import drjit as dr
 
@@ -124,7 +127,7 @@ def _transform(field: Field, at: Any, to: Any, types: Precision, exactly: bool) 
     dr.eval(field.re, field.im, at, to)
     count = dr.opaque(types.Index, n)
 
-    def add(j: Any, re: Any, im: Any) -> tuple[Any, Any, Any]:
+    def add(j: Array, re: Array, im: Array) -> tuple[Array, Array, Array]:
         weight = bessel_j0(dr.gather(types.Float64, at, j) * to, types, exactly)
         re, im = (
             so_far + types.Float64(weight * dr.gather(types.Float, part, j))

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples, samples_of
+from optics.numerics.autodiff import Array
+from optics.numerics.cost import CALL, FOURIER_ENTRY, KERNEL_ENTRY, MATMUL_FLOPS
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
-from optics.numerics.interpolation import chebyshev_points, lagrange
+from optics.numerics.interpolation import chebyshev_points, lagrange_basis
+from optics.numerics.matrices import complex_matmul
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["LowRankSampling", "low_rank"]
 
+# Choice: ranks to try.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
-FLOPS = {"float32": 45e9, "float64": 22e9}
-MOST_ENTRIES = 4_000_000  # of the matrix between pupil and window
+MOST_ENTRIES = 4_000_000  # choice, by memory: of the matrix between pupil and window
 MOST_PIXEL_ENTRIES = 16_000_000  # for them only the direct sum is left
 
 
@@ -36,8 +38,9 @@ class LowRankSampling:
     seconds: float
     method: str = "low_rank"
     model_error: float = 0.0
+    padding: float = 1.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _low_rank(beam, problem, self, precision(problem.dtype)).intensity
 
@@ -60,6 +63,7 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
     if pupil is None:
         return []
     half = max(problem.window.own_half_width, problem.window.dx)
+    # Fourier's kernel for a distance between that to the window's centre and that to its sides. Choice: where between.
     scale = math.hypot(problem.distance, 0.6 * half, *problem.window.centre)
     most = math.isqrt(MOST_ENTRIES if problem.pixelated is None else MOST_PIXEL_ENTRIES) // len(pupil.at)
     rank = _rank(problem, pupil.outermost, half, scale, most)
@@ -69,7 +73,11 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
     height, width = problem.window.shape
     flops = 8 * (inner * inner * width + height * inner * width)
     seconds = (
-        1.5e-3 + flops / FLOPS[problem.dtype] + inner * inner * 2e-8 + pupil.seconds + inner * (height + width) * 1e-8
+        CALL["low_rank"]
+        + flops / MATMUL_FLOPS[problem.dtype]
+        + inner * inner * KERNEL_ENTRY
+        + pupil.seconds
+        + inner * (height + width) * FOURIER_ENTRY
     )
     return [LowRankSampling(pupil, rank, half, scale, seconds)]
 
@@ -86,7 +94,7 @@ def _rank(problem: Problem, outermost: float, half: float, scale: float, most: i
         if rank > most:
             return None
         points = half * chebyshev_points(rank)
-        weights = lagrange(test, points)
+        weights = lagrange_basis(test, points)
         worst = 0.0
         for along, across in places:
             exact, known = (_rest(problem, scale, rim, _line(centre, along, at, across)) for at in (test, points))
@@ -130,12 +138,11 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
         _fourier(at, middle, problem, how, types)
         for at, middle in ((window.x, window.centre[0]), (window.y, window.centre[1]))
     )
-    re, im = _product(*inner, *across_x, transposed=True)
-    re, im = _product(*across_y, re, im, transposed=False)
+    re, im = complex_matmul(across_y, complex_matmul(inner, across_x, transposed=True))
     return Field(re.array, im.array, window, types)
 
 
-def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> tuple[Any, Any]:
+def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> tuple[Array, Array]:
     """W[(b, η), (a, ξ)] = P(ξ, η) G(ξ, η; x_a, y_b) as two tensors."""
     import drjit as dr
 
@@ -165,7 +172,7 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
     return types.Tensor(whole.re, slow.grid.shape), types.Tensor(whole.im, slow.grid.shape)
 
 
-def _split(index: Any, n: int, types: Precision) -> tuple[Any, Any]:
+def _split(index: Array, n: int, types: Precision) -> tuple[Array, Array]:
     """Quotient and remainder of float64 indices by n."""
     import drjit as dr
 
@@ -176,22 +183,11 @@ def _split(index: Any, n: int, types: Precision) -> tuple[Any, Any]:
 
 def _fourier(
     at: np.ndarray, middle: float, problem: Problem, how: LowRankSampling, types: Precision
-) -> tuple[Any, Any]:
+) -> tuple[Array, Array]:
     """A[x, (a, ξ)] = L_a(x) e^{-ik ξ x/c} as two tensors."""
     rank, xi = how.rank, how.pupil.at
     waves = np.tile(np.outer(at, xi) / (-problem.wavelength * how.scale), rank)
-    weight = np.repeat(lagrange(at - middle, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
-    wheel = weight * np.exp(2j * np.pi * waves)
-    re, im = (padded_for_packets(part.astype(types.dtype)) for part in (wheel.real, wheel.imag))
-    return types.Tensor(re, wheel.shape), types.Tensor(im, wheel.shape)
-
-
-def _product(re: Any, im: Any, other_re: Any, other_im: Any, transposed: bool) -> tuple[Any, Any]:
-    """Complex matrix product of tensor pairs."""
-    import drjit as dr
-
-    matmul: Any = dr.matmul
-    return (
-        matmul(re, other_re, Bt=transposed) - matmul(im, other_im, Bt=transposed),
-        matmul(re, other_im, Bt=transposed) + matmul(im, other_re, Bt=transposed),
-    )
+    weight = np.repeat(lagrange_basis(at - middle, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
+    matrix = weight * np.exp(2j * np.pi * waves)
+    re, im = (padded_for_packets(part.astype(types.dtype)) for part in (matrix.real, matrix.imag))
+    return types.Tensor(re, matrix.shape), types.Tensor(im, matrix.shape)

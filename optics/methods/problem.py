@@ -16,10 +16,13 @@ from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 
-__all__ = ["Problem", "PupilEdge"]
+__all__ = ["SLOPE_MARGIN", "Problem", "PupilEdge"]
 
-# Amplitude ripple of the soft aperture and of the spectral taper against the tolerance on intensity. Edge-diffracted
-# light errs by several ripples, its intensity by twice that, and a window may hold no other light: half the tolerance.
+# Choice, over the steepest slope of a wavefront: the grid on which slopes are seen may miss the steepest place.
+SLOPE_MARGIN = 1.02
+# Choice. Amplitude ripple of the soft aperture and of the spectral taper against the tolerance on intensity.
+# Edge-diffracted light errs by several ripples, its intensity by twice that, and a window may hold no other light: half
+# the tolerance.
 EDGE_RIPPLE_PER_TOLERANCE = 0.1
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 
@@ -83,7 +86,7 @@ class Problem:
     @property
     def fade_ripple(self) -> float:
         """Amplitude error allowed to light from beyond the band."""
-        return self.ripple if self.reach is None else 0.1
+        return self.ripple if self.reach is None else 0.1  # choice: beyond the band there is next to no light
 
     @property
     def outermost(self) -> float:
@@ -130,7 +133,7 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
     pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
     slopes = pupil.slopes(wavelength, beam.source)
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
-    detail = 0.0 if pixels else pupil.bandwidth(wavelength, tolerance / 10)
+    detail = 0.0 if pixels else pupil.bandwidth(wavelength, tolerance / 10)  # choice: a tenth, of the phase [rad]
     turning, inside = slopes.turning(distance, window, pupil.medium_n)
     return Problem(
         aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
@@ -138,10 +141,10 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
         wavelength=wavelength / pupil.medium_n,
         distance=distance,
         window=window,
-        phase_band=1.02 * slopes.steepest / wavelength + detail,
-        phase_band_inside=1.02 * slopes.steepest_inside / wavelength + detail,
-        turning=1.02 * turning / wavelength + detail,
-        turning_inside=1.02 * inside / wavelength + detail,
+        phase_band=SLOPE_MARGIN * slopes.steepest / wavelength + detail,
+        phase_band_inside=SLOPE_MARGIN * slopes.steepest_inside / wavelength + detail,
+        turning=SLOPE_MARGIN * turning / wavelength + detail,
+        turning_inside=SLOPE_MARGIN * inside / wavelength + detail,
         symmetric=pupil.rotationally_symmetric(wavelength) and beam.source.angle == (0.0, 0.0),
         tolerance=tolerance,
         dtype=dtype,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.rayleigh_sommerfeld import node_rule
+from optics.numerics.autodiff import Array
+from optics.numerics.cost import PIXEL_NODE_GEOMETRY
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque
@@ -37,7 +39,7 @@ class PupilSamples(Protocol):
     def seconds(self) -> float:
         """What `field` takes, roughly."""
 
-    def places(self, index: Any, beam: Beam, types: Precision) -> Any:
+    def places(self, index: Array, beam: Beam, types: Precision) -> Array:
         """at[index] for float64 indices, with the derivatives that the beam's radius carries."""
 
     def field(self, beam: Beam, types: Precision) -> Field:
@@ -63,7 +65,7 @@ class GridSamples:
     def seconds(self) -> float:
         return self.grid.shape[0] ** 2 * self.edge.seconds_per_point
 
-    def places(self, index: Any, beam: Beam, types: Precision) -> Any:
+    def places(self, index: Array, beam: Beam, types: Precision) -> Array:
         import drjit as dr
 
         return (index - dr.opaque(types.Float64, self.grid.shape[0] // 2)) * opaque(types, self.grid.dx)
@@ -91,9 +93,9 @@ class PixelSamples:
 
     @property
     def seconds(self) -> float:
-        return (self.aperture.count * self.across) ** 2 * 1e-8
+        return (self.aperture.count * self.across) ** 2 * PIXEL_NODE_GEOMETRY
 
-    def places(self, index: Any, beam: Beam, types: Precision) -> Any:
+    def places(self, index: Array, beam: Beam, types: Precision) -> Array:
         import drjit as dr
 
         return dr.gather(types.Float64, types.Float64(self.aperture.rows(self.across)), types.Index(index)) * opaque(

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from optics.apertures.aperture import Aperture, Nodes
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
+from optics.numerics.autodiff import Array
+from optics.numerics.cost import CALL, NODE, PAIRS_PER_SECOND
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
@@ -19,7 +20,6 @@ from optics.numerics.radial_profile import RadialProfile
 
 __all__ = [
     "MOST_DIGITS",
-    "PAIRS_PER_SECOND",
     "NodeSampling",
     "cached_nodes",
     "direct_sum",
@@ -29,11 +29,10 @@ __all__ = [
     "turns",
 ]
 
-PAIRS_PER_SECOND = 2.5e8
-MOST_DIGITS = 14.0  # of float64 sums
-SPARE_DIGITS = 0.5  # the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
-ON_AXIS = 1e-9  # of the radius
-FAR = 0.25  # radius over distance below which the kernel is smooth enough for any nodes
+MOST_DIGITS = 14.0  # choice: of float64 sums, which carry 16
+SPARE_DIGITS = 0.5  # choice: the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
+ON_AXIS = 1e-9  # rounding, of the radius
+FAR = 0.25  # choice: radius over distance below which the kernel is smooth enough for any nodes
 
 
 Rule = tuple[Aperture, float, float, bool]
@@ -54,8 +53,9 @@ class NodeSampling:
     seconds: float
     method: str = "rayleigh_sommerfeld"
     model_error: float = 0.0
+    padding: float = 1.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         types = precision(problem.dtype)
         if self.line is None:
@@ -92,7 +92,7 @@ def nodes(problem: Problem) -> list[NodeSampling]:
         line = line if line.pays(outputs) else None
         outputs = line.points if line else outputs
         count = count if line is None else math.ceil(count / 2)
-    seconds = 1e-3 + count * outputs / PAIRS_PER_SECOND + count * 4e-9
+    seconds = CALL["rayleigh_sommerfeld"] + count * outputs / PAIRS_PER_SECOND + count * NODE
     return [NodeSampling(problem.aperture, cycles, digits, count, line, seconds)]
 
 
@@ -136,7 +136,7 @@ def _intensity_band(problem: Problem) -> float:
     return min(2 * steepest, 2 * problem.radius / (problem.wavelength * problem.distance))
 
 
-def direct_sum(beam: Beam, rule: Rule, x: Any, y: Any, types: Precision) -> Field:
+def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> Field:
     """First Rayleigh-Sommerfeld integral at points (x, y) [m], nodes after rule = (aperture, cycles, digits, halved):
 
     U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ikD} dξ (Goodman, §3.5). D - z = d²/(D + z) loses its whole waves in float64.
@@ -154,7 +154,7 @@ def direct_sum(beam: Beam, rule: Rule, x: Any, y: Any, types: Precision) -> Fiel
     cycles = 1 / wavelength  # per metre: divisions cost most of a node
     k = 2 * math.pi * cycles
 
-    def add(i: Any, re: Any, im: Any) -> tuple[Any, Any, Any]:
+    def add(i: Array, re: Array, im: Array) -> tuple[Array, Array, Array]:
         dx, dy = x - dr.gather(types.Float64, nodes_x, i), y - dr.gather(types.Float64, nodes_y, i)
         d2 = dx * dx + dy * dy
         distance = dr.sqrt(d2 + z * z)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from optics.methods.problem import Problem
+from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision, opaque
 
 __all__ = ["FADES", "TAPER_END_SINE", "Taper", "tapers"]
 
-# The taper must end this far from grazing incidence, where z tan θ has no bound.
+# Choice. The taper must end this far from grazing incidence, where z tan θ has no bound.
 TAPER_END_SINE = 0.9995
-FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)  # blurs to try, in units of the problem's size
+FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)  # choice: blurs to try, in units of the problem's size
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Taper:
     def end(self) -> float:
         return self.band + self.width
 
-    def fade(self, f: Any, types: Precision) -> Any:
+    def fade(self, f: Array, types: Precision) -> Array:
         """1 below the band, 0 beyond its end: the error function falls to the ripple in √ln(1/ripple)."""
         import drjit as dr
 

@@ -1,15 +1,17 @@
-"""Numbers and arrays that know nothing of light.
+"""Numbers and arrays, and sums over them: nothing here is about light.
 
 accuracy        Plan, AccuracyError: what a result promises
-arguments       bad input ends in one line
-autodiff        values that carry derivatives
+arguments       checks of what users give
+autodiff        Array, Scalar: values that may carry derivatives
 backend         the LLVM library that Dr.Jit compiles with
 bessel          J0 on Dr.Jit arrays
+cost            what operations cost: how methods predict their time
 field           a sampled complex field
 fourier         centred Fourier sums of any size and period
 grid            sample positions
-interpolation   Lagrange and Chebyshev
+interpolation   linear, Lagrange, B-splines; functions kept as tables
+matrices        matrix products of Dr.Jit tensors
 precision       float32 and float64 in Dr.Jit
 quadrature      Gauss-Legendre, and how many nodes a wave needs
-radial_profile  pictures that are symmetric about the axis
+radial_profile  pictures that are symmetric about the axis, by one radius
 """

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 __all__ = ["FLOAT_NOISE", "MOST_SAMPLES", "AccuracyError", "Option", "Plan"]
 
 
-# Largest square array: 4096² complex64 is 134 MB, and a handful of such arrays live at once.
+# Choice. Largest square array: 4096² complex64 is 134 MB, and a handful of such arrays live at once.
 MOST_SAMPLES = 4096
 
 
-FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}  # relative to the field's root mean square, see tests
+FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}  # of a method's sums, relative to the field's root mean square
 
 
 class AccuracyError(ValueError):

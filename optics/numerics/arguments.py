@@ -1,4 +1,4 @@
-"""Bad input ends in one line that names the argument, its value and the valid range."""
+"""Checks of arguments: bad input ends in one line that names the argument, its value and the valid range."""
 
 import difflib
 import math

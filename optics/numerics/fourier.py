@@ -5,8 +5,8 @@ One function, `dft2`, stands for all transforms of this package:
     U[k] = Σ_j u[j] exp(± 2πi j·k / period),   j and k counted from the centre sample n//2.
 
 The period is free (a matrix DFT evaluates any output pitch); a whole period may go through the FFT. Which of the two
-runs is decided here by predicted time on one core: Dr.Jit's matrix product does about 45 Gflop/s, SciPy's FFT about
-12 Gflop/s less the copies, so matrices win for small windows and the FFT for large ones. Both are differentiable.
+runs is decided here by predicted time (optics.numerics.cost): Dr.Jit's matrix product does more operations per second,
+SciPy's FFT needs fewer, so matrices win for small windows and the FFT for large ones. Both are differentiable.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.autodiff import is_differentiable
+from optics.numerics.autodiff import Array, Scalar, is_differentiable
+from optics.numerics.cost import DFT_CALL, FFT_COPY, FFT_FLOPS, FFT_LINE_SAMPLE, MATMUL_FLOPS
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
+from optics.numerics.matrices import complex_matmul
 from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = [
@@ -46,7 +48,7 @@ def fast_length(least: float) -> int:
 
 def dft2(
     field: Field,
-    period: Any,
+    period: Scalar,
     shape: tuple[int, int],
     sign: int,
     pitch: float,
@@ -54,9 +56,8 @@ def dft2(
 ) -> Field:
     """Fourier sum of a field onto `shape` samples (formula above), on a grid of the given output pitch.
 
-    centre: where the output's centre sample lies (x, y), in units of the pitch times its index (k = centre / pitch).
-
     sign: -1 forward (exp(-2πi...)), +1 inverse; neither is normalised.
+    centre: (x, y) of the output's centre sample, in the unit of `pitch`.
     """
     grid = Grid(shape, pitch, centre)
     if centre != (0.0, 0.0):
@@ -80,16 +81,23 @@ def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int)
 
 @lru_cache(maxsize=16)
 def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> np.ndarray:
-    """exp(±2πi k j / period) as a (k, j) matrix."""
-    waves = np.outer(np.arange(n_out) - n_out // 2, np.arange(n_in) - n_in // 2) / period
+    """The sum along one axis as a matrix, exp(±2πi k j / period) in row k and column j, both counted from n//2.
+
+    Whole waves are dropped before they lose digits of the rest.
+    """
+    k, j = np.arange(n_out) - n_out // 2, np.arange(n_in) - n_in // 2
+    waves = np.outer(k, j) / period
     return np.exp(2j * np.pi * sign * (waves - np.round(waves))).astype(dtype)
 
 
-def _recentred(field: Field, period: Any, by: tuple[float, float]) -> Field:
-    """Field times exp(2πi j·by / period), which moves the sum's centre."""
+def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
+    """The field whose sum onto samples k is that of `field` onto samples k + c: u[j] exp(±2πi j·c / period).
+
+    by: ±c, (x, y) in samples of the output; need not be whole.
+    """
     types = field.types
-    x, y = Grid(field.grid.shape, 1.0).coordinates(types)
-    waves = (x * opaque(types, by[0]) + y * opaque(types, by[1])) / opaque(types, period)
+    j_x, j_y = Grid(field.grid.shape, 1.0).coordinates(types)
+    waves = (j_x * opaque(types, by[0]) + j_y * opaque(types, by[1])) / opaque(types, period)
     return field * Field.from_waves(1.0, waves, field.grid, types)
 
 
@@ -128,7 +136,7 @@ def kept_indices(period: int, across: int) -> np.ndarray:
 
 
 def predicted_seconds(shape_in: tuple[int, int], period: float, shape_out: tuple[int, int]) -> float:
-    """Time one `dft2` takes on one core, roughly."""
+    """Time one `dft2` takes, roughly."""
     if _fft_wins(shape_in, period, shape_out):
         return _fft_seconds(shape_in, int(period), shape_out)
     return _matrix_seconds(shape_in, shape_out)
@@ -142,46 +150,41 @@ def _fft_wins(shape_in: tuple[int, int], period: float, shape_out: tuple[int, in
 
 def _matrix_seconds(shape_in: tuple[int, int], shape_out: tuple[int, int]) -> float:
     (ny, nx), (my, mx) = shape_in, shape_out
-    return 8 * (ny * nx * mx + ny * mx * my) / 45e9 + 2e-4
+    return 8 * (ny * nx * mx + ny * mx * my) / MATMUL_FLOPS["float32"] + DFT_CALL
 
 
 def _fft_seconds(shape_in: tuple[int, int], period: int, shape_out: tuple[int, int]) -> float:
     lines, copied = shape_in[0] + shape_out[1], shape_in[0] * shape_in[1] + shape_out[0] * shape_out[1]
-    return lines * period * (5 * log2(period + 1) / 12e9 + 5e-9) + copied * 8e-9 + 2e-4
+    return lines * period * (5 * log2(period + 1) / FFT_FLOPS + FFT_LINE_SAMPLE) + copied * FFT_COPY + DFT_CALL
 
 
-def _fourier_matrix(types: Precision, n_out: int, n_in: int, period: Any, sign: int) -> tuple[Any, Any]:
-    """cos and sin of ±2π k j / period as (k, j) tensors; the product k j loses whole periods in float64."""
-    matrix = Grid((n_out, n_in), 1.0)
-    j, k = matrix.coordinates(types)
+def _fourier_matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) -> tuple[Array, Array]:
+    """The same matrix in Dr.Jit: two tensors (k, j), real and imaginary part; a period may carry a derivative."""
+    entries = Grid((n_out, n_in), 1.0)
+    j, k = entries.coordinates(types)
     waves = j * k / opaque(types, sign * period)
-    wheel = Field.from_waves(1.0, waves, matrix, types)
-    return types.Tensor(wheel.re, matrix.shape), types.Tensor(wheel.im, matrix.shape)
+    matrix = Field.from_waves(1.0, waves, entries, types)
+    return types.Tensor(matrix.re, entries.shape), types.Tensor(matrix.im, entries.shape)
 
 
-def _matrix_dft(field: Field, period: Any, shape: tuple[int, int], sign: int) -> tuple[Any, Any]:
-    import drjit as dr
-
-    matmul: Any = dr.matmul
+def _matrix_dft(field: Field, period: Scalar, shape: tuple[int, int], sign: int) -> tuple[Array, Array]:
+    """A_y u A_xᵀ, one matrix per axis."""
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
-    re, im = types.Tensor(field.re, (ny, nx)), types.Tensor(field.im, (ny, nx))
-    cos, sin = _fourier_matrix(types, mx, nx, period, sign)
-    re, im = (
-        matmul(re, cos, Bt=True) - matmul(im, sin, Bt=True),
-        matmul(re, sin, Bt=True) + matmul(im, cos, Bt=True),
-    )
+    u = types.Tensor(field.re, (ny, nx)), types.Tensor(field.im, (ny, nx))
+    along_x = along_y = _fourier_matrix(types, mx, nx, period, sign)
+    u = complex_matmul(u, along_x, transposed=True)
     if (my, ny) != (mx, nx):
-        cos, sin = _fourier_matrix(types, my, ny, period, sign)
-    re, im = matmul(cos, re) - matmul(sin, im), matmul(cos, im) + matmul(sin, re)
+        along_y = _fourier_matrix(types, my, ny, period, sign)
+    re, im = complex_matmul(along_y, u)
     return re.array, im.array
 
 
-def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[Any, Any]:
+def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[Array, Array]:
     import drjit as dr
 
     types, shape_in = field.types, field.grid.shape
 
-    def transform(re: Any, im: Any, to: tuple[int, int], from_: tuple[int, int], turn: int) -> tuple[Any, Any]:
+    def transform(re: Array, im: Array, to: tuple[int, int], from_: tuple[int, int], turn: int) -> tuple[Array, Array]:
         u = np.empty(from_, dtype=types.complex_dtype)
         u.real, u.imag = re.numpy().reshape(from_), im.numpy().reshape(from_)
         for axis in (1, 0):
@@ -191,7 +194,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
     class FourierSum(dr.CustomOp):
         """Its adjoint is the sum with the other sign, from the output's samples to the input's."""
 
-        def eval(self, re: Any, im: Any) -> tuple[Any, Any]:
+        def eval(self, re: Array, im: Array) -> tuple[Array, Array]:
             return transform(re, im, shape, shape_in, sign)
 
         def forward(self) -> None:

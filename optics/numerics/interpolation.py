@@ -1,4 +1,8 @@
-"""A smooth function of one variable as equidistant samples that Dr.Jit interpolates."""
+"""Interpolation between samples: linear, by Lagrange's polynomials, by cubic B-splines; and a function kept as a table.
+
+Functions of arrays that stand for places take Dr.Jit's arrays and NumPy's alike, but for `linear_weights` and
+`lagrange_basis`, which are NumPy's.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +10,31 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
-from typing import Any
 
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["TAPS", "Interpolant", "chebyshev_points", "lagrange", "lagrange_weights"]
+__all__ = [
+    "LAGRANGE_8",
+    "TAPS",
+    "Interpolant",
+    "chebyshev_points",
+    "cubic_bsplines",
+    "lagrange_basis",
+    "lagrange_weights",
+    "linear_weights",
+]
 
-# Samples beyond either end that six-point interpolation reads.
-MARGIN = 2
+# Choice: samples that interpolation onto a grid takes, along an axis. Its error falls with the eighth power of their
+# distance; a function's table, which costs its samples only once, does with the sixth.
+TAPS = 8
+# Largest error of eight taps for e^{iφ}, over (radians per sample)⁸: |Π(t - x_j)| / 8!, which is (1·3·5·7)²/2⁸ / 8!
+# halfway between the middle two.
+LAGRANGE_8 = 1.07e-3
+TABLE_TAPS = 6
+MARGIN = TABLE_TAPS // 2 - 1  # samples beyond either end of a table that it reads
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +57,8 @@ class Interpolant:
         from scipy.fft import dct
 
         per_cycle = 2 * pi * (2.4e-4 / error) ** (1 / 6)
-        n = int(cycles * per_cycle + 64)
+        n = int(cycles * per_cycle + 64)  # choice: 64 at least
+        # A wave of z = π cycles has Chebyshev coefficients 2 J_m(z), which fall fast beyond m = z. Choice: by how many.
         degree = int(pi * cycles - 3 * np.log10(error) + 12)
         middle, half = (ends[0] + ends[1]) / 2, (ends[1] - ends[0]) / 2
         values = function(middle + half * np.cos(pi * (np.arange(degree) + 0.5) / degree))
@@ -48,7 +68,7 @@ class Interpolant:
         samples[: MARGIN + 1], samples[-MARGIN - 1 :] = function(np.array(ends))  # exact where it is constant
         return cls(ends[0], step * half, samples)
 
-    def at(self, place: Any, types: Precision) -> Any:
+    def at(self, place: Array, types: Precision) -> Array:
         """Interpolated at a flat Dr.Jit Float64 array; differentiable."""
         import drjit as dr
 
@@ -56,36 +76,40 @@ class Interpolant:
         t = dr.clip((place - opaque(types, self.first)) * opaque(types, 1 / self.step), 0, last)
         cell = dr.minimum(dr.floor(t), last - 1)
         samples, first = types.Float64(self.samples), types.Index(cell)
-        values = [dr.gather(types.Float64, samples, first + i) for i in range(6)]
-        return sum((w * v for w, v in zip(_lagrange6(t - cell), values, strict=True)), types.Float64(0))
+        values = [dr.gather(types.Float64, samples, first + i) for i in range(TABLE_TAPS)]
+        return sum(
+            (w * v for w, v in zip(lagrange_weights(t - cell, TABLE_TAPS), values, strict=True)), types.Float64(0)
+        )
 
 
-def _lagrange6(t: Any) -> list[Any]:
-    """Weights of six-point Lagrange interpolation at nodes -2 ... 3, t in [0, 1]."""
-    a, b, c, d, e, f = t + 2, t + 1, t, t - 1, t - 2, t - 3
-    ab, cd, ef = a * b, c * d, e * f
-    return [
-        b * cd * ef / -120,
-        a * cd * ef / 24,
-        ab * d * ef / -12,
-        ab * c * ef / 12,
-        ab * cd * f / -24,
-        ab * cd * e / 120,
-    ]
+def lagrange_weights(t: Array, taps: int) -> list[Array]:
+    """Lagrange interpolation between `taps` samples 1 apart, an even number: the weights, t in [0, 1] being the place
+    between the middle two.
 
+        L_i(t) = Π_{j≠i} (t - x_j) / (x_i - x_j),   x_i = i + 1 - taps/2,   i = 0 ... taps - 1,
 
-TAPS = 8
-
-
-def lagrange_weights(t: Any) -> list[Any]:
-    """Eight-point Lagrange interpolation at nodes -3 ... 4, t in [0, 1]."""
-    steps = [t + (TAPS // 2 - 1 - i) for i in range(TAPS)]
+    the product over the nodes before i times that over those after, over (-1)^(taps-1-i) i! (taps-1-i)!.
+    """
+    last = taps - 1
+    steps = [t + (taps // 2 - 1 - i) for i in range(taps)]
     before, after = [1.0], [1.0]
-    for i in range(TAPS - 1):
+    for i in range(last):
         before.append(before[-1] * steps[i])
-        after.append(after[-1] * steps[TAPS - 1 - i])
-    sign = [(-1) ** (TAPS - 1 - i) / (math.factorial(i) * math.factorial(TAPS - 1 - i)) for i in range(TAPS)]
-    return [before[i] * after[TAPS - 1 - i] * sign[i] for i in range(TAPS)]
+        after.append(after[-1] * steps[last - i])
+    scale = [(-1) ** (last - i) / (math.factorial(i) * math.factorial(last - i)) for i in range(taps)]
+    return [before[i] * after[last - i] * scale[i] for i in range(taps)]
+
+
+def linear_weights(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """(node, *x.shape): linear interpolation between rising nodes, constant beyond."""
+    return np.stack([np.interp(x, nodes, row) for row in np.eye(len(nodes))])
+
+
+def cubic_bsplines(t: Array) -> list[Array]:
+    """The four uniform cubic B-splines that act on a knot interval, at t in [0, 1] (Piegl & Tiller, The NURBS Book,
+    ch. 2)."""
+    s = 1 - t
+    return [s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6]
 
 
 def chebyshev_points(n: int) -> np.ndarray:
@@ -93,8 +117,8 @@ def chebyshev_points(n: int) -> np.ndarray:
     return np.cos(np.pi * (np.arange(n) + 0.5) / n)
 
 
-def lagrange(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """(node, *x.shape): the Lagrange polynomials of the nodes at x."""
+def lagrange_basis(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """(node, *x.shape): the Lagrange polynomials of any nodes at x."""
     basis = np.ones((len(nodes), *np.shape(x)))
     for i, node in enumerate(nodes):
         for other in np.delete(nodes, i):

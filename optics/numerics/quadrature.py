@@ -21,7 +21,7 @@ def harmonics(z: np.ndarray, digits: float) -> np.ndarray:
     from scipy.special import jv
 
     z = np.asarray(z, dtype=np.float64)
-    # |J_m(z)| falls steadily in m beyond m = z, and is below (ez/2m)^m, which bounds the search.
+    # |J_m(z)| falls steadily in m beyond m = z, and is below (ez/2m)^m, which bounds the search: e/2 is 1.36.
     low, high = np.floor(z), np.ceil(1.36 * z + 3 * digits + 4)
     while np.any(high - low > 1):
         middle = np.ceil((low + high) / 2)

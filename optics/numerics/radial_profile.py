@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from optics.numerics.grid import Grid
-from optics.numerics.interpolation import TAPS, lagrange_weights
+from optics.numerics.interpolation import LAGRANGE_8, TAPS, lagrange_weights
+from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision
 from optics.numerics.quadrature import harmonics
 
 __all__ = ["RadialProfile"]
 
-# Entries of the matrix from points to table: 128 MB in float64.
+# Choice. Entries of the matrix from points to table: 128 MB in float64.
 LARGEST_MATRIX = 2**24
 
 
@@ -39,11 +40,11 @@ class RadialProfile:
         """Points that carry intensity frequencies up to `band` [1/m] with a relative error of about `error`.
 
         A wave of r over [-R, R] has the Chebyshev coefficients 2 J_m(2πbR); obliquity has poles at ±i distance, whose
-        coefficients fall like e^{-m asinh(distance / R)}. Eight-point Lagrange interpolation errs by 1.07e-3 (2πbh)⁸.
+        coefficients fall like e^{-m asinh(distance / R)}. Eight-point interpolation errs by LAGRANGE_8 (2πbh)⁸.
         """
         digits = -math.log10(error)
         turns = 2 * math.pi * band * rim + 2 * rim / distance
-        step = min(1.0, (error / 1.07e-3) ** 0.125) / max(turns, 1.0)
+        step = min(1.0, (error / LAGRANGE_8) ** 0.125) / max(turns, 1.0)
         table = math.ceil(1 / step) + TAPS
         radius = rim * (1 + TAPS / (2 * (table - 1)))
         degree = int(harmonics(np.array(2 * math.pi * band * radius), digits))
@@ -59,11 +60,10 @@ class RadialProfile:
         """Radii [m], from the rim inwards."""
         return self.radius * np.cos(np.pi * (np.arange(self.points) + 0.5) / (2 * self.points))
 
-    def onto(self, values: Any, window: Grid, types: Precision) -> Any:
+    def onto(self, values: Array, window: Grid, types: Precision) -> Array:
         """Values at `positions` carried to the window's samples, at least 0, and 0 beyond the rim: flat arrays."""
         import drjit as dr
 
-        matmul: Any = dr.matmul
         matrix = types.Tensor(_refinement(self.points, self.table, self.rim / self.radius, types.dtype))
         table = matmul(matrix, types.Tensor(values, (self.points, 1))).array
         x, y = window.coordinates(types)
@@ -73,7 +73,7 @@ class RadialProfile:
         place = dr.minimum(place, rim)
         cell = dr.floor(place)
         first = types.Index(cell)
-        weights = lagrange_weights(types.Float(place - cell))
+        weights = lagrange_weights(types.Float(place - cell), TAPS)
         total = sum((w * dr.gather(types.Float, table, first + i) for i, w in enumerate(weights)), types.Float(0))
         return dr.select(within, dr.maximum(total, 0), 0)
 

@@ -6,19 +6,18 @@ import math
 from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
-from optics.methods.problem import Problem
 from optics.numerics.accuracy import Plan
 from optics.numerics.arguments import shown, vacuum_wavelength
+from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.point_spread.psf import pictures
+from optics.point_spread.pictures import pictures
+from optics.point_spread.request import Setup
 
 __all__ = ["PSFBatch", "psf_batch"]
 
@@ -30,7 +29,7 @@ class PSFBatch:
     plans: of the same order, flat. See PSFResult.
     """
 
-    tensor: Any
+    tensor: Array
     dx: float
     plans: tuple[Plan, ...]
 
@@ -47,8 +46,8 @@ class PSFBatch:
 def psf_batch(
     pupils: Sequence[Pupil],
     wavelengths: Sequence[float] = (550e-9,),
-    sensor_distance: Any = 240e-6,
-    source_distances: Sequence[Any] = (math.inf,),
+    sensor_distance: Scalar = 240e-6,
+    source_distances: Sequence[Scalar] = (math.inf,),
     *,
     dx: float = 0.25e-6,
     shape: tuple[int, int] = (129, 129),
@@ -69,16 +68,17 @@ def psf_batch(
     for name, values in (("pupils", pupils), ("wavelengths", wavelengths), ("source_distances", source_distances)):
         if not isinstance(values, Sized) or len(values) == 0:
             raise ValueError(f"{name} = {shown(values)}: must be a sequence of at least one")
-    beams = [
-        Beam(pupil, PointSource(depth), vacuum_wavelength(wavelength), sensor_distance)
+    window = Grid(shape, dx)
+    setups = [
+        Setup(sensor_distance, PointSource(depth), window, tolerance, method, dtype) for depth in source_distances
+    ]
+    requests = [
+        setup.request(pupil, vacuum_wavelength(wavelength))
         for pupil in pupils
-        for depth in source_distances
+        for setup in setups
         for wavelength in wavelengths
     ]
-    window = Grid(shape, dx)
-    flat, plans = zip(
-        *pictures(beams, [Problem.of(beam, window, tolerance, dtype) for beam in beams], method), strict=True
-    )
+    flat, plans = zip(*pictures(requests), strict=True)
     whole = flat[0] if len(flat) == 1 else dr.concat(flat)
     sizes = len(pupils), len(source_distances), len(wavelengths), *window.shape
     return PSFBatch(precision(dtype).Tensor(whole, sizes), window.dx, tuple(plans))

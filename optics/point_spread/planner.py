@@ -26,13 +26,13 @@ import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 
-from optics.methods import pixelated_spectrum
-from optics.methods.angular_spectrum import split, whole
+from optics.methods.angular_spectrum import split_spectrum, whole_spectrum
 from optics.methods.far_field import far_field
 from optics.methods.fresnel import fraunhofer, fresnel
 from optics.methods.geometric import geometric, pinhole
 from optics.methods.hankel import hankel
 from optics.methods.low_rank import low_rank
+from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
 from optics.methods.sampling import Sampling
@@ -46,8 +46,8 @@ EXACT: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "hankel": hankel,
     "low_rank": low_rank,
     "far_field": far_field,
-    "angular_spectrum": whole,
-    "split_angular_spectrum": split,
+    "angular_spectrum": whole_spectrum,
+    "split_angular_spectrum": split_spectrum,
     "rayleigh_sommerfeld": nodes,
 }
 APPROXIMATE: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
@@ -60,8 +60,8 @@ METHODS = EXACT | APPROXIMATE
 # Have nodes where light jumps from pixel to pixel; no grid has.
 FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "low_rank": low_rank,
-    "angular_spectrum": pixelated_spectrum.whole,
-    "split_angular_spectrum": pixelated_spectrum.split,
+    "angular_spectrum": whole_pixel_spectrum,
+    "split_angular_spectrum": split_pixel_spectrum,
     "rayleigh_sommerfeld": nodes,
 }
 
@@ -150,8 +150,7 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None],
         + ("cheapest of those that meet the tolerance" if len(weighed) > 1 else "asked for")
     )
     error = _sampling_error(problem) + best.model_error
-    padding = getattr(best, "padding", 1.0)
-    return Plan(best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), padding)
+    return Plan(best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), best.padding)
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:

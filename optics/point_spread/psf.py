@@ -4,27 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
-from optics.methods.problem import Problem
-from optics.methods.sampling import Sampling
-from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
+from optics.numerics.accuracy import Plan
 from optics.numerics.arguments import vacuum_wavelength, vacuum_wavelengths
+from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.grid import Grid
-from optics.numerics.precision import opaque, precision
-from optics.point_spread.planner import choose
-from optics.point_spread.spot_check import spot_check
+from optics.numerics.precision import precision
+from optics.point_spread.pictures import pictures
+from optics.point_spread.request import Request, Setup
 
-__all__ = ["PSFResult", "pictures", "plan", "psf", "spread"]
-
-TRIES = 3
+__all__ = ["PSFResult", "plan", "psf", "spread"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +32,10 @@ class PSFResult:
     plans: one per wavelength; `plan` is the least accurate of them.
     """
 
-    tensor: Any
+    tensor: Array
     dx: float
     wavelengths: np.ndarray
-    sensor_distance: Any
+    sensor_distance: Scalar
     pupil: Pupil
     plans: tuple[Plan, ...]
     centre: tuple[float, float] = (0.0, 0.0)
@@ -70,8 +65,8 @@ class PSFResult:
 def psf(
     pupil: Pupil,
     wavelengths: Sequence[float] | np.ndarray = (550e-9,),
-    sensor_distance: Any = 240e-6,
-    source_distance: Any = math.inf,
+    sensor_distance: Scalar = 240e-6,
+    source_distance: Scalar = math.inf,
     source_angle: tuple[float, float] = (0.0, 0.0),
     dx: float = 0.25e-6,
     shape: tuple[int, int] = (129, 129),
@@ -93,23 +88,21 @@ def psf(
         ValueError: bad argument, named with its value and valid range.
         AccuracyError: no method meets the tolerance within the limits on memory and time.
     """
-    window = Grid(shape, dx, centre)
     source = PointSource(source_distance, source_angle)
+    setup = Setup(sensor_distance, source, Grid(shape, dx, centre), tolerance, method, dtype)
     lambdas = np.atleast_1d(vacuum_wavelengths(wavelengths))
     if lambdas.size == 0:
         raise ValueError("wavelengths is empty: must hold at least one wavelength [m]")
     if lambdas.ndim > 1:
         raise ValueError(f"wavelengths has shape {lambdas.shape}: must be one wavelength [m], or a row of them")
-    beams = [Beam(pupil, source, float(at), sensor_distance) for at in lambdas]
-    tasks = [Problem.of(beam, window, tolerance, dtype) for beam in beams]
-    return spread(beams, tasks, method)
+    return spread([setup.request(pupil, float(wavelength)) for wavelength in lambdas])
 
 
 def plan(
     pupil: Pupil,
     wavelength: float = 550e-9,
-    sensor_distance: Any = 240e-6,
-    source_distance: Any = math.inf,
+    sensor_distance: Scalar = 240e-6,
+    source_distance: Scalar = math.inf,
     source_angle: tuple[float, float] = (0.0, 0.0),
     dx: float = 0.25e-6,
     shape: tuple[int, int] = (129, 129),
@@ -119,101 +112,21 @@ def plan(
     centre: tuple[float, float] = (0.0, 0.0),
 ) -> Plan:
     """What `psf` would do at one wavelength, without doing it: see there for arguments and errors."""
-    beam = Beam(pupil, PointSource(source_distance, source_angle), vacuum_wavelength(wavelength), sensor_distance)
-    return choose(Problem.of(beam, Grid(shape, dx, centre), tolerance, dtype), method)[0]
+    source = PointSource(source_distance, source_angle)
+    setup = Setup(sensor_distance, source, Grid(shape, dx, centre), tolerance, method, dtype)
+    return setup.request(pupil, vacuum_wavelength(wavelength)).planned()[0]
 
 
-def spread(beams: list[Beam], tasks: list[Problem], method: str = "auto", most_seconds: float = 60.0) -> PSFResult:
-    """PSFs of several wavelengths over one window.
+def spread(requests: Sequence[Request]) -> PSFResult:
+    """PSFs of one pupil at several wavelengths, over one window.
 
     Raises:
         AccuracyError: no method meets the tolerance, or a window is so dark that rounding breaks it.
     """
     import drjit as dr
 
-    flat, plans = zip(*pictures(beams, tasks, method, most_seconds), strict=True)
-    window, types = tasks[0].window, precision(tasks[0].dtype)
+    flat, plans = zip(*pictures(requests), strict=True)
+    beam, window, types = requests[0].beam, requests[0].problem.window, precision(requests[0].problem.dtype)
     tensor = types.Tensor(flat[0] if len(flat) == 1 else dr.concat(flat), (len(flat), *window.shape))
-    wavelengths = np.array([beam.wavelength for beam in beams])
-    return PSFResult(tensor, window.dx, wavelengths, beams[0].distance, beams[0].pupil, tuple(plans), window.centre)
-
-
-def pictures(
-    beams: Sequence[Beam], tasks: Sequence[Problem], method: str = "auto", most_seconds: float = 60.0
-) -> list[tuple[Any, Plan]]:
-    """PSFs, flat, and their plans: all are refused before anything is computed, and all started before any is waited
-    for.
-
-    Raises:
-        AccuracyError: see `spread`.
-    """
-    import drjit as dr
-
-    chosen = [choose(task, method, most_seconds) for task in tasks]
-    started = [_picture(beam, task, sampling) for beam, task, (_, sampling) in zip(beams, tasks, chosen, strict=True)]
-    for image in started:
-        dr.eval(image)  # one launch each: together they would be one kernel, compiled anew for every number of them
-    asked = method, most_seconds
-    return [_checked(*each, asked) for each in zip(beams, tasks, chosen, started, strict=True)]
-
-
-def _picture(beam: Beam, task: Problem, sampling: Sampling) -> Any:
-    types = precision(task.dtype)
-    radius = opaque(types, beam.radius)
-    return sampling.intensity(beam, task) / types.Float(beam.pupil.aperture.area * radius * radius)
-
-
-def _checked(
-    beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], image: Any, asked: tuple[str, float]
-) -> tuple[Any, Plan]:
-    """The PSF, flat, and the plan with the error that a spot check tells. What does not meet the tolerance is planned
-    again: by an exact method, and for a smaller tolerance, because a dark window needs more digits than a bright one.
-    An approximation asked for by its name stays, however wrong it is seen to be.
-
-    Raises:
-        AccuracyError: the check finds more than the tolerance all the same.
-    """
-    sampled = task
-    for _ in range(TRIES):
-        plan, sampling = chosen
-        picture = image.numpy()
-        seen = spot_check(beam, sampled, picture, plan.seconds)
-        if seen is None:
-            return image, replace(plan, predicted_error=_predicted_error(picture, sampling, sampled))
-        if seen <= task.tolerance or (sampling.model_error and asked[0] == plan.method):
-            return image, replace(plan, predicted_error=seen)
-        if sampling.model_error:
-            asked = ("exact", asked[1])
-        else:
-            least = max(0.3 * sampled.tolerance * task.tolerance / seen, 10 * FLOAT_NOISE[task.dtype])
-            if least >= sampled.tolerance:
-                break
-            sampled = Problem.of(beam, task.window, least, task.dtype)  # fine detail counts for more, too
-        chosen = choose(sampled, *asked)
-        image = _picture(beam, sampled, chosen[1])
-    raise AccuracyError(
-        f"tolerance = {task.tolerance:g}: a check against the direct sum finds an error of {seen:.1g} by "
-        f"{plan.method} in {task.dtype}; widen the tolerance or ask for another method or dtype"
-    )
-
-
-def _predicted_error(image: np.ndarray, sampling: Sampling, task: Problem) -> float:
-    """The error that the picture itself tells: rounding is as large in a dark window as in a bright one, so there it
-    weighs more. A model that leaves the window dark misses all its light.
-
-    Raises:
-        AccuracyError: the window is so dark that rounding breaks the tolerance.
-    """
-    mean, mean_square = float(image.mean(dtype=np.float64)), float(np.mean(np.square(image, dtype=np.float64)))
-    if mean_square == 0 and sampling.model_error:
-        return max(sampling.model_error, 1.0)
-    bright = 1 / sampling.plane(task) ** 2  # mean PSF over the plane that the transform spans
-    noise = FLOAT_NOISE[task.dtype]
-    rounding = 2 * noise * math.sqrt(bright * mean) + noise**2 * bright
-    error = task.tolerance / 2 + rounding / math.sqrt(mean_square) if mean_square > 0 else math.inf
-    if error > task.tolerance:
-        raise AccuracyError(
-            f"tolerance = {task.tolerance:g}: the window is so dark that {task.dtype} rounding reaches {error:.1g}"
-            + ("; dtype='float64' has a 1e6 times lower floor" if task.dtype == "float32" else "")
-        )
-    return error + sampling.model_error
+    wavelengths = np.array([request.beam.wavelength for request in requests])
+    return PSFResult(tensor, window.dx, wavelengths, beam.distance, beam.pupil, tuple(plans), window.centre)

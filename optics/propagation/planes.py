@@ -1,4 +1,4 @@
-"""A plane of a stack, sampled for the light that it has to pass on.
+"""A plane of a system, sampled for the light that it has to pass on.
 
 A pupil's aperture is softened so that frequencies that can reach the next plane are exact (optics.apertures.aperture),
 and its samples lie so close that what folds back stays beyond them. Sums over samples then converge spectrally.
@@ -15,6 +15,7 @@ from optics.apertures.aperture import EDGE_REACH, SoftAperture
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
+from optics.methods.problem import SLOPE_MARGIN
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
@@ -22,6 +23,8 @@ from optics.propagation.propagate import WRAP_RIPPLE_PER_TOLERANCE, PropagationR
 from optics.propagation.transfer_function import kept_band, kept_square
 
 __all__ = ["PlaneField", "PupilSampling", "StepSettings", "Stop"]
+
+REACH_MARGIN = 1.02  # choice, over the planes' half widths: `propagate` adds a sample to each of them
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class StepSettings:
         if z == 0:
             return math.inf
         round_, square = (
-            kept(1.02 * widths, wavelength, z, self.ripple)
+            kept(REACH_MARGIN * widths, wavelength, z, self.ripple)
             for kept, widths in ((kept_band, math.sqrt(2) * half_widths), (kept_square, half_widths))
         )
         if math.isfinite(round_.kept):
@@ -105,7 +108,7 @@ class PupilSampling:
 
     @classmethod
     def of(
-        cls, stop: Stop, following: Stop, light: StepSettings, source: PointSource, arriving: float
+        cls, stop: Stop, following: Stop, settings: StepSettings, source: PointSource, arriving: float
     ) -> PupilSampling:
         """arriving: the highest frequency [1/m] of the light that arrives.
 
@@ -121,12 +124,12 @@ class PupilSampling:
             raise ValueError(
                 "elements: a PixelRelief jumps, which the grids between planes cannot carry: use psf for one"
             )
-        slope = 1.02 * pupil.slopes(light.wavelength, source).steepest / light.wavelength
-        turns = arriving + slope + pupil.bandwidth(light.wavelength, light.ripple)
-        band = light.reaching(stop.half_width + following.half_width, following.distance)
+        slope = SLOPE_MARGIN * pupil.slopes(settings.wavelength, source).steepest / settings.wavelength
+        turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.ripple)
+        band = settings.reaching(stop.half_width + following.half_width, following.distance)
         if math.isinf(band):
             band = turns  # seen in its own plane: an edge as soft as the light's own detail
-        soft = pupil.aperture.soften((turns + band) * pupil.radius, light.ripple, EDGE_REACH)
+        soft = pupil.aperture.soften((turns + band) * pupil.radius, settings.ripple, EDGE_REACH)
         pitch = 1 / (turns + band + soft.stopband / pupil.radius)
         across = 2 * math.ceil((1 + soft.reach) * pupil.radius / pitch) + 1
         if across > MOST_SAMPLES:
@@ -136,13 +139,13 @@ class PupilSampling:
             )
         return cls(pupil, source, Grid.square(across, pitch), soft, band)
 
-    def transmitted(self, u: np.ndarray | float, light: StepSettings) -> PlaneField:
+    def transmitted(self, u: np.ndarray | float, settings: StepSettings) -> PlaneField:
         """The field u on the grid, times the pupil's transmittance (its conjugate backwards)."""
         import drjit as dr
 
-        beam = Beam(self.pupil, self.source, light.wavelength, math.inf)
-        field = beam.behind(self.soft, self.grid, precision(light.dtype))
+        beam = Beam(self.pupil, self.source, settings.wavelength, math.inf)
+        field = beam.behind(self.soft, self.grid, precision(settings.dtype))
         if dr.grad_enabled(field.re, field.im):
-            raise ValueError("elements: a stack carries no derivatives; use psf for a single pupil")
+            raise ValueError("elements: a system carries no derivatives; use psf for a single pupil")
         transmittance = field.numpy()
-        return PlaneField(u * (transmittance.conj() if light.backward else transmittance), self.grid.dx, self.band)
+        return PlaneField(u * (transmittance.conj() if settings.backward else transmittance), self.grid.dx, self.band)

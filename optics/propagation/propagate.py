@@ -30,13 +30,13 @@ from optics.propagation.transfer_function import EVERYTHING, Passage, TransferFu
 __all__ = ["PROPAGATION_METHODS", "WRAP_RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
 
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
-# Share of faded light that strays into the window: small, because the window may hold far less than is faded.
+# Choice. Share of faded light that strays into the window: small, because the window may hold far less than is faded.
 WRAP_RIPPLE_PER_TOLERANCE = 3e-3
-# First room for the blur of light cut at Nyquist's frequency [√(λz)].
+# Choice. First room for the blur of light cut at Nyquist's frequency [√(λz)].
 SPARE = 1.0
-# The estimate of that blur is good to a factor of two or three: carried again is only what is clearly too much.
+# Choice. The estimate of that blur is good to a factor of two or three: carried again is only what is clearly too much.
 CLEARLY = 1.5
-# So many times the light that arrives may be missing and cost next to nothing of the tolerance.
+# Choice. So many times the light that arrives may be missing and cost next to nothing of the tolerance.
 MUCH = 100.0
 
 ONE = np.ones(1)  # the weight of what counts whole
@@ -160,7 +160,8 @@ def _with_room(
     blur = max(plane.blur for plane in planes)
     allowed = CLEARLY * (tolerance - max(plane.error for plane in planes))
     if spare < most and blur > allowed and blur * blur_left(how, sampling(passage, *grids, most)) < allowed:
-        how = sampling(passage, *grids, min(1.2 * CLEARLY * blur / allowed * spare, most))  # it falls like 1 / spare
+        # The blur falls like 1 / spare. Choice: a fifth more room than that asks for.
+        how = sampling(passage, *grids, min(1.2 * CLEARLY * blur / allowed * spare, most))
         planes = [_one(plane, how, types) for plane in sources]
     return how, planes
 

@@ -1,9 +1,19 @@
 """The period of a finite transform: long enough that what walks out of it does not come back into the window.
 
 A finite transform repeats the field every period. Light aimed anywhere near the window has to land there once; light
-aimed farther is faded out before it can wrap around. Where nothing can fade, samples with power at Nyquist's frequency
-end as if cut there, and what is cut blurs: beyond its walk it falls only like 1/(2π distance) (the first term of an
-integral's expansion about its end; Bleistein & Handelsman, Asymptotic Expansions of Integrals, §3.2).
+aimed farther is faded out before it can wrap around. Light of frequency f walks z tan θ to the side, sin θ = λ|f|.
+
+Where nothing can fade, the spectrum ends at Nyquist's frequency f_N as if cut there, and what is cut blurs. Along one
+axis the field is ∫ S(f) e^{2πi (f x + z √(1/λ² - f²))} df up to f_N, and the end of the integral alone gives
+
+    |b(x)| = |S(f_N)| / (2π d),   d = |x - walk(f_N)|,                                                             (1)
+
+2πd being the derivative of the phase there (the first term of an integral's expansion about its end; Bleistein &
+Handelsman, Asymptotic Expansions of Integrals, §3.2). That falls slowly: the next period's blur reaches the window. A
+source of width L that holds such light evenly and incoherently, repeated so that a gap g is left between its walked
+light and a window of width W, brings into the window, per power |S|² of the spectrum's end,
+
+    ∫_0^L ds/L ∫_0^W dx / (2π (g + s + x))² = ln(1 + L W / (g (g + L + W))) / (4π² L).                             (2)
 """
 
 from __future__ import annotations
@@ -21,9 +31,9 @@ from optics.propagation.transfer_function import EVERYTHING, PERIOD_MAX_SINE, Pa
 
 __all__ = ["TransformSampling", "blur_left", "blurred_back", "most_spare", "sampling"]
 
-# Pitches are one and the same where they differ by less than this share of a sample over the whole window.
+# Rounding: pitches are the same where they differ by less than this share of a sample over the whole window.
 SAME_PITCH = 1e-9
-# How much of the spectrum, and how many of its lines, tell its power about Nyquist's frequency.
+# Choice: how much of the spectrum, and how many of its lines, tell its power about Nyquist's frequency.
 NYQUIST_SHARE, NYQUIST_LINES = 1 / 16, 9
 
 
@@ -54,6 +64,7 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
         AccuracyError: the period takes more samples than there is room for.
     """
     wavelength, z, ripple, paraxial = passage.wavelength, abs(passage.z), passage.ripple, passage.paraxial
+    # From the source's far edge (its samples, and one for the function through them) to the window's, across the axis.
     reach = max(
         (n // 2 + 1) * source.dx + (m // 2) * window.dx + abs(middle)
         for n, m, middle in zip(source.shape, window.shape, window.centre[::-1], strict=True)
@@ -68,6 +79,7 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
     # Where nothing can fade, all that the samples hold may matter.
     if band.end >= (nyquist if band.square else math.sqrt(2) * nyquist):
         band, far = EVERYTHING, _farthest(nyquist, wavelength, z, paraxial) + spare
+    # What walks `far` from the source's far edge must not come round to the window's; and the source must fit in.
     least = max(reach + far, 2 * (max(source.shape) // 2 + 1) * source.dx)
     samples = fast_length(least / source.dx)
     half = band.end * samples * source.dx  # as a float: it may be infinite
@@ -85,7 +97,8 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
 
 
 def most_spare(passage: Passage, source: Grid) -> float:
-    """Room [m] worth making for what is cut: with it, the corner's light could walk along an axis."""
+    """Room [m] worth making for what is cut: as if the light that walks farthest, from the spectrum's corner at √2 f_N,
+    walked along an axis instead of the diagonal."""
     nyquist, z, paraxial = 0.5 / source.dx, abs(passage.z), passage.paraxial
     end = math.sqrt(2) * nyquist
     whole = walk(end if paraxial else min(end, PERIOD_MAX_SINE / passage.wavelength), passage.wavelength, z, paraxial)
@@ -93,7 +106,11 @@ def most_spare(passage: Passage, source: Grid) -> float:
 
 
 def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> float:
-    """How far [m] along an axis anything walks that a square of frequencies holds: what is in its corner."""
+    """How far [m] along an axis anything walks that a square of frequencies up to f_N holds.
+
+    Light walks in the direction of (fx, fy): along x by z tan θ fx/|f|. That is largest where fx = f_N and tan θ is, in
+    the corner |f| = √2 f_N, or where the period's steepest light ends. Paraxially it is zλ fx, whatever fy.
+    """
     if paraxial:
         return walk(nyquist, wavelength, z, paraxial)
     end = min(math.sqrt(2) * nyquist, PERIOD_MAX_SINE / wavelength)
@@ -120,27 +137,33 @@ def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
 
 
 def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
-    """What a roomier sampling leaves of the blur's amplitude, if Nyquist's light is even along the other axis."""
+    """What a roomier sampling leaves of the blur's amplitude, if the power at Nyquist's frequency is the same for all
+    frequencies along the other axis."""
     power, left = (sum(float(_blur_weights(sampling, axis).sum()) for axis in (0, 1)) for sampling in (how, roomier))
     return math.sqrt(left / power) if power else 1.0
 
 
 @lru_cache(maxsize=8)
 def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
-    """Of the power at Nyquist's frequency along one axis, per frequency along the other: what comes back."""
+    """Of the power |U|² at Nyquist's frequency along one axis, per frequency along the other: what comes back.
+
+    In samples: U = Σ u e^{-2πi...} is S/dx, so that (2) times dx² |U|² is the power ∫|b|² dx, and that over dx the sum
+    over samples along the one axis. Parseval's 1/period sums along the other. The spectrum has two ends, ±f_N.
+    """
     source, window = how.source, how.window
-    ring = (np.arange(how.period) - how.period // 2) / (how.period * source.dx)
-    far, aside = _walks(0.5 / source.dx, np.fft.ifftshift(ring) if how.step else ring, how)
+    others = (np.arange(how.period) - how.period // 2) / (how.period * source.dx)
+    far, aside = _walks(0.5 / source.dx, np.fft.ifftshift(others) if how.step else others, how)
     lit, seen = (grid.shape[axis] * grid.dx for grid in (source, window))
     meets = _share_that_meets(aside, how, 1 - axis)
-    room = np.maximum(how.period * source.dx - how.reach - np.where(meets > 0, far, 0), source.dx)
-    falls = np.log1p(lit * seen / (room * (room + lit + seen))) / (4 * math.pi**2 * lit)
-    weights: np.ndarray = 2 * falls * meets * source.dx / how.period  # both ends of the spectrum
+    gap = np.maximum(how.period * source.dx - how.reach - np.where(meets > 0, far, 0), source.dx)
+    comes_back = np.log1p(lit * seen / (gap * (gap + lit + seen))) / (4 * math.pi**2 * lit)  # (2)
+    weights: np.ndarray = 2 * comes_back * meets * source.dx / how.period
     return weights
 
 
 def _share_that_meets(walks: np.ndarray, how: TransformSampling, axis: int) -> np.ndarray:
-    """Share of a source's light that walks so far [m] along an axis (0: y) and lands beside the window."""
+    """Share of a source's light that walks so far [m] along an axis (0: y) and lands beside the window: the overlap of
+    two intervals, `lit` and `seen` wide, whose centres are `missed` apart."""
     lit, seen = (grid.shape[axis] * grid.dx for grid in (how.source, how.window))
     missed = np.maximum(walks - abs(how.window.centre[1 - axis]), 0)
     share: np.ndarray = np.clip((lit + seen) / 2 - missed, 0, min(lit, seen)) / lit
@@ -148,7 +171,8 @@ def _share_that_meets(walks: np.ndarray, how: TransformSampling, axis: int) -> n
 
 
 def _walks(fx: float, fy: np.ndarray, how: TransformSampling) -> tuple[np.ndarray, np.ndarray]:
-    """How far [m] along x and along y light of (fx, fy) walks; infinite where it is too near grazing."""
+    """How far [m] along x and along y light of (fx, fy) walks, z tan θ fx/|f| = z λ fx / cos θ; infinite where it is
+    too near grazing."""
     wavelength, z = how.passage.wavelength, abs(how.passage.z)
     sine2 = 0 * fy if how.passage.paraxial else (fx**2 + fy**2) * wavelength**2
     steep = sine2 >= PERIOD_MAX_SINE**2

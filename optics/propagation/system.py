@@ -76,7 +76,7 @@ def propagate_through(
     dtype: str = "float32",
     backward: bool = False,
 ) -> StackResult:
-    """Field behind a stack of pupils and free space, carrier exp(ikz) included.
+    """Field behind a system of pupils and free space, carrier exp(ikz) included.
 
     elements: in the order in which light meets them when it goes forwards; all in one medium.
     u: complex (y, x) in the plane before the first element, pitch dx [m], zero outside; or None: the first element is
@@ -97,7 +97,7 @@ def propagate_through(
     if field is not None and source is not None:
         raise ValueError("source: must not be given with u")
     each = in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5) / (2 * len(stops))
-    light = StepSettings(
+    settings = StepSettings(
         vacuum_wavelength(wavelength), _medium(elements), backward, max(each, 10 * FLOAT_NOISE[dtype]), dtype
     )
     steps: list[SystemStep] = []
@@ -105,17 +105,17 @@ def propagate_through(
         sampling = None
         if stop.pupil is not None:
             at = source or PointSource() if field is None else PointSource()
-            sampling = PupilSampling.of(stop, stops[i + 1], light, at, _arriving(field, stop, light))
+            sampling = PupilSampling.of(stop, stops[i + 1], settings, at, _arriving(field, stop, settings))
         grid = window if sampling is None else sampling.grid
         if field is not None:
-            out = light.carried(field, stop.distance, grid)
+            out = settings.carried(field, stop.distance, grid)
             arrived = PlaneField(out.u, out.dx, field.band)
             steps.append(SystemStep(stop.distance, out.plan, field.power, arrived.power, out.evanescent_power))
             field = arrived
         if sampling is not None:
-            field = sampling.transmitted(1.0 if field is None else field.u, light)
+            field = sampling.transmitted(1.0 if field is None else field.u, settings)
     assert field is not None
-    return StackResult(field.u, window.dx, tuple(steps), _error(steps, tolerance, light))
+    return StackResult(field.u, window.dx, tuple(steps), _error(steps, tolerance, settings))
 
 
 def _start(
@@ -161,14 +161,14 @@ def _medium(elements: Sequence[Pupil | FreeSpace]) -> float:
     return media[0]
 
 
-def _arriving(field: PlaneField | None, stop: Stop, light: StepSettings) -> float:
+def _arriving(field: PlaneField | None, stop: Stop, settings: StepSettings) -> float:
     """Highest frequency [1/m] of the light that arrives at a stop; a source's counts with the pupil's own phase."""
     if field is None:
         return 0.0
-    return min(field.band, light.reaching(field.half_width + stop.half_width, stop.distance))
+    return min(field.band, settings.reaching(field.half_width + stop.half_width, stop.distance))
 
 
-def _error(steps: list[SystemStep], tolerance: float, light: StepSettings) -> float:
+def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings) -> float:
     """Errors of the steps, and of the soft edges between them, each as much larger as the light since has dwindled.
 
     Raises:
@@ -178,7 +178,7 @@ def _error(steps: list[SystemStep], tolerance: float, light: StepSettings) -> fl
     if last == 0:
         return 0.0
     error = sum(step.plan.predicted_error * math.sqrt(max(step.power_out / last, 1)) for step in steps)
-    edges = 8 * light.ripple + 4 * FLOAT_NOISE[light.dtype]
+    edges = 8 * settings.ripple + 4 * FLOAT_NOISE[settings.dtype]
     error += sum(edges * math.sqrt(max(step.power_in / last, 1)) for step in steps)
     if error > tolerance:
         raise AccuracyError(

@@ -12,11 +12,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from optics.apertures.soft_edge import kaiser_beta
+from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import Interpolant
@@ -24,12 +24,15 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = ["PERIOD_MAX_SINE", "Band", "TransferFunction", "evanescent", "kept_band", "kept_square", "walk"]
 
-# Steepest light that a period makes room for, as sin θ; z tan θ has no bound beyond.
+# Choice. Steepest light that a period makes room for, as sin θ; z tan θ has no bound beyond.
 PERIOD_MAX_SINE = 0.995
-# Steepest fade along the axes, one by one: towards grazing they would be ever narrower.
+# Choice. Steepest fade along the axes, one by one: towards grazing they would be ever narrower.
 STEEPEST_SQUARE = 0.8
-# What a fade blurs lands outside its own walk as well, though less: its last part is dark.
+# Choice, in parts of the blur: what a fade blurs lands outside its own walk as well, though less, its last part being
+# dark.
 OUTWARDS = 0.6
+# Choice: widths of the fade to try, as sines.
+FADE_SINES = np.geomspace(0.003, 0.6, 33)
 
 
 @dataclass(frozen=True)
@@ -82,9 +85,9 @@ def _shortest(distance: float, wavelength: float, z: float, ripple: float, parax
     blur = kaiser_beta(ripple) / math.pi
     steepest = STEEPEST_SQUARE if square else PERIOD_MAX_SINE
     best = EVERYTHING
-    for fade in np.geomspace(0.003, 0.6, 33) / wavelength if z else ():
+    for fade in FADE_SINES / wavelength if z else ():
         band = 0.0
-        for _ in range(3 if square and not paraxial else 1):
+        for _ in range(3 if square and not paraxial else 1):  # the band and its fade's gradient depend on each other
             sine = (band + fade) * wavelength
             if not paraxial and sine >= steepest:
                 break
@@ -181,12 +184,12 @@ class Passage:
         waves += x * opaque(types, self.centre[0]) + y * opaque(types, self.centre[1])
         return Field.from_waves(decay, waves, grid, types).numpy()
 
-    def _faded(self, x: Any, y: Any, types: Precision) -> Any:
+    def _faded(self, x: Array, y: Array, types: Precision) -> Array:
         import drjit as dr
 
         table, kept, fade = _fade_table(self.ripple), self.band.kept, self.band.fade
 
-        def left(frequency: Any) -> Any:
+        def left(frequency: Array) -> Array:
             return table.at((dr.abs(frequency) - opaque(types, kept)) * opaque(types, 1 / fade), types)
 
         if not self.band.square:

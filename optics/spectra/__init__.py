@@ -1,4 +1,4 @@
-"""Light and receptors over wavelength; the tables are in data/.
+"""Light and receptors over wavelength; the measured tables are in data/.
 
 spectrum       Spectrum: illuminants, reflectances, cone fundamentals
 bands          SpectralBands: a spectrum as a few numbers

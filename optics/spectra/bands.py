@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import whole
+from optics.numerics.interpolation import linear_weights
 from optics.spectra.pigment import pigment_absorptance
 from optics.spectra.receptors import Receptors, receptors_of
 from optics.spectra.spectrum import Spectrum, cie_1931, daylight
 
 __all__ = ["SpectralBands", "cie_1931", "daylight", "pigment_absorptance"]
 
-FINEST = 64
-CATCHES_FIRST = 1e4  # how much more than means they weigh in least squares
+FINEST = 64  # choice
+CATCHES_FIRST = 1e4  # choice: how much more than means they weigh in least squares
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class SpectralBands:
         edges = np.linspace(*kinds.limits_nm, whole("bands", bands, 1, FINEST) + 1)
         centres = (edges[:-1] + edges[1:]) / 2
         nm, catch = _catch(kinds)
-        weights = (catch @ _hats(nm, centres).T) / catch.sum(axis=1, keepdims=True) / daylight(centres * 1e-9)
+        weights = (catch @ linear_weights(nm, centres).T) / catch.sum(axis=1, keepdims=True) / daylight(centres * 1e-9)
         return cls(centres * 1e-9, weights, catch.sum(axis=1) * 1e-18)
 
     def of(
@@ -67,7 +68,9 @@ class SpectralBands:
         catch /= catch.sum(axis=1, keepdims=True)
         of_daylight = np.broadcast_to(at(nm * 1e-9), nm.shape) / daylight(nm * 1e-9)
         seen = catch.sum(axis=0)
-        shares = _hats(nm, self.wavelengths * 1e9) * (seen + 1e-6 * seen.max())  # what nobody sees has a mean, too
+        shares = linear_weights(nm, self.wavelengths * 1e9) * (
+            seen + 1e-6 * seen.max()
+        )  # what nobody sees has a mean, too
         means = daylight(self.wavelengths) * (shares @ of_daylight) / shares.sum(axis=1)
         caught = catch @ of_daylight
         found: np.ndarray = means + np.linalg.pinv(self.weights) @ (caught - self.weights @ means)
@@ -95,8 +98,3 @@ def _catch(kinds: Receptors) -> tuple[np.ndarray, np.ndarray]:
     catch = kinds.catch(nm)
     catch[:, [0, -1]] /= 2  # trapezoid rule
     return nm, catch
-
-
-def _hats(nm: np.ndarray, centres: np.ndarray) -> np.ndarray:
-    """(band, wavelength): linear interpolation between the bands' centres, constant beyond."""
-    return np.stack([np.interp(nm, centres, row) for row in np.eye(len(centres))])

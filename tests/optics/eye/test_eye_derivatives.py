@@ -112,13 +112,13 @@ def test_noise_carries_no_derivative_and_is_the_same():
     radius = types().Float64(15e-6)
     dr.enable_grad(radius)
     scene = np.random.default_rng(1).random((4, 30, 30))
-    tracked, plain = (
+    differentiable, plain = (
         Eye(Pupil(r, thin_lens_focal_length=240e-6)).see(scene, S, np.random.default_rng(2)) for r in (radius, 15e-6)
     )
-    np.testing.assert_allclose(tracked.numpy(), plain, atol=1e-6)
+    np.testing.assert_allclose(differentiable.numpy(), plain, atol=1e-6)
     quiet = Eye(Pupil(radius, thin_lens_focal_length=240e-6)).see(scene, S)
     dr.forward(radius, flags=dr.ADFlag.ClearInterior)
-    np.testing.assert_allclose(dr.grad(tracked).numpy(), dr.grad(quiet).numpy(), rtol=1e-5)
+    np.testing.assert_allclose(dr.grad(differentiable).numpy(), dr.grad(quiet).numpy(), rtol=1e-5)
 
 
 def test_a_plain_eye_gives_arrays():

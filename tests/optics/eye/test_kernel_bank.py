@@ -10,7 +10,8 @@ import pytest
 from optics import AccuracyError, BSplineRelief, Eye, Pupil
 from optics.eye.eye import LIGHT_FROM
 from optics.eye.kernel_bank import KernelBank
-from optics.eye.kernel_interpolation import NodeChoice, checks, linear_weights, worst_difference
+from optics.eye.kernel_interpolation import NodeChoice, checks, nodes, worst_difference
+from optics.numerics.interpolation import linear_weights
 
 S = 2
 NEAR, FAR = 0.6e-3, 5e-3
@@ -51,9 +52,9 @@ class TestDepth:
         radiance, z, exact = scene
         errors = []
         for layers in (1, 3, 5, 9):
-            sight = LENS.sight(S, z, layers, light_from="centres")
-            assert len(sight.kernels) == layers
-            errors.append(np.abs(LENS.see(radiance, S, z=z, sight=sight) - exact).max() / LENS.throughput)
+            bank = LENS.sight(S, z, layers, light_from="centres")
+            assert len(bank.kernels) == layers
+            errors.append(np.abs(LENS.see(radiance, S, z=z, sight=bank) - exact).max() / LENS.throughput)
         assert errors[0] > 0.03
         assert np.log2(errors[1] / errors[2]) > 1.5
         assert errors[3] < errors[0] / 20
@@ -61,18 +62,18 @@ class TestDepth:
     @pytest.mark.parametrize("tolerance", [0.3, 0.05, 0.01])
     def test_predicted_error_holds_and_is_not_cowardly(self, scene, tolerance):
         radiance, z, exact = scene
-        sight = LENS.sight(S, z, tolerance=tolerance, light_from="centres")
-        (layers,), predicted = sight.choices[0].counts, sight.choices[0].predicted_error
+        bank = LENS.sight(S, z, tolerance=tolerance, light_from="centres")
+        (layers,), predicted = bank.choices[0].counts, bank.choices[0].predicted_error
         assert predicted <= tolerance
         weight = LENS.spectral_bands.weights.max()  # scene cells here reach 1, not white's daylight
-        actual = np.abs(LENS.see(radiance, S, z=z, sight=sight) - exact).max() / LENS.throughput
+        actual = np.abs(LENS.see(radiance, S, z=z, sight=bank) - exact).max() / LENS.throughput
         assert actual <= predicted * max(weight, 1)
         assert layers <= {0.3: 3, 0.05: 5, 0.01: 9}[tolerance]
 
     def test_one_distance_is_one_kernel(self):
-        sight = LENS.sight(S, 2e-3)
-        assert len(sight.kernels) == 1
-        assert sight.choices[0].predicted_error == 0
+        bank = LENS.sight(S, 2e-3)
+        assert len(bank.kernels) == 1
+        assert bank.choices[0].predicted_error == 0
         rng = np.random.default_rng(0)
         scene = flat_scene(rng, LENS)
         everywhere = np.full(scene.shape[1:], 2e-3)
@@ -80,9 +81,9 @@ class TestDepth:
 
     def test_far_scenes_need_one_layer(self):
         """From 10 m on the light is as good as parallel: R² / (2 z λ) = 6e-5 waves."""
-        sight = LENS.sight(S, (10.0, math.inf))
-        assert sight.choices[0].counts == (1,)
-        assert sight.choices[0].predicted_error < 1e-3
+        bank = LENS.sight(S, (10.0, math.inf))
+        assert bank.choices[0].counts == (1,)
+        assert bank.choices[0].predicted_error < 1e-3
 
     def test_a_wrong_depth_is_noticed(self, scene):
         radiance, z, exact = scene
@@ -148,37 +149,37 @@ class TestField:
         assert errors[3] < errors[0] / 8
 
     def test_predicted_error_is_within_the_tolerance_and_printed(self):
-        sight = self.WIDE.sight(S, field_zones="auto", tolerance=0.1)
-        depth, wide = sight.choices
+        bank = self.WIDE.sight(S, field_zones="auto", tolerance=0.1)
+        depth, wide = bank.choices
         assert wide.stage == "field"
         assert 0 < wide.predicted_error <= 0.1
-        assert math.prod(wide.counts) == len(sight.kernels) > 1
-        assert "tolerance of 0.1" in str(sight)
-        assert len(str(sight).splitlines()) == 2
+        assert math.prod(wide.counts) == len(bank.kernels) > 1
+        assert "tolerance of 0.1" in str(bank)
+        assert len(str(bank).splitlines()) == 2
         assert depth.counts == (1,)
 
     def test_mirror_images(self):
         """A symmetric eye sees a mirrored scene mirrored, zones and all."""
         eye = self.WIDE
         scene = flat_scene(np.random.default_rng(1), eye)
-        sight = eye.sight(S, field_zones=3)
-        there = eye.see(scene, S, sight=sight)
-        back = eye.see(scene[:, ::-1, ::-1], S, sight=sight)[:, ::-1, ::-1]
+        bank = eye.sight(S, field_zones=3)
+        there = eye.see(scene, S, sight=bank)
+        back = eye.see(scene[:, ::-1, ::-1], S, sight=bank)[:, ::-1, ::-1]
         np.testing.assert_allclose(back, there, atol=2e-3 * there.max())
 
 
-class TestLadder:
-    @pytest.mark.parametrize("rung", [(1,), (3,), (9,), (1, 1), (3, 3), (3, 5), (9, 9), (1, 5)])
-    def test_checks_lie_between_nodes(self, rung):
-        places = checks(rung)
+class TestNodeChoice:
+    @pytest.mark.parametrize("counts", [(1,), (3,), (9,), (1, 1), (3, 3), (3, 5), (9, 9), (1, 5)])
+    def test_checks_lie_between_nodes(self, counts):
+        places = checks(counts)
         assert 1 <= len(places) <= 8
         assert len(set(places)) == len(places)
         assert all(-1 <= at <= 1 for place in places for at in place)
 
-    def test_hats_sum_to_one(self):
+    def test_linear_weights_sum_to_one(self):
         at = np.linspace(-1.5, 1.5, 31)
         for count in (1, 2, 3, 5):
-            np.testing.assert_allclose(linear_weights(at, count).sum(axis=0), 1)
+            np.testing.assert_allclose(linear_weights(at, nodes(count)).sum(axis=0), 1)
 
     def test_the_worst_scene_reaches_the_worst_difference(self):
         """Light only where the receptive field grew."""
@@ -193,11 +194,11 @@ class TestLadder:
 
     def test_a_quadratic_family_errs_as_predicted(self):
         """Kernels linear in t² between nodes at distance h: error h²/4 halfway."""
-        ladder = NodeChoice("test", lambda at: np.full((1, 1, 1), at[0] ** 2), [(3,), (5,), (9,)], 1)
-        assert [ladder.error((n,)) for n in (3, 5, 9)] == pytest.approx([1 / 4, 1 / 16, 1 / 64])
-        assert ladder.choose(0.1).counts == (5,)
+        choice = NodeChoice("test", lambda at: np.full((1, 1, 1), at[0] ** 2), [(3,), (5,), (9,)], 1)
+        assert [choice.error((n,)) for n in (3, 5, 9)] == pytest.approx([1 / 4, 1 / 16, 1 / 64])
+        assert choice.choose(0.1).counts == (5,)
         with pytest.raises(AccuracyError, match=r"9 test nodes leave 2\.0e-02"):
-            ladder.choose(0.001)
+            choice.choose(0.001)
 
 
 @pytest.mark.parametrize(
@@ -219,10 +220,10 @@ def test_bad_sights(arguments, message):
 
 
 def test_a_sight_of_another_eye():
-    sight = Eye().sight(S)
-    assert isinstance(sight, KernelBank)
+    bank = Eye().sight(S)
+    assert isinstance(bank, KernelBank)
     with pytest.raises(ValueError, match="sight is for a retina of 30 x 30 cells"):
-        LENS.see(np.zeros((1, 14, 18)), S, sight=sight)
+        LENS.see(np.zeros((1, 14, 18)), S, sight=bank)
 
 
 def test_depths_of_another_shape():

@@ -1,4 +1,4 @@
-"""Stacks of pupils and free space against exact integrals, identities and a relay's image."""
+"""Systems of pupils and free space against exact integrals, identities and a relay's image."""
 
 import numpy as np
 import pytest
@@ -115,9 +115,9 @@ def test_a_relay_of_two_lenses_inverts_its_object():
 
 
 def test_backwards_undoes_forwards():
-    stack = [FreeSpace(120e-6), Pupil(30e-6, thin_lens_focal_length=100e-6), FreeSpace(120e-6)]
-    there = propagate_through(stack, OBJECT, **SETTINGS, out_shape=(97, 97))
-    back = propagate_through(stack, there.u, **SETTINGS, out_shape=(N, N), backward=True)
+    system = [FreeSpace(120e-6), Pupil(30e-6, thin_lens_focal_length=100e-6), FreeSpace(120e-6)]
+    there = propagate_through(system, OBJECT, **SETTINGS, out_shape=(97, 97))
+    back = propagate_through(system, there.u, **SETTINGS, out_shape=(N, N), backward=True)
     assert field_error(back.u, OBJECT) < 1e-5  # the lens spreads 4e-6 of it beyond the wide window
     assert [step.distance for step in back.steps] == [-120e-6, -120e-6]
 

@@ -12,7 +12,7 @@ BAYER = ((0, 1), (1, 2))
 
 
 def test_the_default_is_three_rgb_like_channels_from_400_to_700_nm():
-    """To the last digit: pigments of 600, 520 and 460 nm, trapezoids of 1 nm, hats between the bands' centres."""
+    """To the last digit: pigments of 600, 520 and 460 nm, trapezoids of 1 nm, linear between the bands' centres."""
     bands = SpectralBands.uniform(4)
     nm = np.arange(400.0, 700.5)
     catch = np.stack(

@@ -5,6 +5,7 @@ import pytest
 
 from optics import Spectrum, illuminant, reflectance
 from optics.spectra.spectrum import ILLUMINANTS, REFLECTANCES, cie_1931, cone_fundamentals, daylight
+from validation import freeze_spectra
 
 VISIBLE = np.arange(380.0, 781.0, 5.0)
 
@@ -54,6 +55,14 @@ def test_cone_fundamentals_are_those_of_colour_science(colour):
     # Between the entries, linear interpolation is off by h²/8 of the curvature: σ is some 40 nm, so 2e-3.
     exact = np.array([theirs[float(x)] for x in fine])[:, 0] / fine
     np.testing.assert_allclose(cone_fundamentals()[0].at(fine * 1e-9), exact / (exact.max()), atol=3e-3)
+
+
+@pytest.mark.usefixtures("colour")
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", freeze_spectra.TABLES)
+def test_tables_are_what_the_script_makes(name):
+    """Byte for byte; with the colour-science that they were made with or one that holds the same numbers."""
+    assert freeze_spectra.text(freeze_spectra.TABLES[name]()) == (freeze_spectra.DATA / name).read_text()
 
 
 def test_daylight_reaches_into_the_ultraviolet():

@@ -1,0 +1,63 @@
+"""What is asked of a PSF."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from optics.elements.beam import Beam
+from optics.elements.pupil import Pupil
+from optics.elements.source import PointSource
+from optics.methods.problem import Problem
+from optics.methods.sampling import Sampling
+from optics.numerics.accuracy import Plan
+from optics.numerics.autodiff import Scalar
+from optics.numerics.grid import Grid
+from optics.point_spread.planner import choose
+
+__all__ = ["Request", "Setup"]
+
+
+@dataclass(frozen=True)
+class Request:
+    """One monochromatic picture that somebody wants.
+
+    beam: the light; problem: the same in numbers, with the window and the tolerance.
+    method: "auto", "exact" or a method's name. most_seconds: what the picture may take.
+    """
+
+    beam: Beam
+    problem: Problem
+    method: str = "auto"
+    most_seconds: float = 60.0
+
+    def planned(self) -> tuple[Plan, Sampling]:
+        """How it is best answered.
+
+        Raises:
+            AccuracyError: no method meets the tolerance within the limits on memory and time.
+        """
+        return choose(self.problem, self.method, self.most_seconds)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Where a pupil's light comes from, where it is looked at and how exactly: all but the pupil and the wavelength.
+
+    sensor_distance: [m] behind the pupil. window: the samples on the sensor. See `optics.psf` for the others.
+    """
+
+    sensor_distance: Scalar
+    source: PointSource
+    window: Grid
+    tolerance: float
+    method: str
+    dtype: str
+
+    def request(self, pupil: Pupil, wavelength: float) -> Request:
+        """Of a pupil's light at a vacuum wavelength [m].
+
+        Raises:
+            ValueError: a bad argument, named with its value and valid range.
+        """
+        beam = Beam(pupil, self.source, wavelength, self.sensor_distance)
+        return Request(beam, Problem.of(beam, self.window, self.tolerance, self.dtype), self.method)
