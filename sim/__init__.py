@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 from sim.envs.registration import register as register_environments
 
 if TYPE_CHECKING:
+    from sim.envs.assembly import make_vec_env
     from sim.envs.env import make_env
-    from sim.envs.vec_env import make_vec_env
     from sim.exr import View, read_exr, write_exr
     from sim.eyes.eyes import Eyes
     from sim.render.batched_renderer import BatchedRenderer
@@ -41,7 +41,7 @@ _HOME = {
     "Fidelity": "sim.render.fidelity",
     "choose_fidelity": "sim.render.fidelity",
     "make_env": "sim.envs.env",
-    "make_vec_env": "sim.envs.vec_env",
+    "make_vec_env": "sim.envs.assembly",
     "View": "sim.exr",
     "read_exr": "sim.exr",
     "write_exr": "sim.exr",

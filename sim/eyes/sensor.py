@@ -42,7 +42,7 @@ class BoxSensor:
         """Mean radiance of each receptor from the sums over its rays: (band, view, receptor), both ways."""
         return sums * np.float32(1.0 / self.rays_per_receptor)
 
-    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
+    def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Signals from sums of components over receptors' rays, see sim.eyes.receptor_sums."""
         return of_receptors(mixing @ basis.T / self.rays_per_receptor)
 
@@ -82,16 +82,16 @@ class ReceptiveFieldSensor:
         layers = np.stack([plane.reshape(len(plane), -1) for plane in planes])
         return layers.reshape(self.depth.count, -1, *layers.shape[1:]).sum(axis=0)
 
-    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
+    def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Signals from components along rays (layer * component, view, ray), see sim.eyes.receptor_sums."""
         count, k = self.depth.count, len(basis)
         bands = len(self.weights) // count
-        readouts = [self._readout(layer * bands, bands, mixing, basis) for layer in range(count)]
+        sums_of_layers = [self._sums_of_layer(layer * bands, bands, mixing, basis) for layer in range(count)]
         if count == 1:
-            return readouts[0]
-        return lambda light: np.sum([of_layer(light[i * k :][:k]) for i, of_layer in enumerate(readouts)], axis=0)
+            return sums_of_layers[0]
+        return lambda light: np.sum([of_layer(light[i * k :][:k]) for i, of_layer in enumerate(sums_of_layers)], axis=0)
 
-    def _readout(self, first: int, bands: int, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
+    def _sums_of_layer(self, first: int, bands: int, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         planes = slice(first, first + bands)
         if len(mixing) * len(basis) > bands:
             return of_bands(self._products[planes], mixing, basis)

@@ -30,6 +30,16 @@ EVALUATION = RewardWeights(progress=1.5, goal=10.0, adversary=-10.0, contact=-2.
 MODES = {"training": TRAINING, "evaluation": EVALUATION}
 
 
+def check_mode(mode: str) -> None:
+    """Refuse a mode that has no weights.
+
+    Raises:
+        ValueError: not one of MODES.
+    """
+    if mode not in MODES:
+        raise ValueError(f"mode = {mode!r}: must be one of {', '.join(map(repr, MODES))}")
+
+
 def reward_terms(
     weights: RewardWeights, progress: np.ndarray, goal: np.ndarray, adversary: np.ndarray, contact: np.ndarray
 ) -> np.ndarray:

@@ -7,7 +7,7 @@ import sys
 PROGRAM = """
 import gc
 import sim
-from sim import movers
+from sim.tracing import spheres
 
 def environment(seed):
     return sim.make_vec_env("detection", sim.Eyes(n_eyes=1, resolution=(3, 3)), 2, seed=seed, rays_per_receptor=1)
@@ -20,7 +20,7 @@ del first
 second = environment(1)
 gc.set_threshold(10**9)
 gc.enable()
-blocks = movers.blocks
+blocks = spheres.blocks
 
 def collection_falls_due(*arguments):
     gc.set_threshold(1, 1, 1)
@@ -28,7 +28,7 @@ def collection_falls_due(*arguments):
     gc.set_threshold(10**9)
     return blocks(*arguments)
 
-movers.blocks = collection_falls_due
+spheres.blocks = collection_falls_due
 second.reset()
 assert gc.isenabled()
 print("survived")
