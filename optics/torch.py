@@ -14,6 +14,7 @@ import torch
 
 from optics.elements.pupil import Pupil
 from optics.elements.relief import BSplineRelief, HeightMap
+from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.precision import precision
 from optics.point_spread.psf import psf as drjit_psf
 
@@ -39,7 +40,7 @@ def psf(
     precision(view.get("dtype", "float32"))  # proves the backend before Dr.Jit is asked for anything
 
     @dr.wrap(source="torch", target="drjit")
-    def spread(heights: Any, radius: Any, n: Any) -> Any:
+    def spread(heights: Array, radius: Scalar, n: Scalar) -> Array:
         relief = BSplineRelief(heights) if heights.shape == (4, 4) else HeightMap(heights)
         return drjit_psf(Pupil(radius, relief, n=n, **(pupil or {})), **view).tensor
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.arguments import LARGEST, in_range, positive
+from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision
 
 __all__ = ["EDGE_REACH", "Aperture", "Nodes", "SoftAperture"]
@@ -56,7 +56,7 @@ class SoftAperture(ABC):
         return 1e-8
 
     @abstractmethod
-    def transmittance(self, x: Any, y: Any, types: Precision) -> Any:
+    def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
         """At points (x, y), flat Dr.Jit Float64 arrays; differentiable in both."""
 
 

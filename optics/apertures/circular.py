@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, pi
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from optics.apertures.aperture import Aperture, Nodes, SoftAperture
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.arguments import in_range, shown
+from optics.numerics.autodiff import Array
 from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
@@ -98,7 +98,7 @@ class SoftAnnulus(SoftAperture):
     edge: SoftEdge
     inner: float
 
-    def transmittance(self, x: Any, y: Any, types: Precision) -> Any:
+    def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
         import drjit as dr
 
         distance = dr.sqrt(x * x + y * y + 1e-40)  # differentiable on the axis

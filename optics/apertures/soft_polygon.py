@@ -11,12 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, log10, pi
-from typing import Any
 
 import numpy as np
 
 from optics.apertures.aperture import SoftAperture
 from optics.apertures.soft_edge import SoftEdge
+from optics.numerics.autodiff import Array
 from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision, opaque
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
@@ -38,7 +38,7 @@ class SoftPolygon(SoftAperture):
     def seconds_per_point(self) -> float:
         return len(self.vertices) * 1e-8 * (1 + self.edge.cycles)
 
-    def transmittance(self, x: Any, y: Any, types: Precision) -> Any:
+    def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
         import drjit as dr
 
         along = np.roll(self.vertices, -1, axis=0) - self.vertices
@@ -48,7 +48,7 @@ class SoftPolygon(SoftAperture):
         count = dr.opaque(types.Index, len(length))
         line = _Line(self.edge, types)
 
-        def add(i: Any, total: Any, x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
+        def add(i: Array, total: Array, x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
             x0, y0, tx, ty, length = (dr.gather(types.Float64, side, i) for side in sides)
             d = tx * (y - y0) - ty * (x - x0)
             start = -(tx * (x - x0) + ty * (y - y0))
@@ -78,7 +78,7 @@ class _Line:
         self.nodes, self.weights = types.Float64(2 * nodes[half:] - 1), types.Float64(2 * weights[half:])
         self.count = dr.opaque(types.Index, half)
 
-    def between(self, d: Any, start: Any, end: Any) -> Any:
+    def between(self, d: Array, start: Array, end: Array) -> Array:
         """From `start` to `end` at the signed distance d, positive inside."""
         import drjit as dr
 
@@ -88,7 +88,7 @@ class _Line:
         chord = dr.if_stmt((d, zero), near, lambda d, zero: self.straight.at(d, self.types) / 2 - 0.25, _nothing)
         return self._to(end, d, near, half, chord, zero) - self._to(start, d, near, half, chord, zero)
 
-    def _to(self, s: Any, d: Any, near: Any, half: Any, chord: Any, zero: Any) -> Any:
+    def _to(self, s: Array, d: Array, near: Array, half: Array, chord: Array, zero: Array) -> Array:
         """W(d, s); `chord` is half the whole chord's share and 0 where the line is not near."""
         import drjit as dr
 
@@ -98,13 +98,13 @@ class _Line:
         through = dr.select(within, 0, dr.select(s < 0, -chord, chord))
         return dr.atan(slope) / (2 * pi) + through + dr.if_stmt((s, d, zero), within, self._integral, _nothing)
 
-    def _integral(self, s: Any, d: Any, zero: Any) -> Any:
+    def _integral(self, s: Array, d: Array, zero: Array) -> Array:
         """∫ d H(r) dt from 0 to s."""
         import drjit as dr
 
         types = self.types
 
-        def add(j: Any, total: Any, s: Any, d: Any) -> tuple[Any, Any, Any, Any]:
+        def add(j: Array, total: Array, s: Array, d: Array) -> tuple[Array, Array, Array, Array]:
             t = s * dr.gather(types.Float64, self.nodes, j)
             value = self.radial.at(dr.sqrt(d * d + t * t + TINY), types)
             return j + 1, total + dr.gather(types.Float64, self.weights, j) * value, s, d
@@ -114,7 +114,7 @@ class _Line:
         return total * s * d
 
 
-def _nothing(*arguments: Any) -> Any:
+def _nothing(*arguments: Array) -> Array:
     return arguments[-1]
 
 

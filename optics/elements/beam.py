@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from optics.apertures.aperture import SoftAperture
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.arguments import of_kind
+from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque
@@ -26,17 +26,17 @@ class Beam:
     pupil: Pupil
     source: PointSource
     wavelength: float
-    distance: Any
+    distance: Scalar
 
     def __post_init__(self) -> None:
         of_kind("pupil", self.pupil, Pupil, "Pupil(25e-6)")
 
     @property
-    def radius(self) -> Any:
+    def radius(self) -> Scalar:
         """[m]"""
         return self.pupil.aperture_radius
 
-    def waves(self, x: Any, y: Any, types: Precision) -> Any:
+    def waves(self, x: Array, y: Array, types: Precision) -> Array:
         """Optical path in wavelengths at the pupil's points, float64."""
         return self.pupil.path(x, y, self.wavelength, self.source, types) * opaque(types, 1 / self.wavelength)
 

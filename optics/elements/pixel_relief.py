@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from optics.apertures.aperture import Aperture
 from optics.elements.relief import Relief, square_heights
-from optics.numerics.autodiff import is_differentiable
+from optics.numerics.autodiff import Array, is_differentiable
 from optics.numerics.precision import Precision
 
 __all__ = ["PixelRelief"]
@@ -31,7 +30,7 @@ class PixelRelief(Relief):
         ValueError: not square, empty, or not finite.
     """
 
-    samples: Any
+    samples: np.ndarray | Array
     _heights: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -40,7 +39,7 @@ class PixelRelief(Relief):
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", heights)
 
-    def height(self, x: Any, y: Any, types: Precision) -> Any:
+    def height(self, x: Array, y: Array, types: Precision) -> Array:
         import drjit as dr
 
         n = len(self._heights)

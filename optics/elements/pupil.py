@@ -16,7 +16,7 @@ from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
 from optics.elements.wavefront_slopes import Slopes, _derivative
 from optics.numerics.arguments import finite, in_range, of_kind, positive, reals
-from optics.numerics.autodiff import is_differentiable, number
+from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
 
@@ -41,11 +41,11 @@ class Pupil:
         ValueError: names argument, value and valid range.
     """
 
-    aperture_radius: Any
+    aperture_radius: Scalar
     height: Any = None
-    n: Any = 1.5
+    n: Scalar | RefractiveIndex = 1.5
     medium_n: float = 1.0
-    thin_lens_focal_length: Any = None
+    thin_lens_focal_length: Scalar | None = None
     aperture: Aperture = field(default_factory=Circle)
 
     def __post_init__(self) -> None:
@@ -80,7 +80,7 @@ class Pupil:
     def _level(self) -> Pupil:
         return replace(self, height=None)
 
-    def index_step(self, wavelength: float) -> Any:
+    def index_step(self, wavelength: float) -> Scalar:
         """n(λ) - medium_n."""
         return self.n.at(wavelength) - self.medium_n
 
@@ -93,7 +93,7 @@ class Pupil:
         relief_is = not self.bends(wavelength) or self.height.rotationally_symmetric
         return self.aperture.rotationally_symmetric and relief_is
 
-    def path(self, x: Any, y: Any, wavelength: float, source: PointSource, types: Precision) -> Any:
+    def path(self, x: Array, y: Array, wavelength: float, source: PointSource, types: Precision) -> Array:
         """Optical path [m] through source and pupil at points (x, y) [m], flat float64 arrays."""
         import drjit as dr
 

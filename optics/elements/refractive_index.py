@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from optics.numerics.arguments import finite, in_range, positive, vacuum_wavelength
-from optics.numerics.autodiff import number
+from optics.numerics.autodiff import Scalar, number
 
 __all__ = ["RefractiveIndex"]
 
@@ -23,8 +22,8 @@ class RefractiveIndex:
     b: B [m²]; 0 is a material without dispersion.
     """
 
-    a: Any
-    b: Any = 0.0
+    a: Scalar
+    b: Scalar = 0.0
 
     def __post_init__(self) -> None:
         in_range("n", self.a, 1.0, 10.0)
@@ -38,7 +37,7 @@ class RefractiveIndex:
         b = (n_d - 1) / number / (LINE_F**-2 - LINE_C**-2)
         return cls(n_d - b / LINE_D**2, b)
 
-    def at(self, wavelength: float) -> Any:
+    def at(self, wavelength: float) -> Scalar:
         """n at a vacuum wavelength [m]; a Dr.Jit array if the coefficients are.
 
         Raises:

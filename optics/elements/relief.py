@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import reals
-from optics.numerics.autodiff import is_differentiable, plain
+from optics.numerics.autodiff import Array, is_differentiable, plain
+from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision
 
 __all__ = ["BSplineRelief", "HeightMap", "Relief"]
@@ -24,7 +25,7 @@ class Relief(ABC):
     """A height map [m]."""
 
     @abstractmethod
-    def height(self, x: Any, y: Any, types: Precision) -> Any:
+    def height(self, x: Array, y: Array, types: Precision) -> Array:
         """Height [m] at normalised positions: flat Dr.Jit float64 arrays in and out."""
 
     @abstractmethod
@@ -61,7 +62,7 @@ class BSplineRelief(Relief):
         ValueError: not 4 x 4 finite numbers.
     """
 
-    control_points: Any
+    control_points: np.ndarray | Array
 
     def __post_init__(self) -> None:
         points = np.array(plain(self.control_points))
@@ -86,7 +87,7 @@ class BSplineRelief(Relief):
         square = greville**2 - (2 * radius) ** 2 / 3
         return cls(height - curvature * (square[:, None] + square[None, :]) / 2)
 
-    def height(self, x: Any, y: Any, types: Precision) -> Any:
+    def height(self, x: Array, y: Array, types: Precision) -> Array:
         import drjit as dr
 
         points = types.Float64(
@@ -132,7 +133,7 @@ class HeightMap(Relief):
         ValueError: not square, empty, or not finite.
     """
 
-    samples: Any
+    samples: np.ndarray | Array
     _heights: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -150,19 +151,18 @@ class HeightMap(Relief):
         along_y = _spline_coefficients(self._heights, self._margin)
         return np.ascontiguousarray(_spline_coefficients(along_y.T, self._margin).T)
 
-    def _values(self, types: Precision) -> Any:
+    def _values(self, types: Precision) -> Array:
         """Spline coefficients as a flat array; they are linear in the samples, M h Mᵀ."""
         import drjit as dr
 
         if not is_differentiable(self.samples):
             return types.Float64(self._coefficients.ravel())
-        matmul: Any = dr.matmul
         n = len(self._heights)
-        tensor: Any = types.Tensor64(types.Float64(dr.ravel(self.samples)), (n, n))
+        tensor: Array = types.Tensor64(types.Float64(dr.ravel(self.samples)), (n, n))
         matrix = types.Tensor64(np.ascontiguousarray(_spline_coefficients(np.eye(n), self._margin)))
-        return matmul(matmul(matrix, tensor), matrix, Bt=True).array
+        return matmul(matmul(matrix, tensor), matrix, transposed=True).array
 
-    def height(self, x: Any, y: Any, types: Precision) -> Any:
+    def height(self, x: Array, y: Array, types: Precision) -> Array:
         import drjit as dr
 
         n = len(self._heights)
@@ -179,7 +179,7 @@ class HeightMap(Relief):
             total = dr.fma(along[i], line, total)
         return total
 
-    def _cell(self, position: Any, n: int, width: int, types: Precision) -> tuple[Any, list[Any]]:
+    def _cell(self, position: Array, n: int, width: int, types: Precision) -> tuple[Array, list[Array]]:
         """First of the four coefficients that act at a position, and the four weights."""
         import drjit as dr
 
@@ -229,7 +229,7 @@ def square_heights(samples: Any) -> np.ndarray:
     return heights
 
 
-def _cubic_basis(t: Any) -> list[Any]:
+def _cubic_basis(t: Array) -> list[Array]:
     """The four uniform cubic B-splines that act on a knot interval, at t in [0, 1]."""
     s = 1 - t
     return [s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6]

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from optics.numerics.arguments import in_range, point_2d, positive
-from optics.numerics.autodiff import number
+from optics.numerics.autodiff import Array, Scalar, number
 from optics.numerics.precision import Precision, opaque
 
 __all__ = ["PointSource"]
@@ -22,7 +21,7 @@ class PointSource:
         with the aberrations that a single stigmatic lens has off its axis.
     """
 
-    distance: Any = math.inf
+    distance: Scalar = math.inf
     angle: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
@@ -31,7 +30,7 @@ class PointSource:
         angle = in_range("source_angle", tx, -1.5, 1.5), in_range("source_angle", ty, -1.5, 1.5)
         object.__setattr__(self, "angle", angle)
 
-    def path(self, x: Any, y: Any, types: Precision) -> Any:
+    def path(self, x: Array, y: Array, types: Precision) -> Array:
         """Optical path [m] in vacuum at the pupil's points, less the one at the centre (flat float64 arrays)."""
         import drjit as dr
 

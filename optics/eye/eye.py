@@ -15,7 +15,7 @@ from optics.eye.photoreceptor import gaussian_noise, own_type, photon_noise, qua
 from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
 from optics.eye.retinal_image import blur, centred, receptor_average
 from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
-from optics.numerics.autodiff import is_differentiable, number, plain, to_user
+from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, plain, to_user
 from optics.numerics.precision import precision
 from optics.point_spread.psf import PSFResult
 from optics.spectra.bands import SpectralBands
@@ -57,7 +57,7 @@ class Eye:
 
     pupil: Pupil | None = None
     resolution: tuple[int, int] = (15, 15)
-    fov_deg: Any = 45.0
+    fov_deg: Scalar = 45.0
     sensor_width: float = 200e-6
     bands: Any = 4
     noise_sigma: float = 0.01
@@ -90,7 +90,7 @@ class Eye:
         object.__setattr__(self, "bands", len(spectral.wavelengths))
 
     @property
-    def sensor_distance(self) -> Any:
+    def sensor_distance(self) -> Scalar:
         """f [m], from pupil to retina."""
         if is_differentiable(self.fov_deg):
             import drjit as dr
@@ -104,12 +104,12 @@ class Eye:
         return self.sensor_width / self.resolution[1]
 
     @property
-    def relative_aperture(self) -> Any:
+    def relative_aperture(self) -> Scalar:
         """a = 2 R / L; 1 for the perfect lens."""
         return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.sensor_width
 
     @property
-    def throughput(self) -> Any:
+    def throughput(self) -> Scalar:
         """a², times the open share of the aperture's disk."""
         return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
 
@@ -131,7 +131,7 @@ class Eye:
         etendue = math.pi / 4 * (self.sensor_width * self.receptor_pitch / number(self.sensor_distance)) ** 2
         return self.photon_budget.photons(self.spectral_bands, etendue)
 
-    def psf(self, z: Any = math.inf) -> PSFResult:
+    def psf(self, z: Scalar = math.inf) -> PSFResult:
         """PSF on the retina (sensor orientation) of a point on the axis at distance z [m], over the kernel's window.
 
         The perfect lens has one sample that holds all power.
@@ -145,8 +145,8 @@ class Eye:
         return retinal_psf(self.pupil, self._retina(4), z)
 
     def kernel(
-        self, samples_per_receptor: int, z: Any = math.inf, direction_deg: tuple[float, float] = (0.0, 0.0)
-    ) -> Any:
+        self, samples_per_receptor: int, z: Scalar = math.inf, direction_deg: tuple[float, float] = (0.0, 0.0)
+    ) -> np.ndarray | Array:
         """Receptive kernel (band, ky, kx): the PSF integrated over square cells of pitch / samples_per_receptor, in
         visual-field orientation (the PSF turned by 180°), ky and kx odd.
 
@@ -164,8 +164,8 @@ class Eye:
         return to_user(self._kernel(_whole(samples_per_receptor), z, (right, -up)))
 
     def _kernel(
-        self, samples_per_receptor: int, z: Any, direction: tuple[float, float], from_cell: bool = False
-    ) -> Any:
+        self, samples_per_receptor: int, z: Scalar, direction: tuple[float, float], from_cell: bool = False
+    ) -> Array:
         """direction: (right, down), tangents."""
         if self.pupil is None:
             return precision(self.dtype).Tensor(np.ones((len(self.spectral_bands.wavelengths), 1, 1)))
@@ -189,7 +189,7 @@ class Eye:
     def sight(
         self,
         samples_per_receptor: int,
-        z: Any = math.inf,
+        z: Scalar = math.inf,
         depth_layers: int | str = "auto",
         field_zones: int | str = 1,
         tolerance: float | None = None,
@@ -216,7 +216,7 @@ class Eye:
         half = self.sensor_width / (2 * number(self.sensor_distance))
         tangents = (half, half * self.resolution[0] / self.resolution[1])
 
-        def kernel_at(distance: Any, right: float, down: float) -> Any:
+        def kernel_at(distance: Scalar, right: float, down: float) -> Array:
             return self._kernel(s, distance, (right * tangents[0], down * tangents[1]), from_cell)
 
         return prepare(kernel_at, self.resolution, s, z, (depth_layers, field_zones), within)
@@ -226,9 +226,9 @@ class Eye:
         radiance: np.ndarray,
         samples_per_receptor: int,
         rng: np.random.Generator | None = None,
-        z: Any = math.inf,
+        z: Scalar = math.inf,
         sight: KernelBank | None = None,
-    ) -> Any:
+    ) -> np.ndarray | Array:
         """Signals (channel, h, w) of a scene in the tangent plane, by convolution (the reference).
 
         radiance: (band, Y, X), the same all over each cell of pitch / samples_per_receptor (another reading:
@@ -257,7 +257,7 @@ class Eye:
             signal = own_type(signal, self.mosaic, types)
         return to_user(signal) if rng is None else to_user(signal + types.Tensor(self._noise(signal, rng)))
 
-    def _noise(self, signal: Any, rng: np.random.Generator) -> np.ndarray:
+    def _noise(self, signal: Array, rng: np.random.Generator) -> np.ndarray:
         """What noise adds to the signal."""
         clean = plain(signal)
         photons = self.photons
@@ -271,7 +271,7 @@ class Eye:
         should, if bands are at least as many as types. A band may be negative; see `SpectralBands.of`."""
         return self.spectral_bands.of(radiance, self.receptors)
 
-    def describe(self, z: Any = math.inf) -> Description:
+    def describe(self, z: Scalar = math.inf) -> Description:
         """What limits the eye, as a table: see `description.Description`."""
         from optics.eye.summary import describe
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from optics.eye.kernel_interpolation import Choice, NodeChoice, linear_weights, nodes
 from optics.numerics.arguments import positive, shown, whole
-from optics.numerics.autodiff import is_differentiable, number, plain
+from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, plain
 
 __all__ = ["KernelBank", "prepare"]
 
@@ -36,7 +36,7 @@ class KernelBank:
 
     vergence: tuple[float, float]
     field: tuple[float, float]
-    kernels: dict[tuple[int, int, int], Any]
+    kernels: dict[tuple[int, int, int], Array]
     choices: tuple[Choice, ...]
 
     def shares(self, shape: tuple[int, int], z: Any) -> list[Any]:
@@ -76,7 +76,7 @@ class _Range:
     """Distances from nearest to farthest, by their vergence; a Dr.Jit distance stands for itself."""
 
     vergence: tuple[float, float]
-    only: Any
+    only: Scalar
 
     @classmethod
     def of(cls, z: Any) -> _Range:
@@ -87,7 +87,7 @@ class _Range:
         near, far = float(distances.min()), float(distances.max())
         return cls((1 / near, 1 / far), near if near == far else None)
 
-    def distance(self, place: float) -> Any:
+    def distance(self, place: float) -> Scalar:
         """[m], at a place from -1 (farthest) to 1 (nearest)."""
         if self.only is not None:
             return self.only
@@ -97,7 +97,7 @@ class _Range:
 
 
 def prepare(
-    kernel_at: Callable[[Any, float, float], Any],
+    kernel_at: Callable[[Scalar, float, float], Array],
     resolution: tuple[int, int],
     samples_per_receptor: int,
     z: Any,

@@ -11,12 +11,11 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.autodiff import plain
+from optics.numerics.autodiff import Array, plain
 
 __all__ = ["Choice", "NodeChoice", "linear_weights", "nodes", "worst_difference"]
 
@@ -72,7 +71,7 @@ class NodeChoice:
     """One stage: rungs are numbers of nodes along each of its axes; kernel_at a place in [-1, 1]^axes."""
 
     stage: str
-    kernel_at: Callable[[Place], Any]
+    kernel_at: Callable[[Place], Array]
     rungs: Sequence[tuple[int, ...]]
     samples_per_receptor: int
     known: dict[Place, np.ndarray] = field(default_factory=dict)

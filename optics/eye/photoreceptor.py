@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from optics.numerics.arguments import in_range, positive
+from optics.numerics.autodiff import Array, Scalar
+from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision, opaque
 
 __all__ = ["gaussian_noise", "own_type", "photon_noise", "quantum_catch", "throughput"]
@@ -14,7 +14,7 @@ __all__ = ["gaussian_noise", "own_type", "photon_noise", "quantum_catch", "throu
 MOST_PHOTONS = 1e18  # a count must fit a 64-bit integer
 
 
-def throughput(relative_aperture: Any, open_share: float = 1.0) -> Any:
+def throughput(relative_aperture: Scalar, open_share: float = 1.0) -> Scalar:
     """Light gathered, a² times the share of the disk that is open: the pupil's area against that of the widest disk
     (diameter = sensor width). A Dr.Jit array where relative_aperture is one."""
     a = in_range("relative_aperture", relative_aperture, 0.0, 1.0 + 1e-9)
@@ -23,17 +23,15 @@ def throughput(relative_aperture: Any, open_share: float = 1.0) -> Any:
     return relative_aperture * relative_aperture * open_share
 
 
-def quantum_catch(irradiance: Any, weights: np.ndarray, gathered: Any, types: Precision) -> Any:
+def quantum_catch(irradiance: Array, weights: np.ndarray, gathered: Scalar, types: Precision) -> Array:
     """a² Σ_b weights[c, b] irradiance[b]: Dr.Jit (band, y, x) -> (channel, y, x); gathered: a²."""
-    import drjit as dr
 
-    matmul: Any = dr.matmul
     bands, height, width = irradiance.shape
     flat = matmul(types.Tensor(weights), types.Tensor(irradiance.array, (bands, height * width)))
     return types.Tensor(flat.array * types.Float(opaque(types, gathered)), (len(weights), height, width))
 
 
-def own_type(signals: Any, mosaic: np.ndarray, types: Precision) -> Any:
+def own_type(signals: Array, mosaic: np.ndarray, types: Precision) -> Array:
     """What each receptor of a mosaic (y, x) reports, of the signals that every type would give there: Dr.Jit
     (type, y, x) -> (1, y, x)."""
     import drjit as dr

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -14,8 +13,9 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.methods.problem import Problem
 from optics.numerics.accuracy import AccuracyError, Plan
-from optics.numerics.autodiff import is_differentiable, number
+from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
+from optics.numerics.matrices import matmul
 from optics.numerics.precision import precision
 from optics.point_spread.psf import PSFResult, spread
 
@@ -31,7 +31,7 @@ MOST_SECONDS = 3.0  # per band
 class Retina:
     """Where the PSF is wanted: distance behind the pupil [m], wavelengths [m], cell size [m], tolerance, dtype."""
 
-    distance: Any
+    distance: Scalar
     wavelengths: np.ndarray
     cell: float
     tolerance: float
@@ -69,8 +69,8 @@ class _Spot:
 
 
 def visual_kernel(
-    pupil: Pupil, retina: Retina, z: Any, direction: tuple[float, float] = (0.0, 0.0), from_cell: bool = False
-) -> Any:
+    pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0), from_cell: bool = False
+) -> Array:
     """PSF integrated over the retina's cells around the geometric image and turned by 180°: Dr.Jit (band, k, k), k odd.
 
     direction: (right, down) from the axis in the visual field, tangents; the image lies on the other side.
@@ -80,7 +80,6 @@ def visual_kernel(
 
     if is_differentiable(retina.distance) and direction != (0.0, 0.0):
         raise ValueError("fov_deg is a Dr.Jit array: must be a number off the axis, where it turns the light as well")
-    matmul: Any = dr.matmul
     beams = _beams(pupil, retina, z, (-direction[0], -direction[1]))
     spot = _spot(beams, retina)
     result = _spread(beams, spot, retina)
@@ -89,10 +88,10 @@ def visual_kernel(
         types.Tensor(_cell_integrals(n, result.dx, tiles, at)[::-1].copy())
         for n, at in zip(result.tensor.shape[:0:-1], spot.centre, strict=True)
     )
-    return dr.maximum(matmul(along, matmul(result.tensor, across, Bt=True)), 0)
+    return dr.maximum(matmul(along, matmul(result.tensor, across, transposed=True)), 0)
 
 
-def retinal_psf(pupil: Pupil, retina: Retina, z: Any) -> PSFResult:
+def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar) -> PSFResult:
     """PSF of an axial point at distance z on the window that loses less than the tolerance at every wavelength.
 
     Raises:
@@ -102,7 +101,7 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Any) -> PSFResult:
     return _spread(beams, _spot(beams, retina), retina)
 
 
-def _beams(pupil: Pupil, retina: Retina, z: Any, tangents: tuple[float, float]) -> list[Beam]:
+def _beams(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, float]) -> list[Beam]:
     source = PointSource(z, (math.atan(tangents[0]), math.atan(tangents[1])))
     return [Beam(pupil, source, float(wavelength), retina.distance) for wavelength in retina.wavelengths]
 

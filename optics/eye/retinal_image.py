@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length
 from optics.numerics.grid import Grid
+from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision, padded_for_packets
 
 __all__ = ["blur", "centred", "receptor_average"]
 
 
-def blur(scenes: Sequence[np.ndarray], kernels: Sequence[Any], shape: tuple[int, int], types: Precision) -> Any:
+def blur(
+    scenes: Sequence[np.ndarray], kernels: Sequence[np.ndarray | Array], shape: tuple[int, int], types: Precision
+) -> Array:
     """Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u], dark outside: the middle `shape` of it, Dr.Jit (band, *shape).
 
     scenes: (band, Y, X) each; kernels: (band, ky, kx) tensors or arrays, odd, one per scene. A convolution, not a
@@ -30,7 +33,7 @@ def blur(scenes: Sequence[np.ndarray], kernels: Sequence[Any], shape: tuple[int,
     return types.Tensor(found[0] if bands == 1 else dr.concat(found), (bands, *shape))
 
 
-def _blurred(pairs: list[tuple[np.ndarray, Any]], shape: tuple[int, int], types: Precision) -> Any:
+def _blurred(pairs: list[tuple[np.ndarray, Array]], shape: tuple[int, int], types: Precision) -> Array:
     """One band, flat. The sums run over one period, long enough that what wraps around lands outside `shape`."""
     if all(kernel.shape == (1, 1) for _, kernel in pairs):
         return sum(_flat(centred(scene, shape), types) * kernel.array for scene, kernel in pairs)
@@ -50,20 +53,20 @@ def _blurred(pairs: list[tuple[np.ndarray, Any]], shape: tuple[int, int], types:
     return dft2(total, period, shape, 1, 1.0).re / period**2
 
 
-def _spectrum(flat: Any, shape: tuple[int, ...], period: int, types: Precision) -> Field:
+def _spectrum(flat: Array, shape: tuple[int, ...], period: int, types: Precision) -> Field:
     import drjit as dr
 
     field = Field(flat, dr.zeros(types.Float, flat.shape[0]), Grid((shape[0], shape[1]), 1.0), types)
     return dft2(field, period, (period, period), -1, 1.0)
 
 
-def _tensor(kernel: Any, types: Precision) -> Any:
+def _tensor(kernel: np.ndarray | Array, types: Precision) -> Array:
     if isinstance(kernel, np.ndarray):
         return types.Tensor(_flat(kernel, types), kernel.shape)
     return kernel
 
 
-def _flat(array: np.ndarray, types: Precision) -> Any:
+def _flat(array: np.ndarray, types: Precision) -> Array:
     return types.Float(padded_for_packets(np.asarray(array, types.complex_dtype(0).real.dtype)))
 
 
@@ -96,15 +99,13 @@ def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     return image[..., top : top + shape[0], left : left + shape[1]]
 
 
-def receptor_average(image: Any, samples_per_receptor: int, types: Precision) -> Any:
+def receptor_average(image: Array, samples_per_receptor: int, types: Precision) -> Array:
     """Mean over each receptor's square aperture, Dr.Jit tensors: (band, h s, w s) -> (band, h, w)."""
-    import drjit as dr
 
-    matmul: Any = dr.matmul
     down, across = (_means(n // samples_per_receptor, samples_per_receptor, types) for n in image.shape[1:])
-    return matmul(down, matmul(image, across, Bt=True))
+    return matmul(down, matmul(image, across, transposed=True))
 
 
-def _means(receptors: int, samples: int, types: Precision) -> Any:
+def _means(receptors: int, samples: int, types: Precision) -> Array:
     """(receptor, cell): 1/s over each receptor's own cells."""
     return types.Tensor(np.kron(np.eye(receptors), np.full((1, samples), 1 / samples)))

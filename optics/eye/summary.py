@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from optics.numerics.accuracy import Plan
-from optics.numerics.autodiff import number, plain
+from optics.numerics.autodiff import Scalar, number, plain
 from optics.point_spread.image_quality import image_quality, mtf, strehl_ratio
 from optics.point_spread.psf import PSFResult
 from optics.spectra.spectrum import daylight
@@ -97,7 +97,7 @@ def noise_of(eye: Eye) -> float:
     return math.hypot(eye.noise_sigma, light / math.sqrt(float(eye.photons.mean()) * light))
 
 
-def describe(eye: Eye, z: Any) -> Description:
+def describe(eye: Eye, z: Scalar) -> Description:
     """The eye's limits for a scene at distance z [m].
 
     Raises:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 from optics.elements.beam import Beam
 from optics.methods.fresnel import paraxial_integral
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.spectral_taper import Taper, tapers
+from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
@@ -65,7 +65,7 @@ class GridSampling(SpectrumSampling):
         across = 2 * math.ceil(self.edge.outermost / pitch) + 1
         return Grid.square(min(self.pupil_period, across), pitch)
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _angular_spectrum(beam, problem, self, precision(problem.dtype)).intensity
 

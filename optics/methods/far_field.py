@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
+from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
@@ -39,7 +39,7 @@ class FarFieldSampling:
     method: str = "far_field"
     model_error: float = 0.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _far_field(beam, problem, self, precision(problem.dtype))
 
@@ -118,7 +118,7 @@ def _slow_part(problem: Problem, rim_x: np.ndarray, rim_y: np.ndarray, angle: np
     return np.exp(2j * np.pi / problem.wavelength * (distance + along))
 
 
-def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Any:
+def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Array:
     """Rayleigh-Sommerfeld's integral with the plane wave of each direction split off:
 
     U(x) = z/(λρ²) ∫ P(ξ) G(ξ; x) e^{-ik s·ξ} dξ,  G = (ρ/D)² (1/(kD) - i) e^{ik(D - ρ + s·ξ)},
@@ -166,7 +166,7 @@ def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Prec
     )
 
 
-def _onto_window(squared: Any, beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Any:
+def _onto_window(squared: Array, beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Array:
     """Eight-point Lagrange interpolation from direction cosines to the window."""
     import drjit as dr
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from optics.apertures.aperture import EDGE_REACH
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.rays import MARGIN, Rays, brightness, disk_area, mismatch
-from optics.numerics.autodiff import is_differentiable, number
+from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, predicted_seconds
 from optics.numerics.grid import Grid
@@ -36,7 +35,7 @@ class ParaxialSampling:
     seconds: float
     model_error: float
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         u = beam.behind(self.edge.aperture, self.pupil, precision(problem.dtype))
         curved = self.method == "fresnel"
@@ -137,7 +136,7 @@ def _places(problem: Problem, ends: Rays) -> tuple[np.ndarray, np.ndarray]:
     return np.clip(x, window.x[0], window.x[-1]), np.clip(y, window.y[0], window.y[-1])
 
 
-def paraxial_integral(u: Field, distance: Any, wavelength: float, window: Grid, curved: bool = True) -> Field:
+def paraxial_integral(u: Field, distance: Scalar, wavelength: float, window: Grid, curved: bool = True) -> Field:
     """Field over the window at `distance`, up to a phase that intensity forgets:
 
     U(x) = 1/(iλz) ∫ u(ξ) e^{iπξ²/λz} e^{-2πi x·ξ/λz} dξ   (Goodman, Introduction to Fourier Optics, eq. 4-17);

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import cached_nodes, node_count
 from optics.methods.rays import brightness, mismatch
-from optics.numerics.autodiff import is_differentiable
+from optics.numerics.autodiff import Array, is_differentiable
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["PinholeSampling", "RaySampling", "geometric", "pinhole"]
@@ -36,7 +35,7 @@ class RaySampling:
     seconds: float
     method: str = "geometric"
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """Power per area over the window for unit intensity at the pupil, a flat Dr.Jit array."""
         import drjit as dr
 
@@ -71,7 +70,7 @@ class PinholeSampling:
     samples: tuple[int, int] = (1, 1)
     largest: int = 1
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """Power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
 
         Raises:
@@ -123,7 +122,7 @@ def pinhole(problem: Problem) -> list[PinholeSampling]:
     return [PinholeSampling(mismatch(1 / cell, _brightness(problem)))]
 
 
-def _landings(beam: Beam, x: Any, y: Any, types: Precision) -> tuple[Any, Any, Any]:
+def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, Array, Array]:
     """Where rays from points (x, y) of the pupil meet the sensor: x + z p/√(1 - p²), p the gradient of the path; and
     which of them propagate."""
     import drjit as dr
@@ -138,7 +137,7 @@ def _landings(beam: Beam, x: Any, y: Any, types: Precision) -> tuple[Any, Any, A
     return x + tangent * px, y + tangent * py, propagates
 
 
-def _splat(x: Any, y: Any, weight: Any, problem: Problem, types: Precision) -> Any:
+def _splat(x: Array, y: Array, weight: Array, problem: Problem, types: Precision) -> Array:
     """Sum of weights over the window's cells per area, each under a quadratic B-spline three cells wide: its nine
     shares add up to 1, so that no power is lost but over the window's rim."""
     import drjit as dr
@@ -162,7 +161,7 @@ def _splat(x: Any, y: Any, weight: Any, problem: Problem, types: Precision) -> A
     return types.Float(image * opaque(types, 1 / window.dx**2))
 
 
-def _quadratic_basis(t: Any) -> tuple[Any, Any, Any]:
+def _quadratic_basis(t: Array) -> tuple[Array, Array, Array]:
     """The three uniform quadratic B-splines that act within half a cell of a sample, t in [-1/2, 1/2]."""
     return (0.5 - t) * (0.5 - t) / 2, 0.75 - t * t, (0.5 + t) * (0.5 + t) / 2
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.spectral_taper import Taper, tapers
+from optics.numerics.autodiff import Array
 from optics.numerics.bessel import bessel_j0
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
@@ -43,7 +43,7 @@ class HankelSampling:
     method: str = "hankel"
     model_error: float = 0.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         types = precision(problem.dtype)
         profile = _hankel(beam, problem, self, types).intensity
@@ -116,7 +116,7 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
     return _transform(spectrum, f, types.Float64(how.line.positions), types, exactly)
 
 
-def _transform(field: Field, at: Any, to: Any, types: Precision, exactly: bool) -> Field:
+def _transform(field: Field, at: Array, to: Array, types: Precision, exactly: bool) -> Field:
     """Σ_j u_j J₀(2π at_j to_k) for every k."""
     import drjit as dr
 
@@ -124,7 +124,7 @@ def _transform(field: Field, at: Any, to: Any, types: Precision, exactly: bool) 
     dr.eval(field.re, field.im, at, to)
     count = dr.opaque(types.Index, n)
 
-    def add(j: Any, re: Any, im: Any) -> tuple[Any, Any, Any]:
+    def add(j: Array, re: Array, im: Array) -> tuple[Array, Array, Array]:
         weight = bessel_j0(dr.gather(types.Float64, at, j) * to, types, exactly)
         re, im = (
             so_far + types.Float64(weight * dr.gather(types.Float, part, j))

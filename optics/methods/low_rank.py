@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples, samples_of
+from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import chebyshev_points, lagrange
+from optics.numerics.matrices import complex_matmul
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["LowRankSampling", "low_rank"]
@@ -37,7 +38,7 @@ class LowRankSampling:
     method: str = "low_rank"
     model_error: float = 0.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _low_rank(beam, problem, self, precision(problem.dtype)).intensity
 
@@ -130,12 +131,11 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
         _fourier(at, middle, problem, how, types)
         for at, middle in ((window.x, window.centre[0]), (window.y, window.centre[1]))
     )
-    re, im = _product(*inner, *across_x, transposed=True)
-    re, im = _product(*across_y, re, im, transposed=False)
+    re, im = complex_matmul(across_y, complex_matmul(inner, across_x, transposed=True))
     return Field(re.array, im.array, window, types)
 
 
-def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> tuple[Any, Any]:
+def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> tuple[Array, Array]:
     """W[(b, η), (a, ξ)] = P(ξ, η) G(ξ, η; x_a, y_b) as two tensors."""
     import drjit as dr
 
@@ -165,7 +165,7 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
     return types.Tensor(whole.re, slow.grid.shape), types.Tensor(whole.im, slow.grid.shape)
 
 
-def _split(index: Any, n: int, types: Precision) -> tuple[Any, Any]:
+def _split(index: Array, n: int, types: Precision) -> tuple[Array, Array]:
     """Quotient and remainder of float64 indices by n."""
     import drjit as dr
 
@@ -176,7 +176,7 @@ def _split(index: Any, n: int, types: Precision) -> tuple[Any, Any]:
 
 def _fourier(
     at: np.ndarray, middle: float, problem: Problem, how: LowRankSampling, types: Precision
-) -> tuple[Any, Any]:
+) -> tuple[Array, Array]:
     """A[x, (a, ξ)] = L_a(x) e^{-ik ξ x/c} as two tensors."""
     rank, xi = how.rank, how.pupil.at
     waves = np.tile(np.outer(at, xi) / (-problem.wavelength * how.scale), rank)
@@ -184,14 +184,3 @@ def _fourier(
     wheel = weight * np.exp(2j * np.pi * waves)
     re, im = (padded_for_packets(part.astype(types.dtype)) for part in (wheel.real, wheel.imag))
     return types.Tensor(re, wheel.shape), types.Tensor(im, wheel.shape)
-
-
-def _product(re: Any, im: Any, other_re: Any, other_im: Any, transposed: bool) -> tuple[Any, Any]:
-    """Complex matrix product of tensor pairs."""
-    import drjit as dr
-
-    matmul: Any = dr.matmul
-    return (
-        matmul(re, other_re, Bt=transposed) - matmul(im, other_im, Bt=transposed),
-        matmul(re, other_im, Bt=transposed) + matmul(im, other_re, Bt=transposed),
-    )

@@ -7,7 +7,6 @@ light beyond, which jumps send everywhere. From the spectrum on all is as for ot
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 from optics.elements.beam import Beam
 from optics.methods.angular_spectrum import SpectrumSampling, arrived
@@ -16,9 +15,11 @@ from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PixelSamples, pixel_samples
 from optics.methods.rayleigh_sommerfeld import node_rule
 from optics.methods.spectral_taper import Taper, tapers
+from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.fourier import fast_length, predicted_seconds
 from optics.numerics.grid import Grid
+from optics.numerics.matrices import complex_matmul
 from optics.numerics.precision import Precision, precision
 
 __all__ = ["PixelSpectrum", "split", "whole"]
@@ -36,7 +37,7 @@ class PixelSpectrum(SpectrumSampling):
     seconds: float = 0.0
     model_error: float = 0.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         types = precision(problem.dtype)
         spectrum = _spectrum(self.pupil.field(beam, types), beam, self, types)
@@ -113,18 +114,13 @@ def _spectrum(u: Field, beam: Beam, how: PixelSpectrum, types: Precision) -> Fie
     """Σ u(ξ) e^{-2πi f·ξ} at all frequencies of the grid: two matrix products, W u Wᵀ, W = e^{-2πi f ξ}."""
     import drjit as dr
 
-    matmul: Any = dr.matmul
     nodes, grid = len(how.pupil.at), how.spectrum
     index = types.Float64(dr.arange(types.Index, grid.shape[0] * nodes))
     row = dr.floor((index + 0.5) / dr.opaque(types.Float64, nodes))
     place = how.pupil.places(dr.fma(-row, dr.opaque(types.Float64, nodes), index), beam, types)
     waves = place * (row - grid.shape[0] // 2) * dr.opaque(types.Float64, -grid.dx)
     wheel = Field.from_waves(types.Float(1), waves, Grid((grid.shape[0], nodes), 1.0), types)
-    cos, sin = (types.Tensor(part, (grid.shape[0], nodes)) for part in (wheel.re, wheel.im))
-    re, im = (types.Tensor(part, (nodes, nodes)) for part in (u.re, u.im))
-    re, im = matmul(cos, re) - matmul(sin, im), matmul(cos, im) + matmul(sin, re)
-    re, im = (
-        matmul(re, cos, Bt=True) - matmul(im, sin, Bt=True),
-        matmul(re, sin, Bt=True) + matmul(im, cos, Bt=True),
-    )
+    matrix = types.Tensor(wheel.re, wheel.grid.shape), types.Tensor(wheel.im, wheel.grid.shape)
+    samples = types.Tensor(u.re, (nodes, nodes)), types.Tensor(u.im, (nodes, nodes))
+    re, im = complex_matmul(complex_matmul(matrix, samples), matrix, transposed=True)
     return Field(re.array, im.array, grid, types)

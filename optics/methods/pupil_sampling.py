@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.rayleigh_sommerfeld import node_rule
+from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque
@@ -37,7 +38,7 @@ class PupilSamples(Protocol):
     def seconds(self) -> float:
         """What `field` takes, roughly."""
 
-    def places(self, index: Any, beam: Beam, types: Precision) -> Any:
+    def places(self, index: Array, beam: Beam, types: Precision) -> Array:
         """at[index] for float64 indices, with the derivatives that the beam's radius carries."""
 
     def field(self, beam: Beam, types: Precision) -> Field:
@@ -63,7 +64,7 @@ class GridSamples:
     def seconds(self) -> float:
         return self.grid.shape[0] ** 2 * self.edge.seconds_per_point
 
-    def places(self, index: Any, beam: Beam, types: Precision) -> Any:
+    def places(self, index: Array, beam: Beam, types: Precision) -> Array:
         import drjit as dr
 
         return (index - dr.opaque(types.Float64, self.grid.shape[0] // 2)) * opaque(types, self.grid.dx)
@@ -93,7 +94,7 @@ class PixelSamples:
     def seconds(self) -> float:
         return (self.aperture.count * self.across) ** 2 * 1e-8
 
-    def places(self, index: Any, beam: Beam, types: Precision) -> Any:
+    def places(self, index: Array, beam: Beam, types: Precision) -> Array:
         import drjit as dr
 
         return dr.gather(types.Float64, types.Float64(self.aperture.rows(self.across)), types.Index(index)) * opaque(

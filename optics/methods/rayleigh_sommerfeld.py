@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from optics.apertures.aperture import Aperture, Nodes
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
+from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
@@ -55,7 +55,7 @@ class NodeSampling:
     method: str = "rayleigh_sommerfeld"
     model_error: float = 0.0
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         types = precision(problem.dtype)
         if self.line is None:
@@ -136,7 +136,7 @@ def _intensity_band(problem: Problem) -> float:
     return min(2 * steepest, 2 * problem.radius / (problem.wavelength * problem.distance))
 
 
-def direct_sum(beam: Beam, rule: Rule, x: Any, y: Any, types: Precision) -> Field:
+def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> Field:
     """First Rayleigh-Sommerfeld integral at points (x, y) [m], nodes after rule = (aperture, cycles, digits, halved):
 
     U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ikD} dξ (Goodman, §3.5). D - z = d²/(D + z) loses its whole waves in float64.
@@ -154,7 +154,7 @@ def direct_sum(beam: Beam, rule: Rule, x: Any, y: Any, types: Precision) -> Fiel
     cycles = 1 / wavelength  # per metre: divisions cost most of a node
     k = 2 * math.pi * cycles
 
-    def add(i: Any, re: Any, im: Any) -> tuple[Any, Any, Any]:
+    def add(i: Array, re: Array, im: Array) -> tuple[Array, Array, Array]:
         dx, dy = x - dr.gather(types.Float64, nodes_x, i), y - dr.gather(types.Float64, nodes_y, i)
         d2 = dx * dx + dy * dy
         distance = dr.sqrt(d2 + z * z)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
+from optics.numerics.autodiff import Array
 
 __all__ = ["Sampling"]
 
@@ -31,7 +32,7 @@ class Sampling(Protocol):
     def model_error(self) -> float:
         """Relative L2 error of the intensity that the method would make with any number of samples: 0 if exact."""
 
-    def intensity(self, beam: Beam, problem: Problem) -> Any:
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
 
     def plane(self, problem: Problem) -> float:

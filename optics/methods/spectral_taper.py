@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from optics.methods.problem import Problem
+from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision, opaque
 
 __all__ = ["FADES", "TAPER_END_SINE", "Taper", "tapers"]
@@ -40,7 +40,7 @@ class Taper:
     def end(self) -> float:
         return self.band + self.width
 
-    def fade(self, f: Any, types: Precision) -> Any:
+    def fade(self, f: Array, types: Precision) -> Array:
         """1 below the band, 0 beyond its end: the error function falls to the ripple in √ln(1/ripple)."""
         import drjit as dr
 

@@ -6,7 +6,12 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["is_differentiable", "number", "plain", "to_user"]
+__all__ = ["Array", "Scalar", "is_differentiable", "number", "plain", "to_user"]
+
+# Dr.Jit makes its types when it is first asked for a backend, so that no checker can see them: these names say what an
+# `Any` is meant to be.
+Array = Any  # a Dr.Jit array or tensor
+Scalar = Any  # a number, or a Dr.Jit array of one element that carries a derivative
 
 
 def is_differentiable(value: Any) -> bool:
@@ -35,7 +40,7 @@ def plain(value: Any) -> np.ndarray:
     return np.asarray(value, dtype=np.float64)
 
 
-def to_user(tensor: Any) -> Any:
+def to_user(tensor: Array) -> np.ndarray | Array:
     """What a user gets: a NumPy array, or the Dr.Jit tensor itself where it carries derivatives."""
     import drjit as dr
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision
 
 __all__ = ["bessel_j0"]
@@ -21,7 +22,7 @@ SPLIT = 8.0
 TERMS = {"float32": (12, 5), "float64": (16, 11), "float64 to 1e-12": (14, 7)}
 
 
-def bessel_j0(waves: Any, types: Precision, exactly: bool = True) -> Any:
+def bessel_j0(waves: Array, types: Precision, exactly: bool = True) -> Array:
     """J₀(2π waves), waves >= 0 in float64; error about 1e-7 in float32; in float64 1e-15, or 1e-12 if not `exactly`."""
     import drjit as dr
 
@@ -62,7 +63,7 @@ def _fit(function: Any, terms: int) -> list[float]:
     return [float(c) for c in np.polynomial.chebyshev.chebfit(t, function(np.sqrt((t + 1) / 2)), terms - 1)]
 
 
-def _clenshaw(coefficients: list[float], t: Any) -> Any:
+def _clenshaw(coefficients: list[float], t: Array) -> Array:
     import drjit as dr
 
     b1, b2 = type(t)(0), type(t)(0)

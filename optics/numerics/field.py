@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import Any
 
 import numpy as np
 
+from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, padded_for_packets
 
@@ -18,13 +18,13 @@ __all__ = ["Field"]
 class Field:
     """Complex amplitude on a grid; re and im are flat Dr.Jit arrays, row by row."""
 
-    re: Any
-    im: Any
+    re: Array
+    im: Array
     grid: Grid
     types: Precision
 
     @classmethod
-    def from_waves(cls, amplitude: Any, waves: Any, grid: Grid, types: Precision) -> Field:
+    def from_waves(cls, amplitude: Array, waves: Array, grid: Grid, types: Precision) -> Field:
         """amplitude · exp(2πi waves), waves in float64; whole waves are dropped before the cast to the field's type."""
         import drjit as dr
 
@@ -45,12 +45,12 @@ class Field:
         im = self.re * other.im + self.im * other.re
         return Field(re, im, self.grid, self.types)
 
-    def scaled(self, factor: Any) -> Field:
+    def scaled(self, factor: Scalar) -> Field:
         scale = self.types.Float(opaque(self.types, factor))
         return Field(self.re * scale, self.im * scale, self.grid, self.types)
 
     @property
-    def intensity(self) -> Any:
+    def intensity(self) -> Array:
         return self.re * self.re + self.im * self.im
 
     def numpy(self) -> np.ndarray:

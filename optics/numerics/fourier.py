@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.autodiff import is_differentiable
+from optics.numerics.autodiff import Array, Scalar, is_differentiable
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
+from optics.numerics.matrices import complex_matmul
 from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = [
@@ -46,7 +47,7 @@ def fast_length(least: float) -> int:
 
 def dft2(
     field: Field,
-    period: Any,
+    period: Scalar,
     shape: tuple[int, int],
     sign: int,
     pitch: float,
@@ -85,7 +86,7 @@ def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> n
     return np.exp(2j * np.pi * sign * (waves - np.round(waves))).astype(dtype)
 
 
-def _recentred(field: Field, period: Any, by: tuple[float, float]) -> Field:
+def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
     """Field times exp(2πi j·by / period), which moves the sum's centre."""
     types = field.types
     x, y = Grid(field.grid.shape, 1.0).coordinates(types)
@@ -150,7 +151,7 @@ def _fft_seconds(shape_in: tuple[int, int], period: int, shape_out: tuple[int, i
     return lines * period * (5 * log2(period + 1) / 12e9 + 5e-9) + copied * 8e-9 + 2e-4
 
 
-def _fourier_matrix(types: Precision, n_out: int, n_in: int, period: Any, sign: int) -> tuple[Any, Any]:
+def _fourier_matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) -> tuple[Array, Array]:
     """cos and sin of ±2π k j / period as (k, j) tensors; the product k j loses whole periods in float64."""
     matrix = Grid((n_out, n_in), 1.0)
     j, k = matrix.coordinates(types)
@@ -159,29 +160,23 @@ def _fourier_matrix(types: Precision, n_out: int, n_in: int, period: Any, sign: 
     return types.Tensor(wheel.re, matrix.shape), types.Tensor(wheel.im, matrix.shape)
 
 
-def _matrix_dft(field: Field, period: Any, shape: tuple[int, int], sign: int) -> tuple[Any, Any]:
-    import drjit as dr
-
-    matmul: Any = dr.matmul
+def _matrix_dft(field: Field, period: Scalar, shape: tuple[int, int], sign: int) -> tuple[Array, Array]:
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
-    re, im = types.Tensor(field.re, (ny, nx)), types.Tensor(field.im, (ny, nx))
-    cos, sin = _fourier_matrix(types, mx, nx, period, sign)
-    re, im = (
-        matmul(re, cos, Bt=True) - matmul(im, sin, Bt=True),
-        matmul(re, sin, Bt=True) + matmul(im, cos, Bt=True),
-    )
+    u = types.Tensor(field.re, (ny, nx)), types.Tensor(field.im, (ny, nx))
+    wheel = _fourier_matrix(types, mx, nx, period, sign)
+    u = complex_matmul(u, wheel, transposed=True)
     if (my, ny) != (mx, nx):
-        cos, sin = _fourier_matrix(types, my, ny, period, sign)
-    re, im = matmul(cos, re) - matmul(sin, im), matmul(cos, im) + matmul(sin, re)
+        wheel = _fourier_matrix(types, my, ny, period, sign)
+    re, im = complex_matmul(wheel, u)
     return re.array, im.array
 
 
-def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[Any, Any]:
+def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[Array, Array]:
     import drjit as dr
 
     types, shape_in = field.types, field.grid.shape
 
-    def transform(re: Any, im: Any, to: tuple[int, int], from_: tuple[int, int], turn: int) -> tuple[Any, Any]:
+    def transform(re: Array, im: Array, to: tuple[int, int], from_: tuple[int, int], turn: int) -> tuple[Array, Array]:
         u = np.empty(from_, dtype=types.complex_dtype)
         u.real, u.imag = re.numpy().reshape(from_), im.numpy().reshape(from_)
         for axis in (1, 0):
@@ -191,7 +186,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
     class FourierSum(dr.CustomOp):
         """Its adjoint is the sum with the other sign, from the output's samples to the input's."""
 
-        def eval(self, re: Any, im: Any) -> tuple[Any, Any]:
+        def eval(self, re: Array, im: Array) -> tuple[Array, Array]:
             return transform(re, im, shape, shape_in, sign)
 
         def forward(self) -> None:

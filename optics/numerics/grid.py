@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from optics.numerics.arguments import point_2d, positive, shape_2d
+from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision, opaque
 
 __all__ = ["Grid", "sample_positions"]
@@ -64,7 +64,7 @@ class Grid:
         """Largest distance of a sample from the centre."""
         return float(np.hypot(self.shape[0] // 2, self.shape[1] // 2) * self.dx)
 
-    def coordinates(self, precision: Precision) -> tuple[Any, Any]:
+    def coordinates(self, precision: Precision) -> tuple[Array, Array]:
         """x and y of every sample as flat Dr.Jit arrays, float64 (phases need them)."""
         import drjit as dr
 

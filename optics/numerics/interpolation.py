@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
-from typing import Any
 
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision, opaque
 
 __all__ = ["TAPS", "Interpolant", "chebyshev_points", "lagrange", "lagrange_weights"]
@@ -48,7 +48,7 @@ class Interpolant:
         samples[: MARGIN + 1], samples[-MARGIN - 1 :] = function(np.array(ends))  # exact where it is constant
         return cls(ends[0], step * half, samples)
 
-    def at(self, place: Any, types: Precision) -> Any:
+    def at(self, place: Array, types: Precision) -> Array:
         """Interpolated at a flat Dr.Jit Float64 array; differentiable."""
         import drjit as dr
 
@@ -60,7 +60,7 @@ class Interpolant:
         return sum((w * v for w, v in zip(_lagrange6(t - cell), values, strict=True)), types.Float64(0))
 
 
-def _lagrange6(t: Any) -> list[Any]:
+def _lagrange6(t: Array) -> list[Array]:
     """Weights of six-point Lagrange interpolation at nodes -2 ... 3, t in [0, 1]."""
     a, b, c, d, e, f = t + 2, t + 1, t, t - 1, t - 2, t - 3
     ab, cd, ef = a * b, c * d, e * f
@@ -77,7 +77,7 @@ def _lagrange6(t: Any) -> list[Any]:
 TAPS = 8
 
 
-def lagrange_weights(t: Any) -> list[Any]:
+def lagrange_weights(t: Array) -> list[Array]:
     """Eight-point Lagrange interpolation at nodes -3 ... 4, t in [0, 1]."""
     steps = [t + (TAPS // 2 - 1 - i) for i in range(TAPS)]
     before, after = [1.0], [1.0]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.autodiff import is_differentiable
+from optics.numerics.autodiff import Array, Scalar, is_differentiable
 
 __all__ = ["Precision", "opaque", "padded_for_packets", "precision"]
 
@@ -65,7 +65,7 @@ def padded_for_packets(values: np.ndarray) -> np.ndarray:
     return flat
 
 
-def opaque(types: Precision, value: Any) -> Any:
+def opaque(types: Precision, value: Scalar) -> Array:
     """A float64 scalar that Dr.Jit treats as data: another value does not compile another kernel.
 
     A Dr.Jit array of one element stays what it is, derivative included.

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import TAPS, lagrange_weights
+from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision
 from optics.numerics.quadrature import harmonics
 
@@ -59,11 +60,10 @@ class RadialProfile:
         """Radii [m], from the rim inwards."""
         return self.radius * np.cos(np.pi * (np.arange(self.points) + 0.5) / (2 * self.points))
 
-    def onto(self, values: Any, window: Grid, types: Precision) -> Any:
+    def onto(self, values: Array, window: Grid, types: Precision) -> Array:
         """Values at `positions` carried to the window's samples, at least 0, and 0 beyond the rim: flat arrays."""
         import drjit as dr
 
-        matmul: Any = dr.matmul
         matrix = types.Tensor(_refinement(self.points, self.table, self.rim / self.radius, types.dtype))
         table = matmul(matrix, types.Tensor(values, (self.points, 1))).array
         x, y = window.coordinates(types)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from optics.elements.source import PointSource
 from optics.methods.problem import Problem
 from optics.numerics.accuracy import Plan
 from optics.numerics.arguments import shown, vacuum_wavelength
+from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.point_spread.psf import pictures
@@ -30,7 +30,7 @@ class PSFBatch:
     plans: of the same order, flat. See PSFResult.
     """
 
-    tensor: Any
+    tensor: Array
     dx: float
     plans: tuple[Plan, ...]
 
@@ -47,8 +47,8 @@ class PSFBatch:
 def psf_batch(
     pupils: Sequence[Pupil],
     wavelengths: Sequence[float] = (550e-9,),
-    sensor_distance: Any = 240e-6,
-    source_distances: Sequence[Any] = (math.inf,),
+    sensor_distance: Scalar = 240e-6,
+    source_distances: Sequence[Scalar] = (math.inf,),
     *,
     dx: float = 0.25e-6,
     shape: tuple[int, int] = (129, 129),

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import in_range, point_2d, positive, reals, shown
-from optics.numerics.autodiff import number, to_user
+from optics.numerics.autodiff import Array, Scalar, number, to_user
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2
 from optics.numerics.grid import Grid
@@ -36,7 +36,7 @@ class MTF:
     cutoff: (wavelength,) frequency [1/m] beyond which a pupil of this size passes nothing, 2 sin θ / λ.
     """
 
-    tensor: Any
+    tensor: Array
     fx: np.ndarray
     fy: np.ndarray
     cutoff: np.ndarray
@@ -45,7 +45,7 @@ class MTF:
     def mtf(self) -> np.ndarray:
         return np.asarray(self.tensor.numpy())
 
-    def profile(self, frequencies: np.ndarray) -> Any:
+    def profile(self, frequencies: np.ndarray) -> np.ndarray | Array:
         """Mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency); 0 beyond the grid.
 
         Interpolated linearly between the grid's frequencies.
@@ -126,7 +126,7 @@ def _arriving(result: PSFResult, arriving: Any) -> np.ndarray | None:
     return np.broadcast_to(known, held.shape)
 
 
-def strehl_ratio(result: PSFResult) -> Any:
+def strehl_ratio(result: PSFResult) -> np.ndarray | Array:
     """Peak of the PSF over the peak that the same aperture makes without aberration, (wavelength,).
 
     Unaberrated is the spherical wave that converges on the sensor's axis; with L = √(z² + r²) its field there is
@@ -179,7 +179,9 @@ def encircled_energy(
     return np.einsum("ryx,wyx->wr", inside, np.asarray(result.psf, dtype=np.float64)) * result.dx**2
 
 
-def image_quality(result: PSFResult, nyquist: float, throughput: Any = 1.0, noise_sigma: float = 0.0) -> Any:
+def image_quality(
+    result: PSFResult, nyquist: float, throughput: Scalar = 1.0, noise_sigma: float = 0.0
+) -> np.ndarray | Array:
     """Throughput times the area of the MTF above the noise floor, up to the retina's Nyquist frequency, (wavelength,).
 
         IQ = T / f_N ∫_0^f_N max(MTF(f) - σ / T, 0) df,   in [0, 1]
@@ -209,7 +211,7 @@ def image_quality(result: PSFResult, nyquist: float, throughput: Any = 1.0, nois
     return to_user(types.Tensor(light * dr.block_reduce(dr.ReduceOp.Add, above, f.size), (waves,)))
 
 
-def _flat(tensor: Any) -> Any:
+def _flat(tensor: np.ndarray | Array) -> Array:
     """Row by row, Dr.Jit or NumPy."""
     import drjit as dr
 

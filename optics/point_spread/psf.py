@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from optics.methods.problem import Problem
 from optics.methods.sampling import Sampling
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
 from optics.numerics.arguments import vacuum_wavelength, vacuum_wavelengths
+from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
 from optics.point_spread.planner import choose
@@ -37,10 +37,10 @@ class PSFResult:
     plans: one per wavelength; `plan` is the least accurate of them.
     """
 
-    tensor: Any
+    tensor: Array
     dx: float
     wavelengths: np.ndarray
-    sensor_distance: Any
+    sensor_distance: Scalar
     pupil: Pupil
     plans: tuple[Plan, ...]
     centre: tuple[float, float] = (0.0, 0.0)
@@ -70,8 +70,8 @@ class PSFResult:
 def psf(
     pupil: Pupil,
     wavelengths: Sequence[float] | np.ndarray = (550e-9,),
-    sensor_distance: Any = 240e-6,
-    source_distance: Any = math.inf,
+    sensor_distance: Scalar = 240e-6,
+    source_distance: Scalar = math.inf,
     source_angle: tuple[float, float] = (0.0, 0.0),
     dx: float = 0.25e-6,
     shape: tuple[int, int] = (129, 129),
@@ -108,8 +108,8 @@ def psf(
 def plan(
     pupil: Pupil,
     wavelength: float = 550e-9,
-    sensor_distance: Any = 240e-6,
-    source_distance: Any = math.inf,
+    sensor_distance: Scalar = 240e-6,
+    source_distance: Scalar = math.inf,
     source_angle: tuple[float, float] = (0.0, 0.0),
     dx: float = 0.25e-6,
     shape: tuple[int, int] = (129, 129),
@@ -140,7 +140,7 @@ def spread(beams: list[Beam], tasks: list[Problem], method: str = "auto", most_s
 
 def pictures(
     beams: Sequence[Beam], tasks: Sequence[Problem], method: str = "auto", most_seconds: float = 60.0
-) -> list[tuple[Any, Plan]]:
+) -> list[tuple[Array, Plan]]:
     """PSFs, flat, and their plans: all are refused before anything is computed, and all started before any is waited
     for.
 
@@ -157,15 +157,15 @@ def pictures(
     return [_checked(*each, asked) for each in zip(beams, tasks, chosen, started, strict=True)]
 
 
-def _picture(beam: Beam, task: Problem, sampling: Sampling) -> Any:
+def _picture(beam: Beam, task: Problem, sampling: Sampling) -> Array:
     types = precision(task.dtype)
     radius = opaque(types, beam.radius)
     return sampling.intensity(beam, task) / types.Float(beam.pupil.aperture.area * radius * radius)
 
 
 def _checked(
-    beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], image: Any, asked: tuple[str, float]
-) -> tuple[Any, Plan]:
+    beam: Beam, task: Problem, chosen: tuple[Plan, Sampling], image: Array, asked: tuple[str, float]
+) -> tuple[Array, Plan]:
     """The PSF, flat, and the plan with the error that a spot check tells. What does not meet the tolerance is planned
     again: by an exact method, and for a smaller tolerance, because a dark window needs more digits than a bright one.
     An approximation asked for by its name stays, however wrong it is seen to be.

@@ -12,11 +12,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from optics.apertures.soft_edge import kaiser_beta
+from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import Interpolant
@@ -181,12 +181,12 @@ class Passage:
         waves += x * opaque(types, self.centre[0]) + y * opaque(types, self.centre[1])
         return Field.from_waves(decay, waves, grid, types).numpy()
 
-    def _faded(self, x: Any, y: Any, types: Precision) -> Any:
+    def _faded(self, x: Array, y: Array, types: Precision) -> Array:
         import drjit as dr
 
         table, kept, fade = _fade_table(self.ripple), self.band.kept, self.band.fade
 
-        def left(frequency: Any) -> Any:
+        def left(frequency: Array) -> Array:
             return table.at((dr.abs(frequency) - opaque(types, kept)) * opaque(types, 1 / fade), types)
 
         if not self.band.square:
