@@ -38,7 +38,7 @@ def make_vec_env(
 ) -> EyesVecEnv:
     """A batched environment of one task.
 
-    task: "detection", "foraging", "navigation" or "tracking"
+    task: one of `sim.TASKS`
     eyes: of every agent; default Eyes()
     n_envs: number of worlds
     seed: of episodes and noise; None draws one
