@@ -53,7 +53,7 @@ def bsdf(
     measured: a reflectance that takes the place of its colour. mirrors: whether its mirror share counts.
     """
     if measured is None:
-        description = _matter(model, geom, surfaces.reflectance(model, geom, to_uv))
+        description = _matter(model, geom, surfaces.reflectance_texture(model, geom, to_uv))
     else:
         description = _measured(model, geom, to_uv, measured)
     share = mirror_share(model, geom) if mirrors else 0.0

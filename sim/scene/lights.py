@@ -70,7 +70,7 @@ def glow(
         return emission(np.ones(3), level, in_daylight(measured))
     texture = surfaces.texture_id(model, geom)
     if texture >= 0 and surfaces.is_mirrored(model, geom, texture):
-        return {"type": "d65", "nested": surfaces.reflectance(model, geom, to_uv), "scale": level * white()}
+        return {"type": "d65", "nested": surfaces.reflectance_texture(model, geom, to_uv), "scale": level * white()}
     return emission(decode_srgb(surfaces.rgba(model, geom)[:3]), level)
 
 

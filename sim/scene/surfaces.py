@@ -76,7 +76,7 @@ def linear(model: mujoco.MjModel, texture: int, color: np.ndarray) -> np.ndarray
     return decode_srgb(pixels * color)
 
 
-def reflectance(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> dict[str, Any]:
+def reflectance_texture(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> dict[str, Any]:
     """Mitsuba texture of a geom's reflectance; `to_uv` (3, 3) turns the shape's texture coordinates to MuJoCo's."""
     color = rgba(model, geom)[:3]
     texture = texture_id(model, geom)

@@ -1,7 +1,7 @@
 """The tasks: where episodes start, what moves, what counts as progress, what ends an episode.
 
-Rewards follow DESIGN: progress to the goal (detection, foraging, tracking) or away from the start (navigation), an
-event reward for reaching the goal or an adversary, and a penalty per action in contact with a wall.
+A task says how many metres of progress an action made, and whether the goal or an adversary was reached. What that is
+worth, with a penalty for contact with a wall, is in `sim.tasks.reward`.
 """
 
 from __future__ import annotations
