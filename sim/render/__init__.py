@@ -1,5 +1,6 @@
-"""What all eyes of all worlds see.
+"""What all eyes of all worlds see. Begin with one_ray: the others do the same, faster.
 
+one_ray             see: one world, one ray for each receptor
 batched_renderer    BatchedRenderer: one wavefront
 reference_renderer  ReferenceRenderer: Mitsuba's integrators, slowly
 fidelity            choose_fidelity, Fidelity: as little work as noise allows

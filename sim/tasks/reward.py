@@ -3,7 +3,8 @@
     reward_t = λ progress_t + w_g goal_t + w_a adversary_t + w_c contact_t
 
     progress   metres in the task's sense, x the agent's place:
-               |x_(t-1) - x_goal| - |x_t - x_goal|   detection, foraging, tracking; to the nearest goal, where it is then
+               |x_(t-1) - x_goal| - |x_t - x_goal|   detection, foraging, tracking; a goal that moves is where it
+                                                     is at that time, and of several the nearest counts
                |x_t - x_start| - |x_(t-1) - x_start| navigation; as the crow flies
     goal       1 when the goal, or the maze's goal region, is reached
     adversary  1 when an adversary is reached
