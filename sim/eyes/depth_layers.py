@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
+
+from optics.numerics.autodiff import Array
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class DepthLayers:
         bounce_samples = [i / (self.count - 1) for i in range(self.count)] if self.count > 1 else [0.5]
         return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in bounce_samples)
 
-    def shares(self, vergence: Any) -> list[Any]:
+    def shares(self, vergence: Array) -> list[Array]:
         """Share of each layer in light from 1/z [1/m], Dr.Jit arrays; they sum to 1."""
         if self.count == 1:
             return [1.0]

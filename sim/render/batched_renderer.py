@@ -16,13 +16,14 @@ import mitsuba as mi
 import numpy as np
 
 import optics
+from optics.numerics.autodiff import Array
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.render import memory_budget
 from sim.render.fidelity import Fidelity, chosen_fidelity
 from sim.render.frozen_kernels import aligned, garbage_kept
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.render.prepared_scene import PreparedScene
-from sim.scene.variant import variant
+from sim.scene.variant import MitsubaObject, variant
 from sim.tracing import lighting
 from sim.tracing.static_scene import StaticScene
 from sim.tracing.tracer import Tracer
@@ -185,7 +186,7 @@ class BatchedRenderer:
         return self._slot.begin(launch)
 
 
-def _read(light: Any) -> np.ndarray:
+def _read(light: Array) -> np.ndarray:
     """Waits for the kernel."""
     with garbage_kept():
         return np.array(light.numpy())
@@ -220,7 +221,7 @@ class _Wavefront:
         self.n_spheres = renderer._poses.n_spheres
         self.tracer, self.depth = renderer.tracer, renderer.sensor.depth
 
-    def __call__(self, scene: Any, poses: Any, inputs: dict[str, Any], reduced: int) -> Any:
+    def __call__(self, scene: MitsubaObject, poses: Array, inputs: dict[str, Array], reduced: int) -> Array:
         lane = inputs["lanes"]
         view = lane // self.n_rays
         world = view // self.n_eyes
@@ -242,16 +243,16 @@ class _Wavefront:
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
 
     def _ray(
-        self, poses: Any, inputs: dict[str, Any], world: Any, eye: Any, ray: Any
-    ) -> tuple[Any, Any, Any, list[Any]]:
+        self, poses: Array, inputs: dict[str, Array], world: Array, eye: Array, ray: Array
+    ) -> tuple[Array, Array, Array, list[Array]]:
         """The lane's ray, its cosine with the eye's axis, and the centres of the agent and of its world's spheres."""
 
-        def row(name: str, index: Any) -> Any:
+        def row(name: str, index: Array) -> Array:
             return dr.gather(mi.Vector4f, inputs[name] if name else poses, index)
 
         x, y, cos, sin = row("", world * (self.stride // 4))
 
-        def turned(v: Any) -> Any:
+        def turned(v: Array) -> Array:
             return mi.Vector3f(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
 
         agent = mi.Point3f(x, y, EYE_HEIGHT)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.eyes.sensor import BoxSampling, EyeSampling, Trial
@@ -160,7 +160,7 @@ class FidelityTrials:
         weights = np.einsum("ckb,lbrp->clkrp", factors, planes, optimize=True).astype(np.float32)
         return np.einsum("clkrp,lkvp->vcr", weights, layers, optimize=True)
 
-    def _trace(self, views: RandomViews, trial: Trial, light: str) -> tuple[list[Any], Any]:
+    def _trace(self, views: RandomViews, trial: Trial, light: str) -> tuple[list[Array], Array]:
         """Components of light along a trial's rays of each view's eye, and from how far along its axis [m]: Dr.Jit,
         flat (view, ray)."""
         directions, azimuths = trial.directions, self._eyes.azimuths()
@@ -174,7 +174,7 @@ class FidelityTrials:
         start = agent + np.einsum("ijv,vj->vi", turn, origins)
         rays, tracer = len(directions), self._scene.tracers.of(light)
 
-        def lanes(points: np.ndarray) -> Any:
+        def lanes(points: np.ndarray) -> Array:
             """The same for all rays of a view."""
             return mi.Point3f([_lanes(np.repeat(column, rays)) for column in points.T])
 
@@ -194,7 +194,7 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _lanes(values: np.ndarray) -> Any:
+def _lanes(values: np.ndarray) -> Array:
     """An array of the device's. Aligned, or Dr.Jit would compile the same kernel anew for every alignment."""
     lanes = aligned(values.size, np.float32)
     lanes[:] = values.ravel()

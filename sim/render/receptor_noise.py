@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 import optics
+from optics.numerics.autodiff import Array
 from sim.render.frozen_kernels import aligned, garbage_kept
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.scene.variant import variant
@@ -55,7 +56,7 @@ class Normals:
         self._frames[worlds] += 1
         return drawn
 
-    def _frame(self, parts: list[Any], n: int) -> np.ndarray:
+    def _frame(self, parts: list[Array], n: int) -> np.ndarray:
         """The first n worlds' numbers, out of the kernel's parts, each flat (world, draw)."""
         drawn = np.empty((n, math.prod(self._shape)), np.float32)
         for k, part in enumerate(parts):
@@ -71,11 +72,11 @@ class _Kernel:
         self._key_buffer, self._frame_buffer = aligned(worlds, np.uint64), aligned(worlds, np.uint32)
         self._slot = FrameSlot()
         with variant():
-            index: Any = dr.uint32_array_t(dr.detached_t(mi.Float))
+            index: Array = dr.uint32_array_t(dr.detached_t(mi.Float))
             self._lanes = dr.arange(index, worlds * draws)
             dr.eval(self._lanes)
 
-        def normals(keys: Any, frames: Any, lane: Any) -> Any:
+        def normals(keys: Array, frames: Array, lane: Array) -> Array:
             module = sys.modules[type(lane).__module__]
             world = lane // draws
             random = module.Philox4x32(
@@ -85,7 +86,9 @@ class _Kernel:
 
         self._normals: Any = dr.freeze(normals)
 
-    def begin(self, keys: np.ndarray, frames: np.ndarray, frame_of: Callable[[list[Any]], np.ndarray]) -> PendingFrame:
+    def begin(
+        self, keys: np.ndarray, frames: np.ndarray, frame_of: Callable[[list[Array]], np.ndarray]
+    ) -> PendingFrame:
         """Draw under these keys; frame_of: makes of the device's arrays what is waited for."""
 
         def launch() -> Callable[[], np.ndarray]:

@@ -10,12 +10,12 @@ materials are grey.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from sim.eyes.eyes import EYE_HEIGHT
 from sim.tracing import lighting, spheres
 from sim.tracing.reflectance_atlas import Atlas, bake
@@ -69,11 +69,11 @@ def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Compo
 class _Hit:
     """Where rays end: lit tells whether light is seen that leaves there; reflectance: one array per component."""
 
-    t: Any
-    point: Any
-    normal: Any
-    lit: Any
-    reflectance: list[Any]
+    t: Array
+    point: Array
+    normal: Array
+    lit: Array
+    reflectance: list[Array]
 
 
 class ClosedForm:
@@ -122,19 +122,25 @@ class ClosedForm:
         """No Mitsuba scene takes part."""
 
     @property
-    def inputs(self) -> dict[str, Any]:
+    def inputs(self) -> dict[str, Array]:
         """Arrays that the kernel reads."""
         return self._static
 
-    def _inputs(self) -> dict[str, Any]:
+    def _inputs(self) -> dict[str, Array]:
         texels = self._components.reflectance.astype(np.float32)
         tables = {f"texels_{k}": np.ascontiguousarray(column) for k, column in enumerate(texels.T)}
         tables |= {"faces": self._faces.astype(np.float32).ravel(), **self._footprints.tables}
         return {name: mi.Float(table) for name, table in tables.items()}
 
     def radiance(
-        self, scene: None, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any], place: Any = None
-    ) -> tuple[list[Any], Any]:
+        self,
+        scene: None,
+        ray: Array,
+        agent: Array,
+        centres: list[Array],
+        inputs: dict[str, Array],
+        place: Array | None = None,
+    ) -> tuple[list[Array], Array]:
         """What comes along each ray, one array per component, and from how far [m]."""
         bodies = [*centres, agent]
         hit = self._hit(ray, centres, inputs)
@@ -145,7 +151,7 @@ class ClosedForm:
             light = [dr.select(hit.lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
         return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
 
-    def _hit(self, ray: Any, centres: list[Any], inputs: dict[str, Any]) -> _Hit:
+    def _hit(self, ray: Array, centres: list[Array], inputs: dict[str, Array]) -> _Hit:
         """Where rays meet walls, floor or bodies first; those without a centre are not there."""
         t, face, normal = self._footprints.hit(ray, inputs)
         on_floor, t_floor = self._floor_hit(ray)
@@ -169,7 +175,7 @@ class ClosedForm:
         lit = (seen | on_sphere) & (t > 0) & (dr.dot(normal, ray.d) < 0)
         return _Hit(t, point, normal, lit, self._interpolate(offset, columns, rows, x, y, inputs))
 
-    def _floor_hit(self, ray: Any) -> tuple[Any, Any]:
+    def _floor_hit(self, ray: Array) -> tuple[Array, Array]:
         """Whether and where a ray from above meets the floor."""
         t = (self._walls.floor - ray.o.z) / ray.d.z
         lower, upper = self._walls.floor_lower, self._walls.floor_upper
@@ -177,7 +183,7 @@ class ClosedForm:
         inside = (x >= float(lower[0])) & (x <= float(upper[0])) & (y >= float(lower[1])) & (y <= float(upper[1]))
         return inside & (ray.d.z < 0) & (t > 0), t
 
-    def _irradiance(self, hit: _Hit, bodies: list[Any], inputs: dict[str, Any]) -> list[Any]:
+    def _irradiance(self, hit: _Hit, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
         """Per component: sum over the lights of level · cos θ, where nothing is in the way."""
         levels = self._components.levels
         start = lighting.clear_of(hit.point, hit.normal)
@@ -193,7 +199,7 @@ class ClosedForm:
             total = [dr.fma(cosine, float(factor), sum_so_far) for factor, sum_so_far in zip(level, total, strict=True)]
         return total
 
-    def _face_texel(self, face: Any, point: Any, inputs: dict[str, Any]) -> tuple[Any, ...]:
+    def _face_texel(self, face: Array, point: Array, inputs: dict[str, Array]) -> tuple[Array, ...]:
         """Texture of a face and where in it a point is: first texel, columns, rows, column and row."""
         columns = dr.gather(mi.Vector4f, inputs["faces"], face * 3)
         place = dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 2)
@@ -203,15 +209,17 @@ class ClosedForm:
             y = _affine(dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 1), point)
         return place.x, place.y, place.z, x, y
 
-    def _sphere_texel(self, which: Any, uv: Any) -> tuple[Any, ...]:
-        found: tuple[Any, ...] = tuple(mi.Float(0) for _ in range(5))
+    def _sphere_texel(self, which: Array, uv: Array) -> tuple[Array, ...]:
+        found: tuple[Array, ...] = tuple(mi.Float(0) for _ in range(5))
         for k, (to_texels, place) in enumerate(self._sphere_textures):
             column, row = (float(a) * uv.x + float(b) * uv.y + float(c) for a, b, c in to_texels)
             mine = (*(mi.Float(float(p)) for p in place), column, row)
             found = tuple(dr.select(which == k, a, b) for a, b in zip(mine, found, strict=True))
         return found
 
-    def _interpolate(self, offset: Any, columns: Any, rows: Any, x: Any, y: Any, inputs: dict[str, Any]) -> list[Any]:
+    def _interpolate(
+        self, offset: Array, columns: Array, rows: Array, x: Array, y: Array, inputs: dict[str, Array]
+    ) -> list[Array]:
         """Reflectance per component, interpolated bilinearly in a texture that repeats."""
         x0, x1, fx = _neighbours(x, columns)
         n = self._components.reflectance.shape[1]
@@ -241,11 +249,11 @@ def _face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _affine(row: Any, point: Any) -> Any:
+def _affine(row: Array, point: Array) -> Array:
     return dr.fma(row.x, point.x, dr.fma(row.y, point.y, dr.fma(row.z, point.z, row.w)))
 
 
-def _neighbours(x: Any, n: Any) -> tuple[Any, Any, Any]:
+def _neighbours(x: Array, n: Array) -> tuple[Array, Array, Array]:
     """The two whole numbers around x, modulo n, and how far x is from the first to the second."""
     whole = dr.floor(x)
     first = dr.clip(whole - n * dr.floor(whole / n), 0, n - 1)

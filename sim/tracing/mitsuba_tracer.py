@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from optics.numerics.autodiff import Array
+from sim.scene.variant import MitsubaObject
 from sim.tracing import lighting, spheres
 from sim.tracing.static_scene import StaticScene
 
@@ -35,12 +35,18 @@ class Traced:
         self.inputs = {"bsdfs": mi.BSDFPtr([*stage.bodies.bsdfs, stage.scene.shapes()[0].bsdf()])}
 
     def radiance(
-        self, scene: Any, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any], place: Any = None
-    ) -> tuple[list[Any], Any]:
+        self,
+        scene: MitsubaObject,
+        ray: Array,
+        agent: Array,
+        centres: list[Array],
+        inputs: dict[str, Array],
+        place: Array | None = None,
+    ) -> tuple[list[Array], Array]:
         """What comes along each ray, one array per component, and from how far [m]."""
         bodies = [*centres, agent]
 
-        def occluded(shadow: Any, active: Any) -> Any:
+        def occluded(shadow: Array, active: Array) -> Array:
             blocked = spheres.blocks(list(map(float, self._bodies.radii)), bodies, shadow)
             return blocked | scene.ray_test(shadow, active & ~blocked)
 
@@ -56,7 +62,9 @@ class Traced:
             spectra = [dr.select(valid, dr.fma(r, b, s), s) for s, r, b in zip(spectra, sent_on, bounced, strict=True)]
         return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], si.t
 
-    def _first_hit(self, scene: Any, ray: Any, centres: list[Any], inputs: dict[str, Any]) -> tuple[Any, Any]:
+    def _first_hit(
+        self, scene: MitsubaObject, ray: Array, centres: list[Array], inputs: dict[str, Array]
+    ) -> tuple[Array, Array]:
         """Where the ray meets the static scene or a sphere first, and the BSDF there."""
         ray.wavelengths = self._bands[0]
         preliminary = scene.ray_intersect_preliminary(ray)

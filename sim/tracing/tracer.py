@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from sim.scene import shapes
-from sim.scene.variant import variant
+from sim.scene.variant import MitsubaObject, variant
 from sim.tracing import lighting
 from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.mitsuba_tracer import Traced
@@ -31,16 +32,22 @@ class Tracer(Protocol):
     basis: np.ndarray
 
     @property
-    def scene(self) -> Any:
+    def scene(self) -> MitsubaObject:
         """A Mitsuba scene or None."""
 
     @property
-    def inputs(self) -> dict[str, Any]:
+    def inputs(self) -> dict[str, Array]:
         """Arrays, by name."""
 
     def radiance(
-        self, scene: Any, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any], place: Any = None
-    ) -> tuple[list[Any], Any]:
+        self,
+        scene: MitsubaObject,
+        ray: Array,
+        agent: Array,
+        centres: list[Array],
+        inputs: dict[str, Array],
+        place: Array | None = None,
+    ) -> tuple[list[Array], Array]:
         """What comes along each ray, one array per component, and from how far [m]; agent and centres: of the
         spheres that move; place: each ray's on the unit square (`lighting.onwards`), wanted for light that bounces."""
 

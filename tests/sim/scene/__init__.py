@@ -1,4 +1,4 @@
-"""What tests hold of mirrors, module by module. Helpers: oracle (MuJoCo's ray casting), drawn (its renderer), models, lit.
+"""What tests hold of mirrors, module by module. Helpers: oracle (MuJoCo's rays), drawn (its renderer), models, lit.
 
 mirror: test_mirror.py, test_mirror_light.py
 source: test_mirror_source.py
