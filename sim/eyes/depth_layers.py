@@ -36,8 +36,8 @@ class DepthLayers:
     def distances(self) -> tuple[float, ...]:
         """[m], farthest first, (layer,)."""
         far, near = 1 / self.farthest, 1 / self.nearest
-        bounce_samples = [i / (self.count - 1) for i in range(self.count)] if self.count > 1 else [0.5]
-        return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in bounce_samples)
+        places = [i / (self.count - 1) for i in range(self.count)] if self.count > 1 else [0.5]
+        return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in places)
 
     def shares(self, vergence: Array) -> list[Array]:
         """Share of each layer in light from 1/z [1/m], Dr.Jit arrays; they sum to 1."""

@@ -110,7 +110,7 @@ def cells_per_receptor(resolution: tuple[int, int]) -> int:
     return max(4, -(-MIN_CELLS // max(resolution)))
 
 
-def fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
+def receptive_fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
     """The fields of an eye on cells as fine as its PSF can be had on.
 
     Raises:

@@ -15,7 +15,14 @@ import scipy.sparse
 
 import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
-from sim.eyes.receptive_fields import Draw, NoRaysError, ReceptiveFields, bounce_samples, fields_of, low_discrepancy
+from sim.eyes.receptive_fields import (
+    Draw,
+    NoRaysError,
+    ReceptiveFields,
+    bounce_samples,
+    low_discrepancy,
+    receptive_fields_of,
+)
 from sim.eyes.receptor_sums import ReceptorSums, RowProduct, of_bands, of_components, of_receptors, within_stretches
 
 # Weights that together change no signal by more than this share of the receptors' noise are left out.
@@ -28,7 +35,7 @@ class BoxSensor:
 
     directions: unit vectors in the eye's frame (x right, y up, z optical axis), (ray, 3) float32; ray = receptor *
         rays_per_receptor + sample
-    places: of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
+    bounce_samples: of each ray, on the unit square: which way light that bounces goes on, (ray, 2) float32
     rays_per_receptor: samples of one receptor; the renderer sums them in its kernel
     depth: nothing is blurred, whatever its distance
     """
@@ -63,7 +70,7 @@ class ReceptiveFieldSensor:
     NEGLIGIBLE of the receptors' noise.
 
     directions: unit vectors in the eye's frame, (ray, 3) float32
-    places: of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
+    bounce_samples: of each ray, on the unit square: which way light that bounces goes on, (ray, 2) float32
     weights: per plane, a band of a depth layer, sparse (receptor, ray)
     resolution: receptors (height, width)
     depth: the layers
@@ -112,7 +119,7 @@ Sensor = BoxSensor | ReceptiveFieldSensor
 
 @dataclass(frozen=True)
 class Trial:
-    """Some receptors of a sensor that need not be built: directions (ray, 3) and places (ray, 2) of rays, weights
+    """Some receptors of a sensor that need not be built: directions (ray, 3), bounce samples (ray, 2) and weights
     (layer * band, receptor, ray)."""
 
     directions: np.ndarray
@@ -206,7 +213,7 @@ def eye_sampling(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> EyeSampling:
     Raises:
         optics.AccuracyError: a pupil whose light spreads too far to be computed.
     """
-    return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, fields_of(eye, depth), depth)
+    return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, receptive_fields_of(eye, depth), depth)
 
 
 def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers = ONE_PSF) -> Sensor:

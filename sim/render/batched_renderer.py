@@ -228,8 +228,8 @@ class _Wavefront:
         sample = lane - view * self.n_rays
         ray, cosine, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, sample)
         bounces = self.tracer.light == lighting.BOUNCE
-        place = dr.gather(mi.Point2f, inputs["bounce_samples"], sample) if bounces else None
-        components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs, place)
+        bounce_sample = dr.gather(mi.Point2f, inputs["bounce_samples"], sample) if bounces else None
+        components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs, bounce_sample)
         if self.depth.count > 1:
             shares = self.depth.shares(dr.rcp(distance * cosine))
             components = [component * share for share in shares for component in components]

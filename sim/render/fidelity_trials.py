@@ -181,10 +181,10 @@ class FidelityTrials:
         with variant(self._scene.static.variant):
             ray = mi.Ray3f(lanes(start), mi.Vector3f([_lanes(d) for d in world]))
             centres = [lanes(views.objects[:, k]) for k in range(views.objects.shape[1])]
-            place = None
+            bounce_sample = None
             if light == lighting.BOUNCE:
-                place = mi.Point2f([_lanes(np.tile(column, len(views))) for column in trial.bounce_samples.T])
-            components, t = tracer.radiance(tracer.scene, ray, lanes(agent), centres, tracer.inputs, place)
+                bounce_sample = mi.Point2f([_lanes(np.tile(column, len(views))) for column in trial.bounce_samples.T])
+            components, t = tracer.radiance(tracer.scene, ray, lanes(agent), centres, tracer.inputs, bounce_sample)
             z = t * _lanes(np.tile(directions[:, 2], len(views)))
             dr.eval(components, z)
             return components, z

@@ -1,4 +1,4 @@
-"""What all agents' retinas report, noise included: begun early, waited for late, beside other work."""
+"""What the eyes of all agents report, noise included: begun early, waited for late, beside other work."""
 
 from __future__ import annotations
 

@@ -90,20 +90,22 @@ class ClosedForm:
 
     name = "closed_form"
 
-    def __init__(self, world: World, stage: StaticScene, wavelengths: np.ndarray, light: str = lighting.DIRECT) -> None:
-        walls = walls_of(world.model, stage.geoms)
+    def __init__(
+        self, world: World, static: StaticScene, wavelengths: np.ndarray, light: str = lighting.DIRECT
+    ) -> None:
+        walls = walls_of(world.model, static.geoms)
         self.light = light
         if light == lighting.BOUNCE:
-            _check_tops(world, walls, stage)
+            _check_tops(world, walls, static)
         self._footprints: Footprints = footprints_of(walls)
         self.why = f"{len(walls)} upright walls, {self._footprints.how}"
-        self._bodies, self._walls = stage.bodies, walls
-        self._lights = lighting.directional_lights(stage.scene, wavelengths)
+        self._bodies, self._walls = static.bodies, walls
+        self._lights = lighting.directional_lights(static.scene, wavelengths)
         if any(source.direction[2] <= 0 for source in self._lights):
             raise NoClosedForm("a light shines from below")
         geoms, place = np.unique(walls.geoms, return_inverse=True)
-        visible = stage.bodies if light == lighting.BOUNCE else stage.spheres
-        bsdfs = [*(stage.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
+        visible = static.bodies if light == lighting.BOUNCE else static.spheres
+        bsdfs = [*(static.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
         atlas = bake(world.model, [*geoms, *visible.geoms], bsdfs, wavelengths)
         irradiance = np.array([source.irradiance for source in self._lights]).reshape(-1, len(wavelengths))
         fewest = reflected_components_of if light == lighting.BOUNCE else components_of
@@ -139,14 +141,14 @@ class ClosedForm:
         agent: Array,
         centres: list[Array],
         inputs: dict[str, Array],
-        place: Array | None = None,
+        bounce_sample: Array | None = None,
     ) -> tuple[list[Array], Array]:
         """What comes along each ray, one array per component, and from how far [m]."""
         bodies = [*centres, agent]
         hit = self._hit(ray, centres, inputs)
         light = self._irradiance(hit, bodies, inputs)
         if self.light == lighting.BOUNCE:
-            there = self._hit(lighting.onwards(hit.point, hit.normal, place), bodies, inputs)
+            there = self._hit(lighting.onwards(hit.point, hit.normal, bounce_sample), bodies, inputs)
             second = zip(there.reflectance, self._irradiance(there, bodies, inputs), strict=True)
             light = [dr.select(hit.lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
         return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
@@ -231,10 +233,10 @@ class ClosedForm:
         return [sum(w * dr.gather(mi.Float, inputs[f"texels_{k}"], i) for i, w in index) for k in range(n)]
 
 
-def _check_tops(world: World, walls: Walls, stage: StaticScene) -> None:
+def _check_tops(world: World, walls: Walls, static: StaticScene) -> None:
     """No top of a wall may be seen from where light is reflected: from any point of walls and movers."""
     objects = [world.model.body(name).pos[2] for name in world.objects]
-    bodies = np.add(np.add([*objects, EYE_HEIGHT], stage.bodies.radii), stage.bodies.offsets[:, 2])
+    bodies = np.add(np.add([*objects, EYE_HEIGHT], static.bodies.radii), static.bodies.offsets[:, 2])
     lowest, highest = walls.top.min(initial=np.inf), max(walls.top.max(initial=-np.inf), bodies.max())
     if highest > lowest + ALIGNED:
         raise NoClosedForm(f"light that is reflected twice sees the top of a wall {lowest:.2g} m high")

@@ -2,8 +2,8 @@
 
 Direct light is what Mitsuba's `direct` integrator converges to, without its noise, since each emitter has exactly one
 direction. Light that was reflected once more before is found at the end of one more ray, which leaves the surface in a
-fixed direction drawn from Lambert's cosine: each camera ray has a place of its own on the unit square for it
-(`sim.eyes.sensor`), so that the rays of a receptor together see the hemisphere.
+fixed direction drawn from Lambert's cosine: each camera ray has a sample of its own on the unit square for it, its
+bounce sample (`sim.eyes.sensor`), so that the rays of a receptor together see the hemisphere.
 """
 
 from __future__ import annotations
@@ -102,10 +102,11 @@ def direct_light(
     return [e * diffuse_reflectance(si, bsdf, b) * dr.inv_pi for e, b in zip(irradiance, bands, strict=True)]
 
 
-def onwards(point: Array, normal: Array, place: Array) -> Array:
-    """The ray that leaves a surface at a place (2,) of the unit square, which Lambert's cosine is laid out on: with the
-    radiance L that it brings, ρ L is what the surface sends on, averaged over places."""
-    local = mi.warp.square_to_cosine_hemisphere(place)
+def onwards(point: Array, normal: Array, bounce_sample: Array) -> Array:
+    """The ray that leaves a surface as a sample (2,) of the unit square says, on which Lambert's cosine is laid out.
+
+    With the radiance L that it brings, ρ L is what the surface sends on, averaged over samples."""
+    local = mi.warp.square_to_cosine_hemisphere(bounce_sample)
     # Not mi.Frame3f(normal): on walls, whose normals are level to rounding, its axes are the rounding's.
     beside = dr.select(dr.abs(normal.z) < 0.9, mi.Vector3f(0, 0, 1), mi.Vector3f(1, 0, 0))
     s = dr.normalize(dr.cross(beside, mi.Vector3f(normal)))

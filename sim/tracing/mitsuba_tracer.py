@@ -24,15 +24,15 @@ class Traced:
 
     name = "mitsuba"
 
-    def __init__(self, stage: StaticScene, wavelengths: np.ndarray, why: str, light: str = lighting.DIRECT) -> None:
+    def __init__(self, static: StaticScene, wavelengths: np.ndarray, why: str, light: str = lighting.DIRECT) -> None:
         self.why, self.light = why, light
         self.basis = np.eye(len(wavelengths))
-        self.scene = stage.scene
-        self._bodies = stage.bodies
-        self._lights = lighting.directional_lights(stage.scene, wavelengths)
+        self.scene = static.scene
+        self._bodies = static.bodies
+        self._lights = lighting.directional_lights(static.scene, wavelengths)
         self._bands = lighting.spectra(wavelengths)
         # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.
-        self.inputs = {"bsdfs": mi.BSDFPtr([*stage.bodies.bsdfs, stage.scene.shapes()[0].bsdf()])}
+        self.inputs = {"bsdfs": mi.BSDFPtr([*static.bodies.bsdfs, static.scene.shapes()[0].bsdf()])}
 
     def radiance(
         self,
@@ -41,7 +41,7 @@ class Traced:
         agent: Array,
         centres: list[Array],
         inputs: dict[str, Array],
-        place: Array | None = None,
+        bounce_sample: Array | None = None,
     ) -> tuple[list[Array], Array]:
         """What comes along each ray, one array per component, and from how far [m]."""
         bodies = [*centres, agent]
@@ -54,7 +54,7 @@ class Traced:
         spectra = lighting.direct_light(si, bsdf, self._lights, self._bands, occluded)
         if self.light == lighting.BOUNCE:
             seen_from = dr.copysign(mi.Float(1), dr.dot(si.n, si.to_world(si.wi)))
-            second = lighting.onwards(si.p, si.sh_frame.n * seen_from, place)
+            second = lighting.onwards(si.p, si.sh_frame.n * seen_from, bounce_sample)
             there = self._first_hit(scene, second, bodies, inputs)
             bounced = lighting.direct_light(*there, self._lights, self._bands, occluded)
             sent_on = [lighting.diffuse_reflectance(si, bsdf, b) for b in self._bands]

@@ -42,7 +42,7 @@ class StaticScene:
 
 
 def build_static_scene(world: World) -> StaticScene:
-    """The stage of a world.
+    """The static scene of a world.
 
     Raises:
         ValueError: an object that is not one sphere, for moving geoms that are neither the agent's nor an object's, and
