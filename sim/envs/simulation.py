@@ -14,8 +14,8 @@ from sim.tasks.task import respawned, task_of
 from sim.worlds.state import WorldState, wrap_angle
 from sim.worlds.world import MAX_SPEED, World
 
-EPISODE_STEPS = 256  # actions, then the episode is truncated
-MAX_TURN = np.pi / 4  # [rad] change of heading per action
+EPISODE_STEPS = 256  # actions, then the episode is truncated; as published
+MAX_TURN = np.pi / 4  # [rad] change of heading per action; chosen
 
 UNSTABLE = "unstable physics"
 NO_ACTION = "action is not finite"

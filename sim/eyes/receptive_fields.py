@@ -12,7 +12,8 @@ import numpy as np
 import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 
-# Cells across the eye, at least, on which receptive fields are tabulated.
+# Chosen: cells across the eye, at least, on which receptive fields are tabulated (validation/C1_receptive_fields.py
+# says what of the error is this).
 MIN_CELLS = 32
 
 

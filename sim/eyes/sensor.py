@@ -25,7 +25,8 @@ from sim.eyes.receptive_fields import (
 )
 from sim.eyes.receptor_sums import ReceptorSums, RowProduct, of_bands, of_components, of_receptors, within_stretches
 
-# Weights that together change no signal by more than this share of the receptors' noise are left out.
+# Chosen: weights that together change no signal by more than this share of the receptors' noise are left out; beside
+# it, that makes √(1 + 0.1²) = 1.005 of it.
 NEGLIGIBLE = 0.1
 
 

@@ -20,7 +20,7 @@ from sim.physics.mujoco_batch import BatchedStep
 from sim.worlds.state import WorldState
 from sim.worlds.world import MAX_SPEED, World
 
-SUBSTEPS = 10  # of the model's timestep per action
+SUBSTEPS = 10  # of the model's timestep per action, as published
 UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s]: no actuator can do that
 FEW_GEOMS = 200  # so few are sooner gone through one by one than by MuJoCo's tree of boxes
 

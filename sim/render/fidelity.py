@@ -23,17 +23,21 @@ from sim.render.prepared_scene import PreparedScene
 from sim.tracing.lighting import BOUNCE, DIRECT, LEVELS
 from sim.worlds.world import World
 
+# Errors beside noise add up as squares: half of it makes √(1 + 1/4) = 1.12 of it.
 SHARE_OF_NOISE = 0.5
-# Errors of less than this share of white's signal never cost rays, however little noise there is.
+# Chosen: errors of less than this share of white's signal never cost rays, however little noise there is.
 LEAST_TOLERANCE = 5e-3
-CAUTION = 1.2  # of an error seen in a few random views
+# Chosen: times an error that a few random views have; what agents live through has another
+# (tests/sim/render/test_fidelity.py holds that against the noise).
+CAUTION = 1.2
+# Numbers of rays that are tried: steps of about √2, so that hardly more are traced than are needed.
 PERFECT_LENS_RAYS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 PUPIL_RAYS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
-# Of the tolerance; errors add up as squares, so at least 0.7 of it is left to the rays.
+# Chosen, of the tolerance; errors add up as squares, so that √(1 - 2 · 0.35² - 0.5²) = 0.71 of it is left to the rays.
 SHARE_OF_DEPTH = SHARE_OF_BANDS = 0.35
 SHARE_OF_LIGHT = 0.5
 LAYERS = (1, 3, 5, 9)  # nodes of each are among those of the next
-NEAREST = 0.005  # quantile of the distances that counts as the nearest
+NEAREST = 0.005  # chosen: quantile of the distances that counts as the nearest
 
 
 @dataclass(frozen=True)
@@ -189,7 +193,7 @@ def _allowed(eyes: Eyes, eye: optics.Eye, tolerance: float | None) -> float:
 
 def _bands(eye: optics.Eye, allowed: float) -> tuple[int, Level]:
     """As few bands as `optics.Eye` wants for scenes of any colour."""
-    within = min(max(allowed / eye.throughput, 1e-6), 0.5)
+    within = min(max(allowed / eye.throughput, 1e-6), 0.5)  # what an Eye takes as its tolerance
     try:
         bands = int(replace(eye, bands="auto", tolerance=within).bands)
     except optics.AccuracyError as error:

@@ -24,13 +24,15 @@ from sim.tasks.placement import CLEARANCE
 from sim.tracing import lighting
 from sim.worlds.world import World
 
+# Choices: how much a trial may cost, and how much finer than what it tries its truth is.
 RECEPTORS = 24  # looked through, at most
 RAYS = 2**19  # of one trial, at most, unless that leaves too few views
 VIEWS = (12, 96)  # of one trial, at least and at most
 FINER = 8  # times as many rays, at least, for what is taken as the truth
 TRUE = 4096  # rays of it, at least, behind a pupil
 WEIGHTS = 2**23  # of it, at most, unless it would not be finer
-STRAY = 0.75  # [m] from a cell's centre, along either axis
+# [m] from a cell's centre, along either axis: less than half a cell without the agent's body, 1 - 0.2.
+STRAY = 0.75
 
 
 @dataclass(frozen=True)

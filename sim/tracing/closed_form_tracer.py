@@ -24,9 +24,9 @@ from sim.tracing.wall_intersection import Footprints, footprints_of
 from sim.tracing.walls import ALIGNED, NoClosedForm, Walls, walls_of
 from sim.worlds.world import World
 
-# Singular values below this share of the largest are float32 rounding.
+# Singular values below this share of the largest are rounding: eight times float32's 1.2e-7.
 RANK_TOLERANCE = 1e-6
-# Deviation of a grey's reflectances from band to band, in Mitsuba's spectra of grey colours.
+# Chosen: deviation of a grey's reflectances from band to band, in Mitsuba's spectra of grey colours, that is not a hue.
 GREY = 1e-4
 ROW = 12  # floats per face: column and row of the texel as affine functions of (x, y, z), then where the texture is
 

@@ -108,6 +108,7 @@ def onwards(point: Array, normal: Array, bounce_sample: Array) -> Array:
     With the radiance L that it brings, ρ L is what the surface sends on, averaged over samples."""
     local = mi.warp.square_to_cosine_hemisphere(bounce_sample)
     # Not mi.Frame3f(normal): on walls, whose normals are level to rounding, its axes are the rounding's.
+    # Any vector well away from the normal does; 0.9: up to 26° from upright, the other one is taken.
     beside = dr.select(dr.abs(normal.z) < 0.9, mi.Vector3f(0, 0, 1), mi.Vector3f(1, 0, 0))
     s = dr.normalize(dr.cross(beside, mi.Vector3f(normal)))
     direction = mi.Frame3f(s, dr.cross(mi.Vector3f(normal), s), normal).to_world(local)

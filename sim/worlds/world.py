@@ -24,10 +24,11 @@ from sim.worlds.layout import WALL_CONAFFINITY
 # Navigation's has an argument of its own, its number of mazes.
 _LAYOUTS = {"detection": detection.add_layout, "foraging": foraging.add_layout, "tracking": detection.add_layout}
 
-TIMESTEP = 0.02  # [s]
-TIME_CONSTANT = 0.35  # [s] lag of the agent's speed behind the commanded one
-SPEED_GAIN = 0.99  # speed reached per speed commanded
-MAX_SPEED = 10.0  # [m/s] commanded
+TIMESTEP = 0.02  # [s], as published
+# Lag [s] of the agent's speed behind the commanded one, and speed reached per speed commanded: with them an agent goes
+# as far per action as in the published environment (tests/sim/worlds/test_world.py).
+TIME_CONSTANT, SPEED_GAIN = 0.35, 0.99
+MAX_SPEED = 10.0  # [m/s] commanded, as published
 
 # The agent can move MAX_SPEED * TIMESTEP = 0.2 m in one substep. Its whiskers feel a wall that near, so that the
 # skin, and the eyes in it, never pass through a wall. See `_add_agent` for the contact's stiffness.

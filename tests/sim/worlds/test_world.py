@@ -30,7 +30,7 @@ def started(world, x, y):
 
 
 def test_speed_rises_as_in_the_published_environment(field):
-    """.44, 1.12, 1.50, 1.71 m per action from rest, limit 1.98 m (DESIGN §7, read off the published code, to 1 cm).
+    """.44, 1.12, 1.50, 1.71 m per action from rest, limit 1.98 m (read off the published code, to 1 cm).
 
     That code reads `xpos` after mj_step, which is one substep old; the same is read here.
     """
