@@ -1,6 +1,7 @@
 """rhabdom.sim: a MuJoCo world, mirrored as a spectral Mitsuba scene, seen by the eyes of many agents at once.
 
 Eyes, build_world, World            what there is to see, and with which eyes
+TASKS                               names of the tasks
 mirror, Mirror                      any MuJoCo model as a Mitsuba scene
 BatchedRenderer                     all eyes of all worlds as one wavefront
 choose_fidelity, Fidelity           how finely: as the receptors' noise allows
@@ -16,21 +17,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from sim.envs.registration import register as register_environments
+from sim.worlds import catalog
 
 if TYPE_CHECKING:
+    from sim.envs.assembly import make_vec_env
     from sim.envs.env import make_env
-    from sim.envs.vec_env import make_vec_env
     from sim.exr import View, read_exr, write_exr
     from sim.eyes.eyes import Eyes
     from sim.render.batched_renderer import BatchedRenderer
     from sim.render.fidelity import Fidelity, choose_fidelity
     from sim.render.reference_renderer import ReferenceRenderer
     from sim.scene.mirror import Mirror, MirrorWarning, mirror
-    from sim.worlds.world import TASKS, World, build_world
+    from sim.worlds.world import World, build_world
 
 _HOME = {
     "Eyes": "sim.eyes.eyes",
-    "TASKS": "sim.worlds.world",
     "World": "sim.worlds.world",
     "build_world": "sim.worlds.world",
     "Mirror": "sim.scene.mirror",
@@ -41,7 +42,7 @@ _HOME = {
     "Fidelity": "sim.render.fidelity",
     "choose_fidelity": "sim.render.fidelity",
     "make_env": "sim.envs.env",
-    "make_vec_env": "sim.envs.vec_env",
+    "make_vec_env": "sim.envs.assembly",
     "View": "sim.exr",
     "read_exr": "sim.exr",
     "write_exr": "sim.exr",
@@ -65,6 +66,8 @@ __all__ = [
     "read_exr",
     "write_exr",
 ]
+
+TASKS = tuple(catalog.TASKS)
 
 register_environments()
 

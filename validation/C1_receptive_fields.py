@@ -104,7 +104,7 @@ def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -
     return np.array(found)
 
 
-def sampled(world: sim.World, eyes: sim.Eyes, state: WorldState, fidelity: Any) -> tuple[np.ndarray, float]:
+def sampled(world: sim.World, eyes: sim.Eyes, state: WorldState, fidelity: sim.Fidelity) -> tuple[np.ndarray, float]:
     """The same by rays, and how many there were per receptor."""
     renderer = sim.BatchedRenderer(world, eyes, 1, fidelity)
     rays = len(renderer.sensor.directions) / math.prod(eyes.resolution)
@@ -113,7 +113,7 @@ def sampled(world: sim.World, eyes: sim.Eyes, state: WorldState, fidelity: Any) 
 
 def measure(pupil: str, resolution: tuple[int, int], world: sim.World, state: WorldState) -> Series:
     eyes, receptors = eyes_behind(pupil, resolution), math.prod(resolution)
-    auto = sim.BatchedRenderer(world, eyes, 1).fidelity
+    auto = sim.choose_fidelity(world, eyes, bands="own")
     truth = {light: convolved(world, eyes, state, light) for light in {"direct", auto.light}}
     counts = [n for n in RAYS if 4 <= n * receptors <= MOST and (pupil != "perfect" or n >= 1)]
     found = [sampled(world, eyes, state, sim.Fidelity(n, eyes.bands)) for n in counts]

@@ -102,9 +102,10 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
     for name, eyes, tracer, rays in (
         ("render", case.eyes, "auto", SAMPLES),
         ("render_mitsuba", case.eyes, "mitsuba", SAMPLES),
-        ("render_optics", with_pupil(case.eyes), "auto", "auto"),
+        ("render_optics", with_pupil(case.eyes), "auto", None),
     ):
-        renderer = sim.BatchedRenderer(world, eyes, n_envs, rays, tracer)
+        fidelity = sim.Fidelity(rays, eyes.bands) if rays else sim.choose_fidelity(world, eyes, bands="own")
+        renderer = sim.BatchedRenderer(world, eyes, n_envs, fidelity, tracer)
         chosen[name] = f"{renderer.tracer.name}, {renderer.fidelity.rays_per_receptor:g} rays per receptor"
         rates[name] = n_envs / seconds(lambda renderer=renderer: renderer.signals(moved()), budget)  # type: ignore[misc]
     step = _Step(case, n_envs)
@@ -147,8 +148,8 @@ class _Step:
         simulation.task = SimpleNamespace(world=task.world, begin=task.begin, judge=task.judge, move=task.move)
         self._note(simulation.task, "move", lambda state, _, seconds: task.move(state, chance, seconds))
         self._note(simulation._physics, "step", simulation._physics.step)
-        self._note(self._worlds._retinas, "begin", lambda *asked: self._alone.begin(*asked)())
-        self._note(self._worlds._retinas, "begin_some", lambda *asked: self._alone.begin_some(*asked)())
+        self._note(self._worlds._signals, "begin", lambda *asked: self._alone.begin(*asked).wait())
+        self._note(self._worlds._signals, "begin_some", lambda *asked: self._alone.begin_some(*asked).wait())
 
     def _note(self, owner: Any, name: str, alone: Callable[..., Any]) -> None:
         """Remember what the step asks of this method, for doing it again `alone`."""

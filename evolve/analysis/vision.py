@@ -61,7 +61,9 @@ def seen_and_perfect(eyes: sim.Eyes, task: str, world: WorldConfig | None = None
         built, states = worlds.simulation.world, worlds.state
     finally:
         worlds.close()
-    seen, sharp = (sim.BatchedRenderer(built, e, SCENES, RAYS).signals(states) for e in (eyes, perfect))
+    seen, sharp = (
+        sim.BatchedRenderer(built, e, SCENES, sim.Fidelity(RAYS, e.bands)).signals(states) for e in (eyes, perfect)
+    )
     return np.asarray(seen), np.asarray(sharp)
 
 

@@ -20,6 +20,7 @@ from evolve.genome import anatomy
 from evolve.genome.genes import CLUSTERS, GENES, INHERITED, Gene, GeneConfig
 from evolve.genome.interval import Interval
 from optics.spectra.receptors import RECEPTORS
+from sim.worlds.catalog import TASKS
 
 __all__ = [
     "SECTIONS",
@@ -33,14 +34,6 @@ __all__ = [
     "SearchConfig",
     "WorldConfig",
 ]
-
-TASKS: Mapping[str, str] = {
-    "navigation": "get as far as possible through a maze of striped corridors",
-    "detection": "reach the goal sphere, avoid two adversaries that differ in stripe orientation only",
-    "tracking": "detection with goal and adversaries that move",
-    "foraging": "reach the goal sphere, avoid an adversary that differs below 400 nm only",
-}
-
 
 LEAST_EXPOSURE = 2e-4  # [lx s]: of some 30 photons from white at a = 1; of few, noise is not what it is taken for
 

@@ -7,7 +7,6 @@ import time
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,6 +18,8 @@ from evolve.learning.policy import Brain, TrainingDiverged, save_policy
 from evolve.learning.ppo import Episodes, Progress, Training, Worlds, play, train
 from evolve.learning.training_stage import TrainingStage
 from evolve.store.evaluation import Evaluation
+from sim.envs.assembly import prepared_scene, vec_env_in
+from sim.render.fidelity import fidelity_for
 
 __all__ = ["evaluate"]
 
@@ -89,23 +90,19 @@ def _live(
     the same for all of a run, and of all runs."""
     weights, worlds, evaluation = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     eyes = phenotype.eyes(config.eye)
-    common: dict[str, Any] = {"eyes": eyes, "memory": phenotype.memory_frames}
-    closely: dict[str, Any] = {"rays_per_receptor": config.eye.rays_per_receptor}
-    evaluation_worlds = sim.make_vec_env(
-        config.task,
-        n_envs=config.evaluation.episodes,
-        seed=evaluation,
-        mode="evaluation",
-        **{**common, **closely, **config.world.evaluation},
+    scene = prepared_scene(config.task, eyes, **config.world.evaluation)
+    fidelity = fidelity_for(scene, config.eye.rays_per_receptor)
+    evaluation_worlds = vec_env_in(
+        scene, fidelity, config.evaluation.episodes, evaluation, memory=phenotype.memory_frames, mode="evaluation"
     )
-    coarse = _coarser(evaluation_worlds.renderer.fidelity, eyes, config.learning.rays_per_eye)
-    coarsely: dict[str, Any] = {"rays_per_receptor": coarse}
     training_worlds = sim.make_vec_env(
         config.task,
-        n_envs=config.learning.n_envs,
-        seed=worlds,
-        mode="training",
-        **{**common, **coarsely, **config.world.training},
+        eyes,
+        config.learning.n_envs,
+        worlds,
+        memory=phenotype.memory_frames,
+        fidelity=_coarser(fidelity, eyes, config.learning.rays_per_eye),
+        **config.world.training,
     )
     with closing(training_worlds), closing(evaluation_worlds):
         brain = Brain(phenotype.neurons, phenotype.layers)

@@ -1,6 +1,7 @@
 """Environments: worlds, tasks and eyes put together.
 
-vec_env                make_vec_env, EyesVecEnv: stable-baselines3
+assembly               make_vec_env: world, task, physics and eyes put together
+vec_env                EyesVecEnv: stable-baselines3
 env                    make_env, EyesEnv: Gymnasium
 registration           Gymnasium's ids
 simulation             worlds in motion, unseen

@@ -7,8 +7,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from sim.envs.assembly import make_vec_env
 from sim.envs.follow_camera import RENDER_MODES
-from sim.envs.vec_env import make_vec_env
 from sim.eyes.eyes import Eyes
 from sim.worlds.state import WorldState
 
@@ -16,7 +16,8 @@ from sim.worlds.state import WorldState
 class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     """One agent with eyes in one world. Spaces, rewards, endings and `info` are in docs/tasks.md.
 
-    task, eyes, memory, mode, rays_per_receptor, world_seed, spectra, render_mode as in `sim.make_vec_env`
+    task, eyes, memory, mode, rays_per_receptor, fidelity, world_seed, mazes, spectra, render_mode: as in
+        `sim.make_vec_env`
 
     Raises:
         ValueError: a bad argument.

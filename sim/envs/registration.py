@@ -1,4 +1,4 @@
-"""Gymnasium ids: `gymnasium.make("rhabdom/Detection-v0")`, Foraging-v0, Navigation-v0, Tracking-v0.
+"""Gymnasium ids, one for each task: `gymnasium.make("rhabdom/Detection-v0")`.
 
 `import sim` registers them.
 """
@@ -7,13 +7,9 @@ from __future__ import annotations
 
 import gymnasium
 
-# Spelled out rather than taken from sim.worlds.world, which would load MuJoCo whenever Gymnasium is imported.
-IDS = {
-    "rhabdom/Detection-v0": "detection",
-    "rhabdom/Foraging-v0": "foraging",
-    "rhabdom/Navigation-v0": "navigation",
-    "rhabdom/Tracking-v0": "tracking",
-}
+from sim.worlds.catalog import TASKS
+
+IDS = {f"rhabdom/{task.capitalize()}-v0": task for task in TASKS}
 
 
 def register() -> None:

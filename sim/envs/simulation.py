@@ -9,13 +9,13 @@ import numpy as np
 from sim.envs.observation import STANDING
 from sim.physics.physics import Agents, Motion, Physics
 from sim.tasks.random_streams import Streams
-from sim.tasks.reward import MODES, TERMS, reward_terms
+from sim.tasks.reward import MODES, TERMS, check_mode, reward_terms
 from sim.tasks.task import respawned, task_of
 from sim.worlds.state import WorldState, wrap_angle
 from sim.worlds.world import MAX_SPEED, World
 
-EPISODE_STEPS = 256  # actions, then the episode is truncated
-MAX_TURN = np.pi / 4  # [rad] change of heading per action
+EPISODE_STEPS = 256  # actions, then the episode is truncated; as published
+MAX_TURN = np.pi / 4  # [rad] change of heading per action; chosen
 
 UNSTABLE = "unstable physics"
 NO_ACTION = "action is not finite"
@@ -95,8 +95,7 @@ class Simulation:
     """
 
     def __init__(self, world: World, n: int, seed: int | None, mode: str, threads: int) -> None:
-        if mode not in MODES:
-            raise ValueError(f"mode = {mode!r}: must be one of {', '.join(map(repr, MODES))}")
+        check_mode(mode)
         if n < 1:
             raise ValueError(f"n_envs = {n!r}: must be at least 1")
         self.world, self.n, self.mode = world, n, mode

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
+
+from optics.numerics.autodiff import Array
 
 
 @dataclass(frozen=True)
@@ -35,10 +36,10 @@ class DepthLayers:
     def distances(self) -> tuple[float, ...]:
         """[m], farthest first, (layer,)."""
         far, near = 1 / self.farthest, 1 / self.nearest
-        bounce_samples = [i / (self.count - 1) for i in range(self.count)] if self.count > 1 else [0.5]
-        return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in bounce_samples)
+        places = [i / (self.count - 1) for i in range(self.count)] if self.count > 1 else [0.5]
+        return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in places)
 
-    def shares(self, vergence: Any) -> list[Any]:
+    def shares(self, vergence: Array) -> list[Array]:
         """Share of each layer in light from 1/z [1/m], Dr.Jit arrays; they sum to 1."""
         if self.count == 1:
             return [1.0]

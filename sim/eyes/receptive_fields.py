@@ -12,7 +12,8 @@ import numpy as np
 import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 
-# Cells across the eye, at least, on which receptive fields are tabulated.
+# Chosen: cells across the eye, at least, on which receptive fields are tabulated (validation/C1_receptive_fields.py
+# says what of the error is this).
 MIN_CELLS = 32
 
 
@@ -110,7 +111,7 @@ def cells_per_receptor(resolution: tuple[int, int]) -> int:
     return max(4, -(-MIN_CELLS // max(resolution)))
 
 
-def fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
+def receptive_fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
     """The fields of an eye on cells as fine as its PSF can be had on.
 
     Raises:

@@ -15,10 +15,18 @@ import scipy.sparse
 
 import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
-from sim.eyes.receptive_fields import Draw, NoRaysError, ReceptiveFields, bounce_samples, fields_of, low_discrepancy
+from sim.eyes.receptive_fields import (
+    Draw,
+    NoRaysError,
+    ReceptiveFields,
+    bounce_samples,
+    low_discrepancy,
+    receptive_fields_of,
+)
 from sim.eyes.receptor_sums import ReceptorSums, RowProduct, of_bands, of_components, of_receptors, within_stretches
 
-# Weights that together change no signal by more than this share of the receptors' noise are left out.
+# Chosen: weights that together change no signal by more than this share of the receptors' noise are left out; beside
+# it, that makes √(1 + 0.1²) = 1.005 of it.
 NEGLIGIBLE = 0.1
 
 
@@ -28,7 +36,7 @@ class BoxSensor:
 
     directions: unit vectors in the eye's frame (x right, y up, z optical axis), (ray, 3) float32; ray = receptor *
         rays_per_receptor + sample
-    places: of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
+    bounce_samples: of each ray, on the unit square: which way light that bounces goes on, (ray, 2) float32
     rays_per_receptor: samples of one receptor; the renderer sums them in its kernel
     depth: nothing is blurred, whatever its distance
     """
@@ -42,7 +50,7 @@ class BoxSensor:
         """Mean radiance of each receptor from the sums over its rays: (band, view, receptor), both ways."""
         return sums * np.float32(1.0 / self.rays_per_receptor)
 
-    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
+    def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Signals from sums of components over receptors' rays, see sim.eyes.receptor_sums."""
         return of_receptors(mixing @ basis.T / self.rays_per_receptor)
 
@@ -63,7 +71,7 @@ class ReceptiveFieldSensor:
     NEGLIGIBLE of the receptors' noise.
 
     directions: unit vectors in the eye's frame, (ray, 3) float32
-    places: of the rays on the unit square, where light that bounces is drawn from, (ray, 2) float32
+    bounce_samples: of each ray, on the unit square: which way light that bounces goes on, (ray, 2) float32
     weights: per plane, a band of a depth layer, sparse (receptor, ray)
     resolution: receptors (height, width)
     depth: the layers
@@ -82,16 +90,16 @@ class ReceptiveFieldSensor:
         layers = np.stack([plane.reshape(len(plane), -1) for plane in planes])
         return layers.reshape(self.depth.count, -1, *layers.shape[1:]).sum(axis=0)
 
-    def readout(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
+    def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Signals from components along rays (layer * component, view, ray), see sim.eyes.receptor_sums."""
         count, k = self.depth.count, len(basis)
         bands = len(self.weights) // count
-        readouts = [self._readout(layer * bands, bands, mixing, basis) for layer in range(count)]
+        sums_of_layers = [self._sums_of_layer(layer * bands, bands, mixing, basis) for layer in range(count)]
         if count == 1:
-            return readouts[0]
-        return lambda light: np.sum([of_layer(light[i * k :][:k]) for i, of_layer in enumerate(readouts)], axis=0)
+            return sums_of_layers[0]
+        return lambda light: np.sum([of_layer(light[i * k :][:k]) for i, of_layer in enumerate(sums_of_layers)], axis=0)
 
-    def _readout(self, first: int, bands: int, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
+    def _sums_of_layer(self, first: int, bands: int, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         planes = slice(first, first + bands)
         if len(mixing) * len(basis) > bands:
             return of_bands(self._products[planes], mixing, basis)
@@ -112,7 +120,7 @@ Sensor = BoxSensor | ReceptiveFieldSensor
 
 @dataclass(frozen=True)
 class Trial:
-    """Some receptors of a sensor that need not be built: directions (ray, 3) and places (ray, 2) of rays, weights
+    """Some receptors of a sensor that need not be built: directions (ray, 3), bounce samples (ray, 2) and weights
     (layer * band, receptor, ray)."""
 
     directions: np.ndarray
@@ -206,7 +214,7 @@ def eye_sampling(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> EyeSampling:
     Raises:
         optics.AccuracyError: a pupil whose light spreads too far to be computed.
     """
-    return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, fields_of(eye, depth), depth)
+    return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, receptive_fields_of(eye, depth), depth)
 
 
 def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers = ONE_PSF) -> Sensor:

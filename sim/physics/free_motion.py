@@ -72,7 +72,7 @@ class FreeMotion:
         return obeys
 
 
-def glide_of(model: mujoco.MjModel, agent: int, run: FreeSteps, strongest: float) -> FreeMotion | None:
+def free_motion_of(model: mujoco.MjModel, agent: int, run: FreeSteps, strongest: float) -> FreeMotion | None:
     """What `model` does to the body `agent` away from everything; None where that is not linear, or where something
     it can touch moves or has no end."""
     obstacles = _obstacles(model, agent)
@@ -86,11 +86,11 @@ def glide_of(model: mujoco.MjModel, agent: int, run: FreeSteps, strongest: float
     reach = float((np.linalg.norm(model.geom_pos[geoms], axis=1) + model.geom_rbound[geoms]).max())
     ids, lower, upper, their_margin = obstacles
     margin = model.geom_margin[geoms].max() + model.geom_gap[geoms].max() + their_margin
-    glide = FreeMotion(response, ids, lower, upper, reach + float(margin), strongest)
+    motion = FreeMotion(response, ids, lower, upper, reach + float(margin), strongest)
     actual = run(*trial)
-    path, velocity = glide(*trial[:2])
+    path, velocity = motion(*trial[:2])
     linear = np.abs(path - actual[0]).max() < ROUNDING and np.abs(velocity - actual[1][:, -1]).max() < ROUNDING
-    return glide if linear else None
+    return motion if linear else None
 
 
 def _obstacles(model: mujoco.MjModel, agent: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:

@@ -2,8 +2,8 @@
 
 The agent is a heavy body on two slide joints driven by velocity actuators; its heading is set, not simulated.
 Objects are mocap bodies that collide with nothing, so that physics need not know where they are. Agents that surely
-touch nothing during the action glide (`sim.physics.free_motion`); the others are MuJoCo's, among the few geoms that
-they could touch (`sim.physics.local_contacts`).
+touch nothing during the action move in closed form (`sim.physics.free_motion`); the others are MuJoCo's, among the few
+geoms that they could touch (`sim.physics.local_contacts`).
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from sim.physics.free_motion import glide_of
-from sim.physics.local_contacts import vicinity_of
+from sim.physics.free_motion import free_motion_of
+from sim.physics.local_contacts import local_contacts_of
 from sim.physics.mujoco_batch import BatchedStep
 from sim.worlds.state import WorldState
 from sim.worlds.world import MAX_SPEED, World
 
-SUBSTEPS = 10  # of the model's timestep per action
+SUBSTEPS = 10  # of the model's timestep per action, as published
 UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s]: no actuator can do that
 FEW_GEOMS = 200  # so few are sooner gone through one by one than by MuJoCo's tree of boxes
 
@@ -61,17 +61,18 @@ class Physics:
     """Batched physics of one world's model.
 
     threads: of MuJoCo's batched step, see `sim.physics.mujoco_batch`
-    gliding: whether agents out of reach of everything move in closed form, and those near something among that alone
-        (`.glide`, `.vicinity`: how, None where they cannot); otherwise everything is MuJoCo's, in the whole world
+    closed_form: whether agents out of reach of everything move in closed form, and those near something among that
+        alone (`.free_motion`, `.local_contacts`: how, None where they cannot); otherwise everything is MuJoCo's, in the
+        whole world
 
     Raises:
         ValueError: a model without the agent's joints, actuators and touch sensor, and for objects that could collide.
     """
 
-    def __init__(self, world: World, threads: int, gliding: bool = True) -> None:
+    def __init__(self, world: World, threads: int, closed_form: bool = True) -> None:
         model = _without_detours(world.model)
         self._model = model
-        self._rollouts = BatchedStep(model, threads)
+        self._step_batch = BatchedStep(model, threads)
         self._columns = _Columns.of(model)
         self._actuators = [_actuator(model, joint) for joint in ("agent_x", "agent_y")]
         self._touch = _touch_columns(model)
@@ -80,16 +81,16 @@ class Physics:
         mujoco.mj_getState(model, mujoco.MjData(model), self._start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         self.seconds = SUBSTEPS * model.opt.timestep
         agent = int(model.jnt_bodyid[_joint(model, "agent_x")])
-        self.glide = glide_of(model, agent, self._untouched, MAX_SPEED) if gliding else None
-        self.vicinity = vicinity_of(world, model, self.glide, threads)
+        self.free_motion = free_motion_of(model, agent, self._untouched, MAX_SPEED) if closed_form else None
+        self.local_contacts = local_contacts_of(world, model, self.free_motion, threads)
 
     def step(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
         """One action: SUBSTEPS with the commanded velocity [m/s] (n, 2) held."""
-        if self.glide is None:
+        if self.free_motion is None:
             return self._simulate(agents, velocity)
-        path, speed = self.glide(agents.velocity, velocity)
-        met = self.glide.met(agents.position, path)
-        free = ~met.any(axis=1) & self.glide.obeys(velocity)
+        path, speed = self.free_motion(agents.velocity, velocity)
+        met = self.free_motion.met(agents.position, path)
+        free = ~met.any(axis=1) & self.free_motion.obeys(velocity)
         # False for NaN, too: MuJoCo tells what it makes of that.
         free &= (np.abs(agents.velocity) < UNSTABLE_SPEED).all(axis=-1)
         n = len(velocity)
@@ -102,11 +103,11 @@ class Physics:
     def _near(self, agents: Agents | WorldState, velocity: np.ndarray, met: np.ndarray) -> Motion:
         """Of agents that may touch something, each among what it may meet. Where that is too much, where something
         turns it aside to where it could meet more, and where it breaks down, it is done again in the whole world."""
-        if self.vicinity is None:
+        if self.local_contacts is None:
             return self._simulate(agents, velocity)
-        few = self.vicinity.few(met)
-        motion = self._motion(agents.position, *self.vicinity.roll(few, *self._start_of(agents, velocity)))
-        strayed = self.vicinity.strayed(agents.position, motion.path - agents.position[:, None], few)
+        few = self.local_contacts.few(met)
+        motion = self._motion(agents.position, *self.local_contacts.step(few, *self._start_of(agents, velocity)))
+        strayed = self.local_contacts.strayed(agents.position, motion.path - agents.position[:, None], few)
         again = np.flatnonzero(strayed | motion.unstable)
         if len(again):
             motion.put(again, self._simulate(agents.take(again), velocity[again]))
@@ -115,7 +116,7 @@ class Physics:
     def _simulate(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
         """MuJoCo's step, in the whole world."""
         models = [self._model] * len(velocity)
-        return self._motion(agents.position, *self._rollouts(models, *self._start_of(agents, velocity)))
+        return self._motion(agents.position, *self._step_batch(models, *self._start_of(agents, velocity)))
 
     def _start_of(self, agents: Agents | WorldState, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """MuJoCo's states (n, ...), and controls (n, substep, nu) that hold a commanded velocity [m/s] (n, 2)."""
@@ -148,9 +149,9 @@ class Physics:
 
     def close(self) -> None:
         """Stop the thread pool."""
-        self._rollouts.close()
-        if self.vicinity:
-            self.vicinity.close()
+        self._step_batch.close()
+        if self.local_contacts:
+            self.local_contacts.close()
 
     def _motion(self, position: np.ndarray, states: np.ndarray, sensors: np.ndarray) -> Motion:
         path = states[:, :, self._columns.position] + self._columns.origin

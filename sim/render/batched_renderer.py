@@ -16,17 +16,17 @@ import mitsuba as mi
 import numpy as np
 
 import optics
+from optics.numerics.autodiff import Array
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
-from sim.eyes.sensor import eye_sampling
 from sim.render import memory_budget
-from sim.render.band_error import with_band_averaged_lights
-from sim.render.fidelity import Fidelity, chosen
-from sim.render.fidelity_trials import FidelityTrials
+from sim.render.fidelity import Fidelity, chosen_fidelity
 from sim.render.frozen_kernels import aligned, garbage_kept
-from sim.scene.variant import variant
+from sim.render.pending_frame import FrameSlot, PendingFrame
+from sim.render.prepared_scene import PreparedScene
+from sim.scene.variant import MitsubaObject, variant
 from sim.tracing import lighting
-from sim.tracing.static_scene import StaticScene, build_static_scene
-from sim.tracing.tracer import Tracer, Tracers
+from sim.tracing.static_scene import StaticScene
+from sim.tracing.tracer import Tracer
 from sim.worlds.state import WorldState
 from sim.worlds.world import World
 
@@ -39,58 +39,64 @@ class BatchedRenderer:
     world: geometry, materials and lights; shared by all worlds
     eyes: of every agent
     n_envs: number of worlds in a state
-    rays_per_receptor: samples of each receptor (rounded, perfect lens), or per receptor on average (behind a pupil);
-        "auto": as few as the receptors' noise allows in this world, see `sim.choose_fidelity`; or a whole Fidelity. The
-        one in use is in `.fidelity`
-    brightest: signal of a white surface that faced all lights at once
+    fidelity: how finely, with its own number of bands: `Fidelity(4, bands=4)` traces 4 rays for each receptor; None:
+        `choose_fidelity(world, eyes, bands="own")`, as finely as the receptors' noise asks for. The one in use is in
+        `.fidelity`
     tracer: "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto"; the one in
         use is in `.tracer.name`, why in `.tracer.why`
+    brightest: signal of a white surface that faced all lights at once
 
     Raises:
-        ValueError: less than one world or ray, for more rays than there is memory for, for lights other than
-            directional ones, and for a world that has no closed form where that is asked for.
+        ValueError: less than one world, more rays than there is memory for, lights other than directional ones, and a
+            world that has no closed form where that is asked for.
     """
 
     def __init__(
-        self,
-        world: World,
-        eyes: Eyes,
-        n_envs: int,
-        rays_per_receptor: float | str | Fidelity = "auto",
-        tracer: str = "auto",
+        self, world: World, eyes: Eyes, n_envs: int, fidelity: Fidelity | None = None, tracer: str = "auto"
     ) -> None:
-        asked = _asked(rays_per_receptor, eyes)
-        self.world, self.eyes = world, eyes if asked is None else replace(eyes, bands=asked.bands)
-        self.eye = self.eyes.eye()
-        self.bands: optics.SpectralBands = self.eye.spectral_bands
-        self._stage = build_static_scene(with_band_averaged_lights(world, self.eye))
-        tracers = Tracers(world, self._stage, self.bands.wavelengths, tracer)
-        with variant(self._stage.variant):
-            white = lighting.white_radiance(self._stage.scene, self.bands.wavelengths)
-        if asked is None:
-            self.fidelity, sampling = chosen(
-                FidelityTrials(world, self._stage, tracers, eyes, self.eye), eyes, self.eye
-            )
-        else:
-            self.fidelity, sampling = asked, eye_sampling(self.eye, asked.depth)
-        self.tracer: Tracer = tracers.of(self.fidelity.light)
-        self._check_room(n_envs)
-        self.sensor = sampling.sensor(self.fidelity.rays_per_receptor)
+        if fidelity is not None and not isinstance(fidelity, Fidelity):
+            raise ValueError(f"fidelity = {fidelity!r}: must be a sim.Fidelity, such as Fidelity(4, bands=4), or None")
+        scene = PreparedScene(world, eyes if fidelity is None else replace(eyes, bands=fidelity.bands), tracer)
+        self._open(scene, n_envs, fidelity or chosen_fidelity(scene))
+
+    @classmethod
+    def of(cls, scene: PreparedScene, n_envs: int, fidelity: Fidelity) -> BatchedRenderer:
+        """The renderer of a scene that has been prepared.
+
+        Raises:
+            ValueError: as the constructor, and a fidelity for another number of bands than the scene's.
+        """
+        renderer = cls.__new__(cls)
+        renderer._open(scene, n_envs, fidelity)
+        return renderer
+
+    def _open(self, scene: PreparedScene, n_envs: int, fidelity: Fidelity) -> None:
+        if fidelity.bands != scene.eyes.bands:
+            raise ValueError(f"fidelity.bands = {fidelity.bands}: must be the scene's {scene.eyes.bands}")
+        self.world, self.eyes, self.eye = scene.world, scene.eyes, scene.eye
+        self.bands: optics.SpectralBands = scene.bands
+        self._static = scene.static
+        with variant(self._static.variant):
+            white = lighting.white_radiance(self._static.scene, self.bands.wavelengths)
+        self.fidelity, sampling = fidelity, scene.sampling(fidelity.depth)
+        self.tracer: Tracer = scene.tracers.of(fidelity.light)
+        self._check_memory(n_envs)
+        self.sensor = sampling.sensor(fidelity.rays_per_receptor)
         if self.eye.pupil is None:  # a whole number of its own for every receptor
-            self.fidelity = replace(self.fidelity, rays_per_receptor=float(self.sensor.rays_per_receptor))
+            self.fidelity = replace(fidelity, rays_per_receptor=float(self.sensor.rays_per_receptor))
         mixing = self.eye.throughput * self.bands.weights
         self.brightest = float((mixing @ white).max())
-        self._readout = self.sensor.readout(mixing, self.tracer.basis)
+        self._receptor_sums = self.sensor.receptor_sums(mixing, self.tracer.basis)
         self._set_width(n_envs)
 
     def resized(self, n_envs: int) -> BatchedRenderer:
         """The same eyes and scene for another number of worlds; the scene is shared, not loaded again."""
         other = copy.copy(self)
-        other._check_room(n_envs)
+        other._check_memory(n_envs)
         other._set_width(n_envs)
         return other
 
-    def _check_room(self, n_envs: int) -> None:
+    def _check_memory(self, n_envs: int) -> None:
         if n_envs < 1:
             raise ValueError(f"n_envs = {n_envs!r}: must be at least 1")
         fidelity, layers = self.fidelity, self.fidelity.depth.count
@@ -108,9 +114,8 @@ class BatchedRenderer:
 
     def _set_width(self, n_envs: int) -> None:
         self.n_envs = n_envs
-        stage = self._stage
-        self._poses = _PoseBuffer(n_envs, len(stage.spheres))
-        with variant(self._stage.variant):
+        self._poses, self._slot = _PoseBuffer(n_envs, len(self._static.spheres)), FrameSlot()
+        with variant(self._static.variant):
             self._inputs = {
                 "directions": mi.Float(_in_agent_frame(self.eyes, self.sensor.directions)),
                 "origins": mi.Float(_in_fours(eye_positions(self.eyes.azimuths()), 0.0)),
@@ -144,17 +149,15 @@ class BatchedRenderer:
     def signals(self, state: WorldState) -> np.ndarray:
         """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
         a² sum_b weights[channel, b] radiance_b."""
-        return self.begin(state)()
+        return self.begin(state).wait()
 
-    def begin(self, state: WorldState) -> Callable[[], np.ndarray]:
-        """Start looking; it runs beside whatever comes next. A call of what is returned waits for the signals, and has
-        to come before the next look."""
-        light = self._launch(self._sums, state)
-        return lambda: self._signals(_waited_for(light))
+    def begin(self, state: WorldState) -> PendingFrame:
+        """Begin to see; it runs beside whatever comes next, until the signals are waited for."""
+        return self._launched(self._sums, state).then(self._signals)
 
     def _signals(self, light: np.ndarray) -> np.ndarray:
         planes = self.sensor.depth.count * len(self.tracer.basis)
-        signals = self._readout(light.reshape(planes, self.n_envs * self.eyes.n_eyes, -1))
+        signals = self._receptor_sums(light.reshape(planes, self.n_envs * self.eyes.n_eyes, -1))
         signals = signals.reshape(self.n_envs, self.eyes.n_eyes, len(self.bands.weights), *self.eye.resolution)
         mosaic = self.eye.mosaic
         return signals if mosaic is None else np.take_along_axis(signals, mosaic[None, None, None], axis=2)
@@ -166,32 +169,27 @@ class BatchedRenderer:
 
     def _components(self, frozen: Any, state: WorldState) -> np.ndarray:
         """(layer, component, all rays of all views, or their sums)"""
-        light = _waited_for(self._launch(frozen, state))
+        light = self._launched(frozen, state).wait()
         return light.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)
 
-    def _launch(self, frozen: Any, state: WorldState) -> Any:
-        """The kernel at work on this state; its poses are in a buffer that must not be written before it is done."""
+    def _launched(self, frozen: Any, state: WorldState) -> PendingFrame:
+        """The kernel at work on this state."""
         if state.n != self.n_envs:
             raise ValueError(f"state has {state.n} worlds, this renderer was built for n_envs = {self.n_envs}")
-        with variant(self._stage.variant), garbage_kept():
-            poses = mi.Float(self._poses.pack(state, self._stage))  # shares the buffer's memory
-            return frozen(self.tracer.scene, poses, self._inputs)
+
+        def launch() -> Callable[[], np.ndarray]:
+            with variant(self._static.variant), garbage_kept():
+                poses = mi.Float(self._poses.pack(state, self._static))  # shares the buffer's memory
+                light = frozen(self.tracer.scene, poses, self._inputs)
+            return lambda: _read(light)
+
+        return self._slot.begin(launch)
 
 
-def _waited_for(light: Any) -> np.ndarray:
+def _read(light: Array) -> np.ndarray:
+    """Waits for the kernel."""
     with garbage_kept():
         return np.array(light.numpy())
-
-
-def _asked(rays_per_receptor: float | str | Fidelity, eyes: Eyes) -> Fidelity | None:
-    """What was asked for; None: to be chosen."""
-    if isinstance(rays_per_receptor, Fidelity):
-        return rays_per_receptor
-    if isinstance(rays_per_receptor, str):
-        if rays_per_receptor != "auto":
-            raise ValueError(f"rays_per_receptor = {rays_per_receptor!r}: must be positive, or 'auto'")
-        return None
-    return Fidelity(rays_per_receptor, eyes.bands)
 
 
 class _PoseBuffer:
@@ -203,12 +201,12 @@ class _PoseBuffer:
         self.stride = -(-4 * (1 + n_spheres) // ROW) * ROW
         self._rows = aligned(n_envs * self.stride, np.float32).reshape(n_envs, self.stride)
 
-    def pack(self, state: WorldState, stage: StaticScene) -> np.ndarray:
+    def pack(self, state: WorldState, static: StaticScene) -> np.ndarray:
         rows = self._rows
         rows[:, :2] = state.position
         rows[:, 2], rows[:, 3] = np.cos(state.heading), np.sin(state.heading)
         places = rows[:, 4 : 4 * (1 + self.n_spheres)].reshape(len(rows), self.n_spheres, 4)
-        places[..., :3] = state.objects + stage.spheres.offsets
+        places[..., :3] = state.objects + static.spheres.offsets
         return rows.reshape(-1)
 
 
@@ -223,15 +221,15 @@ class _Wavefront:
         self.n_spheres = renderer._poses.n_spheres
         self.tracer, self.depth = renderer.tracer, renderer.sensor.depth
 
-    def __call__(self, scene: Any, poses: Any, inputs: dict[str, Any], reduced: int) -> Any:
+    def __call__(self, scene: MitsubaObject, poses: Array, inputs: dict[str, Array], reduced: int) -> Array:
         lane = inputs["lanes"]
         view = lane // self.n_rays
         world = view // self.n_eyes
         sample = lane - view * self.n_rays
         ray, cosine, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, sample)
         bounces = self.tracer.light == lighting.BOUNCE
-        place = dr.gather(mi.Point2f, inputs["bounce_samples"], sample) if bounces else None
-        components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs, place)
+        bounce_sample = dr.gather(mi.Point2f, inputs["bounce_samples"], sample) if bounces else None
+        components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs, bounce_sample)
         if self.depth.count > 1:
             shares = self.depth.shares(dr.rcp(distance * cosine))
             components = [component * share for share in shares for component in components]
@@ -245,16 +243,16 @@ class _Wavefront:
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
 
     def _ray(
-        self, poses: Any, inputs: dict[str, Any], world: Any, eye: Any, ray: Any
-    ) -> tuple[Any, Any, Any, list[Any]]:
+        self, poses: Array, inputs: dict[str, Array], world: Array, eye: Array, ray: Array
+    ) -> tuple[Array, Array, Array, list[Array]]:
         """The lane's ray, its cosine with the eye's axis, and the centres of the agent and of its world's spheres."""
 
-        def row(name: str, index: Any) -> Any:
+        def row(name: str, index: Array) -> Array:
             return dr.gather(mi.Vector4f, inputs[name] if name else poses, index)
 
         x, y, cos, sin = row("", world * (self.stride // 4))
 
-        def turned(v: Any) -> Any:
+        def turned(v: Array) -> Array:
             return mi.Vector3f(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
 
         agent = mi.Point3f(x, y, EYE_HEIGHT)

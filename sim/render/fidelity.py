@@ -16,25 +16,28 @@ import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.eyes.receptive_fields import NoRaysError
-from sim.eyes.sensor import EyeSampling, eye_sampling
-from sim.render.band_error import band_error, measured, with_band_averaged_lights
+from sim.eyes.sensor import EyeSampling
+from sim.render.band_error import band_error, measured
 from sim.render.fidelity_trials import FidelityTrials
+from sim.render.prepared_scene import PreparedScene
 from sim.tracing.lighting import BOUNCE, DIRECT, LEVELS
-from sim.tracing.static_scene import build_static_scene
-from sim.tracing.tracer import Tracers
 from sim.worlds.world import World
 
+# Errors beside noise add up as squares: half of it makes √(1 + 1/4) = 1.12 of it.
 SHARE_OF_NOISE = 0.5
-# Errors of less than this share of white's signal never cost rays, however little noise there is.
+# Chosen: errors of less than this share of white's signal never cost rays, however little noise there is.
 LEAST_TOLERANCE = 5e-3
-CAUTION = 1.2  # of an error seen in a few glimpses
-PERFECT_LENS_RUNGS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
-PUPIL_RUNGS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
-# Of the tolerance; errors add up as squares, so at least 0.7 of it is left to the rays.
+# Chosen: times an error that a few random views have; what agents live through has another
+# (tests/sim/render/test_fidelity.py holds that against the noise).
+CAUTION = 1.2
+# Numbers of rays that are tried: steps of about √2, so that hardly more are traced than are needed.
+PERFECT_LENS_RAYS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
+PUPIL_RAYS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
+# Chosen, of the tolerance; errors add up as squares, so that √(1 - 2 · 0.35² - 0.5²) = 0.71 of it is left to the rays.
 SHARE_OF_DEPTH = SHARE_OF_BANDS = 0.35
 SHARE_OF_LIGHT = 0.5
 LAYERS = (1, 3, 5, 9)  # nodes of each are among those of the next
-NEAREST = 0.005  # quantile of the distances that counts as the nearest
+NEAREST = 0.005  # chosen: quantile of the distances that counts as the nearest
 
 
 @dataclass(frozen=True)
@@ -104,48 +107,73 @@ class Fidelity:
         return "\n".join("  ".join([*(c.ljust(w) for c, w in zip(r, widths, strict=False)), r[3]]) for r in rows)
 
 
-def choose_fidelity(world: World, eyes: Eyes, tolerance: float | None = None) -> Fidelity:
-    """The cheapest fidelity whose predicted error is within the tolerance, bands included.
+def choose_fidelity(
+    world: World, eyes: Eyes, tolerance: float | None = None, *, bands: str = "auto", tracer: str = "auto"
+) -> Fidelity:
+    """The cheapest fidelity whose predicted error is within the tolerance.
 
     tolerance: of a receptor's signal (root mean square); None: half of the receptors' noise, but no less than
         LEAST_TOLERANCE of what white is worth behind the eyes' pupil.
+    bands: "auto": as few as scenes of any colours want; "own": the eyes' own, as environments have them
+    tracer: by which it is tried, see `sim.BatchedRenderer`
 
     Raises:
-        ValueError: a tolerance that is not positive, and what BatchedRenderer raises for such a world.
+        ValueError: a tolerance that is not positive, unknown bands, and what BatchedRenderer raises for such a world.
     """
+    if bands not in ("auto", "own"):
+        raise ValueError(f"bands = {bands!r}: must be 'auto' or 'own'")
     allowed = _allowed(eyes, eyes.eye(), tolerance)
-    bands, level = _bands(eyes.eye(), SHARE_OF_BANDS * allowed)
-    chosen_eyes = replace(eyes, bands=bands)
-    eye = chosen_eyes.eye()
-    stage = build_static_scene(with_band_averaged_lights(world, eye))
-    tracers = Tracers(world, stage, eye.spectral_bands.wavelengths)
-    fidelity, _ = chosen(FidelityTrials(world, stage, tracers, chosen_eyes, eye), chosen_eyes, eye, allowed)
+    if bands == "own":
+        return chosen_fidelity(PreparedScene(world, eyes, tracer), allowed)
+    n_bands, level = _bands(eyes.eye(), SHARE_OF_BANDS * allowed)
+    fidelity = chosen_fidelity(PreparedScene(world, replace(eyes, bands=n_bands), tracer), allowed)
     return replace(fidelity, levels=(level, *fidelity.levels[1:]))
 
 
-def chosen(
-    pilot: FidelityTrials, eyes: Eyes, eye: optics.Eye, tolerance: float | None = None
-) -> tuple[Fidelity, EyeSampling]:
-    """What `choose_fidelity` gives, with the eyes' own bands, and how the eye is to be sampled."""
+def fidelity_for(scene: PreparedScene, rays_per_receptor: float | str) -> Fidelity:
+    """What these words mean in a scene: so many rays in direct light, or, "auto", what is chosen.
+
+    Raises:
+        ValueError: neither a positive number nor "auto".
+    """
+    return fidelity_asked(rays_per_receptor, scene.eyes) or chosen_fidelity(scene)
+
+
+def fidelity_asked(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity | None:
+    """So many rays in direct light; None where that is left to be chosen, "auto".
+
+    Raises:
+        ValueError: neither a positive number nor "auto".
+    """
+    if not isinstance(rays_per_receptor, str):
+        return Fidelity(rays_per_receptor, eyes.bands)
+    if rays_per_receptor != "auto":
+        raise ValueError(f"rays_per_receptor = {rays_per_receptor!r}: must be positive, or 'auto'")
+    return None
+
+
+def chosen_fidelity(scene: PreparedScene, tolerance: float | None = None) -> Fidelity:
+    """What `choose_fidelity` gives for a scene that has been prepared, with the bands that it has."""
+    eyes, eye, trials = scene.eyes, scene.eye, FidelityTrials(scene)
     allowed = _allowed(eyes, eye, tolerance)
-    depth, depth_level = _depth(pilot, eye, SHARE_OF_DEPTH * allowed)
-    sampling = eye_sampling(eye, depth)
-    light_level = _light(pilot, sampling, SHARE_OF_LIGHT * allowed)
+    depth, depth_level = _depth(trials, eye, SHARE_OF_DEPTH * allowed)
+    sampling = scene.sampling(depth)
+    light_level = _light(trials, sampling, SHARE_OF_LIGHT * allowed)
     spent = (
         SHARE_OF_DEPTH**2 + SHARE_OF_BANDS**2 + min((light_level.predicted_error or 0) / allowed, SHARE_OF_LIGHT) ** 2
     )
-    rungs = PERFECT_LENS_RUNGS if eye.pupil is None else PUPIL_RUNGS
-    errors = pilot.errors(sampling, light_level.level)
-    rays, rays_level = _fewest(errors, rungs, allowed * math.sqrt(1 - spent))
-    levels = _own_bands(pilot.world, eye), depth_level, light_level, rays_level
-    return Fidelity(rays, eyes.bands, depth, allowed, levels, light_level.level), sampling
+    numbers = PERFECT_LENS_RAYS if eye.pupil is None else PUPIL_RAYS
+    errors = trials.errors(sampling, light_level.level)
+    rays, rays_level = _fewest(errors, numbers, allowed * math.sqrt(1 - spent))
+    levels = _own_bands(scene.world, eye), depth_level, light_level, rays_level
+    return Fidelity(rays, eyes.bands, depth, allowed, levels, light_level.level)
 
 
-def _light(pilot: FidelityTrials, sampling: EyeSampling, allowed: float) -> Level:
+def _light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Level:
     """Direct light where what is reflected twice is little; else both, and of all that is reflected more often only
     its size is known: as small beside what is reflected twice as that is beside direct light."""
     try:
-        twice, direct = pilot.reflected_twice(sampling)
+        twice, direct = trials.reflected_twice(sampling)
     except ValueError as error:
         return Level("light", DIRECT, None, f"of what is reflected twice nothing is known: {error}")
     if twice <= allowed:
@@ -165,7 +193,7 @@ def _allowed(eyes: Eyes, eye: optics.Eye, tolerance: float | None) -> float:
 
 def _bands(eye: optics.Eye, allowed: float) -> tuple[int, Level]:
     """As few bands as `optics.Eye` wants for scenes of any colour."""
-    within = min(max(allowed / eye.throughput, 1e-6), 0.5)
+    within = min(max(allowed / eye.throughput, 1e-6), 0.5)  # what an Eye takes as its tolerance
     try:
         bands = int(replace(eye, bands="auto", tolerance=within).bands)
     except optics.AccuracyError as error:
@@ -181,8 +209,8 @@ def _own_bands(world: World, eye: optics.Eye) -> Level:
     return Level("bands", f"{eye.bands}", error, "the eyes' own; error: of measured reflectances in daylight")
 
 
-def _depth(pilot: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
-    """One PSF for infinity where that is certainly enough, else as few layers as glimpses of the world want.
+def _depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
+    """One PSF for infinity where that is certainly enough, else as few layers as random views of the world want.
 
     Light through the pupil's point p lands f p/z further off than from infinity. In the mean over a disk of radius R
     that is |Δx| + |Δy| = 8/(3π) f R/z; a square receptor's field moves by as much of its width, and no scene up to
@@ -190,7 +218,7 @@ def _depth(pilot: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
     """
     if eye.pupil is None:
         return ONE_PSF, Level("depth", str(ONE_PSF), 0.0, "a perfect lens blurs nothing")
-    distances = pilot.distances()
+    distances = trials.distances()
     near, far = float(np.quantile(distances, NEAREST, method="higher")), float(distances[-1])
     shift = 8 / (3 * math.pi) * eye.sensor_distance * eye.pupil.radius / near / eye.receptor_pitch
     bound = eye.throughput * shift
@@ -198,7 +226,7 @@ def _depth(pilot: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
         why = f"blur of {shift:.1e} of a receptor at {near:.2g} m, the nearest that is seen"
         return ONE_PSF, Level("depth", str(ONE_PSF), bound, why)
     try:
-        errors = pilot.errors_of_layers(DepthLayers(far, near, LAYERS[-1]), LAYERS)
+        errors = trials.errors_of_layers(DepthLayers(far, near, LAYERS[-1]), LAYERS)
     except optics.AccuracyError as error:
         return DepthLayers(far, near, 1), Level("depth", "one PSF", None, f"at the mean depth: {error}")
     count = next((n for n, e in errors.items() if CAUTION * e <= allowed), LAYERS[-1])
@@ -207,19 +235,20 @@ def _depth(pilot: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
     return layers, Level("depth", str(layers), CAUTION * errors[count], why)
 
 
-def _fewest(error: Callable[[float], float], rungs: tuple[float, ...], allowed: float) -> tuple[float, Level]:
-    """The lowest rung whose error fits. Errors fall no faster than 1/n: rungs below that are left out."""
+def _fewest(error: Callable[[float], float], numbers: tuple[float, ...], allowed: float) -> tuple[float, Level]:
+    """The lowest of these numbers of rays whose error fits. Errors fall no faster than 1/n: numbers that
+    could not do by that are left out."""
     at, tried = 0, 0
     while True:
         tried += 1
         try:
-            predicted = CAUTION * error(rungs[at])
+            predicted = CAUTION * error(numbers[at])
         except NoRaysError:
             predicted = math.inf
-        if predicted <= allowed or at == len(rungs) - 1:
+        if predicted <= allowed or at == len(numbers) - 1:
             break
-        least = rungs[at] * (predicted / allowed if math.isfinite(predicted) else 1)
-        at = next((i for i in range(at + 1, len(rungs)) if rungs[i] >= least), len(rungs) - 1)
+        least = numbers[at] * (predicted / allowed if math.isfinite(predicted) else 1)
+        at = next((i for i in range(at + 1, len(numbers)) if numbers[i] >= least), len(numbers) - 1)
     found = "fewest of" if predicted <= allowed else "not enough, but the most of"
-    why = f"{found} {rungs[0]:g} ... {rungs[-1]:g} for {allowed:.1e}, {tried} tried"
-    return rungs[at], Level("rays", f"{rungs[at]:g} per receptor", predicted, why)
+    why = f"{found} {numbers[0]:g} ... {numbers[-1]:g} for {allowed:.1e}, {tried} tried"
+    return numbers[at], Level("rays", f"{numbers[at]:g} per receptor", predicted, why)

@@ -1,4 +1,4 @@
-"""A few glimpses of a world, on which numbers of rays are tried before any kernel is recorded.
+"""A few random views of a world, on which numbers of rays are tried before any kernel is recorded.
 
 A trial looks through some of an eye's receptors, at random places and headings of a world, and compares what it sees
 with what many times as many rays see. All is drawn with fixed seeds: the same world and eyes give the same answer.
@@ -8,36 +8,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from optics import Eye
+from optics.numerics.autodiff import Array
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
-from sim.eyes.sensor import BoxSampling, EyeSampling, Trial, eye_sampling
+from sim.eyes.sensor import BoxSampling, EyeSampling, Trial
 from sim.render.frozen_kernels import aligned
+from sim.render.prepared_scene import PreparedScene
 from sim.scene.variant import variant
 from sim.tasks.placement import CLEARANCE
 from sim.tracing import lighting
-from sim.tracing.static_scene import StaticScene
-from sim.tracing.tracer import Tracers
 from sim.worlds.world import World
 
+# Choices: how much a trial may cost, and how much finer than what it tries its truth is.
 RECEPTORS = 24  # looked through, at most
-RAYS = 2**19  # of one trial, at most, unless that leaves too few glimpses
-GLIMPSES = (12, 96)  # at least and at most
+RAYS = 2**19  # of one trial, at most, unless that leaves too few views
+VIEWS = (12, 96)  # of one trial, at least and at most
 FINER = 8  # times as many rays, at least, for what is taken as the truth
 TRUE = 4096  # rays of it, at least, behind a pupil
 WEIGHTS = 2**23  # of it, at most, unless it would not be finer
-STRAY = 0.75  # [m] from a cell's centre, along either axis
+# [m] from a cell's centre, along either axis: less than half a cell without the agent's body, 1 - 0.2.
+STRAY = 0.75
 
 
 @dataclass(frozen=True)
 class RandomViews:
-    """Views of single eyes; first axis: glimpse.
+    """Views of single eyes; first axis: view.
 
     position: of the agent [m], (n, 2) · heading [rad], (n,) · objects: centres [m], (n, k, 3) · eye: which, (n,)
     """
@@ -55,7 +55,7 @@ class RandomViews:
         return len(self.heading)
 
 
-def glimpses(world: World, eyes: Eyes, n: int) -> RandomViews:
+def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
     """Agents about the cells where agents or objects may start, looking anywhere; objects on theirs."""
     rng = np.random.default_rng(0)
     k = len(world.objects)
@@ -80,13 +80,13 @@ def _clear_of(objects: np.ndarray, cells: np.ndarray, rng: np.random.Generator) 
 
 
 class FidelityTrials:
-    """Tries ways of sampling on one world, as these eyes see it; tracers: of the world at the eye's bands."""
+    """Tries ways of sampling in one scene."""
 
-    def __init__(self, world: World, stage: StaticScene, tracers: Tracers, eyes: Eyes, eye: Eye) -> None:
-        self.world = world
-        self._stage, self._tracers, self._eyes, self._eye = stage, tracers, eyes, eye
-        self._views = glimpses(world, eyes, GLIMPSES[1])
-        self._receptors = np.sort(np.random.default_rng(0).permutation(int(np.prod(eyes.resolution)))[:RECEPTORS])
+    def __init__(self, scene: PreparedScene) -> None:
+        self._scene, self._eyes, self._eye = scene, scene.eyes, scene.eye
+        self._views = random_views(scene.world, scene.eyes, VIEWS[1])
+        receptors = np.random.default_rng(0).permutation(int(np.prod(scene.eyes.resolution)))
+        self._receptors = np.sort(receptors[:RECEPTORS])
 
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
         """Root mean square error of the signals with so many rays per receptor.
@@ -129,7 +129,7 @@ class FidelityTrials:
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
         """
-        sampling = eye_sampling(self._eye, finest)
+        sampling = self._scene.sampling(finest)
         trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
         truth = self._signals(trial, finest, lighting.DIRECT)
         nodes = trial.weights.reshape(finest.count, -1, *trial.weights.shape[1:])
@@ -150,19 +150,19 @@ class FidelityTrials:
     def _signals(self, trial: Trial, depth: DepthLayers, light: str, n: int | None = None) -> np.ndarray:
         """(view, channel, receptor), of as many views as the rays allow."""
         rays = len(trial.directions)
-        views = self._views.take(n or int(np.clip(RAYS // rays, *GLIMPSES)))
+        views = self._views.take(n or int(np.clip(RAYS // rays, *VIEWS)))
         components, z = self._trace(views, trial, light)
-        with variant(self._stage.variant):
+        with variant(self._scene.static.variant):
             shared = [np.array(share * c) for share in depth.shares(dr.rcp(z)) for c in components]
         layers = np.reshape(shared, (depth.count, len(components), len(views), rays))
         # signals_c = sum_b mixing[c, b] sum_l sum_k basis[k, b] sum_p W_lb[r, p] light_lk[p]
-        basis = self._tracers.of(light).basis
+        basis = self._scene.tracers.of(light).basis
         factors = self._eye.throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
         planes = trial.weights.reshape(depth.count, -1, *trial.weights.shape[1:])
         weights = np.einsum("ckb,lbrp->clkrp", factors, planes, optimize=True).astype(np.float32)
         return np.einsum("clkrp,lkvp->vcr", weights, layers, optimize=True)
 
-    def _trace(self, views: RandomViews, trial: Trial, light: str) -> tuple[list[Any], Any]:
+    def _trace(self, views: RandomViews, trial: Trial, light: str) -> tuple[list[Array], Array]:
         """Components of light along a trial's rays of each view's eye, and from how far along its axis [m]: Dr.Jit,
         flat (view, ray)."""
         directions, azimuths = trial.directions, self._eyes.azimuths()
@@ -174,19 +174,19 @@ class FidelityTrials:
         world = np.einsum("ijv,vjr->ivr", turn, in_agent)
         agent = np.column_stack([views.position, np.full(len(views), EYE_HEIGHT)])
         start = agent + np.einsum("ijv,vj->vi", turn, origins)
-        rays, tracer = len(directions), self._tracers.of(light)
+        rays, tracer = len(directions), self._scene.tracers.of(light)
 
-        def lanes(points: np.ndarray) -> Any:
+        def lanes(points: np.ndarray) -> Array:
             """The same for all rays of a view."""
             return mi.Point3f([_lanes(np.repeat(column, rays)) for column in points.T])
 
-        with variant(self._stage.variant):
+        with variant(self._scene.static.variant):
             ray = mi.Ray3f(lanes(start), mi.Vector3f([_lanes(d) for d in world]))
             centres = [lanes(views.objects[:, k]) for k in range(views.objects.shape[1])]
-            place = None
+            bounce_sample = None
             if light == lighting.BOUNCE:
-                place = mi.Point2f([_lanes(np.tile(column, len(views))) for column in trial.bounce_samples.T])
-            components, t = tracer.radiance(tracer.scene, ray, lanes(agent), centres, tracer.inputs, place)
+                bounce_sample = mi.Point2f([_lanes(np.tile(column, len(views))) for column in trial.bounce_samples.T])
+            components, t = tracer.radiance(tracer.scene, ray, lanes(agent), centres, tracer.inputs, bounce_sample)
             z = t * _lanes(np.tile(directions[:, 2], len(views)))
             dr.eval(components, z)
             return components, z
@@ -196,7 +196,7 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _lanes(values: np.ndarray) -> Any:
+def _lanes(values: np.ndarray) -> Array:
     """An array of the device's. Aligned, or Dr.Jit would compile the same kernel anew for every alignment."""
     lanes = aligned(values.size, np.float32)
     lanes[:] = values.ravel()

@@ -1,17 +1,15 @@
-"""What all agents' retinas report, noise included: begun early, waited for late, beside other work."""
+"""What the eyes of all agents report, noise included: begun early, waited for late, beside other work."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
 
 from sim.render.batched_renderer import BatchedRenderer
+from sim.render.pending_frame import PendingFrame
 from sim.render.receptor_noise import FEW, NoiseModel, Normals
 from sim.worlds.state import WorldState
-
-Pending = Callable[[], np.ndarray]  # waits for signals (env, eye, channel, height, width) float32
 
 
 class NoisySignals:
@@ -20,6 +18,8 @@ class NoisySignals:
     renderer: of all worlds
     keys: of their noise, (n,) uint64
     spread: largest standard deviation of a signal's noise
+
+    Frames hold signals (env, eye, channel, height, width) float32.
     """
 
     def __init__(self, renderer: BatchedRenderer, keys: np.ndarray) -> None:
@@ -39,25 +39,21 @@ class NoisySignals:
         if self._normals:
             self._normals.restart(keys)
 
-    def begin(self, state: WorldState) -> Pending:
-        """Look at all worlds; to be waited for before the next look at all."""
+    def begin(self, state: WorldState) -> PendingFrame:
+        """Look at all worlds."""
         return self._noisy(self.renderer.begin(state), slice(None), np.arange(state.n))
 
-    def begin_some(self, state: WorldState, worlds: np.ndarray) -> Pending:
-        """Look at these of the worlds alone, perhaps beside a look at all; to be waited for after that one, and before
-        the next look at some."""
+    def begin_some(self, state: WorldState, worlds: np.ndarray) -> PendingFrame:
+        """Look at these of the worlds alone; if they are few, beside a look at all that is under way."""
         if len(worlds) <= FEW < state.n:
             signals = self._few.begin(state.take(np.resize(worlds, FEW)))
             return self._noisy(signals, slice(len(worlds)), worlds)
-        # Kernels and buffers are those of `begin`: this cannot run beside it.
-        return lambda: self._noisy(self.renderer.begin(state), worlds, worlds)()
+        return self._noisy(self.renderer.begin(state), worlds, worlds)
 
-    def _noisy(self, signals: Pending, rows: np.ndarray | slice, worlds: np.ndarray) -> Pending:
+    def _noisy(self, signals: PendingFrame, rows: np.ndarray | slice, worlds: np.ndarray) -> PendingFrame:
         """These rows of the signals, and on them the noise of these worlds."""
-        normals = self._normals.begin(worlds) if self._normals else None
-
-        def wait() -> np.ndarray:
-            seen = signals()[rows]
-            return self._noise(seen, normals.values()) if self._noise and normals else seen
-
-        return wait
+        noise = self._noise
+        if noise is None or self._normals is None:
+            return signals.then(lambda seen: seen[rows])
+        normals = self._normals.begin(worlds)
+        return signals.then(lambda seen: noise(seen[rows], normals.wait()))

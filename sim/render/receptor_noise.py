@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,9 @@ import mitsuba as mi
 import numpy as np
 
 import optics
+from optics.numerics.autodiff import Array
 from sim.render.frozen_kernels import aligned, garbage_kept
+from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.scene.variant import variant
 
 PER_DRAW = 4  # normal numbers from one evaluation of Philox4x32
@@ -39,33 +42,27 @@ class Normals:
         """Draw from the first frame on, under these keys (n,)."""
         self._keys, self._frames = keys, np.zeros(len(keys), np.uint32)
 
-    def begin(self, worlds: np.ndarray) -> Running:
-        """Start drawing the next frame of these worlds; it runs beside whatever comes next, but for more of its kind:
-        wait for one draw of many worlds before the next, and for one of a few."""
+    def begin(self, worlds: np.ndarray) -> PendingFrame:
+        """Begin to draw the next frame of these worlds, (len(worlds), *shape) float32; it runs beside whatever comes
+        next."""
         n = len(self._keys)
         width = FEW if len(worlds) <= FEW < n else n
         if width not in self._kernels:
             self._kernels[width] = _Kernel(width, self._draws)
         padded = np.resize(worlds, width)
-        running = self._kernels[width](self._keys[padded], self._frames[padded])
+        drawn = self._kernels[width].begin(
+            self._keys[padded], self._frames[padded], lambda parts: self._frame(parts, len(worlds))
+        )
         self._frames[worlds] += 1
-        return Running(running, len(worlds), self._shape)
+        return drawn
 
-
-class Running:
-    """A frame that is being drawn."""
-
-    def __init__(self, normals: Any, n: int, shape: tuple[int, ...]) -> None:
-        self._normals, self._n, self._shape = normals, n, shape
-
-    def values(self) -> np.ndarray:
-        """Wait for it: (n, *shape) float32."""
-        drawn = np.empty((self._n, math.prod(self._shape)), np.float32)
-        per_world = -(-drawn.shape[1] // PER_DRAW)
-        for k, part in enumerate(self._normals):
-            mine = drawn[:, k * per_world : (k + 1) * per_world]
-            mine[:] = part.numpy().reshape(-1, per_world)[: self._n, : mine.shape[1]]
-        return drawn.reshape(self._n, *self._shape)
+    def _frame(self, parts: list[Array], n: int) -> np.ndarray:
+        """The first n worlds' numbers, out of the kernel's parts, each flat (world, draw)."""
+        drawn = np.empty((n, math.prod(self._shape)), np.float32)
+        for k, part in enumerate(parts):
+            mine = drawn[:, k * self._draws : (k + 1) * self._draws]
+            mine[:] = part.numpy().reshape(-1, self._draws)[:n, : mine.shape[1]]
+        return drawn.reshape(n, *self._shape)
 
 
 class _Kernel:
@@ -73,12 +70,13 @@ class _Kernel:
 
     def __init__(self, worlds: int, draws: int) -> None:
         self._key_buffer, self._frame_buffer = aligned(worlds, np.uint64), aligned(worlds, np.uint32)
+        self._slot = FrameSlot()
         with variant():
-            index: Any = dr.uint32_array_t(dr.detached_t(mi.Float))
+            index: Array = dr.uint32_array_t(dr.detached_t(mi.Float))
             self._lanes = dr.arange(index, worlds * draws)
             dr.eval(self._lanes)
 
-        def normals(keys: Any, frames: Any, lane: Any) -> Any:
+        def normals(keys: Array, frames: Array, lane: Array) -> Array:
             module = sys.modules[type(lane).__module__]
             world = lane // draws
             random = module.Philox4x32(
@@ -88,11 +86,19 @@ class _Kernel:
 
         self._normals: Any = dr.freeze(normals)
 
-    def __call__(self, keys: np.ndarray, frames: np.ndarray) -> Any:
-        self._key_buffer[:], self._frame_buffer[:] = keys, frames
-        module = sys.modules[type(self._lanes).__module__]
-        with variant(), garbage_kept():
-            return self._normals(module.UInt64(self._key_buffer), module.UInt32(self._frame_buffer), self._lanes)
+    def begin(
+        self, keys: np.ndarray, frames: np.ndarray, frame_of: Callable[[list[Array]], np.ndarray]
+    ) -> PendingFrame:
+        """Draw under these keys; frame_of: makes of the device's arrays what is waited for."""
+
+        def launch() -> Callable[[], np.ndarray]:
+            self._key_buffer[:], self._frame_buffer[:] = keys, frames
+            module = sys.modules[type(self._lanes).__module__]
+            with variant(), garbage_kept():
+                parts = self._normals(module.UInt64(self._key_buffer), module.UInt32(self._frame_buffer), self._lanes)
+            return lambda: frame_of(parts)
+
+        return self._slot.begin(launch)
 
 
 @dataclass(frozen=True)

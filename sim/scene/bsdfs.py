@@ -9,8 +9,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import mitsuba as mi
 import mujoco
 import numpy as np
@@ -18,6 +16,7 @@ import numpy as np
 from optics.spectra.spectrum import Spectrum
 from sim.scene import spectra, surfaces
 from sim.scene.color import decode_srgb
+from sim.scene.variant import Description, MitsubaObject
 
 _TYPES = mujoco.mjtGeom
 _UNSET_GLOSS = (0.5, 0.5)  # specular, shininess
@@ -46,14 +45,14 @@ def bsdf(
     to_uv: np.ndarray | None = None,
     measured: Spectrum | None = None,
     mirrors: bool = True,
-) -> Any:
+) -> MitsubaObject:
     """A geom's BSDF (a Mitsuba object of the variant in force): both sides of planes and meshes, which may be open;
     see-through by its rgba's alpha.
 
     measured: a reflectance that takes the place of its colour. mirrors: whether its mirror share counts.
     """
     if measured is None:
-        description = _matter(model, geom, surfaces.reflectance(model, geom, to_uv))
+        description = _matter(model, geom, surfaces.reflectance_texture(model, geom, to_uv))
     else:
         description = _measured(model, geom, to_uv, measured)
     share = mirror_share(model, geom) if mirrors else 0.0
@@ -68,7 +67,7 @@ def bsdf(
     return mi.load_dict(description)
 
 
-def _matter(model: mujoco.MjModel, geom: int, color: dict[str, Any]) -> dict[str, Any]:
+def _matter(model: mujoco.MjModel, geom: int, color: Description) -> Description:
     """Mitsuba BSDF of a geom's material in a colour (a Mitsuba texture)."""
     material = model.geom_matid[geom]
     if material < 0:
@@ -91,7 +90,7 @@ def _matter(model: mujoco.MjModel, geom: int, color: dict[str, Any]) -> dict[str
     }
 
 
-def _measured(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, spectrum: Spectrum) -> dict[str, Any]:
+def _measured(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, spectrum: Spectrum) -> Description:
     """Mitsuba BSDF of a measured reflectance, multiplied by the geom's texture if it has one."""
     whole = _matter(model, geom, spectra.described(spectrum))
     texture = surfaces.texture_id(model, geom)

@@ -7,11 +7,12 @@ to_world is the camera's rotation times diag(-1, 1, -1).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import mitsuba as mi
 import mujoco
 import numpy as np
+
+from sim.scene.variant import MitsubaObject
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: str | int | Vi
     return Viewpoint(data.cam_xpos[index].copy(), rotation, float(model.cam_fovy[index]))
 
 
-def sensor(view: Viewpoint, width: int, height: int, near: float) -> Any:
+def sensor(view: Viewpoint, width: int, height: int, near: float) -> MitsubaObject:
     """Mitsuba perspective sensor (of the variant in force) of width x height pixels."""
     matrix = np.eye(4)
     matrix[:3, :3] = view.rotation @ np.diag([-1.0, 1.0, -1.0])

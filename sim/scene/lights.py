@@ -12,17 +12,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import mujoco
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from optics.spectra.spectrum import Spectrum, daylight
 from sim.scene import sky, surfaces
 from sim.scene.color import decode_srgb
 from sim.scene.spectra import HEADLIGHT, Spectra, described, in_daylight
+from sim.scene.variant import Description, MitsubaObject
 
 WAVELENGTHS_NM = np.arange(300.0, 781.0, 5.0)
 _TYPES = mujoco.mjtLightType
@@ -38,10 +39,10 @@ class Emitter:
 
     name: str
     light: int  # id in the model; -1: none of its lights (the camera's headlight, the sky)
-    description: dict[str, Any]
+    description: Description
 
 
-def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) -> dict[str, Any]:
+def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) -> Description:
     """Spectrum scale · rgb · daylight(λ) on 300-780 nm; a grey rgb is exactly that, a coloured one goes by the
     reflectance spectrum of its hue (Jakob and Hanika 2019). `measured` takes the place of daylight and hue."""
     level = float(np.max(rgb))
@@ -58,9 +59,7 @@ def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) ->
     }
 
 
-def glow(
-    model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, measured: Spectrum | None
-) -> dict[str, Any] | None:
+def glow(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, measured: Spectrum | None) -> Description | None:
     """Radiance of a geom whose material is emissive: that share of what it would have in full daylight."""
     material = model.geom_matid[geom]
     if material < 0 or model.mat_emission[material] <= 0:
@@ -70,7 +69,7 @@ def glow(
         return emission(np.ones(3), level, in_daylight(measured))
     texture = surfaces.texture_id(model, geom)
     if texture >= 0 and surfaces.is_mirrored(model, geom, texture):
-        return {"type": "d65", "nested": surfaces.reflectance(model, geom, to_uv), "scale": level * white()}
+        return {"type": "d65", "nested": surfaces.reflectance_texture(model, geom, to_uv), "scale": level * white()}
     return emission(decode_srgb(surfaces.rgba(model, geom)[:3]), level)
 
 
@@ -86,8 +85,8 @@ def _hue(rgb: np.ndarray) -> np.ndarray:
     return _evaluate(texture, mi.Float(WAVELENGTHS_NM.astype(np.float32)))
 
 
-def _evaluate(texture: Any, nm: Any) -> np.ndarray:
-    si: Any = dr.zeros(mi.SurfaceInteraction3f, dr.width(nm))
+def _evaluate(texture: MitsubaObject, nm: Array) -> np.ndarray:
+    si: Array = dr.zeros(mi.SurfaceInteraction3f, dr.width(nm))
     si.wavelengths = mi.Spectrum(nm)
     return np.atleast_1d(np.array(texture.eval(si)[0]))
 
@@ -114,13 +113,13 @@ def emitters(model: mujoco.MjModel, data: mujoco.MjData, spectra: Spectra) -> tu
     return found, left_out
 
 
-def pose(data: mujoco.MjData, light: int) -> Any:
+def pose(data: mujoco.MjData, light: int) -> MitsubaObject:
     """Mitsuba's to_world of a light: at its position, +z along its direction."""
     origin, direction = data.light_xpos[light], data.light_xdir[light]
     return aimed(origin, direction)
 
 
-def aimed(origin: np.ndarray, direction: np.ndarray) -> Any:
+def aimed(origin: np.ndarray, direction: np.ndarray) -> MitsubaObject:
     """to_world with +z along `direction`; the turn about it does not matter to a light."""
     z = direction / np.linalg.norm(direction)
     x = np.cross([1.0, 0, 0] if abs(z[0]) < 0.9 else [0, 1.0, 0], z)
@@ -149,7 +148,7 @@ def _left_out(model: mujoco.MjModel, light: int) -> list[str]:
     return words
 
 
-def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int, spectra: Spectra) -> dict[str, Any]:
+def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int, spectra: Spectra) -> Description:
     diffuse, kind = model.light_diffuse[light], model.light_type[light]
     measured = spectra.get(model.light(light).name)
     if kind == _TYPES.mjLIGHT_DIRECTIONAL:
@@ -168,7 +167,7 @@ def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int, spectra: S
     return spot | {"beam_width": 0.999 * cutoff, "texture": _profile(cutoff, exponent)}
 
 
-def _profile(cutoff_deg: float, exponent: float) -> dict[str, Any]:
+def _profile(cutoff_deg: float, exponent: float) -> Description:
     """cosᵉ of the angle from a spot's axis, as the image that it projects over its cone."""
     tangent = np.tan(np.radians(cutoff_deg)) * (2 * (np.arange(_PROFILE) + 0.5) / _PROFILE - 1)
     cosine = 1 / np.sqrt(1 + tangent[:, None] ** 2 + tangent[None, :] ** 2)

@@ -19,7 +19,7 @@ from optics.spectra.spectrum import Spectrum
 from sim.scene import bsdfs, cameras, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
 from sim.scene.spectra import of_geom, resolve
-from sim.scene.variant import DEFAULT_VARIANT
+from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject
 from sim.scene.variant import variant as in_variant
 
 VISIBLE_GROUPS = (0, 1, 2)  # MuJoCo draws these unless told otherwise
@@ -86,7 +86,7 @@ class Mirror:
         self._data = _reference_pose(model) if data is None else _checked(model, data)
         self._parts = {int(g): shapes.parts(model, g) for g in self.geoms}
         self._poses = {g: shapes.pose(self._data, g) for g in self._parts}
-        self._bsdfs: dict[Any, Any] = {}
+        self._bsdfs: dict[Any, MitsubaObject] = {}
         with in_variant(variant):
             self._emitters, left_out = lights.emitters(model, self._data, self.spectra)
             self.scene = self._build()
@@ -115,7 +115,7 @@ class Mirror:
                     self._move_light(emitter.name, lights.pose(data, emitter.light))
             self._params.update()
 
-    def bsdf(self, geom: str | int) -> Any:
+    def bsdf(self, geom: str | int) -> MitsubaObject:
         """The BSDF of a geom, also of one that is not in the scene."""
         index = self.model.geom(geom).id
         with in_variant(self.variant):
@@ -181,8 +181,8 @@ class Mirror:
     def _near(self) -> float:
         return max(float(self.model.vis.map.znear * self.model.stat.extent), 1e-6)
 
-    def _build(self) -> Any:
-        description: dict[str, Any] = {"type": "scene"}
+    def _build(self) -> MitsubaObject:
+        description: Description = {"type": "scene"}
         for geom, parts in self._parts.items():
             for k, part in enumerate(parts):
                 name = f"geom_{geom}_{k}"
@@ -192,12 +192,12 @@ class Mirror:
             description[emitter.name] = emitter.description
         return mi.load_dict(description)
 
-    def _glow(self, geom: int) -> dict[str, Any] | None:
+    def _glow(self, geom: int) -> Description | None:
         """What a geom of an emissive material sends out."""
         to_uv = shapes.uv_transform(self.model, geom)
         return lights.glow(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
 
-    def _bsdf(self, geom: int, mirrors: bool = True) -> Any:
+    def _bsdf(self, geom: int, mirrors: bool = True) -> MitsubaObject:
         """Geoms that look alike share one BSDF object."""
         to_uv = shapes.uv_transform(self.model, geom)
         key = (
@@ -218,7 +218,7 @@ class Mirror:
             for key, value in part.placement(pose).items():
                 self._params[f"geom_{geom}_{k}.{key}"] = value
 
-    def _move_light(self, name: str, to_world: Any) -> None:
+    def _move_light(self, name: str, to_world: MitsubaObject) -> None:
         key = f"{name}.to_world"
         if not np.array_equal(np.array(to_world.matrix), np.array(self._params[key].matrix).reshape(4, 4)):
             self._params[key] = mi.Transform4f(np.array(to_world.matrix))

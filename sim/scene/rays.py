@@ -14,6 +14,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from optics.numerics.autodiff import Array
+from sim.scene.variant import Description, MitsubaObject
+
 LANES = 4  # wavelengths in one mi.Spectrum
 WAVEFRONT = 1 << 21  # rays traced at once
 NESTED = 64  # bodies in each other that a camera may be inside of
@@ -30,8 +33,8 @@ class Camera:
     """scene, sensor: Mitsuba's. names: of the scene's shapes, by their ids. one_sided: names of the shapes whose inner
     side the camera looks through."""
 
-    scene: Any
-    sensor: Any
+    scene: MitsubaObject
+    sensor: MitsubaObject
     names: Mapping[int, str]
     one_sided: frozenset[str]
 
@@ -81,7 +84,7 @@ class Camera:
         ray, _ = self.sensor.sample_ray(0.0, 0.5, mi.Point2f(positions), mi.Point2f(0.5))
         ray.maxt = dr.inf  # nothing is too far away to be seen
         si = self._look(ray)
-        shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
+        shape: Array = dr.reinterpret_array(mi.UInt32, si.shape)
         found = dr.select(si.is_valid(), shape, 0).numpy()
         # Of the hit, its distance is exact; its point suffers on shapes as large as a world.
         return [self.names[i] if i else "" for i in found], np.array(ray(si.t).numpy(), dtype=float).T
@@ -94,7 +97,7 @@ class Camera:
             return "", np.full(3, np.nan)
         return si.shape.id(), np.array(ray(si.t), dtype=float)
 
-    def _look(self, ray: Any) -> Any:
+    def _look(self, ray: Array) -> Array:
         """What the ray meets first; its origin is moved past the inner faces in its way."""
         si = self.scene.ray_intersect(ray)
         for _ in range(NESTED):
@@ -107,15 +110,17 @@ class Camera:
             si = self.scene.ray_intersect(ray)
         return si
 
-    def _is_inner(self, si: Any, ray: Any) -> Any:
+    def _is_inner(self, si: Array, ray: Array) -> Array:
         leaving = si.is_valid() & (dr.dot(si.n, ray.d) > 0)
         if _is_scalar():
             return bool(leaving) and si.shape.id() in self.one_sided
         table = mi.Bool([self.names.get(i, "") in self.one_sided for i in range(max(self.names) + 1)])
-        shape: Any = dr.reinterpret_array(mi.UInt32, si.shape)
+        shape: Array = dr.reinterpret_array(mi.UInt32, si.shape)
         return leaving & dr.gather(mi.Bool, table, shape, leaving)
 
-    def _sum_of_samples(self, method: Any, spectrum: list[float], sampler: Any, seed: int) -> np.ndarray:
+    def _sum_of_samples(
+        self, method: MitsubaObject, spectrum: list[float], sampler: MitsubaObject, seed: int
+    ) -> np.ndarray:
         """Sum of the sampler's samples per pixel, (LANES, pixels)."""
         width, height = self.size
         n = sampler.sample_count()
@@ -134,7 +139,9 @@ class Camera:
         )
         return values.reshape(LANES, pixels, n).sum(axis=2, dtype=float)
 
-    def _sample(self, method: Any, spectrum: list[float], sampler: Any, x: Any, y: Any) -> np.ndarray:
+    def _sample(
+        self, method: MitsubaObject, spectrum: list[float], sampler: MitsubaObject, x: Array, y: Array
+    ) -> np.ndarray:
         width, height = self.size
         jitter = sampler.next_2d()
         position = mi.Point2f(x + jitter.x / width, y + jitter.y / height)
@@ -147,12 +154,12 @@ class Camera:
         return np.array(value) if _is_scalar() else np.array(value.numpy(), dtype=float)
 
 
-def names_of(scene: Any) -> dict[int, str]:
+def names_of(scene: MitsubaObject) -> dict[int, str]:
     """Names of a scene's shapes by the ids that Dr.Jit gave them; none in a scalar variant, which has no ids."""
     return {} if _is_scalar() else {_registry_id(shape): shape.id() for shape in scene.shapes()}
 
 
-def _description(integrator: str | Mapping[str, Any]) -> dict[str, Any]:
+def _description(integrator: str | Mapping[str, Any]) -> Description:
     description = {"type": integrator} if isinstance(integrator, str) else dict(integrator)
     if description["type"] == "direct" and {"emitter_samples", "shading_samples"} & description.keys():
         # Mitsuba 3.9.1 adds these samples up instead of averaging them where the light is a point or a direction.
@@ -160,15 +167,15 @@ def _description(integrator: str | Mapping[str, Any]) -> dict[str, Any]:
     return description
 
 
-def _sampler(kind: str, n: int) -> Any:
-    sampler: Any = mi.load_dict({"type": kind, "sample_count": n})
+def _sampler(kind: str, n: int) -> MitsubaObject:
+    sampler: MitsubaObject = mi.load_dict({"type": kind, "sample_count": n})
     if kind != "independent" and (_is_scalar() or sampler.sample_count() != n):
         raise ValueError(f"sampler = {kind!r}: cannot take {n} samples here; take 'independent'")
     return sampler
 
 
-def _registry_id(shape: Any) -> int:
-    pointer: Any = dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))
+def _registry_id(shape: MitsubaObject) -> int:
+    pointer: Array = dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))
     return int(pointer[0])
 
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import mitsuba as mi
 import mujoco
@@ -14,6 +13,7 @@ import numpy as np
 
 from sim.scene import bsdfs, cube, surfaces, tessellation
 from sim.scene.tessellation import Triangles
+from sim.scene.variant import Description, MitsubaObject
 
 _TYPES = mujoco.mjtGeom
 _PRIMITIVES = (
@@ -45,7 +45,7 @@ class Part:
     triangles: Triangles | None = None
     mirrors: bool = True
 
-    def placement(self, pose: np.ndarray) -> dict[str, Any]:
+    def placement(self, pose: np.ndarray) -> Description:
         """What puts the shape where a geom's pose (4, 4) says: names and values of Mitsuba's parameters."""
         if self.triangles is not None:
             placed = {"vertex_positions": self.vertices(pose)}
@@ -193,12 +193,12 @@ def _placed(sx: float, sy: float, sz: float, z: float = 0.0) -> np.ndarray:
     return matrix
 
 
-def build(part: Part, pose: np.ndarray, name: str, bsdf: Any, radiance: dict[str, Any] | None) -> Any:
+def build(part: Part, pose: np.ndarray, name: str, bsdf: MitsubaObject, radiance: Description | None) -> MitsubaObject:
     """The Mitsuba shape (of the variant in force) of a part, emitting where `radiance` is given."""
     if part.triangles is None:
         assert part.local is not None
         placed = mi.ScalarTransform4f((pose @ part.local).tolist())
-        description: dict[str, Any] = {"type": part.plugin, "bsdf": bsdf, "id": name, "to_world": placed}
+        description: Description = {"type": part.plugin, "bsdf": bsdf, "id": name, "to_world": placed}
         if radiance is not None:
             description["emitter"] = {"type": "area", "radiance": radiance}
         return mi.load_dict(description)

@@ -7,13 +7,12 @@ seen towards +x/-x, U/D towards +z/-z, F/B towards -y/+y.
 
 from __future__ import annotations
 
-from typing import Any
-
 import mitsuba as mi
 import mujoco
 import numpy as np
 
 from sim.scene import cube, surfaces
+from sim.scene.variant import Description
 
 MAX_ROWS = 1024  # of the panorama
 
@@ -24,7 +23,7 @@ def texture(model: mujoco.MjModel) -> int:
     return int(found[0]) if len(found) else -1
 
 
-def description(model: mujoco.MjModel, white: float) -> dict[str, Any] | None:
+def description(model: mujoco.MjModel, white: float) -> Description | None:
     """Mitsuba's `envmap` of the model's skybox; None where there is none, or a black one.
 
     white: radiance of white over that of Mitsuba's `d65`, which `envmap` takes for the light of a panorama.

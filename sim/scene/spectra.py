@@ -15,6 +15,7 @@ import numpy as np
 
 from optics.numerics.arguments import did_you_mean
 from optics.spectra.spectrum import LIMITS_NM, Spectrum, daylight, illuminant, reflectance
+from sim.scene.variant import Description
 
 HEADLIGHT = "headlight"
 Spectra = Mapping[str, Spectrum]
@@ -61,7 +62,7 @@ def in_daylight(reflectance: Spectrum) -> Spectrum:
     return Spectrum(tuple(nm), tuple(reflectance.at(nm * 1e-9) * daylight(nm * 1e-9)))
 
 
-def described(spectrum: Spectrum, scale: float = 1.0) -> dict[str, Any]:
+def described(spectrum: Spectrum, scale: float = 1.0) -> Description:
     """Mitsuba's description of scale · spectrum on 300-780 nm: `rgb` and `d65` would be dark in the ultraviolet."""
     inside = [nm for nm in spectrum.wavelengths_nm if LIMITS_NM[0] < nm < LIMITS_NM[1]]
     nm = np.array([LIMITS_NM[0], *inside, LIMITS_NM[1]])

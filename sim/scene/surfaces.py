@@ -3,14 +3,13 @@ that Jakob and Hanika (2019) give an RGB reflectance."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import mitsuba as mi
 import mujoco
 import numpy as np
 
 from sim.scene import cube
 from sim.scene.color import decode_srgb
+from sim.scene.variant import Description
 
 # MuJoCo's own sign that a geom's rgba was not set, and its material's counts.
 _UNSET_RGBA = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
@@ -76,7 +75,7 @@ def linear(model: mujoco.MjModel, texture: int, color: np.ndarray) -> np.ndarray
     return decode_srgb(pixels * color)
 
 
-def reflectance(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> dict[str, Any]:
+def reflectance_texture(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> Description:
     """Mitsuba texture of a geom's reflectance; `to_uv` (3, 3) turns the shape's texture coordinates to MuJoCo's."""
     color = rgba(model, geom)[:3]
     texture = texture_id(model, geom)
@@ -85,7 +84,7 @@ def reflectance(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = Non
     return bitmap(linear(model, texture, color), to_uv)
 
 
-def bitmap(values: np.ndarray, to_uv: np.ndarray | None) -> dict[str, Any]:
+def bitmap(values: np.ndarray, to_uv: np.ndarray | None) -> Description:
     """Mitsuba texture of an image (height, width, 1 or 3), row 0 on top, that repeats."""
     # Given as an object, a bitmap has its first row at v = 0, as in MuJoCo (a bitmap's `data` would be taken as
     # coefficients of spectra, not as RGB).

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import mitsuba as mi
 
 from optics.numerics import backend
+
+# Types of Mitsuba exist once a variant is set, so that no checker can see them: these names say what an `Any` is. What
+# Mitsuba makes of arrays (rays, points, interactions) is an `optics.numerics.autodiff.Array`.
+MitsubaObject = Any  # a scene, shape, BSDF, sensor, sampler, integrator, texture or transform
+Description = dict[str, Any]  # of one of them, for mi.load_dict
 
 DEFAULT_VARIANT = "llvm_ad_spectral"
 

@@ -10,8 +10,8 @@ from sim.tasks.placement import SEPARATION
 from sim.tasks.random_streams import MotionNoise
 from sim.worlds.state import WorldState, wrap_angle
 
-SPEED = 0.5  # [m/s]
-TURN = 0.4  # standard deviation of the change of heading per action [rad]
+SPEED = 0.5  # [m/s], as published
+TURN = 0.4  # chosen: standard deviation of the change of heading per action [rad]
 
 
 def wander(state: WorldState, chance: MotionNoise, bounds: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:

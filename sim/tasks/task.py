@@ -1,7 +1,7 @@
 """The tasks: where episodes start, what moves, what counts as progress, what ends an episode.
 
-Rewards (docs/tasks.md has the table): progress to the goal (detection, foraging, tracking) or away from the start
-(navigation), an event reward for reaching the goal or an adversary, and a penalty per action in contact with a wall.
+A task says how many metres of progress an action made, and whether the goal or an adversary was reached. What that is
+worth, with a penalty for contact with a wall, is in `sim.tasks.reward`.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ import numpy as np
 from sim.tasks.object_motion import wander
 from sim.tasks.placement import REACH, Places, free_spot
 from sim.tasks.random_streams import MotionNoise
+from sim.worlds.catalog import TASKS
 from sim.worlds.state import WorldState
-from sim.worlds.world import TASKS, World
+from sim.worlds.world import World
 
 
 @dataclass(frozen=True)
@@ -168,11 +169,9 @@ def task_of(world: World) -> Task:
     Raises:
         ValueError: a world of no known task.
     """
-    if world.task in ("detection", "foraging", "tracking"):
-        return FindGoal(world, moving=world.task == "tracking")
-    if world.task == "navigation":
-        return LeaveMaze(world)
-    raise ValueError(f"task = {world.task!r}: must be one of {', '.join(map(repr, TASKS))}")
+    if world.task not in TASKS:
+        raise ValueError(f"task = {world.task!r}: must be one of {', '.join(map(repr, TASKS))}")
+    return LeaveMaze(world) if world.task == "navigation" else FindGoal(world, moving=world.task == "tracking")
 
 
 def _distance_to_goal(state: WorldState, goals: int) -> np.ndarray:

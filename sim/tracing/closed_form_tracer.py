@@ -10,12 +10,12 @@ materials are grey.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from sim.eyes.eyes import EYE_HEIGHT
 from sim.tracing import lighting, spheres
 from sim.tracing.reflectance_atlas import Atlas, bake
@@ -24,9 +24,9 @@ from sim.tracing.wall_intersection import Footprints, footprints_of
 from sim.tracing.walls import ALIGNED, NoClosedForm, Walls, walls_of
 from sim.worlds.world import World
 
-# Singular values below this share of the largest are float32 rounding.
+# Singular values below this share of the largest are rounding: eight times float32's 1.2e-7.
 RANK_TOLERANCE = 1e-6
-# Deviation of a grey's reflectances from band to band, in Mitsuba's spectra of grey colours.
+# Chosen: deviation of a grey's reflectances from band to band, in Mitsuba's spectra of grey colours, that is not a hue.
 GREY = 1e-4
 ROW = 12  # floats per face: column and row of the texel as affine functions of (x, y, z), then where the texture is
 
@@ -69,11 +69,11 @@ def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Compo
 class _Hit:
     """Where rays end: lit tells whether light is seen that leaves there; reflectance: one array per component."""
 
-    t: Any
-    point: Any
-    normal: Any
-    lit: Any
-    reflectance: list[Any]
+    t: Array
+    point: Array
+    normal: Array
+    lit: Array
+    reflectance: list[Array]
 
 
 class ClosedForm:
@@ -90,20 +90,22 @@ class ClosedForm:
 
     name = "closed_form"
 
-    def __init__(self, world: World, stage: StaticScene, wavelengths: np.ndarray, light: str = lighting.DIRECT) -> None:
-        walls = walls_of(world.model, stage.geoms)
+    def __init__(
+        self, world: World, static: StaticScene, wavelengths: np.ndarray, light: str = lighting.DIRECT
+    ) -> None:
+        walls = walls_of(world.model, static.geoms)
         self.light = light
         if light == lighting.BOUNCE:
-            _check_tops(world, walls, stage)
+            _check_tops(world, walls, static)
         self._footprints: Footprints = footprints_of(walls)
         self.why = f"{len(walls)} upright walls, {self._footprints.how}"
-        self._bodies, self._walls = stage.bodies, walls
-        self._lights = lighting.directional_lights(stage.scene, wavelengths)
+        self._bodies, self._walls = static.bodies, walls
+        self._lights = lighting.directional_lights(static.scene, wavelengths)
         if any(source.direction[2] <= 0 for source in self._lights):
             raise NoClosedForm("a light shines from below")
         geoms, place = np.unique(walls.geoms, return_inverse=True)
-        visible = stage.bodies if light == lighting.BOUNCE else stage.spheres
-        bsdfs = [*(stage.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
+        visible = static.bodies if light == lighting.BOUNCE else static.spheres
+        bsdfs = [*(static.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
         atlas = bake(world.model, [*geoms, *visible.geoms], bsdfs, wavelengths)
         irradiance = np.array([source.irradiance for source in self._lights]).reshape(-1, len(wavelengths))
         fewest = reflected_components_of if light == lighting.BOUNCE else components_of
@@ -122,30 +124,36 @@ class ClosedForm:
         """No Mitsuba scene takes part."""
 
     @property
-    def inputs(self) -> dict[str, Any]:
+    def inputs(self) -> dict[str, Array]:
         """Arrays that the kernel reads."""
         return self._static
 
-    def _inputs(self) -> dict[str, Any]:
+    def _inputs(self) -> dict[str, Array]:
         texels = self._components.reflectance.astype(np.float32)
         tables = {f"texels_{k}": np.ascontiguousarray(column) for k, column in enumerate(texels.T)}
         tables |= {"faces": self._faces.astype(np.float32).ravel(), **self._footprints.tables}
         return {name: mi.Float(table) for name, table in tables.items()}
 
     def radiance(
-        self, scene: None, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any], place: Any = None
-    ) -> tuple[list[Any], Any]:
+        self,
+        scene: None,
+        ray: Array,
+        agent: Array,
+        centres: list[Array],
+        inputs: dict[str, Array],
+        bounce_sample: Array | None = None,
+    ) -> tuple[list[Array], Array]:
         """What comes along each ray, one array per component, and from how far [m]."""
         bodies = [*centres, agent]
         hit = self._hit(ray, centres, inputs)
         light = self._irradiance(hit, bodies, inputs)
         if self.light == lighting.BOUNCE:
-            there = self._hit(lighting.onwards(hit.point, hit.normal, place), bodies, inputs)
+            there = self._hit(lighting.onwards(hit.point, hit.normal, bounce_sample), bodies, inputs)
             second = zip(there.reflectance, self._irradiance(there, bodies, inputs), strict=True)
             light = [dr.select(hit.lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
         return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
 
-    def _hit(self, ray: Any, centres: list[Any], inputs: dict[str, Any]) -> _Hit:
+    def _hit(self, ray: Array, centres: list[Array], inputs: dict[str, Array]) -> _Hit:
         """Where rays meet walls, floor or bodies first; those without a centre are not there."""
         t, face, normal = self._footprints.hit(ray, inputs)
         on_floor, t_floor = self._floor_hit(ray)
@@ -169,7 +177,7 @@ class ClosedForm:
         lit = (seen | on_sphere) & (t > 0) & (dr.dot(normal, ray.d) < 0)
         return _Hit(t, point, normal, lit, self._interpolate(offset, columns, rows, x, y, inputs))
 
-    def _floor_hit(self, ray: Any) -> tuple[Any, Any]:
+    def _floor_hit(self, ray: Array) -> tuple[Array, Array]:
         """Whether and where a ray from above meets the floor."""
         t = (self._walls.floor - ray.o.z) / ray.d.z
         lower, upper = self._walls.floor_lower, self._walls.floor_upper
@@ -177,7 +185,7 @@ class ClosedForm:
         inside = (x >= float(lower[0])) & (x <= float(upper[0])) & (y >= float(lower[1])) & (y <= float(upper[1]))
         return inside & (ray.d.z < 0) & (t > 0), t
 
-    def _irradiance(self, hit: _Hit, bodies: list[Any], inputs: dict[str, Any]) -> list[Any]:
+    def _irradiance(self, hit: _Hit, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
         """Per component: sum over the lights of level · cos θ, where nothing is in the way."""
         levels = self._components.levels
         start = lighting.clear_of(hit.point, hit.normal)
@@ -193,7 +201,7 @@ class ClosedForm:
             total = [dr.fma(cosine, float(factor), sum_so_far) for factor, sum_so_far in zip(level, total, strict=True)]
         return total
 
-    def _face_texel(self, face: Any, point: Any, inputs: dict[str, Any]) -> tuple[Any, ...]:
+    def _face_texel(self, face: Array, point: Array, inputs: dict[str, Array]) -> tuple[Array, ...]:
         """Texture of a face and where in it a point is: first texel, columns, rows, column and row."""
         columns = dr.gather(mi.Vector4f, inputs["faces"], face * 3)
         place = dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 2)
@@ -203,15 +211,17 @@ class ClosedForm:
             y = _affine(dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 1), point)
         return place.x, place.y, place.z, x, y
 
-    def _sphere_texel(self, which: Any, uv: Any) -> tuple[Any, ...]:
-        found: tuple[Any, ...] = tuple(mi.Float(0) for _ in range(5))
+    def _sphere_texel(self, which: Array, uv: Array) -> tuple[Array, ...]:
+        found: tuple[Array, ...] = tuple(mi.Float(0) for _ in range(5))
         for k, (to_texels, place) in enumerate(self._sphere_textures):
             column, row = (float(a) * uv.x + float(b) * uv.y + float(c) for a, b, c in to_texels)
             mine = (*(mi.Float(float(p)) for p in place), column, row)
             found = tuple(dr.select(which == k, a, b) for a, b in zip(mine, found, strict=True))
         return found
 
-    def _interpolate(self, offset: Any, columns: Any, rows: Any, x: Any, y: Any, inputs: dict[str, Any]) -> list[Any]:
+    def _interpolate(
+        self, offset: Array, columns: Array, rows: Array, x: Array, y: Array, inputs: dict[str, Array]
+    ) -> list[Array]:
         """Reflectance per component, interpolated bilinearly in a texture that repeats."""
         x0, x1, fx = _neighbours(x, columns)
         n = self._components.reflectance.shape[1]
@@ -223,10 +233,10 @@ class ClosedForm:
         return [sum(w * dr.gather(mi.Float, inputs[f"texels_{k}"], i) for i, w in index) for k in range(n)]
 
 
-def _check_tops(world: World, walls: Walls, stage: StaticScene) -> None:
+def _check_tops(world: World, walls: Walls, static: StaticScene) -> None:
     """No top of a wall may be seen from where light is reflected: from any point of walls and movers."""
     objects = [world.model.body(name).pos[2] for name in world.objects]
-    bodies = np.add(np.add([*objects, EYE_HEIGHT], stage.bodies.radii), stage.bodies.offsets[:, 2])
+    bodies = np.add(np.add([*objects, EYE_HEIGHT], static.bodies.radii), static.bodies.offsets[:, 2])
     lowest, highest = walls.top.min(initial=np.inf), max(walls.top.max(initial=-np.inf), bodies.max())
     if highest > lowest + ALIGNED:
         raise NoClosedForm(f"light that is reflected twice sees the top of a wall {lowest:.2g} m high")
@@ -241,11 +251,11 @@ def _face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _affine(row: Any, point: Any) -> Any:
+def _affine(row: Array, point: Array) -> Array:
     return dr.fma(row.x, point.x, dr.fma(row.y, point.y, dr.fma(row.z, point.z, row.w)))
 
 
-def _neighbours(x: Any, n: Any) -> tuple[Any, Any, Any]:
+def _neighbours(x: Array, n: Array) -> tuple[Array, Array, Array]:
     """The two whole numbers around x, modulo n, and how far x is from the first to the second."""
     whole = dr.floor(x)
     first = dr.clip(whole - n * dr.floor(whole / n), 0, n - 1)

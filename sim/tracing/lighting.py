@@ -2,19 +2,21 @@
 
 Direct light is what Mitsuba's `direct` integrator converges to, without its noise, since each emitter has exactly one
 direction. Light that was reflected once more before is found at the end of one more ray, which leaves the surface in a
-fixed direction drawn from Lambert's cosine: each camera ray has a place of its own on the unit square for it
-(`sim.eyes.sensor`), so that the rays of a receptor together see the hemisphere.
+fixed direction drawn from Lambert's cosine: each camera ray has a sample of its own on the unit square for it, its
+bounce sample (`sim.eyes.sensor`), so that the rays of a receptor together see the hemisphere.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.scene.variant import MitsubaObject
 
 LANES = 4  # wavelengths in one mi.Spectrum
 DIRECT, BOUNCE = LEVELS = ("direct", "bounce")  # what of the light is followed: "bounce" adds what is reflected twice
@@ -28,13 +30,13 @@ class DirectionalLight:
     irradiance: np.ndarray
 
 
-def spectra(wavelengths: np.ndarray) -> list[Any]:
+def spectra(wavelengths: np.ndarray) -> list[Array]:
     """The bands' wavelengths [m] as Mitsuba spectra [nm], LANES at a time; the last one is filled up by repetition."""
     padded = np.pad(wavelengths * 1e9, (0, -len(wavelengths) % LANES), mode="edge")
     return [mi.Spectrum(*map(float, chunk)) for chunk in padded.reshape(-1, LANES)]
 
 
-def directional_lights(scene: Any, wavelengths: np.ndarray) -> tuple[DirectionalLight, ...]:
+def directional_lights(scene: MitsubaObject, wavelengths: np.ndarray) -> tuple[DirectionalLight, ...]:
     """The scene's lights at the bands' wavelengths [m].
 
     Raises:
@@ -55,14 +57,14 @@ def directional_lights(scene: Any, wavelengths: np.ndarray) -> tuple[Directional
     return tuple(lights)
 
 
-def white_radiance(scene: Any, wavelengths: np.ndarray) -> np.ndarray:
+def white_radiance(scene: MitsubaObject, wavelengths: np.ndarray) -> np.ndarray:
     """Of a white surface that faced all of the scene's lights at once, per band (band,): no surface sends out more of
     their direct light."""
     lights = directional_lights(scene, wavelengths)
     return sum((light.irradiance for light in lights), np.zeros(len(wavelengths))) / np.pi
 
 
-def check_lambertian(bsdfs: Sequence[Any]) -> None:
+def check_lambertian(bsdfs: Sequence[MitsubaObject]) -> None:
     """Refuse what the renderer cannot light.
 
     Raises:
@@ -76,12 +78,12 @@ def check_lambertian(bsdfs: Sequence[Any]) -> None:
 
 
 def direct_light(
-    si: Any,
-    bsdf: Any,
+    si: Array,
+    bsdf: MitsubaObject,
     lights: tuple[DirectionalLight, ...],
-    bands: list[Any],
-    occluded: Callable[[Any, Any], Any],
-) -> list[Any]:
+    bands: list[Array],
+    occluded: Callable[[Array, Array], Array],
+) -> list[Array]:
     """Radiance [mi.Spectrum per chunk of bands] that leaves a Lambertian surface at si: ρ/π Σ_l E_l cos θ_l.
 
     occluded(ray, active) tells which rays towards a light are blocked. The inside of a closed one-sided surface
@@ -100,24 +102,26 @@ def direct_light(
     return [e * diffuse_reflectance(si, bsdf, b) * dr.inv_pi for e, b in zip(irradiance, bands, strict=True)]
 
 
-def onwards(point: Any, normal: Any, place: Any) -> Any:
-    """The ray that leaves a surface at a place (2,) of the unit square, which Lambert's cosine is laid out on: with the
-    radiance L that it brings, ρ L is what the surface sends on, averaged over places."""
-    local = mi.warp.square_to_cosine_hemisphere(place)
+def onwards(point: Array, normal: Array, bounce_sample: Array) -> Array:
+    """The ray that leaves a surface as a sample (2,) of the unit square says, on which Lambert's cosine is laid out.
+
+    With the radiance L that it brings, ρ L is what the surface sends on, averaged over samples."""
+    local = mi.warp.square_to_cosine_hemisphere(bounce_sample)
     # Not mi.Frame3f(normal): on walls, whose normals are level to rounding, its axes are the rounding's.
+    # Any vector well away from the normal does; 0.9: up to 26° from upright, the other one is taken.
     beside = dr.select(dr.abs(normal.z) < 0.9, mi.Vector3f(0, 0, 1), mi.Vector3f(1, 0, 0))
     s = dr.normalize(dr.cross(beside, mi.Vector3f(normal)))
     direction = mi.Frame3f(s, dr.cross(mi.Vector3f(normal), s), normal).to_world(local)
     return mi.Ray3f(clear_of(point, normal), direction)
 
 
-def clear_of(point: Any, normal: Any) -> Any:
+def clear_of(point: Array, normal: Array) -> Array:
     """A point as far from the surface as Mitsuba's own shadow rays start."""
     offset = (1 + dr.max(dr.abs(point))) * mi.math.RayEpsilon
     return mi.Point3f(dr.fma(normal, offset, point))
 
 
-def diffuse_reflectance(si: Any, bsdf: Any, wavelengths: Any) -> Any:
+def diffuse_reflectance(si: Array, bsdf: MitsubaObject, wavelengths: Array) -> Array:
     """Of a Lambertian surface."""
     si.wavelengths = wavelengths
     return bsdf.eval_diffuse_reflectance(si, si.is_valid())

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from optics.numerics.autodiff import Array
+from sim.scene.variant import MitsubaObject
 from sim.tracing import lighting, spheres
 from sim.tracing.static_scene import StaticScene
 
@@ -24,23 +24,29 @@ class Traced:
 
     name = "mitsuba"
 
-    def __init__(self, stage: StaticScene, wavelengths: np.ndarray, why: str, light: str = lighting.DIRECT) -> None:
+    def __init__(self, static: StaticScene, wavelengths: np.ndarray, why: str, light: str = lighting.DIRECT) -> None:
         self.why, self.light = why, light
         self.basis = np.eye(len(wavelengths))
-        self.scene = stage.scene
-        self._bodies = stage.bodies
-        self._lights = lighting.directional_lights(stage.scene, wavelengths)
+        self.scene = static.scene
+        self._bodies = static.bodies
+        self._lights = lighting.directional_lights(static.scene, wavelengths)
         self._bands = lighting.spectra(wavelengths)
         # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.
-        self.inputs = {"bsdfs": mi.BSDFPtr([*stage.bodies.bsdfs, stage.scene.shapes()[0].bsdf()])}
+        self.inputs = {"bsdfs": mi.BSDFPtr([*static.bodies.bsdfs, static.scene.shapes()[0].bsdf()])}
 
     def radiance(
-        self, scene: Any, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any], place: Any = None
-    ) -> tuple[list[Any], Any]:
+        self,
+        scene: MitsubaObject,
+        ray: Array,
+        agent: Array,
+        centres: list[Array],
+        inputs: dict[str, Array],
+        bounce_sample: Array | None = None,
+    ) -> tuple[list[Array], Array]:
         """What comes along each ray, one array per component, and from how far [m]."""
         bodies = [*centres, agent]
 
-        def occluded(shadow: Any, active: Any) -> Any:
+        def occluded(shadow: Array, active: Array) -> Array:
             blocked = spheres.blocks(list(map(float, self._bodies.radii)), bodies, shadow)
             return blocked | scene.ray_test(shadow, active & ~blocked)
 
@@ -48,7 +54,7 @@ class Traced:
         spectra = lighting.direct_light(si, bsdf, self._lights, self._bands, occluded)
         if self.light == lighting.BOUNCE:
             seen_from = dr.copysign(mi.Float(1), dr.dot(si.n, si.to_world(si.wi)))
-            second = lighting.onwards(si.p, si.sh_frame.n * seen_from, place)
+            second = lighting.onwards(si.p, si.sh_frame.n * seen_from, bounce_sample)
             there = self._first_hit(scene, second, bodies, inputs)
             bounced = lighting.direct_light(*there, self._lights, self._bands, occluded)
             sent_on = [lighting.diffuse_reflectance(si, bsdf, b) for b in self._bands]
@@ -56,7 +62,9 @@ class Traced:
             spectra = [dr.select(valid, dr.fma(r, b, s), s) for s, r, b in zip(spectra, sent_on, bounced, strict=True)]
         return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], si.t
 
-    def _first_hit(self, scene: Any, ray: Any, centres: list[Any], inputs: dict[str, Any]) -> tuple[Any, Any]:
+    def _first_hit(
+        self, scene: MitsubaObject, ray: Array, centres: list[Array], inputs: dict[str, Array]
+    ) -> tuple[Array, Array]:
         """Where the ray meets the static scene or a sphere first, and the BSDF there."""
         ray.wavelengths = self._bands[0]
         preliminary = scene.ray_intersect_preliminary(ray)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -16,6 +15,7 @@ import mujoco
 import numpy as np
 
 from sim.scene import shapes, surfaces
+from sim.scene.variant import MitsubaObject
 from sim.tracing import lighting
 
 
@@ -36,7 +36,7 @@ class Atlas:
         return bool((self.places[:, 2] == 1).all())
 
 
-def bake(model: mujoco.MjModel, geoms: Sequence[int], bsdfs: Sequence[Any], wavelengths: np.ndarray) -> Atlas:
+def bake(model: mujoco.MjModel, geoms: Sequence[int], bsdfs: Sequence[MitsubaObject], wavelengths: np.ndarray) -> Atlas:
     """The atlas of these geoms' BSDFs at wavelengths [m]: one texture per geom; geoms of one BSDF share its texels."""
     texels: list[np.ndarray] = []
     places: dict[int, tuple[tuple[int, int, int], np.ndarray]] = {}
@@ -51,7 +51,9 @@ def bake(model: mujoco.MjModel, geoms: Sequence[int], bsdfs: Sequence[Any], wave
     return Atlas(np.concatenate(texels), np.array([p for p, _ in found]), np.array([t for _, t in found]))
 
 
-def _bake_one(model: mujoco.MjModel, geom: int, bsdf: Any, wavelengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _bake_one(
+    model: mujoco.MjModel, geom: int, bsdf: MitsubaObject, wavelengths: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Reflectance (row, column, band), and the way there from Mitsuba's (u, v) of the geom, (2, 3)."""
     width, height = 1, 1
     if shapes.is_textured(model, geom):
@@ -73,7 +75,7 @@ def _constant(table: np.ndarray, axis: int) -> bool:
     return bool(np.allclose(table, table.take([0], axis), rtol=1e-6, atol=0))
 
 
-def _reflectance(bsdf: Any, uv: np.ndarray, wavelengths: np.ndarray) -> np.ndarray:
+def _reflectance(bsdf: MitsubaObject, uv: np.ndarray, wavelengths: np.ndarray) -> np.ndarray:
     """What Mitsuba says, (point, band)."""
     si = dr.zeros(mi.SurfaceInteraction3f, uv.shape[1])
     si.uv = mi.Point2f(*(mi.Float(np.ascontiguousarray(c, np.float32)) for c in uv))

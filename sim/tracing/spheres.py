@@ -8,11 +8,13 @@ from +z, both in the sphere's own frame.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.scene.variant import MitsubaObject
 
 
 @dataclass(frozen=True)
@@ -29,14 +31,14 @@ class Spheres:
     radii: np.ndarray
     frames: np.ndarray
     offsets: np.ndarray
-    bsdfs: tuple[Any, ...]
+    bsdfs: tuple[MitsubaObject, ...]
     geoms: tuple[int, ...]
 
     def __len__(self) -> int:
         return len(self.radii)
 
 
-def nearest(spheres: Spheres, centres: list[Any], ray: Any, t: Any) -> tuple[Any, Any]:
+def nearest(spheres: Spheres, centres: list[Array], ray: Array, t: Array) -> tuple[Array, Array]:
     """Distance [m] to the nearest of `t` and the spheres along the ray, and which sphere that is; none: len(spheres).
     With fewer centres than spheres, the last ones are not there."""
     which = mi.UInt32(len(spheres))
@@ -52,7 +54,7 @@ def nearest(spheres: Spheres, centres: list[Any], ray: Any, t: Any) -> tuple[Any
     return t, which
 
 
-def blocks(radii: list[float], centres: list[Any], ray: Any) -> Any:
+def blocks(radii: list[float], centres: list[Array], ray: Array) -> Array:
     """Whether any sphere lies on the ray ahead of its origin."""
     blocked = mi.Bool(False)
     for radius, centre in zip(radii, centres, strict=True):
@@ -61,7 +63,7 @@ def blocks(radii: list[float], centres: list[Any], ray: Any) -> Any:
     return blocked
 
 
-def normal_and_uv(spheres: Spheres, centres: list[Any], which: Any, point: Any) -> tuple[Any, Any]:
+def normal_and_uv(spheres: Spheres, centres: list[Array], which: Array, point: Array) -> tuple[Array, Array]:
     """Outward normal in the world's frame and texture coordinates at a point on sphere `which`."""
     centre, local = mi.Point3f(0), mi.Vector3f(0)
     for k, other in enumerate(centres):
@@ -75,7 +77,7 @@ def normal_and_uv(spheres: Spheres, centres: list[Any], which: Any, point: Any) 
     return mi.Normal3f(normal), mi.Point2f(dr.select(u < 0, u + 1, u), v)
 
 
-def _quadratic(ray: Any, centre: Any, radius: float) -> tuple[Any, Any]:
+def _quadratic(ray: Array, centre: Array, radius: float) -> tuple[Array, Array]:
     """Half the linear and the constant coefficient of |o + t d - centre|² = radius² (the ray's d is a unit vector)."""
     from_centre = ray.o - centre
     return dr.dot(from_centre, ray.d), dr.squared_norm(from_centre) - radius * radius

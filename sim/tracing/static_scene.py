@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import mitsuba as mi
 import mujoco
@@ -19,6 +18,7 @@ from sim.scene import lights, shapes, tessellation
 from sim.scene.mirror import Mirror, mirror
 from sim.scene.shapes import Part
 from sim.scene.tessellation import Triangles
+from sim.scene.variant import Description, MitsubaObject
 from sim.scene.variant import variant as in_variant
 from sim.tracing.spheres import Spheres
 from sim.worlds.world import World
@@ -33,16 +33,16 @@ class StaticScene:
     variant: of Mitsuba
     """
 
-    scene: Any
+    scene: MitsubaObject
     geoms: tuple[int, ...]
-    bsdfs: Mapping[int, Any]
+    bsdfs: Mapping[int, MitsubaObject]
     spheres: Spheres
     bodies: Spheres
     variant: str
 
 
 def build_static_scene(world: World) -> StaticScene:
-    """The stage of a world.
+    """The static scene of a world.
 
     Raises:
         ValueError: an object that is not one sphere, for moving geoms that are neither the agent's nor an object's, and
@@ -74,13 +74,13 @@ def _spheres(static: Mirror, geoms: list[int]) -> Spheres:
     )
 
 
-def _static_scene(static: Mirror) -> Any:
+def _static_scene(static: Mirror) -> MitsubaObject:
     """The mirror's scene with one shape per material (and per plugin that is no mesh)."""
     model = static.model
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    description: dict[str, Any] = {"type": "scene"}
-    meshes: dict[tuple[int, bool, bool], tuple[Any, list[Triangles]]] = {}
+    description: Description = {"type": "scene"}
+    meshes: dict[tuple[int, bool, bool], tuple[MitsubaObject, list[Triangles]]] = {}
     for geom in map(int, static.geoms):
         _refuse_glow(model, geom)
         bsdf, pose = static.bsdf(geom), shapes.pose(data, geom)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from sim.scene import shapes
-from sim.scene.variant import variant
+from sim.scene.variant import MitsubaObject, variant
 from sim.tracing import lighting
 from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.mitsuba_tracer import Traced
@@ -31,25 +32,32 @@ class Tracer(Protocol):
     basis: np.ndarray
 
     @property
-    def scene(self) -> Any:
+    def scene(self) -> MitsubaObject:
         """A Mitsuba scene or None."""
 
     @property
-    def inputs(self) -> dict[str, Any]:
+    def inputs(self) -> dict[str, Array]:
         """Arrays, by name."""
 
     def radiance(
-        self, scene: Any, ray: Any, agent: Any, centres: list[Any], inputs: dict[str, Any], place: Any = None
-    ) -> tuple[list[Any], Any]:
+        self,
+        scene: MitsubaObject,
+        ray: Array,
+        agent: Array,
+        centres: list[Array],
+        inputs: dict[str, Array],
+        bounce_sample: Array | None = None,
+    ) -> tuple[list[Array], Array]:
         """What comes along each ray, one array per component, and from how far [m]; agent and centres: of the
-        spheres that move; place: each ray's on the unit square (`lighting.onwards`), wanted for light that bounces."""
+        spheres that move; bounce_sample: each ray's own on the unit square, wanted
+        for light that bounces (`lighting.onwards`)."""
 
 
 class Tracers:
     """The tracers of a world, one for every level of light. Raises what `tracer_of` does for direct light."""
 
-    def __init__(self, world: World, stage: StaticScene, wavelengths: np.ndarray, name: str = "auto") -> None:
-        self._world, self._stage, self._wavelengths, self._name = world, stage, wavelengths, name
+    def __init__(self, world: World, static: StaticScene, wavelengths: np.ndarray, name: str = "auto") -> None:
+        self._world, self._static, self._wavelengths, self._name = world, static, wavelengths, name
         self._known: dict[str, Tracer] = {}
         self.of(lighting.DIRECT)
 
@@ -60,13 +68,13 @@ class Tracers:
             ValueError: see `tracer_of`.
         """
         if light not in self._known:
-            with variant(self._stage.variant):
-                self._known[light] = tracer_of(self._world, self._stage, self._wavelengths, self._name, light)
+            with variant(self._static.variant):
+                self._known[light] = tracer_of(self._world, self._static, self._wavelengths, self._name, light)
         return self._known[light]
 
 
 def tracer_of(
-    world: World, stage: StaticScene, wavelengths: np.ndarray, name: str, light: str = lighting.DIRECT
+    world: World, static: StaticScene, wavelengths: np.ndarray, name: str, light: str = lighting.DIRECT
 ) -> Tracer:
     """The tracer of a world, "auto" being the fastest that can.
 
@@ -74,16 +82,16 @@ def tracer_of(
         ValueError: an unknown name, for "closed_form" where the world has none, for lights other than directional ones,
             for surfaces that are not Lambertian, and for light that bounces off an agent with a texture.
     """
-    if light == lighting.BOUNCE and shapes.is_textured(world.model, stage.bodies.geoms[-1]):
+    if light == lighting.BOUNCE and shapes.is_textured(world.model, static.bodies.geoms[-1]):
         raise ValueError("light = 'bounce': the agent's body has a texture, which would have to turn with it")
     if name not in TRACERS:
         raise ValueError(f"tracer = {name!r}: must be one of {', '.join(map(repr, TRACERS))}")
-    lighting.check_lambertian([*stage.spheres.bsdfs, *(shape.bsdf() for shape in stage.scene.shapes())])
+    lighting.check_lambertian([*static.spheres.bsdfs, *(shape.bsdf() for shape in static.scene.shapes())])
     if name == Traced.name:
-        return Traced(stage, wavelengths, "asked for", light)
+        return Traced(static, wavelengths, "asked for", light)
     try:
-        return ClosedForm(world, stage, wavelengths, light)
+        return ClosedForm(world, static, wavelengths, light)
     except NoClosedForm as reason:
         if name == ClosedForm.name:
             raise ValueError(f"tracer = 'closed_form': this world has no closed form: {reason}") from reason
-        return Traced(stage, wavelengths, f"no closed form: {reason}", light)
+        return Traced(static, wavelengths, f"no closed form: {reason}", light)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Protocol
+from typing import Protocol
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from sim.tracing.walls import ALIGNED, SIDES, NoClosedForm, Walls
 
 FEW = 8  # walls that are solved one by one; a walk through a grid costs about as much
@@ -22,10 +23,10 @@ class Footprints(Protocol):
     how: str
     tables: dict[str, np.ndarray]
 
-    def hit(self, ray: Any, inputs: dict[str, Any]) -> tuple[Any, Any, Any]:
+    def hit(self, ray: Array, inputs: dict[str, Array]) -> tuple[Array, Array, Array]:
         """Distance [m] to the nearest wall (inf: none; 0: inside one), its face, and the face's normal."""
 
-    def blocks(self, start: Any, direction: np.ndarray, inputs: dict[str, Any]) -> Any:
+    def blocks(self, start: Array, direction: np.ndarray, inputs: dict[str, Array]) -> Array:
         """Whether a wall stands between a point outside all walls and a light in this direction, upwards."""
 
 
@@ -46,7 +47,7 @@ class EachWall:
         self.how = "each solved"
         self.tables: dict[str, np.ndarray] = {}
 
-    def hit(self, ray: Any, inputs: dict[str, Any]) -> tuple[Any, Any, Any]:
+    def hit(self, ray: Array, inputs: dict[str, Array]) -> tuple[Array, Array, Array]:
         """See Footprints."""
         dx, dy = _never_zero(ray.d.x), _never_zero(ray.d.y)
         ix, iy = 1 / dx, 1 / dy
@@ -62,7 +63,7 @@ class EachWall:
             face = dr.select(hit, SIDES * i, face)
         return _finished(t, face, through_x, dx, dy)
 
-    def blocks(self, start: Any, direction: np.ndarray, inputs: dict[str, Any]) -> Any:
+    def blocks(self, start: Array, direction: np.ndarray, inputs: dict[str, Array]) -> Array:
         """See Footprints."""
         dx, dy = (math.copysign(max(abs(float(d)), NEVER_ZERO), float(d)) for d in direction[:2])
         blocked = mi.Bool(False)
@@ -72,7 +73,7 @@ class EachWall:
             blocked |= (near < far) & (dr.fma(near, float(direction[2]), start.z) < float(self._walls.top[i]))
         return blocked
 
-    def _slabs(self, i: int, o: Any, ix: Any, iy: Any) -> tuple[Any, Any, Any]:
+    def _slabs(self, i: int, o: Array, ix: Array, iy: Array) -> tuple[Array, Array, Array]:
         (lx, ly), (ux, uy) = (map(float, corner[i]) for corner in (self._walls.lower, self._walls.upper))
         x0, x1 = (lx - o.x) * ix, (ux - o.x) * ix
         y0, y1 = (ly - o.y) * iy, (uy - o.y) * iy
@@ -107,12 +108,12 @@ class Cells:
             "stop": np.where(edge, np.inf, tops).astype(np.float32).ravel(),
         }
 
-    def hit(self, ray: Any, inputs: dict[str, Any]) -> tuple[Any, Any, Any]:
+    def hit(self, ray: Array, inputs: dict[str, Array]) -> tuple[Array, Array, Array]:
         """See Footprints."""
         dx, dy = _never_zero(ray.d.x), _never_zero(ray.d.y)
         x, y = self._place(ray.o)
         column, row = dr.floor(x), dr.floor(y)
-        per_x, per_y = self._side / dr.abs(dx), self._side / dr.abs(dy)
+        per_x, per_y = self._side / abs(dx), self._side / abs(dy)
         next_x = dr.select(dx > 0, column + 1 - x, x - column) * per_x
         next_y = dr.select(dy > 0, row + 1 - y, y - row) * per_y
         step_x = dr.select(dx > 0, mi.Int32(1), mi.Int32(-1))
@@ -120,11 +121,11 @@ class Cells:
         cell = dr.select(self._inside(column, row), mi.Int32(row * self._columns + column), 0)
         z, dz, stop = ray.o.z, ray.d.z, inputs["stop"]
 
-        def going(t: Any, cell: Any, next_x: Any, next_y: Any, through_x: Any) -> Any:
+        def going(t: Array, cell: Array, next_x: Array, next_y: Array, through_x: Array) -> Array:
             height = dr.fma(dz, t, z)
             return (height >= dr.gather(mi.Float, stop, cell)) & ((height <= self._ceiling) | (dz <= 0))
 
-        def walk(t: Any, cell: Any, next_x: Any, next_y: Any, through_x: Any) -> tuple[Any, ...]:
+        def walk(t: Array, cell: Array, next_x: Array, next_y: Array, through_x: Array) -> tuple[Array, ...]:
             through_x = next_x < next_y
             t = dr.minimum(next_x, next_y)
             cell = cell + dr.select(through_x, step_x, step_y)
@@ -138,7 +139,7 @@ class Cells:
         face = SIDES * mi.UInt32(dr.gather(mi.Float, inputs["wall"], cell))
         return _finished(dr.select(hit, t, math.inf), face, through_x, dx, dy)
 
-    def blocks(self, start: Any, direction: np.ndarray, inputs: dict[str, Any]) -> Any:
+    def blocks(self, start: Array, direction: np.ndarray, inputs: dict[str, Array]) -> Array:
         """See Footprints. A shadow ray has left the walls behind after so few cells that the walk is unrolled."""
         dx, dy, dz = map(float, direction)
         x, y = self._place(start)
@@ -164,15 +165,15 @@ class Cells:
         reach = self._climb * np.abs(direction[:2]) / direction[2] / self._side
         return int(np.ceil(reach).sum())
 
-    def _inside(self, column: Any, row: Any) -> Any:
+    def _inside(self, column: Array, row: Array) -> Array:
         return (column >= 0) & (column < self._columns) & (row >= 0) & (row < self._rows)
 
-    def _place(self, point: Any) -> tuple[Any, Any]:
+    def _place(self, point: Array) -> tuple[Array, Array]:
         """Coordinates in cells."""
         return tuple((point[i] - float(self._corner[i])) * (1 / self._side) for i in range(2))
 
 
-def _finished(t: Any, face: Any, through_x: Any, dx: Any, dy: Any) -> tuple[Any, Any, Any]:
+def _finished(t: Array, face: Array, through_x: Array, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
     """A wall's first face is turned into the one that was met: those that face -x, +x, -y, +y."""
     x, y = dr.select(dx > 0, -1.0, 1.0), dr.select(dy > 0, -1.0, 1.0)
     side = dr.select(
@@ -182,8 +183,8 @@ def _finished(t: Any, face: Any, through_x: Any, dx: Any, dy: Any) -> tuple[Any,
     return t, face + side, normal
 
 
-def _never_zero(d: Any) -> Any:
-    return dr.select(dr.abs(d) < NEVER_ZERO, dr.copysign(mi.Float(NEVER_ZERO), d), d)
+def _never_zero(d: Array) -> Array:
+    return dr.select(abs(d) < NEVER_ZERO, dr.copysign(mi.Float(NEVER_ZERO), d), d)
 
 
 def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:

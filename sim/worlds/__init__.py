@@ -1,5 +1,6 @@
 """The worlds of the tasks, as MuJoCo models.
 
+catalog      TASKS: their names, and what is asked of the agent
 world        build_world, World
 detection    an open field with goal and adversaries; of tracking, too
 foraging     the same, for receptors of the ultraviolet

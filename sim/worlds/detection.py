@@ -8,8 +8,8 @@ import numpy as np
 from sim.worlds import materials
 from sim.worlds.layout import CELL, Layout, add_floor, add_wall, cell_centers
 
-FIELD = (9, 11)  # free cells (rows, columns)
-OBJECT_RADIUS = 0.5  # [m]
+FIELD = (9, 11)  # free cells (rows, columns), as published
+OBJECT_RADIUS = 0.5  # [m], as published
 OBJECTS = ("goal", "adversary_0", "adversary_1")
 STRIPES = 6  # across the visible side of an object
 # Edges between an adversary's bands [deg from the top]: about as far apart as a goal's where eyes see them, and such

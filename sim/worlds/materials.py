@@ -15,6 +15,7 @@ import numpy as np
 from optics.spectra.spectrum import Spectrum, daylight
 from sim.scene.color import encode_srgb, preview
 
+# Chosen.
 WHITE = 0.9  # reflectance of a light stripe
 BLACK = 0.05  # reflectance of a dark stripe
 GREY = 0.5  # reflectance of a plain wall: stripes are as far below as above it

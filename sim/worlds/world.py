@@ -18,20 +18,17 @@ from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_p
 from sim.scene.spectra import resolve
 from sim.worlds import detection, foraging, materials, navigation
 from sim.worlds.agent_model import AgentModel
+from sim.worlds.catalog import TASKS
 from sim.worlds.layout import WALL_CONAFFINITY
 
-_LAYOUTS = {
-    "detection": detection.add_layout,
-    "foraging": foraging.add_layout,
-    "navigation": navigation.add_layout,
-    "tracking": detection.add_layout,
-}
-TASKS = tuple(_LAYOUTS)
+# Navigation's has an argument of its own, its number of mazes.
+_LAYOUTS = {"detection": detection.add_layout, "foraging": foraging.add_layout, "tracking": detection.add_layout}
 
-TIMESTEP = 0.02  # [s]
-TIME_CONSTANT = 0.35  # [s] lag of the agent's speed behind the commanded one
-SPEED_GAIN = 0.99  # speed reached per speed commanded
-MAX_SPEED = 10.0  # [m/s] commanded
+TIMESTEP = 0.02  # [s], as published
+# Lag [s] of the agent's speed behind the commanded one, and speed reached per speed commanded: with them an agent goes
+# as far per action as in the published environment (tests/sim/worlds/test_world.py).
+TIME_CONSTANT, SPEED_GAIN = 0.35, 0.99
+MAX_SPEED = 10.0  # [m/s] commanded, as published
 
 # The agent can move MAX_SPEED * TIMESTEP = 0.2 m in one substep. Its whiskers feel a wall that near, so that the
 # skin, and the eyes in it, never pass through a wall. See `_add_agent` for the contact's stiffness.
@@ -72,7 +69,7 @@ def build_world(
 ) -> World:
     """Build the world of a task.
 
-    task: "detection", "foraging", "navigation" or "tracking"
+    task: one of `sim.TASKS`
     seed: draws the mazes of navigation; the field of the others is always the same
     mazes: of navigation: so many different ones, and an episode begins in any of them
     eyes: if given, the agent carries cameras eye_0 ..., left to right

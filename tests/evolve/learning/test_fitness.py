@@ -11,6 +11,7 @@ from evolve.config.run_config import WorldConfig
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.learning.ppo import play
+from sim.envs.assembly import vec_env_in
 from tests.evolve.small_run import LEARNING, PHENOTYPE, small_config
 
 pytestmark = pytest.mark.usefixtures("short_episodes")
@@ -63,12 +64,16 @@ def test_training_looks_less_closely_than_evaluation(rays_per_eye, expected, tmp
     Evaluation traces those in any case."""
     rays = {}
 
-    def recorded(*args, make=sim.make_vec_env, **kwargs):
-        worlds = make(*args, **kwargs)
-        rays[kwargs["mode"]] = worlds.renderer.fidelity.rays_per_receptor
-        return worlds
+    def recorded(make):
+        def made(*args, **kwargs):
+            worlds = make(*args, **kwargs)
+            rays[worlds.simulation.mode] = worlds.renderer.fidelity.rays_per_receptor
+            return worlds
 
-    monkeypatch.setattr(sim, "make_vec_env", recorded)
+        return made
+
+    monkeypatch.setattr(sim, "make_vec_env", recorded(sim.make_vec_env))
+    monkeypatch.setattr("evolve.learning.fitness.vec_env_in", recorded(vec_env_in))
     config = small_config()
     learning = replace(config.learning, rays_per_eye=rays_per_eye)
     config = replace(config, eye=replace(config.eye, rays_per_receptor="auto"), learning=learning)

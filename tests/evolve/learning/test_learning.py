@@ -39,7 +39,7 @@ def accuracy_of_telling_goal_from_adversary(resolution, seed):
     """Share of unseen scenes told right by the policy's features and one linear unit after 400 batches."""
     random = np.random.default_rng(seed)
     eyes = sim.Eyes(n_eyes=1, resolution=resolution)
-    renderer = sim.BatchedRenderer(sim.build_world("detection"), eyes, SCENES, 4)
+    renderer = sim.BatchedRenderer(sim.build_world("detection"), eyes, SCENES, sim.Fidelity(4, eyes.bands))
     drawn = [scenes(random) for _ in range(TRAINING_SCENES + 4)]
     signals = torch.from_numpy(np.concatenate([renderer.signals(state) for state, _ in drawn]))[:, None]
     goal = torch.from_numpy(np.concatenate([is_goal for _, is_goal in drawn])).float()

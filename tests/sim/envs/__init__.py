@@ -1,0 +1,13 @@
+"""What tests hold of environments, module by module.
+
+assembly: test_env.py, test_vec_env.py, test_tasks_page.py
+env: test_env.py
+vec_env: test_vec_env.py, test_env.py
+registration: test_env.py, worlds/test_catalog.py
+simulation: tasks/test_task.py, test_vec_env.py
+observation: test_vec_env.py, test_tasks_page.py
+info: test_vec_env.py, test_tasks_page.py
+follow_camera: test_env.py
+field_of_view_overlay: test_env.py
+retina_images: test_env.py
+"""

@@ -94,7 +94,7 @@ def test_picture_follows_the_agent():
     assert first.dtype == np.uint8
     env.step(np.array([-1.0, 1.0]))  # turns on the spot: the body stays, the world turns
     second = env.render()
-    state, mirror = env.state, env._batch._onlooker._mirror
+    state, mirror = env.state, env._batch._follow_camera._mirror
     ids = mirror.render_ids(_follow(state, 0), 480, 360)
     y, x = np.nonzero(ids == mirror.model.geom("agent").id)
     assert len(y) > 50
@@ -233,3 +233,12 @@ def test_eyes_and_seeds_of_another_kind_are_named():
 def test_a_perfect_lens_tells_how_many_rays_it_has():
     renderer = sim.make_vec_env("detection", EYES, 1, rays_per_receptor=1.6).renderer
     assert renderer.fidelity.rays_per_receptor == renderer.sensor.rays_per_receptor == 2
+
+
+def test_a_fidelity_by_either_name_is_the_same():
+    """docs/tasks.md once had it as `rays_per_receptor`; the eyes then have its number of bands."""
+    fidelity = sim.Fidelity(2, bands=3, light="bounce")
+    for named in ({"fidelity": fidelity}, {"rays_per_receptor": fidelity}):
+        renderer = sim.make_vec_env("detection", EYES, 1, **named).renderer
+        assert renderer.fidelity == fidelity
+        assert renderer.eyes.bands == 3

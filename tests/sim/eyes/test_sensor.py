@@ -125,7 +125,7 @@ def test_signals_are_the_weighted_sums(components):
     basis = np.eye(3) if components == 3 else rng.random((components, 3))
     mixing = rng.random((2, 3))
     expected = np.einsum("cb,kb,brp,kvp->vcr", mixing, basis, dense(sensor), light)
-    found = sensor.readout(mixing, basis)(light)
+    found = sensor.receptor_sums(mixing, basis)(light)
     np.testing.assert_allclose(found.reshape(37, 2, 20), expected, rtol=2e-5)
     bands = np.einsum("kb,kvp->bvp", basis, light).astype(np.float32)
     np.testing.assert_allclose(

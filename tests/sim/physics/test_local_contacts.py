@@ -61,21 +61,21 @@ def test_agents_among_a_few_geoms_do_what_they_do_among_all(task, threads, redon
     world = build_world(task)
     state, command = begun_at_walls(world, 2 * POOLED)
     few, all_of_them = Physics(world, threads), Physics(world, 1)
-    all_of_them.vicinity = None
+    all_of_them.local_contacts = None
     redone.clear()
     ours = few.step(state, command)
     assert sum(redone) < 5
-    assert (few.vicinity._rollouts._pool is None) == (threads == 1)
+    assert (few.local_contacts._step._pool is None) == (threads == 1)
     assert_same_bits(ours, all_of_them.step(state, command))
     assert ours.contact.sum() > 100
-    assert len(few.vicinity._models) > 4  # different walls, and corners
+    assert len(few.local_contacts._models) > 4  # different walls, and corners
 
 
 def test_agents_among_too_many_geoms_are_stepped_in_the_whole_world(redone):
     world = build_world("navigation")
     state, command = begun_at_walls(world, 64)
     cramped = Physics(world, 1)
-    cramped.vicinity._slots = cramped.vicinity._slots[:1]
+    cramped.local_contacts._slots = cramped.local_contacts._slots[:1]
     redone.clear()
     ours = cramped.step(state, command)
     assert 0 < sum(redone) < 64  # those in corners
@@ -88,10 +88,10 @@ def test_agents_that_stray_to_what_their_models_lack_are_done_again(monkeypatch,
     world = build_world("navigation")
     state, command = begun_at_walls(world, 64)
     without_room = Physics(world, 1)
-    without_room.vicinity._slots = without_room.vicinity._slots[:0]
+    without_room.local_contacts._slots = without_room.local_contacts._slots[:0]
     if not noticed:
         monkeypatch.setattr(LocalContacts, "strayed", lambda _, position, path, few: np.zeros(len(few), bool))
-    ours, theirs = without_room.step(state, command), Physics(world, 1, gliding=False).step(state, command)
+    ours, theirs = without_room.step(state, command), Physics(world, 1, closed_form=False).step(state, command)
     assert (np.abs(ours.path - theirs.path).max() < 1e-12) == noticed
     assert np.array_equal(ours.contact, theirs.contact) == noticed
 
@@ -103,7 +103,7 @@ def test_an_agent_that_breaks_down_at_a_wall_is_what_the_whole_world_makes_of_it
     velocity = state.velocity.copy()
     velocity[touching[::2]] = [[1e9, -1e9]]
     state = dataclasses.replace(state, velocity=velocity)
-    ours, theirs = (Physics(world, 1, gliding).step(state, command) for gliding in (True, False))
+    ours, theirs = (Physics(world, 1, closed_form).step(state, command) for closed_form in (True, False))
     assert theirs.unstable.sum() == len(touching[::2])
     np.testing.assert_array_equal(ours.unstable, theirs.unstable)
     np.testing.assert_allclose(ours.path, theirs.path, rtol=0, atol=1e-12)
@@ -113,16 +113,16 @@ def test_an_agent_that_breaks_down_at_a_wall_is_what_the_whole_world_makes_of_it
 def test_a_model_that_was_altered_has_no_parts(change):
     """Another number anywhere, and agents at walls are stepped in the whole of it."""
     world = build_world("navigation")
-    assert Physics(world, 1).vicinity is not None
+    assert Physics(world, 1).local_contacts is not None
     if change.startswith("opt."):
         was = getattr(world.model.opt, change[4:])
         setattr(world.model.opt, change[4:], type(was)(was / 2))
     else:
         getattr(world.model, change)[1] += 1
-    assert Physics(world, 1).vicinity is None
+    assert Physics(world, 1).local_contacts is None
 
 
-def test_a_world_with_nothing_to_touch_is_glided_through():
+def test_a_world_with_nothing_to_touch_is_crossed_in_closed_form():
     """Boundless, but a world."""
     field, spec = build_world("detection"), _empty_world()
     _add_agent(spec, np.zeros(2), None)
@@ -136,23 +136,23 @@ def test_a_world_with_nothing_to_touch_is_glided_through():
 
 def test_threads_change_nothing(world):
     state, command = begun_at_walls(world, POOLED)
-    one, two = (Physics(world, threads, gliding=False) for threads in (1, 2))
+    one, two = (Physics(world, threads, closed_form=False) for threads in (1, 2))
     assert_same_bits(one.step(state, command), two.step(state, command))
-    assert two._rollouts._pool is not None
+    assert two._step_batch._pool is not None
 
 
 def test_fewer_worlds_than_are_worth_it_start_no_threads(world):
     state, command = begun_at_walls(world, POOLED - 1)
-    physics = Physics(world, 2, gliding=False)
+    physics = Physics(world, 2, closed_form=False)
     physics.step(state, command)
-    assert physics._rollouts._pool is None
+    assert physics._step_batch._pool is None
 
 
 def test_mujocos_clock_outlives_physics_in_two_threads(world):
     """Each saves and restores it; a race would leave the process without."""
     state, command = begun(world, 64), np.zeros((64, 2))
     stepping = [
-        threading.Thread(target=step_often, args=(Physics(world, 1, gliding=False), state, command)) for _ in "12"
+        threading.Thread(target=step_often, args=(Physics(world, 1, closed_form=False), state, command)) for _ in "12"
     ]
     before = mujoco_batch._clock().value
     for thread in stepping:
@@ -170,11 +170,11 @@ def step_often(physics, state, command):
 
 def test_mujocos_clock_runs_on_after_physics(world):
     """It is stopped during a rollout, whose data count their steps without timing them, and for nobody else."""
-    ours = Physics(world, 1, gliding=False)
+    ours = Physics(world, 1, closed_form=False)
     ours.step(begun(world, 1), np.ones((1, 2)))
     step = mujoco.mjtTimer.mjTIMER_STEP
-    assert ours._rollouts._data[0].timer[step].number >= SUBSTEPS
-    assert ours._rollouts._data[0].timer[step].duration == 0
+    assert ours._step_batch._data[0].timer[step].number >= SUBSTEPS
+    assert ours._step_batch._data[0].timer[step].duration == 0
     data = mujoco.MjData(world.model)
     mujoco.mj_step(world.model, data)
     assert data.timer[step].duration > 0

@@ -47,22 +47,22 @@ def test_batch_equals_single_data(world):
 
 
 @pytest.mark.parametrize("task", ["detection", "navigation"])
-def test_gliding_is_what_mujoco_does(task):
+def test_free_motion_is_what_mujoco_does(task):
     """Everywhere, near walls and away from them, to rounding: 1e-12 m on metres over ten substeps."""
     world = build_world(task)
-    gliding, simulating = Physics(world, 1), Physics(world, 1, gliding=False)
+    moving, simulating = Physics(world, 1), Physics(world, 1, closed_form=False)
     simulation = Simulation(world, 32, 0, "training", 1)
     simulation.reset()
     rng = np.random.default_rng(0)
     free = 0
     for _ in range(40):
         state, command = simulation.state, rng.uniform(-10, 10, (32, 2))
-        ours, mujocos = gliding.step(state, command), simulating.step(state, command)
+        ours, mujocos = moving.step(state, command), simulating.step(state, command)
         np.testing.assert_allclose(ours.path, mujocos.path, rtol=0, atol=1e-12)
         np.testing.assert_allclose(ours.velocity, mujocos.velocity, rtol=0, atol=1e-11)
         np.testing.assert_array_equal(ours.contact, mujocos.contact)
-        path, _ = gliding.glide(state.velocity, command)
-        free += (~gliding.glide.met(state.position, path).any(axis=1)).sum()
+        path, _ = moving.free_motion(state.velocity, command)
+        free += (~moving.free_motion.met(state.position, path).any(axis=1)).sum()
         simulation.step(rng.uniform(-1, 1, (32, 2)))
     assert free > 50  # or nothing was compared
 
@@ -71,10 +71,10 @@ def test_gliding_is_what_mujoco_does(task):
 def test_what_physics_leaves_out_changes_no_bit(task, monkeypatch):
     """Islands and, in small models, boxes of boxes: agents at walls and in corners move as in all of MuJoCo."""
     world = build_world(task)
-    lean = Physics(world, 1, gliding=False)
+    lean = Physics(world, 1, closed_form=False)
     assert lean._model.opt.disableflags != world.model.opt.disableflags
     monkeypatch.setattr(physics, "_without_detours", copy.copy)
-    whole = Physics(world, 1, gliding=False)
+    whole = Physics(world, 1, closed_form=False)
     assert whole._model.opt.disableflags == world.model.opt.disableflags
     simulation = Simulation(world, 32, 0, "training", 1)
     simulation.reset()
@@ -89,10 +89,10 @@ def test_what_physics_leaves_out_changes_no_bit(task, monkeypatch):
     assert touched > 50
 
 
-def test_an_agent_that_glides_through_a_wall_would_be_noticed(world):
-    """Blind to the walls, the same glide departs from MuJoCo: the test above can fail."""
+def test_an_agent_that_moves_freely_through_a_wall_would_be_noticed(world):
+    """Blind to the walls, the same motion departs from MuJoCo: the test above can fail."""
     physics = Physics(world, 1)
-    physics.glide = dataclasses.replace(physics.glide, lower=np.empty((0, 2)), upper=np.empty((0, 2)))
+    physics.free_motion = dataclasses.replace(physics.free_motion, lower=np.empty((0, 2)), upper=np.empty((0, 2)))
     state = dataclasses.replace(begun(world, 1), position=np.array([[10.5, 0.0]]), velocity=np.array([[9.0, 0.0]]))
     command = np.array([[10.0, 0.0]])
     apart = physics.step(state, command).path - Physics(world, 1).step(state, command).path
@@ -100,19 +100,19 @@ def test_an_agent_that_glides_through_a_wall_would_be_noticed(world):
 
 
 @pytest.mark.parametrize(
-    ("field", "glides"), [("dof_damping", True), ("dof_frictionloss", False), ("jnt_stiffness", False)]
+    ("field", "linear"), [("dof_damping", True), ("dof_frictionloss", False), ("jnt_stiffness", False)]
 )
-def test_models_glide_as_far_as_they_are_linear(field, glides):
+def test_models_move_in_closed_form_as_far_as_they_are_linear(field, linear):
     """A spring's pull depends on the place, dry friction on the direction: such agents are left to MuJoCo. And models
     of a part, compiled before this one was altered, do not stand for it."""
     world = build_world("detection")
     getattr(world.model, field)[0] = 0.3
     world.model.qpos_spring[:] = world.model.qpos0  # at rest where the agent starts, and nowhere else
-    assert (Physics(world, 1).glide is not None) == glides
-    assert Physics(world, 1).vicinity is None
+    assert (Physics(world, 1).free_motion is not None) == linear
+    assert Physics(world, 1).local_contacts is None
     state = dataclasses.replace(begun(world, 4), position=np.array([[3.0, 1.0]] * 4))
     command = np.random.default_rng(0).uniform(-10, 10, (4, 2))
-    ours, mujocos = (Physics(world, 1, gliding).step(state, command) for gliding in (True, False))
+    ours, mujocos = (Physics(world, 1, closed_form).step(state, command) for closed_form in (True, False))
     np.testing.assert_allclose(ours.path, mujocos.path, rtol=0, atol=1e-12)
 
 

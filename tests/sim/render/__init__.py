@@ -1,0 +1,15 @@
+"""What tests hold of rendering, module by module.
+
+one_ray: test_one_ray.py
+batched_renderer: test_batched_renderer.py, test_one_ray.py, test_reference_renderer.py
+reference_renderer: test_reference_renderer.py
+fidelity: test_fidelity.py, eyes/test_depth_layers.py
+fidelity_trials: test_fidelity.py, eyes/test_depth_layers.py
+prepared_scene: test_batched_renderer.py, test_fidelity.py
+band_error: test_band_error.py
+memory_budget: test_memory_budget.py
+frozen_kernels: test_frozen_kernels.py, test_batched_renderer.py
+receptor_noise: test_receptor_noise.py
+noisy_signals: test_noisy_signals.py
+pending_frame: test_pending_frame.py, test_noisy_signals.py
+"""

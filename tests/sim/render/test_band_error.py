@@ -80,7 +80,7 @@ class TestLampsWithLines:
         simulation.close()
         eyes = sim.Eyes(1, (3, 3), fov_deg=80, bands=bands, receptors=receptors, noise_sigma=0)
         if renderer == "batched":
-            return sim.BatchedRenderer(world, eyes, 1, 4).signals(state)
+            return sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(4, eyes.bands)).signals(state)
         return sim.ReferenceRenderer(world, eyes, "direct", spp=4).signals(state)
 
     @pytest.mark.parametrize("renderer", ["batched", "reference"])
@@ -91,7 +91,7 @@ class TestLampsWithLines:
         assert few.max() > 0.05
 
     def test_samples_at_the_centres_miss_lines(self, monkeypatch):
-        monkeypatch.setattr("sim.render.batched_renderer.with_band_averaged_lights", lambda world, eye: world)
+        monkeypatch.setattr("sim.render.prepared_scene.with_band_averaged_lights", lambda world, eye: world)
         few, many = (self.signals("batched", bands) for bands in (4, 64))
         assert (few > 1.9 * many)[many > 0.1].any()
 

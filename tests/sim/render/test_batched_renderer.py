@@ -9,6 +9,7 @@ import pytest
 
 import sim
 from sim.envs.simulation import Simulation
+from sim.render.prepared_scene import PreparedScene
 from sim.tracing import lighting, spheres
 from sim.worlds.state import pose
 from sim.worlds.world import build_world
@@ -78,7 +79,7 @@ class Disagreement:
 
 
 def disagreement(world, state, images, tracer):
-    renderer = sim.BatchedRenderer(world, EYES, state.n, rays_per_receptor=RAYS, tracer=tracer)
+    renderer = sim.BatchedRenderer(world, EYES, state.n, sim.Fidelity(RAYS, EYES.bands), tracer)
     ours = np.moveaxis(renderer.receptor_radiance(state), 0, 2)
     means, theirs = ours.mean(axis=(3, 4)), images.mean(axis=(4, 5))
     shares = [m / m.sum(axis=-1, keepdims=True) for m in (means, theirs.mean(axis=0))]
@@ -174,7 +175,7 @@ def test_parity_is_lost_when_something_is_wrong(references, monkeypatch, module,
 
 def test_signals_weight_the_bands(references):
     world, state, _ = references["detection"]
-    renderer = sim.BatchedRenderer(world, EYES, state.n, rays_per_receptor=3)
+    renderer = sim.BatchedRenderer(world, EYES, state.n, sim.Fidelity(3, EYES.bands))
     rays = renderer.radiance(state)
     assert rays.shape == (2, 2, 9 * 15 * 3, 6)
     receptors = rays.reshape(2, 2, 9, 15, 3, 6).mean(axis=4)
@@ -210,8 +211,10 @@ def test_a_world_looks_the_same_among_any_number_of_neighbours(references, task,
 def test_bad_arguments_are_named(references):
     world, state, _ = references["detection"]
     with pytest.raises(ValueError, match="n_envs"):
-        sim.BatchedRenderer(world, EYES, 0)
-    with pytest.raises(ValueError, match="rays_per_receptor"):
-        sim.BatchedRenderer(world, EYES, 1, rays_per_receptor=0)
+        sim.BatchedRenderer(world, EYES, 0, sim.Fidelity(1, EYES.bands))
+    with pytest.raises(ValueError, match=r"fidelity = 4: must be a sim\.Fidelity"):
+        sim.BatchedRenderer(world, EYES, 1, 4)
+    with pytest.raises(ValueError, match=rf"fidelity\.bands = 3: must be the scene's {EYES.bands}"):
+        sim.BatchedRenderer.of(PreparedScene(world, EYES), 1, sim.Fidelity(1, bands=3))
     with pytest.raises(ValueError, match="state has 2 worlds"):
-        sim.BatchedRenderer(world, EYES, 1, 1).signals(state)
+        sim.BatchedRenderer(world, EYES, 1, sim.Fidelity(1, EYES.bands)).signals(state)

@@ -10,7 +10,7 @@ import pytest
 import optics
 import sim
 from sim.envs.simulation import Simulation
-from sim.render.fidelity import PERFECT_LENS_RUNGS, PUPIL_RUNGS
+from sim.render.fidelity import PERFECT_LENS_RAYS, PUPIL_RAYS
 
 DETECTION = sim.Eyes(n_eyes=2, resolution=(9, 11))
 FEW = sim.Eyes(n_eyes=2, resolution=(5, 6))
@@ -32,7 +32,7 @@ CASES = {
 
 
 def lived_through(world, n=16):
-    """States that agents get into, which the pilot knows nothing of."""
+    """States that agents get into, which the trials know nothing of."""
     simulation = Simulation(world, n, 3, "training", 1)
     simulation.reset()
     rng = np.random.default_rng(5)
@@ -67,30 +67,30 @@ def test_the_pick_is_enough_and_not_far_more_than_enough(name):
         return np.sqrt(np.mean((signals(world, eyes, state, fidelity, n) - truth) ** 2))
 
     assert actual_error(rays) < eyes.noise_sigma / 2
-    # A third as many rays would not do, or there is no lower rung: errors fall like n^-0.6 ... n^-1.
-    rungs = PERFECT_LENS_RUNGS if eyes.optics is None else PUPIL_RUNGS
-    fewer = max((n for n in rungs if n <= rays / 3), default=None)
+    # A third as many rays would not do, or there is no lower number: errors fall like n^-0.6 ... n^-1.
+    numbers = PERFECT_LENS_RAYS if eyes.optics is None else PUPIL_RAYS
+    fewer = max((n for n in numbers if n <= rays / 3), default=None)
     if fewer is not None:
         assert actual_error(fewer) > 0.35 * eyes.noise_sigma
 
 
 def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
-    """With the eyes' own bands, which renderers do not choose: bands are most of the work of choosing all."""
+    """With the eyes' own bands: bands are most of the work of choosing all."""
     world = sim.build_world("detection")
 
     def rays(a, noise_sigma=FEW.noise_sigma):
         eyes = behind_lens(replace(FEW, noise_sigma=noise_sigma), a)
-        return sim.BatchedRenderer(world, eyes, 1).fidelity.rays_per_receptor
+        return sim.choose_fidelity(world, eyes, bands="own").rays_per_receptor
 
     found = [rays(a) for a in (0.1, 0.25, 0.6)]
     assert found == sorted(found)
     assert found[0] < 1 < found[-1]
-    assert found[0] < rays(0.1, noise_sigma=0.0) < PUPIL_RUNGS[-1]
+    assert found[0] < rays(0.1, noise_sigma=0.0) < PUPIL_RAYS[-1]
 
 
 def test_light_is_followed_as_far_as_it_matters():
     """Walls light each other in a maze: behind a narrow pupil that is lost in the noise, behind a wide one not. What
-    the pilot expects of it is what agents see, to a factor of 1.5."""
+    the trials expect of it is what agents see, to a factor of 1.5."""
     world, state, wide = picked("navigation, a = 0.6")
     narrow = sim.choose_fidelity(world, behind_lens(NAVIGATION, 0.1))
     assert (narrow.light, wide.light) == ("direct", "bounce")
@@ -112,6 +112,16 @@ def test_the_same_pick_every_time_whatever_the_number_of_worlds():
     assert len(one.sensor.directions) == round(one.fidelity.rays_per_receptor * 99)
 
 
+def test_environments_and_renderers_have_what_is_chosen_with_the_eyes_own_bands():
+    """The same value, whoever prepares the scene: the maker of an environment, a renderer or choose_fidelity."""
+    world = sim.build_world("detection")
+    chosen = sim.choose_fidelity(world, FEW, bands="own")
+    assert chosen.bands == FEW.bands
+    assert sim.BatchedRenderer(world, FEW, 2).fidelity == chosen
+    assert sim.make_vec_env("detection", FEW, 2).renderer.fidelity == chosen
+    assert sim.choose_fidelity(world, FEW).bands != FEW.bands
+
+
 def test_it_can_be_overruled():
     world = sim.build_world("detection")
     eyes = behind_lens(FEW, 0.25)
@@ -121,7 +131,7 @@ def test_it_can_be_overruled():
     renderer = sim.BatchedRenderer(world, eyes, 1, strict)
     assert renderer.fidelity is strict
     assert len(renderer.bands.wavelengths) == strict.bands
-    asked = sim.BatchedRenderer(world, eyes, 1, 2)
+    asked = sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(2, eyes.bands))
     assert len(asked.sensor.directions) == 2 * math.prod(FEW.resolution)
     assert "as asked" in str(asked.fidelity)
 
@@ -137,9 +147,16 @@ def test_it_says_why():
 @pytest.mark.parametrize(
     ("call", "named"),
     [
-        (lambda world: sim.BatchedRenderer(world, DETECTION, 1, 0), "rays_per_receptor = 0"),
-        (lambda world: sim.BatchedRenderer(world, DETECTION, 1, math.nan), "rays_per_receptor = nan"),
-        (lambda world: sim.BatchedRenderer(world, DETECTION, 1, "many"), "rays_per_receptor = 'many'"),
+        (lambda _: sim.Fidelity(0, 3), "rays_per_receptor = 0"),
+        (lambda _: sim.Fidelity(math.nan, 3), "rays_per_receptor = nan"),
+        (lambda _: sim.make_vec_env("detection", DETECTION, 1, rays_per_receptor=0), "rays_per_receptor = 0"),
+        (lambda _: sim.make_vec_env("detection", DETECTION, 1, rays_per_receptor="many"), "rays_per_receptor = 'many'"),
+        (lambda _: sim.make_vec_env("detection", DETECTION, 1, fidelity=4), "fidelity = 4: must be"),
+        (
+            lambda _: sim.make_vec_env("detection", DETECTION, 1, rays_per_receptor=4, fidelity=sim.Fidelity(4, 3)),
+            "rays_per_receptor = 4: must be left out",
+        ),
+        (lambda world: sim.choose_fidelity(world, DETECTION, bands="few"), "bands = 'few': must be 'auto' or 'own'"),
         (lambda world: sim.choose_fidelity(world, DETECTION, tolerance=0), "tolerance = 0"),
         (lambda world: sim.Fidelity(1.0, 0), "bands = 0"),
         (lambda world: sim.Fidelity(1.0, 3, light="path"), "light = 'path': must be one of 'direct', 'bounce'"),

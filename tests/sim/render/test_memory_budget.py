@@ -18,9 +18,9 @@ SOME = Demand(8, 64, 2, (15, 15), 1, 0)
 def test_a_renderer_says_what_it_has_room_for(pupil):
     world, eyes = sim.build_world("detection"), dataclasses.replace(EYES, optics=pupil)
     with pytest.raises(ValueError, match=r"rays_per_receptor = 1e\+12: 1 worlds .* GiB .* use at most .* rays"):
-        sim.BatchedRenderer(world, eyes, 1, 1e12)
+        sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(1e12, eyes.bands))
     with pytest.raises(ValueError, match="fewer worlds at once"):
-        sim.BatchedRenderer(world, eyes, 1, 1).resized(10**12)
+        sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(1, eyes.bands)).resized(10**12)
 
 
 def test_what_it_recommends_fits(monkeypatch):

@@ -18,7 +18,7 @@ def keys(n, seed=0):
 @pytest.fixture(scope="module")
 def frames():
     noise = Normals(keys(12), SHAPE)
-    return np.array([noise.begin(np.arange(12)).values() for _ in range(200)])
+    return np.array([noise.begin(np.arange(12)).wait() for _ in range(200)])
 
 
 def test_it_is_standard_normal(frames):
@@ -42,22 +42,22 @@ def test_no_frame_comes_twice(frames):
 
 def test_a_worlds_noise_does_not_depend_on_its_neighbours(frames):
     few = Normals(keys(12)[:3], SHAPE)
-    np.testing.assert_array_equal([few.begin(np.arange(3)).values() for _ in range(4)], frames[:4, :3])
+    np.testing.assert_array_equal([few.begin(np.arange(3)).wait() for _ in range(4)], frames[:4, :3])
 
 
 def test_some_worlds_alone_draw_their_own_next_frames(frames):
     noise = Normals(keys(12), SHAPE)
-    np.testing.assert_array_equal(noise.begin(np.array([7, 3])).values(), frames[0, [7, 3]])
-    after = noise.begin(np.arange(12)).values()
+    np.testing.assert_array_equal(noise.begin(np.array([7, 3])).wait(), frames[0, [7, 3]])
+    after = noise.begin(np.arange(12)).wait()
     np.testing.assert_array_equal(after[[3, 7]], frames[1, [3, 7]])
     np.testing.assert_array_equal(after[[0, 11]], frames[0, [0, 11]])
 
 
 def test_restart_begins_anew(frames):
     noise = Normals(keys(12, seed=1), SHAPE)
-    assert not np.array_equal(noise.begin(np.arange(12)).values(), frames[0])
+    assert not np.array_equal(noise.begin(np.arange(12)).wait(), frames[0])
     noise.restart(keys(12))
-    np.testing.assert_array_equal(noise.begin(np.arange(12)).values(), frames[0])
+    np.testing.assert_array_equal(noise.begin(np.arange(12)).wait(), frames[0])
 
 
 def test_gaussian_noise_adds_with_its_standard_deviation():

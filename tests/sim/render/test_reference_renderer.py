@@ -162,7 +162,7 @@ def through_a_prism():
 def departs(through_a_prism):
     """Whether the signals differ from the reference's by more than its standard errors and PSF_TOLERANCE allow."""
     world, state, eyes, batches = through_a_prism
-    found = sim.BatchedRenderer(world, eyes, 1, 256).signals(state)[0]
+    found = sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(256, eyes.bands)).signals(state)[0]
     floor = PSF_TOLERANCE * batches.mean()
     each = z_scores(found, batches, floor)
     images = z_scores(found.mean(axis=(2, 3)), batches.mean(axis=(3, 4)), floor)
@@ -214,5 +214,5 @@ def test_scalar_variant_needs_no_llvm():
     world, state = random_world("navigation", 0)
     eyes = dataclasses.replace(EYES, resolution=(2, 3), n_eyes=1)
     slow = sim.ReferenceRenderer(world, eyes, "direct", 4096, variant="scalar_spectral").radiance(state).mean()
-    exact = sim.BatchedRenderer(world, eyes, 1, 4096).receptor_radiance(state).mean()
+    exact = sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(4096, eyes.bands)).receptor_radiance(state).mean()
     assert slow == pytest.approx(exact, rel=0.04)  # four standard errors

@@ -1,0 +1,18 @@
+"""What tests hold of mirrors, module by module. Helpers: oracle (MuJoCo's rays), drawn (its renderer), models, lit.
+
+mirror: test_mirror.py, test_mirror_light.py
+source: test_mirror_source.py
+inventory: test_mirror.py
+rays: test_mirror.py
+cameras: test_mirror.py
+variant: test_mirror.py
+shapes: test_mirror.py, test_textures.py
+tessellation: test_mirror.py, test_cube_textures.py
+cube: test_cube_textures.py
+surfaces: test_textures.py, test_mirror_light.py
+bsdfs: test_bsdfs.py
+lights: test_lights.py, test_mirror_light.py
+sky: test_sky.py
+spectra: test_spectra.py
+color: test_color.py, test_exr.py
+"""

@@ -17,6 +17,7 @@ from sim.tracing.static_scene import build_static_scene
 from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=3, resolution=(9, 12), fov_deg=70, placement_range_deg=240, bands=5, noise_sigma=0)
+FOUR_RAYS = sim.Fidelity(4, EYES.bands)
 
 
 def scattered(world, n, seed=0):
@@ -32,7 +33,7 @@ def scattered(world, n, seed=0):
 def radiances(world, state):
     """Along every ray, by both tracers, (ray, band)."""
     return [
-        sim.BatchedRenderer(world, EYES, state.n, 4, tracer=name).radiance(state).reshape(-1, EYES.bands)
+        sim.BatchedRenderer(world, EYES, state.n, FOUR_RAYS, name).radiance(state).reshape(-1, EYES.bands)
         for name in ("closed_form", "mitsuba")
     ]
 
@@ -99,7 +100,7 @@ def around(world, n, seed):
 @pytest.mark.parametrize(("n_boxes", "grid", "seed"), [(6, False, 0), (7, False, 1), (12, True, 2), (14, True, 3)])
 def test_coloured_walls_of_any_height_under_coloured_lights(n_boxes, grid, seed):
     world = furnished(n_boxes, grid=grid, seed=seed)
-    renderer = sim.BatchedRenderer(world, EYES, 1, 1)
+    renderer = sim.BatchedRenderer(world, EYES, 1, sim.Fidelity(1, EYES.bands))
     assert renderer.tracer.name == "closed_form"
     assert ("grid" in renderer.tracer.why) == grid
     ours, theirs = radiances(world, around(world, 32, seed))
@@ -121,7 +122,7 @@ def test_coloured_walls_of_any_height_under_coloured_lights(n_boxes, grid, seed)
 )
 def test_other_worlds_are_left_to_mitsuba(extra, reason):
     world = furnished(3, grid=False, extra=extra)
-    tracer = sim.BatchedRenderer(world, EYES, 1, 1).tracer
+    tracer = sim.BatchedRenderer(world, EYES, 1, sim.Fidelity(1, EYES.bands)).tracer
     assert tracer.name == "mitsuba"
     assert reason in tracer.why
     with pytest.raises(ValueError, match="closed_form.*" + reason):

@@ -4,7 +4,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from sim.eyes.receptive_fields import places
+from sim.eyes.receptive_fields import bounce_samples
 from sim.scene.variant import variant
 from sim.tracing import lighting
 
@@ -17,7 +17,7 @@ def test_rays_go_on_by_lamberts_cosine(normal):
     normal = np.array(normal) / np.linalg.norm(normal)
     n = 4096
     with variant():
-        place = mi.Point2f(places(n).T.astype(np.float32))
+        place = mi.Point2f(bounce_samples(n).T.astype(np.float32))
         ray = lighting.onwards(mi.Point3f(3, -4, 0.5), mi.Normal3f(*normal.tolist()), place)
         start, directions = np.array(ray.o).T, np.array(ray.d).T
     cosine = directions @ normal

@@ -27,7 +27,7 @@ def facing(kind):
 def differences():
     """Signal of an adversary less that of a goal, (distance, direction)."""
     world = sim.build_world("detection")
-    renderer = sim.BatchedRenderer(world, EYE, len(DISTANCES) * len(DIRECTIONS), 1024)
+    renderer = sim.BatchedRenderer(world, EYE, len(DISTANCES) * len(DIRECTIONS), sim.Fidelity(1024, EYE.bands))
     goal, adversary = (renderer.signals(facing(kind))[:, 0, 0, 0, 0] for kind in (0, 1))
     return (adversary - goal).reshape(len(DISTANCES), -1)
 

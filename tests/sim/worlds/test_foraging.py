@@ -37,7 +37,7 @@ def before_the_eyes(world, n=1, swapped=False):
 def difference(world, eyes):
     """Largest difference that swapping goal and adversary makes to any noise-free signal, in standard deviations of the
     receptors' noise."""
-    renderer = sim.BatchedRenderer(world, eyes, 1, 4)
+    renderer = sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(4, eyes.bands))
     one, other = (renderer.signals(before_the_eyes(world, swapped=s)) for s in (False, True))
     assert one.max() > 0.05
     return np.abs(one - other).max() / eyes.noise_sigma
@@ -105,7 +105,7 @@ def test_one_pigment_is_enough_in_whatever_place_of_a_mosaic(world):
     assert difference(world, alone) > 5
     kinds = optics.Receptors((540, 350), mosaic=((0, 1),))
     mosaic = dataclasses.replace(EYES, receptors=kinds, bands=8)
-    renderer = sim.BatchedRenderer(world, mosaic, 1, 4)
+    renderer = sim.BatchedRenderer(world, mosaic, 1, sim.Fidelity(4, mosaic.bands))
     one, other = (renderer.signals(before_the_eyes(world, swapped=s)) for s in (False, True))
     assert one.shape == (1, 2, 1, 9, 13)
     change = np.abs(one - other)[0, :, 0] / mosaic.noise_sigma
@@ -122,7 +122,7 @@ def test_both_tracers_agree_ray_by_ray(world, eyes):
     position = state.objects[:, 0, :2] + 2 * rng.standard_normal((n, 2))
     state = dataclasses.replace(state, position=position, heading=rng.uniform(-np.pi, np.pi, n))
     ours, theirs = (
-        sim.BatchedRenderer(world, eyes, n, 4, tracer=name).radiance(state).reshape(-1, eyes.bands)
+        sim.BatchedRenderer(world, eyes, n, sim.Fidelity(4, eyes.bands), name).radiance(state).reshape(-1, eyes.bands)
         for name in ("closed_form", "mitsuba")
     )
     assert (np.abs(ours - theirs).max(axis=1) > 2e-3).mean() < 1e-3
@@ -131,8 +131,8 @@ def test_both_tracers_agree_ray_by_ray(world, eyes):
 
 def test_as_many_components_as_the_eye_can_tell_spectra_apart(world):
     """Grey and yellow; and, from 300 nm on, yellow with ultraviolet."""
-    assert len(sim.BatchedRenderer(world, dataclasses.replace(EYES, bands=8), 1, 4).tracer.basis) == 2
-    assert len(sim.BatchedRenderer(world, BEES, 1, 4).tracer.basis) == 3
+    assert len(sim.BatchedRenderer(world, EYES, 1, sim.Fidelity(4, bands=8)).tracer.basis) == 2
+    assert len(sim.BatchedRenderer(world, BEES, 1, sim.Fidelity(4, BEES.bands)).tracer.basis) == 3
 
 
 def test_the_mirror_shows_what_the_renderer_shows(world):
@@ -145,7 +145,11 @@ def test_the_mirror_shows_what_the_renderer_shows(world):
     pose(data, seen, state)
     wavelengths = BEES.eye().spectral_bands.wavelengths
     mirror = sim.mirror(seen.model, data, spectra=seen.spectra)
-    ours = sim.BatchedRenderer(seen, BEES, 1, 256).receptor_radiance(state)[:, 0].mean(axis=(2, 3))
+    ours = (
+        sim.BatchedRenderer(seen, BEES, 1, sim.Fidelity(256, BEES.bands))
+        .receptor_radiance(state)[:, 0]
+        .mean(axis=(2, 3))
+    )
     theirs = np.stack(
         [mirror.render(f"eye_{i}", 13, 9, "direct", 1024, wavelengths).mean(axis=(1, 2)) for i in range(2)], axis=1
     )
@@ -163,7 +167,9 @@ def test_lights_and_walls_take_spectra_in_any_task():
     ratio = evening.signals(state).mean(axis=(0, 1, 3, 4)) / day.signals(state).mean(axis=(0, 1, 3, 4))
     assert ratio[0] > 1.15
     assert ratio[2] < 0.75
-    leafy = sim.BatchedRenderer(build_world("detection", spectra={"wall": "foliage"}), EYES, 1, 4)
+    leafy = sim.BatchedRenderer(
+        build_world("detection", spectra={"wall": "foliage"}), EYES, 1, sim.Fidelity(4, EYES.bands)
+    )
     near_wall = dataclasses.replace(state, position=np.array([[9.5, 0.0]]))
     _, green, blue = leafy.signals(near_wall)[0].mean(axis=(0, 2, 3))
     assert green > 1.15 * blue  # grey walls: 1

@@ -30,7 +30,7 @@ def started(world, x, y):
 
 
 def test_speed_rises_as_in_the_published_environment(field):
-    """.44, 1.12, 1.50, 1.71 m per action from rest, limit 1.98 m (DESIGN §7, read off the published code, to 1 cm).
+    """.44, 1.12, 1.50, 1.71 m per action from rest, limit 1.98 m (read off the published code, to 1 cm).
 
     That code reads `xpos` after mj_step, which is one substep old; the same is read here.
     """
@@ -176,7 +176,7 @@ def test_several_mazes_are_different_and_apart():
     physics = Physics(three, 1)
     for border in (centers[:2] + centers[1:]) / 2:
         for x in np.arange(-38.9, 39, 0.5):
-            inside = (physics.glide.lower < [x, border - 0.1]) & (physics.glide.upper > [x, border - 0.1])
+            inside = (physics.free_motion.lower < [x, border - 0.1]) & (physics.free_motion.upper > [x, border - 0.1])
             assert inside.all(axis=1).any()
     begun = {round(Simulation(three, 1, seed, "training", 1).reset().position[0, 1] / height) for seed in range(9)}
     assert begun == {-1, 0, 1}

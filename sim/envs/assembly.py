@@ -1,0 +1,131 @@
+"""World, task, physics and eyes put together: the makers of environments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from optics.spectra.spectrum import Spectrum
+from sim.envs.follow_camera import check_render_mode
+from sim.envs.simulation import Simulation
+from sim.envs.vec_env import EyesVecEnv
+from sim.eyes.eyes import Eyes
+from sim.render.batched_renderer import BatchedRenderer
+from sim.render.fidelity import Fidelity, chosen_fidelity, fidelity_asked
+from sim.render.prepared_scene import PreparedScene
+from sim.tasks.reward import check_mode
+from sim.worlds.world import build_world
+
+
+def make_vec_env(
+    task: str,
+    eyes: Eyes | None = None,
+    n_envs: int = 64,
+    seed: int | None = 0,
+    *,
+    memory: int = 1,
+    mode: str = "training",
+    rays_per_receptor: float | str | Fidelity = "auto",
+    fidelity: Fidelity | None = None,
+    world_seed: int = 0,
+    mazes: int = 1,
+    spectra: Mapping[str, Spectrum | str] | None = None,
+    render_mode: str | None = None,
+) -> EyesVecEnv:
+    """A batched environment of one task.
+
+    task: one of `sim.TASKS`
+    eyes: of every agent; default Eyes()
+    n_envs: number of worlds
+    seed: of episodes and noise; None draws one
+    memory: frames in an observation
+    mode: "training", or "evaluation" (objects respawn; rewards weighted as fitness)
+    rays_per_receptor: rays traced for each receptor, in direct light; "auto": as few as its noise allows, and light
+        that was reflected twice where it counts: `sim.choose_fidelity(world, eyes, bands="own")`
+    fidelity: all of how finely it is rendered, in the place of rays_per_receptor (which takes one, too)
+    world_seed, mazes: of the layout that all worlds share: navigation's mazes, and how many
+    spectra: of materials and lights, by name, in the place of their colours: see `sim.build_world`
+    render_mode: "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye reports,
+        side by side
+
+    Physics takes as many threads as Dr.Jit has: limit both with drjit.set_thread_count.
+
+    Raises:
+        ValueError: a bad argument.
+    """
+    eyes = Eyes() if eyes is None else eyes
+    if not isinstance(eyes, Eyes):
+        raise ValueError(f"eyes = {eyes!r}: must be sim.Eyes or None, the default ones")
+    asked = _fidelity_of(rays_per_receptor, fidelity, eyes)
+    _require_whole("world_seed", world_seed, 0)
+    _check(n_envs, seed, memory, mode, render_mode)
+    eyes = eyes if asked is None else replace(eyes, bands=asked.bands)
+    scene = prepared_scene(task, eyes, world_seed=world_seed, mazes=mazes, spectra=spectra)
+    how: dict[str, Any] = {"memory": memory, "mode": mode, "render_mode": render_mode}
+    return vec_env_in(scene, asked or chosen_fidelity(scene), n_envs, seed, **how)
+
+
+def prepared_scene(
+    task: str,
+    eyes: Eyes,
+    *,
+    world_seed: int = 0,
+    mazes: int = 1,
+    spectra: Mapping[str, Spectrum | str] | None = None,
+) -> PreparedScene:
+    """A task's world made ready for given eyes; arguments as `make_vec_env` has them."""
+    return PreparedScene(build_world(task, seed=world_seed, mazes=mazes, spectra=spectra), eyes)
+
+
+def vec_env_in(
+    scene: PreparedScene,
+    fidelity: Fidelity,
+    n_envs: int,
+    seed: int | None,
+    *,
+    memory: int = 1,
+    mode: str = "training",
+    render_mode: str | None = None,
+) -> EyesVecEnv:
+    """A batched environment in a scene that has been prepared, rendered as finely as is said; arguments as
+    `make_vec_env` has them.
+
+    Raises:
+        ValueError: a bad argument, and a fidelity for another number of bands than the scene's.
+    """
+    _check(n_envs, seed, memory, mode, render_mode)
+    simulation = Simulation(scene.world, n_envs, seed, mode, threads=min(dr.thread_count(), n_envs))
+    return EyesVecEnv(simulation, BatchedRenderer.of(scene, n_envs, fidelity), memory, render_mode)
+
+
+def _fidelity_of(rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | None, eyes: Eyes) -> Fidelity | None:
+    """What was asked for by either name; None: to be chosen."""
+    if isinstance(rays_per_receptor, Fidelity):
+        return rays_per_receptor
+    asked = fidelity_asked(rays_per_receptor, eyes)
+    if fidelity is None:
+        return asked
+    if not isinstance(fidelity, Fidelity):
+        raise ValueError(f"fidelity = {fidelity!r}: must be a sim.Fidelity or None, see rays_per_receptor")
+    if asked is not None:
+        raise ValueError(f"rays_per_receptor = {rays_per_receptor!r}: must be left out where a fidelity is given")
+    return fidelity
+
+
+def _check(n_envs: int, seed: int | None, memory: int, mode: str, render_mode: str | None) -> None:
+    """Refuse bad arguments before anything expensive is done."""
+    _require_whole("n_envs", n_envs, 1)
+    _require_whole("memory", memory, 1)
+    if seed is not None:
+        _require_whole("seed", seed, 0)
+    check_mode(mode)
+    check_render_mode(render_mode)
+
+
+def _require_whole(name: str, number: Any, least: int) -> None:
+    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
+        raise ValueError(f"{name} = {number!r}: must be a whole number, at least {least}")

@@ -1,0 +1,45 @@
+"""A world made ready for given eyes: what choosing a fidelity and rendering both begin with, built once for both."""
+
+from __future__ import annotations
+
+import optics
+from sim.eyes.depth_layers import DepthLayers
+from sim.eyes.eyes import Eyes
+from sim.eyes.sensor import EyeSampling, eye_sampling
+from sim.render.band_error import with_band_averaged_lights
+from sim.tracing.static_scene import StaticScene, build_static_scene
+from sim.tracing.tracer import Tracers
+from sim.worlds.world import World
+
+
+class PreparedScene:
+    """A world as the spectral bands of given eyes have it. Nothing in it depends on how finely it will be seen.
+
+    world: geometry, materials and lights
+    eyes: of every agent; with their own bands
+    tracer: which way rays are traced, see `sim.BatchedRenderer`
+
+    Raises:
+        ValueError: a world or a tracer that `sim.BatchedRenderer` refuses.
+    """
+
+    def __init__(self, world: World, eyes: Eyes, tracer: str = "auto") -> None:
+        self.world, self.eyes, self.eye = world, eyes, eyes.eye()
+        self.static: StaticScene = build_static_scene(with_band_averaged_lights(world, self.eye))
+        self.tracers = Tracers(world, self.static, self.bands.wavelengths, tracer)
+        self._samplings: dict[DepthLayers, EyeSampling] = {}
+
+    @property
+    def bands(self) -> optics.SpectralBands:
+        """Of the eyes."""
+        return self.eye.spectral_bands
+
+    def sampling(self, depth: DepthLayers) -> EyeSampling:
+        """How the eye is sampled with these depth layers; its PSFs are computed once, when first asked for.
+
+        Raises:
+            optics.AccuracyError: a pupil whose light spreads too far to be computed.
+        """
+        if depth not in self._samplings:
+            self._samplings[depth] = eye_sampling(self.eye, depth)
+        return self._samplings[depth]
