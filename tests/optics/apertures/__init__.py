@@ -1,11 +1,11 @@
 """Which test fails when a module of optics/apertures is broken.
 
-aperture: test_aperture
-circular: test_aperture
-outline: test_pixelated
-pixelated: test_pixelated
-polygonal: test_polygonal
-soft_edge: test_soft_edge
-soft_polygon: test_polygonal
-triangulation: test_aperture, test_polygonal
+aperture: test_aperture.py
+circular: test_aperture.py
+outline: test_pixelated.py
+pixelated: test_pixelated.py
+polygonal: test_polygonal.py
+soft_edge: test_soft_edge.py
+soft_polygon: test_polygonal.py
+triangulation: test_aperture.py, test_polygonal.py
 """

@@ -1,10 +1,10 @@
 """Which test fails when a module of optics/elements is broken.
 
-beam: methods/test_textbook
-pixel_relief: test_pixel_relief
-pupil: test_pupil
-refractive_index: test_refractive_index
-relief: test_relief
-source: test_source
-wavefront_slopes: test_pupil
+beam: methods/test_textbook.py
+pixel_relief: test_pixel_relief.py
+pupil: test_pupil.py
+refractive_index: test_refractive_index.py
+relief: test_relief.py
+source: test_source.py
+wavefront_slopes: test_pupil.py
 """

@@ -1,11 +1,11 @@
 """Which test fails when a module of optics/eye is broken.
 
-band_choice: spectra/test_bands
-eye: test_eye, test_eye_derivatives, test_eye_robustness
-kernel_bank: test_kernel_bank
-kernel_interpolation: test_kernel_bank
-photoreceptor: test_photoreceptor
-receptive_field: test_eye
-retinal_image: test_retinal_image
-summary: test_summary
+band_choice: spectra/test_bands.py
+eye: test_eye.py, test_eye_derivatives.py, test_eye_robustness.py
+kernel_bank: test_kernel_bank.py
+kernel_interpolation: test_kernel_bank.py
+photoreceptor: test_photoreceptor.py
+receptive_field: test_eye.py
+retinal_image: test_retinal_image.py
+summary: test_summary.py
 """

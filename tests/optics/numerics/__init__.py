@@ -1,17 +1,17 @@
 """Which test fails when a module of optics/numerics is broken.
 
-accuracy: point_spread/test_psf
-arguments: test_any_input
-autodiff: point_spread/test_derivatives
-backend: test_backend
-bessel: test_bessel
-cost: test_fourier, point_spread/test_planner
-field: test_fourier, methods/test_textbook
-fourier: test_fourier
-grid: test_grid
-interpolation: test_interpolation
-matrices: test_fourier
-precision: test_precision
-quadrature: test_quadrature
-radial_profile: test_radial_profile
+accuracy: point_spread/test_psf.py
+arguments: test_any_input.py
+autodiff: point_spread/test_derivatives.py
+backend: test_backend.py
+bessel: test_bessel.py
+cost: test_fourier.py, point_spread/test_planner.py
+field: test_fourier.py, methods/test_textbook.py
+fourier: test_fourier.py
+grid: test_grid.py
+interpolation: test_interpolation.py
+matrices: test_fourier.py
+precision: test_precision.py
+quadrature: test_quadrature.py
+radial_profile: test_radial_profile.py
 """

@@ -1,10 +1,10 @@
 """Which test fails when a module of optics/point_spread is broken.
 
-batch: test_batch
-image_quality: test_image_quality
-pictures: test_psf
-planner: test_planner
-psf: test_psf, test_derivatives, test_robustness
-request: test_psf
-spot_check: test_spot_check
+batch: test_batch.py
+image_quality: test_image_quality.py
+pictures: test_psf.py
+planner: test_planner.py
+psf: test_psf.py, test_derivatives.py, test_robustness.py
+request: test_psf.py
+spot_check: test_spot_check.py
 """

@@ -1,8 +1,8 @@
 """Which test fails when a module of optics/propagation is broken.
 
-planes: test_system
-propagate: test_propagate
-sampling: test_sampling
-system: test_system
-transfer_function: test_propagate
+planes: test_system.py
+propagate: test_propagate.py
+sampling: test_sampling.py
+system: test_system.py
+transfer_function: test_propagate.py
 """

@@ -1,8 +1,8 @@
 """Which test fails when a module of optics/spectra is broken.
 
-bands: test_bands
-photon_budget: test_photon_budget
-pigment: test_pigment
-receptors: test_receptors
-spectrum: test_spectrum
+bands: test_bands.py
+photon_budget: test_photon_budget.py
+pigment: test_pigment.py
+receptors: test_receptors.py
+spectrum: test_spectrum.py
 """
