@@ -90,7 +90,7 @@ def test_corrupt_cache_is_ignored(tmp_path, monkeypatch):
 
 def test_user_error_is_one_line_with_the_remedy(tmp_path):
     child = run_child(
-        "from optics import backend\ntry: backend.require()\nexcept backend.BackendError as e: print(e)",
+        "from optics.numerics import backend\ntry: backend.require()\nexcept backend.BackendError as e: print(e)",
         DRJIT_LIBLLVM_PATH=str(tmp_path / "none.so"),
     )
     assert child.returncode == 0, child.stderr
@@ -101,7 +101,7 @@ def test_user_error_is_one_line_with_the_remedy(tmp_path):
 
 def test_require_points_drjit_at_the_library():
     child = run_child(
-        "import drjit as dr; from optics import backend; found = backend.require()\n"
+        "import drjit as dr; from optics.numerics import backend; found = backend.require()\n"
         "from drjit.llvm import Float; import os\n"
         "assert os.environ['DRJIT_LIBLLVM_PATH'] == found.path\n"
         "assert '.'.join(map(str, dr.detail.llvm_version())) == found.version\n"

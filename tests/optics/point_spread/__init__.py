@@ -2,7 +2,7 @@
 
 batch: test_batch
 image_quality: test_image_quality
-pictures: test_psf
+pictures: test_pictures
 planner: test_planner
 psf: test_psf, test_derivatives, test_robustness
 request: test_psf
