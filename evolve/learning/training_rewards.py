@@ -45,5 +45,5 @@ def contact_share(steps: int, ramp: int) -> float:
 
 def terms_of(info: dict[str, Any]) -> dict[str, float]:
     """What a step's reward is the sum of, by name."""
-    terms: dict[str, float] = info["terms_of"]
+    terms: dict[str, float] = info["reward_terms"]
     return terms

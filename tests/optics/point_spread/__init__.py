@@ -2,7 +2,7 @@
 
 batch: test_batch.py
 image_quality: test_image_quality.py
-pictures: test_psf.py
+pictures: test_pictures.py
 planner: test_planner.py
 psf: test_psf.py, test_derivatives.py, test_robustness.py
 request: test_psf.py

@@ -1,0 +1,90 @@
+"""What becomes of a picture that the spot check finds wrong."""
+
+import numpy as np
+import pytest
+
+import optics
+from optics.numerics.accuracy import FLOAT_NOISE
+from optics.point_spread import pictures
+
+LENS = optics.Pupil(20e-6, thin_lens_focal_length=400e-6)
+PLAIN = optics.Pupil(20e-6)
+WINDOW = {"dx": 1e-6, "shape": (21, 21)}
+TOLERANCE = 1e-3
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """Makes checks find these errors, one after the other, and returns the problems that were checked."""
+
+    def tell(*errors):
+        checked, left = [], iter(errors)
+
+        def spot_check(beam, problem, image, seconds):
+            checked.append(problem)
+            return next(left)
+
+        monkeypatch.setattr(pictures, "spot_check", spot_check)
+        return checked
+
+    return tell
+
+
+def test_the_error_that_is_seen_is_the_one_that_is_stated(told):
+    checked = told(0.7 * TOLERANCE)
+    result = optics.psf(LENS, sensor_distance=400e-6, tolerance=TOLERANCE, method="low_rank", **WINDOW)
+    assert result.plan.predicted_error == 0.7 * TOLERANCE
+    assert [problem.tolerance for problem in checked] == [TOLERANCE]
+
+
+def test_an_exact_method_tries_again_for_a_smaller_tolerance(told):
+    """Ten times too wrong: 0.3 of a tenth of the tolerance, for which the method takes more samples."""
+    checked = told(10 * TOLERANCE, 0.5 * TOLERANCE)
+    ask = {"sensor_distance": 400e-6, "method": "low_rank", **WINDOW}
+    result = optics.psf(LENS, tolerance=TOLERANCE, **ask)
+    assert [problem.tolerance for problem in checked] == pytest.approx([TOLERANCE, 0.03 * TOLERANCE])
+    assert result.plan.samples == optics.plan(LENS, tolerance=0.03 * TOLERANCE, **ask).samples
+    assert result.plan.samples > optics.plan(LENS, tolerance=TOLERANCE, **ask).samples
+    assert result.plan.predicted_error == 0.5 * TOLERANCE
+
+
+def test_an_approximation_gives_way_to_an_exact_method(told):
+    ask = {"sensor_distance": 40e-3, "tolerance": 1e-2, "dx": 40e-6, "shape": (21, 21)}
+    assert optics.plan(PLAIN, **ask).method in ("fresnel", "fraunhofer")
+    checked = told(0.5, 1e-3)
+    result = optics.psf(PLAIN, **ask)
+    assert result.plan.method not in ("fresnel", "fraunhofer")
+    assert [problem.tolerance for problem in checked] == [1e-2, 1e-2]
+    exact = optics.psf(PLAIN, **ask | {"method": "exact"}) if told(1e-3) == [] else None
+    np.testing.assert_array_equal(result.psf, exact.psf)
+
+
+def test_an_approximation_asked_for_by_name_stays(told):
+    checked = told(0.5)
+    result = optics.psf(PLAIN, sensor_distance=1e-3, method="fresnel", **WINDOW)
+    assert (result.plan.method, result.plan.predicted_error, len(checked)) == ("fresnel", 0.5, 1)
+
+
+def test_what_stays_wrong_is_refused(told):
+    checked = told(*[2 * TOLERANCE] * pictures.TRIES)
+    with pytest.raises(optics.AccuracyError, match=r"finds an error of 0\.002 by low_rank"):
+        optics.psf(LENS, sensor_distance=400e-6, tolerance=TOLERANCE, method="low_rank", **WINDOW)
+    assert len(checked) == pictures.TRIES
+
+
+def test_no_more_digits_are_asked_than_there_are(told):
+    """float32 carries ten times its noise: a picture that was wrong at that tolerance is not computed again."""
+    least = 10 * FLOAT_NOISE["float32"]
+    checked = told(10 * least)
+    with pytest.raises(optics.AccuracyError, match="in float32"):
+        optics.psf(LENS, sensor_distance=400e-6, tolerance=least, method="low_rank", **WINDOW)
+    assert len(checked) == 1
+
+
+def test_where_no_check_was_made_the_picture_tells_how_dark_it_is(told):
+    """Far off the focus rounding weighs more: there float32 cannot meet what it meets in the middle."""
+    ask = {"sensor_distance": 400e-6, "method": "low_rank", "tolerance": 2e-5, "dx": 0.5e-6, "shape": (9, 9)}
+    told(None, None)
+    assert optics.psf(LENS, **ask).plan.predicted_error < 2e-5
+    with pytest.raises(optics.AccuracyError, match="so dark that float32 rounding"):
+        optics.psf(LENS, **ask, centre=(150e-6, 0.0))
