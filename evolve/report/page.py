@@ -112,7 +112,7 @@ def _gene(run: Run, gene: Gene) -> str:
 
 
 def _dimensionless(gene: Gene) -> str:
-    return "rounded" if gene.kind == "integer" else "ratio"
+    return "number" if gene.kind == "integer" else "ratio"
 
 
 def _acuity(run: Run) -> str:
