@@ -17,20 +17,18 @@ import numpy as np
 
 import optics
 from optics.numerics.autodiff import Array
-from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
+from sim.eyes.eyes import Eyes, eye_positions, eye_rotations
 from sim.render import memory_budget
 from sim.render.fidelity import Fidelity, chosen_fidelity
-from sim.render.frozen_kernels import aligned, garbage_kept
+from sim.render.frozen_kernels import garbage_kept
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.render.prepared_scene import PreparedScene
-from sim.scene.variant import MitsubaObject, variant
+from sim.render.wavefront import PoseBuffer, Wavefront
+from sim.scene.variant import variant
 from sim.tracing import lighting
-from sim.tracing.static_scene import StaticScene
 from sim.tracing.tracer import Tracer
 from sim.worlds.state import WorldState
 from sim.worlds.world import World
-
-ROW = 16  # floats: rows of the pose buffer start on 64 bytes
 
 
 class BatchedRenderer:
@@ -114,7 +112,7 @@ class BatchedRenderer:
 
     def _set_width(self, n_envs: int) -> None:
         self.n_envs = n_envs
-        self._poses, self._slot = _PoseBuffer(n_envs, len(self._static.spheres)), FrameSlot()
+        self._poses, self._slot = PoseBuffer(n_envs, len(self._static.spheres)), FrameSlot()
         with variant(self._static.variant):
             self._inputs = {
                 "directions": mi.Float(_in_agent_frame(self.eyes, self.sensor.directions)),
@@ -122,7 +120,7 @@ class BatchedRenderer:
                 "bounce_samples": mi.Float(self.sensor.bounce_samples.ravel()),
                 **self.tracer.inputs,
             }
-            wavefront = _Wavefront(self)
+            wavefront = Wavefront(n_envs, self.eyes.n_eyes, self.sensor, self.tracer, self._poses)
             # Read lane by lane, so that a replay has the width that was recorded. With tables alone as inputs, Dr.Jit
             # 1.5 took it from one that changes with what else the process has loaded: 126 lanes replayed out of 128,
             # the last receptors silently dark (tests/test_parameters.py runs each life twice and has met it).
@@ -190,76 +188,6 @@ def _read(light: Array) -> np.ndarray:
     """Waits for the kernel."""
     with garbage_kept():
         return np.array(light.numpy())
-
-
-class _PoseBuffer:
-    """The kernel's only changing input: one aligned row of floats per world, (x, y, cos, sin) and, in fours as well,
-    the objects' centres."""
-
-    def __init__(self, n_envs: int, n_spheres: int) -> None:
-        self.n_spheres = n_spheres
-        self.stride = -(-4 * (1 + n_spheres) // ROW) * ROW
-        self._rows = aligned(n_envs * self.stride, np.float32).reshape(n_envs, self.stride)
-
-    def pack(self, state: WorldState, static: StaticScene) -> np.ndarray:
-        rows = self._rows
-        rows[:, :2] = state.position
-        rows[:, 2], rows[:, 3] = np.cos(state.heading), np.sin(state.heading)
-        places = rows[:, 4 : 4 * (1 + self.n_spheres)].reshape(len(rows), self.n_spheres, 4)
-        places[..., :3] = state.objects + static.spheres.offsets
-        return rows.reshape(-1)
-
-
-class _Wavefront:
-    """The kernel's body. Everything here is traced once; only arrays passed as arguments may change."""
-
-    def __init__(self, renderer: BatchedRenderer) -> None:
-        self.n_rays = len(renderer.sensor.directions)
-        self.n_eyes = renderer.eyes.n_eyes
-        self.lanes = renderer.n_envs * self.n_eyes * self.n_rays
-        self.stride = renderer._poses.stride
-        self.n_spheres = renderer._poses.n_spheres
-        self.tracer, self.depth = renderer.tracer, renderer.sensor.depth
-
-    def __call__(self, scene: MitsubaObject, poses: Array, inputs: dict[str, Array], reduced: int) -> Array:
-        lane = inputs["lanes"]
-        view = lane // self.n_rays
-        world = view // self.n_eyes
-        sample = lane - view * self.n_rays
-        ray, cosine, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, sample)
-        bounces = self.tracer.light == lighting.BOUNCE
-        bounce_sample = dr.gather(mi.Point2f, inputs["bounce_samples"], sample) if bounces else None
-        components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs, bounce_sample)
-        if self.depth.count > 1:
-            shares = self.depth.shares(dr.rcp(distance * cosine))
-            components = [component * share for share in shares for component in components]
-        if len(components) == 1:
-            out = components[0]
-        else:
-            out = dr.zeros(mi.Float, self.lanes * len(components))
-            for k, value in enumerate(components):
-                dr.scatter(out, value, lane + k * self.lanes, mode=dr.ReduceMode.Permute)
-        # One reduction of one array: a reduction per component would trace the rays once per component.
-        return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
-
-    def _ray(
-        self, poses: Array, inputs: dict[str, Array], world: Array, eye: Array, ray: Array
-    ) -> tuple[Array, Array, Array, list[Array]]:
-        """The lane's ray, its cosine with the eye's axis, and the centres of the agent and of its world's spheres."""
-
-        def row(name: str, index: Array) -> Array:
-            return dr.gather(mi.Vector4f, inputs[name] if name else poses, index)
-
-        x, y, cos, sin = row("", world * (self.stride // 4))
-
-        def turned(v: Array) -> Array:
-            return mi.Vector3f(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
-
-        agent = mi.Point3f(x, y, EYE_HEIGHT)
-        origin = agent + turned(row("origins", eye))
-        direction = row("directions", eye * self.n_rays + ray)
-        centres = [mi.Point3f(*list(row("", world * (self.stride // 4) + (1 + k)))[:3]) for k in range(self.n_spheres)]
-        return mi.Ray3f(origin, turned(direction)), direction.w, agent, centres
 
 
 def _in_agent_frame(eyes: Eyes, directions: np.ndarray) -> np.ndarray:

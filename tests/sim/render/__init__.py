@@ -2,6 +2,7 @@
 
 one_ray: test_one_ray.py
 batched_renderer: test_batched_renderer.py, test_one_ray.py, test_reference_renderer.py
+wavefront: test_batched_renderer.py, test_one_ray.py
 reference_renderer: test_reference_renderer.py
 fidelity: test_fidelity.py, eyes/test_depth_layers.py
 fidelity_trials: test_fidelity.py, eyes/test_depth_layers.py

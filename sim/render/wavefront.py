@@ -1,0 +1,87 @@
+"""The kernel that traces all rays of all eyes of all worlds: what it reads, and its body."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.eyes.eyes import EYE_HEIGHT
+from sim.eyes.sensor import Sensor
+from sim.render.frozen_kernels import aligned
+from sim.scene.variant import MitsubaObject
+from sim.tracing import lighting
+from sim.tracing.static_scene import StaticScene
+from sim.tracing.tracer import Tracer
+from sim.worlds.state import WorldState
+
+ROW = 16  # floats: rows of the pose buffer start on 64 bytes
+
+
+class PoseBuffer:
+    """The kernel's only changing input: one aligned row of floats per world, (x, y, cos, sin) and, in fours as well,
+    the objects' centres."""
+
+    def __init__(self, n_envs: int, n_spheres: int) -> None:
+        self.n_spheres = n_spheres
+        self.stride = -(-4 * (1 + n_spheres) // ROW) * ROW
+        self._rows = aligned(n_envs * self.stride, np.float32).reshape(n_envs, self.stride)
+
+    def pack(self, state: WorldState, static: StaticScene) -> np.ndarray:
+        rows = self._rows
+        rows[:, :2] = state.position
+        rows[:, 2], rows[:, 3] = np.cos(state.heading), np.sin(state.heading)
+        places = rows[:, 4 : 4 * (1 + self.n_spheres)].reshape(len(rows), self.n_spheres, 4)
+        places[..., :3] = state.objects + static.spheres.offsets
+        return rows.reshape(-1)
+
+
+class Wavefront:
+    """The kernel's body. Everything here is traced once; only arrays passed as arguments may change."""
+
+    def __init__(self, n_envs: int, n_eyes: int, sensor: Sensor, tracer: Tracer, poses: PoseBuffer) -> None:
+        self.n_rays, self.n_eyes = len(sensor.directions), n_eyes
+        self.lanes = n_envs * n_eyes * self.n_rays
+        self.stride, self.n_spheres = poses.stride, poses.n_spheres
+        self.tracer, self.depth = tracer, sensor.depth
+
+    def __call__(self, scene: MitsubaObject, poses: Array, inputs: dict[str, Array], reduced: int) -> Array:
+        lane = inputs["lanes"]
+        view = lane // self.n_rays
+        world = view // self.n_eyes
+        sample = lane - view * self.n_rays
+        ray, cosine, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, sample)
+        bounces = self.tracer.light == lighting.BOUNCE
+        bounce_sample = dr.gather(mi.Point2f, inputs["bounce_samples"], sample) if bounces else None
+        components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs, bounce_sample)
+        if self.depth.count > 1:
+            shares = self.depth.shares(dr.rcp(distance * cosine))
+            components = [component * share for share in shares for component in components]
+        if len(components) == 1:
+            out = components[0]
+        else:
+            out = dr.zeros(mi.Float, self.lanes * len(components))
+            for k, value in enumerate(components):
+                dr.scatter(out, value, lane + k * self.lanes, mode=dr.ReduceMode.Permute)
+        # One reduction of one array: a reduction per component would trace the rays once per component.
+        return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
+
+    def _ray(
+        self, poses: Array, inputs: dict[str, Array], world: Array, eye: Array, ray: Array
+    ) -> tuple[Array, Array, Array, list[Array]]:
+        """The lane's ray, its cosine with the eye's axis, and the centres of the agent and of its world's spheres."""
+
+        def row(name: str, index: Array) -> Array:
+            return dr.gather(mi.Vector4f, inputs[name] if name else poses, index)
+
+        x, y, cos, sin = row("", world * (self.stride // 4))
+
+        def turned(v: Array) -> Array:
+            return mi.Vector3f(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
+
+        agent = mi.Point3f(x, y, EYE_HEIGHT)
+        origin = agent + turned(row("origins", eye))
+        direction = row("directions", eye * self.n_rays + ray)
+        centres = [mi.Point3f(*list(row("", world * (self.stride // 4) + (1 + k)))[:3]) for k in range(self.n_spheres)]
+        return mi.Ray3f(origin, turned(direction)), direction.w, agent, centres
