@@ -19,7 +19,7 @@ from evolve.learning.adam import Adam
 from evolve.learning.checkpoint import Checkpoint
 from evolve.learning.policy import Brain, EyePolicy, TrainingDiverged, learnt, set_learnt
 from evolve.learning.rollout_buffer import FrameRolloutBuffer
-from evolve.learning.training_rewards import RewardsInUnits, contact_share, reward_terms
+from evolve.learning.training_rewards import RewardsInUnits, contact_share, terms_of
 
 UNIT_RATE = 0.2  # of the way to the spread of the last returns, per rollout
 FLAT = 1e-6  # spread of returns that all are the same
@@ -222,7 +222,7 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
         action, _ = policy.predict(observation, deterministic=True)
         observation, reward, done, infos = worlds.step(action)
         returns[playing] += reward[playing]
-        events = np.array([np.sign(terms["goal"] + terms["adversary"]) for terms in map(reward_terms, infos)])
+        events = np.array([np.sign(terms["goal"] + terms["adversary"]) for terms in map(terms_of, infos)])
         first_event = np.where(playing & (first_event == 0), events, first_event)
         playing &= ~done
     if not math.isfinite(returns.sum()):

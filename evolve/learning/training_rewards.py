@@ -8,7 +8,7 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
-__all__ = ["RewardsInUnits", "contact_share", "reward_terms"]
+__all__ = ["RewardsInUnits", "contact_share", "terms_of"]
 
 CONTACT_FIRST = 0.1  # of what contact costs in the end; with a third, agents turned on the spot
 
@@ -27,7 +27,7 @@ class RewardsInUnits(VecEnvWrapper):
     def step_wait(self) -> VecEnvStepReturn:
         observation, reward, done, infos = self.venv.step_wait()
         if self.contact_share < 1:
-            price = np.array([terms["contact"] for terms in map(reward_terms, infos)], np.float32)
+            price = np.array([terms["contact"] for terms in map(terms_of, infos)], np.float32)
             reward = reward - np.float32(1 - self.contact_share) * price
         return observation, reward / np.float32(self.unit), done, infos
 
@@ -43,7 +43,7 @@ def contact_share(steps: int, ramp: int) -> float:
     return float(CONTACT_FIRST ** min(1.0, 1.5 * (1 - steps / ramp)))
 
 
-def reward_terms(info: dict[str, Any]) -> dict[str, float]:
+def terms_of(info: dict[str, Any]) -> dict[str, float]:
     """What a step's reward is the sum of, by name."""
     terms: dict[str, float] = info["reward_terms"]
     return terms
