@@ -48,6 +48,7 @@ from evolve.learning.policy import load_policy
 from evolve.learning.ppo import play
 from evolve.learning.training_stage import TrainingStage
 from evolve.search.successive_halving import budgets
+from evolve.search.successive_halving import promoted as promoted_after
 from evolve.search.worker import prepare_device
 from evolve.store.atomic_files import write_whole
 from validation.page import Page, parser
@@ -213,7 +214,7 @@ def halving(rows: Sequence[Row], rungs: int, promoted: float, by: str = "fitness
         total += spent[sorted(reached), below : place + 1].sum()
         below = place + 1
         told = [(number, float(fitness[number, place])) for number in sorted(reached)]
-        reached = promoted(search, rung, told) or reached
+        reached = promoted_after(search, rung, told) or reached
     best = max(reached, key=lambda number: (fitness[number, -1], -number))
     place = 1 + int((many[:, -1] > many[best, -1]).sum())
     return Halving(rungs, promoted, total / spent.sum(), place)
