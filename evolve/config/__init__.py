@@ -1,7 +1,7 @@
 """Settings of a run.
 
 run_config     RunConfig
-sections       its sections: every setting, its range, what it does
+settings       its sections: every setting, its range, what it does
 assemble       all sources put together, later ones winning
 sources        presets, tasks, files and options
 provenance     where a setting stands

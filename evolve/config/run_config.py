@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from evolve.config.checks import ConfigError
-from evolve.config.sections import (
+from evolve.config.settings import (
     SECTIONS,
     EvaluationConfig,
     EyeConfig,

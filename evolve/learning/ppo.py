@@ -1,4 +1,7 @@
-"""Learning within a lifetime: PPO (stable-baselines3) on batched worlds, until it is solved, stuck or out of steps."""
+"""Learning within a lifetime: PPO (stable-baselines3) on batched worlds, until it is solved, stuck or out of steps.
+
+Its settings, with their ranges, are `evolve.config.settings.LearningConfig`.
+"""
 
 from __future__ import annotations
 

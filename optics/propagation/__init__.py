@@ -1,4 +1,4 @@
-"""Sampled fields carried from plane to plane.
+"""Sampled fields carried from plane to plane. (The integrals behind a PSF are in optics/methods.)
 
 propagate          propagate: one stretch of free space
 system             propagate_through: pupils and free space

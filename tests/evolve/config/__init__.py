@@ -1,7 +1,7 @@
 """Which test covers which module of evolve/config.
 
 run_config: test_run_config.py
-sections: test_assemble.py, test_run_config.py, test_parameters.py
+settings: test_assemble.py, test_run_config.py, test_parameters.py
 assemble: test_assemble.py, test_presets.py
 sources: test_sources.py, test_assemble.py
 provenance: test_provenance.py
