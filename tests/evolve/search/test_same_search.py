@@ -2,6 +2,7 @@
 
 import pytest
 
+from evolve.config.numbering import Place
 from evolve.search.same_search import ROUNDING, TAKEN_FOR_ANOTHERS, SameSearch
 from evolve.search.search import Proposal
 from evolve.store.directory import Run, RunError
@@ -15,7 +16,7 @@ def run(finished):
 def off(candidate, by):
     """What a search proposes that is `by` off the record in one coordinate."""
     genome = (candidate.genome[0] + by, *candidate.genome[1:])
-    return Proposal(candidate.id, candidate.generation, candidate.index, genome, candidate.parents)
+    return Proposal(Place(candidate.id, candidate.generation, candidate.index), genome, candidate.parents)
 
 
 def accepted(run, candidate, by):
