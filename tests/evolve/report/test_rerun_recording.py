@@ -81,7 +81,7 @@ def test_eyes_are_cameras_that_look_where_the_eyes_look(columns, episode):
         np.testing.assert_allclose(frame @ [0, -1, 0], [0, 0, 1], atol=1e-6, err_msg="up")
         assert np.linalg.det(frame) == pytest.approx(1, abs=1e-6)
         camera = columns[f"/world/agent/eyes/{name}", "Pinhole:image_from_camera"][0][0]
-        assert camera[0] == pytest.approx(5 / (2 * np.tan(np.radians(45) / 2)), rel=1e-6)
+        assert camera[0] == pytest.approx(5 / (2 * np.tan(np.radians(33) / 2)), rel=1e-6)
 
 
 def test_time_is_the_worlds(columns, episode):
