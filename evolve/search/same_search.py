@@ -17,8 +17,9 @@ from evolve.store.versions import present, recorded
 
 __all__ = ["SameSearch"]
 
-# Of a coordinate in [0, 1]. Seventeen records of a processor with AVX-512, proposed again on one without: 2e-12 at most
-# where no solution was taken for another's, 4e-3 where one was (tests/experiments/test_records.py).
+# Of a coordinate in [0, 1], with room for longer runs: 500 and 5 times what was seen. Seventeen records of a processor
+# with AVX-512, proposed again on one without: 2e-12 at most where no solution was taken for another's, 4e-3 where one
+# was (tests/experiments/test_records.py).
 ROUNDING, TAKEN_FOR_ANOTHERS = 1e-9, 0.02
 LIBRARIES = ("nevergrad", "cma", "numpy")
 

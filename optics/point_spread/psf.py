@@ -77,8 +77,10 @@ def psf(
 ) -> PSFResult:
     """|U|² / (pupil area) of the field U that a unit-amplitude wave makes behind the pupil.
 
-    wavelengths: vacuum [m]. sensor_distance [m] behind the pupil. dx [m], shape (y, x), centre (x, y) [m]: the window.
-    source_distance [m], source_angle [rad]: see PointSource.
+    wavelengths: in vacuum [m], one or a row of them.
+    sensor_distance: [m] behind the pupil.
+    source_distance, source_angle: [m], (x, y) [rad]: see PointSource.
+    dx, shape, centre: of the window: pitch [m], samples (y, x), position of sample n//2 (x, y) [m].
     tolerance: relative L2 error of the intensity over the window.
     method: "auto", "exact" (nothing approximate), or one of planner.METHODS. An approximation asked for by its name
         answers however wrong it is: the tolerance is then that of its sampling, and the plan tells the error.

@@ -31,14 +31,14 @@ def test_page_is_its_template_filled_in():
 
 def test_what_the_template_lacks_is_refused():
     with pytest.raises(ValueError, match="no place for weight"):
-        sizes({"size": "3", "weight": "4"}).markdown  # noqa: B018
+        assert sizes({"size": "3", "weight": "4"}).markdown
     with pytest.raises(ValueError, match="no place for weights"):
-        sizes(figure="weights").markdown  # noqa: B018
+        assert sizes(figure="weights").markdown
 
 
 def test_what_the_page_lacks_is_refused():
     with pytest.raises(KeyError, match="size"):
-        sizes({}).markdown  # noqa: B018
+        assert sizes({}).markdown
 
 
 def test_published_page_stands_beside_its_figures(tmp_path):
