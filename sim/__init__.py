@@ -1,13 +1,14 @@
 """rhabdom.sim: a MuJoCo world, mirrored as a spectral Mitsuba scene, seen by the eyes of many agents at once.
 
 Eyes, build_world, World            what there is to see, and with which eyes
+Course                              a course of one's own, for navigation
 TASKS                               names of the tasks
 mirror, Mirror                      any MuJoCo model as a Mitsuba scene
 BatchedRenderer                     all eyes of all worlds as one wavefront
 choose_fidelity, Fidelity           how finely: as the receptors' noise allows
 ReferenceRenderer                   the same, slowly: Mitsuba's integrators and optics' convolution
 make_vec_env, make_env              the environments, natively batched or single
-                                    (also gymnasium.make("rhabdom/Detection-v0"), Foraging, Navigation, Tracking)
+                                    (also gymnasium.make("rhabdom/Detection-v0"), Foraging, Maze ...)
 View, write_exr, read_exr           what was seen, on disk
 """
 
@@ -28,10 +29,12 @@ if TYPE_CHECKING:
     from sim.render.fidelity import Fidelity, choose_fidelity
     from sim.render.reference_renderer import ReferenceRenderer
     from sim.scene.mirror import Mirror, MirrorWarning, mirror
+    from sim.worlds.course import Course
     from sim.worlds.world import World, build_world
 
 _HOME = {
     "Eyes": "sim.eyes.eyes",
+    "Course": "sim.worlds.course",
     "World": "sim.worlds.world",
     "build_world": "sim.worlds.world",
     "Mirror": "sim.scene.mirror",
@@ -51,6 +54,7 @@ _HOME = {
 __all__ = [
     "TASKS",
     "BatchedRenderer",
+    "Course",
     "Eyes",
     "Fidelity",
     "Mirror",

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 import sim
+from evolve.config.formats import task_then
 from evolve.config.run_config import EyeConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
@@ -98,7 +99,9 @@ class Episode:
                 arrays = dict(file)
             rest = json.loads(str(arrays.pop("rest")))
             rest |= {"phenotype": Phenotype.from_json(rest["phenotype"]), "eye": EyeConfig(**rest["eye"])}
-            rest["world"] = WorldConfig(**rest.get("world", {}))
+            if "course" not in rest.setdefault("world", {}):
+                rest["task"] = task_then(rest["task"])
+            rest["world"] = WorldConfig(**rest["world"])
             terms = {name: arrays.pop(f"term_{name}") for name in rest.pop("terms")}
             return cls(**rest, reward_terms=terms, **arrays)
         except (OSError, EOFError, KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile) as error:

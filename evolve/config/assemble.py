@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from evolve.config.checks import check_gene_value, check_value, suggestion
+from evolve.config.formats import FORMAT, format_of, upgraded
 from evolve.config.provenance import Source
 from evolve.config.relief_starts import no_such_gene, with_relief
 from evolve.config.run_config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
@@ -43,7 +44,7 @@ def assemble(
         ConfigError: unknown key, wrong type, value out of range, contradiction, unreadable file; one line that names
             key, value, what is allowed, and where it was set.
     """
-    asked = [read_toml(file)] if file is not None else []
+    asked = [_of_this_format(read_toml(file))] if file is not None else []
     if starts is not None:
         asked.append(starts)
     asked += [read_assignment(text) for text in assignments]
@@ -69,20 +70,32 @@ def _assembled(task: str | None, below: list[Source], asked: list[Source]) -> Ru
 
 
 def from_toml(path: Path) -> RunConfig:
-    """Configuration written by `to_toml`, which has every default written out."""
-    return assemble(file=path)
+    """Configuration written by `to_toml`, in this format or a former one."""
+    return _read_back(read_toml(path))
 
 
 def from_text(text: str) -> RunConfig:
     """As `from_toml`, from the text itself."""
-    return _assembled(None, [], [Source("config.toml", tomllib.loads(text), text)])
+    return _read_back(Source("config.toml", tomllib.loads(text), text))
+
+
+def _read_back(written: Source) -> RunConfig:
+    """Every default is written out, so no task's and no preset's settings are looked up."""
+    return _assembled(None, [], [replace(written, tree=upgraded(written.tree))])
+
+
+def _of_this_format(source: Source) -> Source:
+    """What somebody asks for, maybe with another run's config.toml."""
+    if "format" in source.tree and format_of(source.tree) != FORMAT:
+        raise ConfigError(f"{source.name}: format = {source.tree['format']}: must be {FORMAT}", "format")
+    return replace(source, tree={key: value for key, value in source.tree.items() if key != "format"})
 
 
 def to_toml(config: RunConfig) -> str:
     """TOML text with every setting; `from_toml` reads it back equal."""
     import tomli_w
 
-    tree = asdict(config)
+    tree = {"format": FORMAT, **asdict(config)}
     for name, use in tree["genome"].items():
         if ALL_GENES[name].kind == "integer":
             use.update({key: int(use[key]) for key in ("low", "high", "start")})

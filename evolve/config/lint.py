@@ -9,7 +9,7 @@ from evolve.genome.genes import INHERITED, LAMBDA_MAX
 
 __all__ = ["coarse_bands", "idle_genes", "idle_starts", "lint"]
 
-GREY_TASKS = ("navigation", "detection", "tracking")
+GREY_TASKS = ("navigation", "maze", "detection", "tracking")
 PEAKS = 17  # of an open gene's range, at which its pigment is tried
 SHOWN = 4  # names in a line, at most
 LEAST_ERROR = 1e-3  # of white's signal: what the 64 bands that others are held against may be wrong by themselves

@@ -20,7 +20,7 @@ from evolve.genome import anatomy
 from evolve.genome.genes import CLUSTERS, GENES, INHERITED, Gene, GeneConfig
 from evolve.genome.interval import Interval
 from optics.spectra.receptors import RECEPTORS
-from sim.worlds.catalog import TASKS
+from sim.worlds.catalog import COURSES, TASKS
 
 __all__ = [
     "SECTIONS",
@@ -64,12 +64,7 @@ class RunConfig:
                 f"eye.receptors = {self.eye.receptors!r}: must be one of {', '.join(known)}", "eye.receptors"
             )
         self._check_light()
-        if self.task != "navigation" and self.world != WorldConfig():
-            raise ConfigError(
-                f"world.mazes, world.unseen: {self.task} has no mazes, only navigation has",
-                "world.mazes",
-                "world.unseen",
-            )
+        self._check_world()
         for name, gene in self.eye.genes.items():
             _check_gene_use(gene, self.genome[name])
         self._check_clusters()
@@ -84,6 +79,16 @@ class RunConfig:
         if (cramped := anatomy.contradiction(self.genome, self.eye)) is not None:
             message, keys = cramped
             raise ConfigError(message, *keys)
+
+    def _check_world(self) -> None:
+        """Only what the task's world has may be set."""
+        for name in ("course", "evaluation_course"):
+            if (course := getattr(self.world, name)) not in COURSES:
+                raise ConfigError(f"world.{name} = {course!r}: must be one of {', '.join(COURSES)}", f"world.{name}")
+        of_task = {"mazes": "maze", "unseen": "maze", "course": "navigation", "evaluation_course": "navigation"}
+        for name, task in of_task.items():
+            if self.task != task and getattr(self.world, name) != getattr(WorldConfig, name):
+                raise ConfigError(f"world.{name}: is for the task {task}, not for {self.task}", f"world.{name}", "task")
 
     def _check_light(self) -> None:
         """So little light that it must be a mistake, or a time to count photons in where none are counted."""

@@ -74,22 +74,24 @@ class EyeConfig:
 class WorldConfig:
     """What the worlds of a run are like, beside its task."""
 
-    mazes: int = setting(1, Interval(1, 32), "number of mazes in navigation; an episode begins in any of them")
+    mazes: int = setting(1, Interval(1, 32), "number of mazes in the task maze; an episode begins in any of them")
     unseen: bool = setting(
         False,
         None,
         "evaluate in other mazes than those trained in; selection and early stopping use them, so not held out",
     )
+    course: str = setting("short", None, "navigation's course: short, or long, twice as long in half as many actions")
+    evaluation_course: str = setting("short", None, "navigation's course in evaluation")
 
     @property
     def training(self) -> dict[str, Any]:
         """Arguments of `sim.make_vec_env` for worlds to learn in."""
-        return {"mazes": self.mazes, "world_seed": 0}
+        return {"mazes": self.mazes, "world_seed": 0, "course": self.course}
 
     @property
     def evaluation(self) -> dict[str, Any]:
         """The same for those that fitness comes from."""
-        return {"mazes": self.mazes, "world_seed": int(self.unseen)}
+        return {"mazes": self.mazes, "world_seed": int(self.unseen), "course": self.evaluation_course}
 
 
 @dataclass(frozen=True)
@@ -141,10 +143,11 @@ class LearningConfig:
         Interval(0, 10**10),
         "steps until contact costs its full price: a tenth of it for a third of them, then rising exponentially",
     )
-    rays_per_eye: float = setting(
-        256.0,
-        Interval(0, 10**7, open_low=True),
-        "most rays per eye and frame in training; every receptor gets at least one",
+    rays_per_receptor: float = setting(
+        8.0, Interval(0, 4096, open_low=True), "most rays per receptor and frame in training and in its checkpoints"
+    )
+    least_return: float = setting(
+        0.0, Interval(-1e6, 0), "a training episode whose rewards add up to no more is truncated; 0: none is"
     )
     eval_interval: int = setting(50_000, Interval(1, 10**10), "training steps between evaluations")
     patience: int = setting(5, Interval(1, 10**6), "evaluations without improvement before training stops")

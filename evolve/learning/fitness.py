@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from contextlib import closing
 from dataclasses import replace
@@ -10,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-import sim
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
@@ -19,6 +17,7 @@ from evolve.learning.ppo import Episodes, Progress, Training, Worlds, play, trai
 from evolve.learning.training_stage import TrainingStage
 from evolve.store.evaluation import Evaluation
 from sim.envs.assembly import prepared_scene, vec_env_in
+from sim.envs.vec_env import EyesVecEnv
 from sim.render.fidelity import fidelity_for
 
 __all__ = ["evaluate"]
@@ -88,30 +87,29 @@ def _live(
 ) -> tuple[Training, Episodes]:
     """Training, and the evaluation episodes after it, from starts and objects' places never seen before. Mazes are
     the same for all of a run, and of all runs."""
-    weights, worlds, evaluation = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
-    eyes = phenotype.eyes(config.eye)
-    scene = prepared_scene(config.task, eyes, **config.world.evaluation)
-    fidelity = fidelity_for(scene, config.eye.rays_per_receptor)
-    evaluation_worlds = vec_env_in(
-        scene, fidelity, config.evaluation.episodes, evaluation, memory=phenotype.memory_frames, mode="evaluation"
-    )
-    training_worlds = sim.make_vec_env(
-        config.task,
-        eyes,
-        config.learning.n_envs,
-        worlds,
-        memory=phenotype.memory_frames,
-        fidelity=_coarser(fidelity, eyes, config.learning.rays_per_eye),
-        **config.world.training,
-    )
-    with closing(training_worlds), closing(evaluation_worlds):
+    weights, *seeds = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
+    lessons, checkpoints, finals = _worlds(phenotype, config, *seeds)
+    with closing(lessons), closing(checkpoints), closing(finals):
         brain = Brain(phenotype.neurons, phenotype.layers)
-        training = train(Worlds(training_worlds, evaluation_worlds), brain, config.learning, weights, progress, begun)
-        return training, play(training.policy, evaluation_worlds, evaluation)
+        training = train(Worlds(lessons, checkpoints), brain, config.learning, weights, progress, begun)
+        return training, play(training.policy, finals, seeds[1])
 
 
-def _coarser(fidelity: sim.Fidelity, eyes: sim.Eyes, rays_per_eye: float) -> sim.Fidelity:
-    """With so many rays at most, but one per receptor: what to learn from. Noise of the signals averages out over a
-    training, and errors of so few rays are the same at every look."""
-    most = max(1.0, rays_per_eye / math.prod(eyes.resolution))
-    return replace(fidelity, rays_per_receptor=min(fidelity.rays_per_receptor, most))
+def _worlds(
+    phenotype: Phenotype, config: RunConfig, learning: int, evaluation: int
+) -> tuple[EyesVecEnv, EyesVecEnv, EyesVecEnv]:
+    """Worlds to learn in, to try out in meanwhile, and to measure fitness in, of two seeds. All have the same light;
+    the first two take no more rays than are good enough to learn from, as their noise averages out."""
+    eyes, memory, wanted = phenotype.eyes(config.eye), phenotype.memory_frames, config.learning
+    scene = prepared_scene(config.task, eyes, **config.world.evaluation)
+    fine = fidelity_for(scene, config.eye.rays_per_receptor)
+    coarse = replace(fine, rays_per_receptor=min(fine.rays_per_receptor, wanted.rays_per_receptor))
+    same_place = config.world.training == config.world.evaluation
+    school = scene if same_place else prepared_scene(config.task, eyes, **config.world.training)
+    checkpoints, finals = (
+        vec_env_in(scene, how, config.evaluation.episodes, evaluation, memory=memory, mode="evaluation")
+        for how in (coarse, fine)
+    )
+    least = wanted.least_return or None
+    lessons = vec_env_in(school, coarse, wanted.n_envs, learning, memory=memory, least_return=least)
+    return lessons, checkpoints, finals

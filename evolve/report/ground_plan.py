@@ -21,7 +21,7 @@ class GroundPlan:
 
     walls: (n, 4): centre x, y and half sides along x, y
     bounds: x_min, y_min, x_max, y_max of all walls
-    goal_region: the same of navigation's goal, or None
+    goal_region: the same of the goal of navigation or maze, or None
     object_names, object_radius: (object,)
     body_radius: of the agent
     seconds: that one action lasts
@@ -42,7 +42,7 @@ class GroundPlan:
     def of(cls, episode: Episode) -> GroundPlan:
         """The stage of an episode."""
         where = episode.world.evaluation
-        world = sim.build_world(episode.task, seed=where["world_seed"], mazes=where["mazes"])
+        world = sim.build_world(episode.task, seed=where["world_seed"], mazes=where["mazes"], course=where["course"])
         model = world.model
         walls = np.array([_footprint(model, i) for i in range(model.ngeom) if model.geom(i).name.startswith("wall")])
         region = world.goal_region

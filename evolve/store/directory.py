@@ -15,7 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from evolve.config.assemble import from_toml, to_toml
+from evolve.config.formats import FORMAT, LAST_OF_FORMER, format_of
 from evolve.config.run_config import RunConfig
+from evolve.config.sources import read_toml
 from evolve.store.atomic_files import UNFINISHED, sweep, write_whole
 from evolve.store.candidate import Candidate
 from evolve.store.lock import RunLock
@@ -77,6 +79,19 @@ class Run:
             raise RunError(f"{path} is no run: it holds no {CONFIG}")
         config = from_toml(path / CONFIG)
         return cls(path, config, Record.read(path / CANDIDATES, config))
+
+    def require_present_format(self) -> None:
+        """Trainings can be carried on in the light in which they began, and in no other.
+
+        Raises:
+            RunError: the run's format is a former one; names the version that carries it on.
+        """
+        number = format_of(read_toml(self.path / CONFIG).tree)
+        if number != FORMAT:
+            raise RunError(
+                f"{self.path} has format {number}: must be {FORMAT} to be continued; rhabdom at commit "
+                f"{LAST_OF_FORMER} continues it, and status, report, replay and export read it here"
+            )
 
     def lock(self) -> RunLock:
         """The right to write to this run, as a context manager.

@@ -11,13 +11,14 @@ import numpy as np
 
 from optics.spectra.spectrum import Spectrum
 from sim.envs.follow_camera import check_render_mode
-from sim.envs.simulation import Simulation
+from sim.envs.simulation import Simulation, check_least_return
 from sim.envs.vec_env import EyesVecEnv
 from sim.eyes.eyes import Eyes
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.fidelity import Fidelity, chosen_fidelity, fidelity_asked
 from sim.render.prepared_scene import PreparedScene
 from sim.tasks.reward import check_mode
+from sim.worlds.course import Course
 from sim.worlds.world import build_world
 
 
@@ -33,6 +34,8 @@ def make_vec_env(
     fidelity: Fidelity | None = None,
     world_seed: int = 0,
     mazes: int = 1,
+    course: str | Course = "short",
+    least_return: float | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
     render_mode: str | None = None,
 ) -> EyesVecEnv:
@@ -47,7 +50,8 @@ def make_vec_env(
     rays_per_receptor: rays traced for each receptor, in direct light; "auto": as few as its noise allows, and light
         that was reflected twice where it counts: `sim.choose_fidelity(world, eyes, bands="own")`
     fidelity: all of how finely it is rendered, in the place of rays_per_receptor (which takes one, too)
-    world_seed, mazes: of the layout that all worlds share: navigation's mazes, and how many
+    world_seed, mazes, course: of the layout that all worlds share, see `sim.build_world`
+    least_return: in training, an episode whose rewards add up to no more is truncated; None: none is
     spectra: of materials and lights, by name, in the place of their colours: see `sim.build_world`
     render_mode: "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye reports,
         side by side
@@ -63,9 +67,10 @@ def make_vec_env(
     asked = _fidelity_of(rays_per_receptor, fidelity, eyes)
     _require_whole("world_seed", world_seed, 0)
     _check(n_envs, seed, memory, mode, render_mode)
+    check_least_return(least_return, mode)
     eyes = eyes if asked is None else replace(eyes, bands=asked.bands)
-    scene = prepared_scene(task, eyes, world_seed=world_seed, mazes=mazes, spectra=spectra)
-    how: dict[str, Any] = {"memory": memory, "mode": mode, "render_mode": render_mode}
+    scene = prepared_scene(task, eyes, world_seed=world_seed, mazes=mazes, course=course, spectra=spectra)
+    how: dict[str, Any] = {"memory": memory, "mode": mode, "least_return": least_return, "render_mode": render_mode}
     return vec_env_in(scene, asked or chosen_fidelity(scene), n_envs, seed, **how)
 
 
@@ -75,10 +80,11 @@ def prepared_scene(
     *,
     world_seed: int = 0,
     mazes: int = 1,
+    course: str | Course = "short",
     spectra: Mapping[str, Spectrum | str] | None = None,
 ) -> PreparedScene:
     """A task's world made ready for given eyes; arguments as `make_vec_env` has them."""
-    return PreparedScene(build_world(task, seed=world_seed, mazes=mazes, spectra=spectra), eyes)
+    return PreparedScene(build_world(task, seed=world_seed, mazes=mazes, course=course, spectra=spectra), eyes)
 
 
 def vec_env_in(
@@ -89,6 +95,7 @@ def vec_env_in(
     *,
     memory: int = 1,
     mode: str = "training",
+    least_return: float | None = None,
     render_mode: str | None = None,
 ) -> EyesVecEnv:
     """A batched environment in a scene that has been prepared, rendered as finely as is said; arguments as
@@ -98,7 +105,8 @@ def vec_env_in(
         ValueError: a bad argument, and a fidelity for another number of bands than the scene's.
     """
     _check(n_envs, seed, memory, mode, render_mode)
-    simulation = Simulation(scene.world, n_envs, seed, mode, threads=min(dr.thread_count(), n_envs))
+    threads = min(dr.thread_count(), n_envs)
+    simulation = Simulation(scene.world, n_envs, seed, mode, threads, least_return)
     return EyesVecEnv(simulation, BatchedRenderer.of(scene, n_envs, fidelity), memory, render_mode)
 
 

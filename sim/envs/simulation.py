@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +20,7 @@ MAX_TURN = np.pi / 4  # [rad] change of heading per action; chosen
 
 UNSTABLE = "unstable physics"
 NO_ACTION = "action is not finite"
+LEAST_RETURN = "least return"
 NOWHERE = np.empty(0, int)
 
 
@@ -53,6 +55,7 @@ class Step:
     terms: of the reward, in the order of TERMS (term, n)
     terminated, truncated, contact, success: (n,) bool; success: the goal was reached in this episode
     respawned: worlds in which an object was put elsewhere
+    given_up: truncated because the rewards of the episode add up to too little, (n,) bool
     failure: world that could not go on -> why: "unstable physics" or "action is not finite"
     """
 
@@ -63,6 +66,7 @@ class Step:
     contact: np.ndarray
     success: np.ndarray
     respawned: np.ndarray
+    given_up: np.ndarray
     failure: dict[int, str]
 
     @property
@@ -89,16 +93,27 @@ class Simulation:
     mode: "training": reaching an object ends the episode; "evaluation": the object respawns, and rewards are weighted
         as fitness
     threads: of the physics
+    least_return: an episode whose rewards add up to no more is truncated, for training only; None: none is
 
     Raises:
-        ValueError: an unknown mode or less than one world.
+        ValueError: an unknown mode, less than one world, or a least return that is not below 0 or not for training.
     """
 
-    def __init__(self, world: World, n: int, seed: int | None, mode: str, threads: int) -> None:
+    def __init__(
+        self, world: World, n: int, seed: int | None, mode: str, threads: int, least_return: float | None = None
+    ) -> None:
         check_mode(mode)
+        check_least_return(least_return, mode)
         if n < 1:
             raise ValueError(f"n_envs = {n!r}: must be at least 1")
-        self.world, self.n, self.mode = world, n, mode
+        self.world, self.n, self.mode, self.least_return = (
+            world,
+            n,
+            mode,
+            -math.inf if least_return is None else least_return,
+        )
+        self._steps = world.episode_steps or EPISODE_STEPS
+        self._returns = np.zeros(n)
         self.task = task_of(world)
         self._physics = Physics(world, threads)
         self._heights = np.array([world.model.body(name).pos[2] for name in world.objects])
@@ -124,6 +139,7 @@ class Simulation:
     def reset(self) -> WorldState:
         """Start all episodes anew."""
         self._state = self._begin(np.arange(self.n))
+        self._returns[:] = 0.0
         return self._state
 
     def close(self) -> None:
@@ -133,6 +149,7 @@ class Simulation:
     def restart(self, worlds: np.ndarray) -> WorldState:
         """Start the episodes of these worlds anew."""
         self._state = self.state.put(worlds, self._begin(worlds))
+        self._returns[worlds] = 0.0
         return self._state
 
     def step(self, actions: np.ndarray) -> Step:
@@ -179,14 +196,18 @@ class Simulation:
             after = respawned(self.task, after, outcome.respawn, self.streams.placement)
             elsewhere = np.unique(outcome.respawn.nonzero()[0])
         self._state = final = after
+        terms = reward_terms(MODES[self.mode], outcome.progress, outcome.goal, outcome.adversary, motion.contact)
+        self._returns += terms.sum(axis=0)
+        given_up = (self._returns <= self.least_return) & ~terminated
         return Step(
             state=final,
-            terms=reward_terms(MODES[self.mode], outcome.progress, outcome.goal, outcome.adversary, motion.contact),
+            terms=terms,
             terminated=terminated,
-            truncated=(final.steps >= EPISODE_STEPS) & ~terminated,
+            truncated=((final.steps >= self._steps) | given_up) & ~terminated,
             contact=motion.contact,
             success=final.goals_reached > 0,
             respawned=elsewhere,
+            given_up=given_up,
             failure=moved.failed,
         )
 
@@ -197,8 +218,8 @@ class Simulation:
         objects[:, :, 2] = self._heights
         for row, world in enumerate(worlds):
             rng = self.streams.placement[world]
-            position[row], objects[row, :, :2] = self.task.begin(rng)
-            heading[row] = rng.uniform(-np.pi, np.pi)
+            beginning = self.task.begin(rng, training=self.mode == "training")
+            position[row], objects[row, :, :2], heading[row] = beginning.agent, beginning.objects, beginning.heading
             object_heading[row] = rng.uniform(-np.pi, np.pi, k)
         return WorldState(
             position=position,
@@ -211,6 +232,20 @@ class Simulation:
             goals_reached=np.zeros(n, int),
             adversaries_reached=np.zeros(n, int),
         )
+
+
+def check_least_return(least_return: float | None, mode: str) -> None:
+    """Refuse a least return that would end every episode at once, or episodes that fitness comes from.
+
+    Raises:
+        ValueError: it is.
+    """
+    if least_return is None:
+        return
+    if isinstance(least_return, str | bool) or not least_return < 0:
+        raise ValueError(f"least_return = {least_return!r}: must be below 0, or None")
+    if mode != "training":
+        raise ValueError(f"least_return = {least_return!r}: must be left out in mode {mode!r}, only training ends so")
 
 
 def _taken(actions: np.ndarray) -> tuple[np.ndarray, list[int]]:

@@ -13,7 +13,7 @@ from sim.envs.follow_camera import FollowCamera
 from sim.envs.info import first_infos, infos_of
 from sim.envs.observation import STANDING, Memory, action_space, observation_space
 from sim.envs.retina_images import side_by_side
-from sim.envs.simulation import NOWHERE, Simulation, Step
+from sim.envs.simulation import LEAST_RETURN, NOWHERE, Simulation, Step
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.noisy_signals import NoisySignals
 from sim.render.pending_frame import PendingFrame
@@ -170,6 +170,8 @@ class EyesVecEnv(VecEnv):
         for world in ended:
             infos[world]["TimeLimit.truncated"] = bool(step.truncated[world])
             infos[world]["episode"] = {"r": float(self._returns[world]), "l": int(self._lengths[world])}
+            if step.given_up[world]:
+                infos[world]["given_up"] = LEAST_RETURN
         for index, reason in step.failure.items():
             infos[index]["failure"] = reason
         return infos

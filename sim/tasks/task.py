@@ -6,6 +6,7 @@ worth, with a penalty for contact with a wall, is in `sim.tasks.reward`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -16,8 +17,10 @@ from sim.tasks.object_motion import wander
 from sim.tasks.placement import REACH, Places, free_spot
 from sim.tasks.random_streams import MotionNoise
 from sim.worlds.catalog import TASKS
-from sim.worlds.state import WorldState
+from sim.worlds.state import WorldState, wrap_angle
 from sim.worlds.world import World
+
+HEADING_SPREAD = math.radians(20)  # [rad] either way, of headings along a course; chosen
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,15 @@ class Outcome:
         )
 
 
+@dataclass(frozen=True)
+class Beginning:
+    """Start of an episode in one world: agent (2,) [m], objects (k, 2) [m] and the agent's heading [rad]."""
+
+    agent: np.ndarray
+    objects: np.ndarray
+    heading: float
+
+
 class Task(Protocol):
     """The rules of a game on a World; pure functions of states, all worlds at once."""
 
@@ -57,8 +69,8 @@ class Task(Protocol):
     def world(self) -> World:
         """Where it is played."""
 
-    def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """Start of an episode in one world: agent (2,) and objects (k, 2)."""
+    def begin(self, rng: np.random.Generator, training: bool) -> Beginning:
+        """Start of an episode in one world."""
 
     def move(self, state: WorldState, chance: MotionNoise, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         """Objects (n, k, 3) and their headings (n, k) one action later."""
@@ -101,8 +113,9 @@ class FindGoal:
         spots = self.world.object_spawn
         return np.concatenate([spots.min(axis=0), spots.max(axis=0)])
 
-    def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        return self._places.draw(rng, len(self.world.objects))
+    def begin(self, rng: np.random.Generator, training: bool) -> Beginning:
+        agent, objects = self._places.draw(rng, len(self.world.objects))
+        return Beginning(agent, objects, rng.uniform(-np.pi, np.pi))
 
     def move(self, state: WorldState, chance: MotionNoise, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         if not self.moving:
@@ -130,8 +143,8 @@ class FindGoal:
 
 
 @dataclass(frozen=True)
-class LeaveMaze:
-    """Navigation: get far from the start and into the goal region.
+class FindWay:
+    """Navigation and maze: get far from the start and into the goal region.
 
     Progress is the increase of the distance from the start. Reaching the goal region ends the episode, in
     evaluation too: there is no object that could respawn elsewhere.
@@ -139,8 +152,13 @@ class LeaveMaze:
 
     world: World
 
-    def begin(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        return self.world.agent_spawn[rng.integers(len(self.world.agent_spawn))], np.empty((0, 2))
+    def begin(self, rng: np.random.Generator, training: bool) -> Beginning:
+        starts = (self.world.training_starts if training else None) or self.world.starts
+        place = rng.integers(len(starts.position))
+        if starts.heading is None:
+            return Beginning(starts.position[place], np.empty((0, 2)), rng.uniform(-np.pi, np.pi))
+        heading = wrap_angle(starts.heading[place] + rng.uniform(-HEADING_SPREAD, HEADING_SPREAD))
+        return Beginning(starts.position[place], np.empty((0, 2)), float(heading))
 
     def move(self, state: WorldState, chance: MotionNoise, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         return state.objects, state.object_heading
@@ -171,7 +189,7 @@ def task_of(world: World) -> Task:
     """
     if world.task not in TASKS:
         raise ValueError(f"task = {world.task!r}: must be one of {', '.join(map(repr, TASKS))}")
-    return LeaveMaze(world) if world.task == "navigation" else FindGoal(world, moving=world.task == "tracking")
+    return FindGoal(world, moving=world.task == "tracking") if world.objects else FindWay(world)
 
 
 def _distance_to_goal(state: WorldState, goals: int) -> np.ndarray:

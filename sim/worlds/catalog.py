@@ -11,9 +11,12 @@ from types import MappingProxyType
 # Name -> what is asked of the agent: "evolve to ...".
 TASKS: Mapping[str, str] = MappingProxyType(
     {
-        "navigation": "get as far as possible through a maze of striped corridors",
+        "navigation": "follow a course between striped walls to its end",
         "detection": "reach the goal sphere, avoid two adversaries that differ in stripe orientation only",
         "tracking": "detection with goal and adversaries that move",
+        "maze": "get as far as possible through a maze of striped corridors",
         "foraging": "reach the goal sphere, avoid an adversary that differs below 400 nm only",
     }
 )
+
+COURSES = ("short", "long")  # of navigation: names of the drawings in `sim.worlds.navigation`

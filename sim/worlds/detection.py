@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from sim.worlds import materials
-from sim.worlds.layout import CELL, Layout, add_floor, add_wall, cell_centers
+from sim.worlds.layout import CELL, Layout, Starts, add_floor, add_wall, cell_centers
 
 FIELD = (9, 11)  # free cells (rows, columns), as published
 OBJECT_RADIUS = 0.5  # [m], as published
@@ -45,7 +45,7 @@ def furnished_field(spec: mujoco.MjSpec) -> Layout:
     centers = cell_centers(columns, rows, FIELD)
     return Layout(
         objects=OBJECTS,
-        agent_spawn=centers[to_wall == 0],
+        starts=Starts(centers[to_wall == 0]),
         object_spawn=centers[to_wall >= OBJECT_MARGIN],
         goal_region=None,
     )

@@ -19,20 +19,36 @@ WALL_CONAFFINITY = 1
 
 
 @dataclass(frozen=True)
+class Starts:
+    """Where agents begin.
+
+    position: (n, 2) [m]
+    heading: which way they look there [rad], (n,); None: any way
+    """
+
+    position: np.ndarray
+    heading: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
 class Layout:
     """What a task adds to a world: its mocap sphere bodies and the places to start from.
 
     objects: names of mocap sphere bodies
-    agent_spawn: (n, 2) [m];  object_spawn (m, 2) [m]
+    starts: of the agent;  object_spawn: (m, 2) [m]
     goal_region: (x_min, y_min, x_max, y_max) [m] or None
     spectra: reflectances of materials, by name, where a colour would not do
+    training_starts: of the agent in training, if not the same
+    episode_steps: actions, then an episode is truncated; None: as many as everywhere
     """
 
     objects: tuple[str, ...]
-    agent_spawn: np.ndarray
+    starts: Starts
     object_spawn: np.ndarray
     goal_region: np.ndarray | None
     spectra: Mapping[str, Spectrum] = field(default_factory=dict)
+    training_starts: Starts | None = None
+    episode_steps: int | None = None
 
 
 def cell_centers(columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

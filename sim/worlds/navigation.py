@@ -1,109 +1,94 @@
-"""Navigation: a maze of corridors between striped walls; the way leads from its west end to its east end."""
+"""Navigation: a course between striped walls, from its west end to its east end, with islands to pass by."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import mujoco
 import numpy as np
+import scipy.ndimage
 
-from sim.worlds import materials
-from sim.worlds.layout import CELL, Layout, add_floor, add_wall, cell_centers
+from optics.numerics.arguments import did_you_mean
+from sim.worlds.catalog import COURSES
+from sim.worlds.course import GOAL_COLUMNS, Course
+from sim.worlds.layout import CELL, Layout, Starts, add_floor
+from sim.worlds.striped_walls import add_striped_walls
 
-MAZE = (13, 39)  # cells (rows, columns), odd: rooms at odd coordinates, walls or doors between them
-START_COLUMNS = 4  # the agent starts in the free cells west of this column
-GOAL_COLUMNS = 3  # the free cells of the last columns but the outer wall are the goal
-LONGEST_WALL = 4  # cells in one box: a new stripe frequency at least every 8 m
+# Diagonals are so wide that an agent has 2 m of free play between the corners of their walls, and ways part and join
+# again. The shortest way is 90 m.
+SHORT = Course(
+    """
+    ###########################################
+    #######...##########........###############
+    ######..s..########....s.....##############
+    #####.......######............#############
+    ####...###...####...#....###...#########..#
+    #S....#####...##...####...###...#######...#
+    #S...#######..s...######...###.s.#####....#
+    #S....#####......########...###...###...###
+    ####...###...#############...###...#...####
+    #####.......###############.s.........#####
+    ######..s..#################......s..######
+    #######...###################.......#######
+    ###########################################
+    """
+)
+# Twice as long, to be run in half as many actions: only who is fast gets far.
+LONG = Course(
+    """
+    ##################################################################################
+    #######...##########........###########################.......#########...########
+    ######..s..########....s.....#########################......s..#######..s..#######
+    #####.......######............#######################...........#####.......######
+    ####...###...####...#....###...#####################...###...#...###...###...#####
+    #S....#####...##...####...###...#######.##.########...###...###...#...#####......#
+    #S...#######..s...######...###...#####..s...######...###...#####..s..#######.....#
+    #S....#####......########...###...###........####...###...#######.....#####......#
+    ####...###...#############...###...#...####...##...###...###########...###...#####
+    #####.......###############...........######............#############.......######
+    ######..s..#################......s..########...s......###############..s..#######
+    #######...###################.......##########........#################...########
+    ##################################################################################
+    """,
+    episode_steps=128,
+)
+DRAWN: Mapping[str, Course] = MappingProxyType(dict(zip(COURSES, (SHORT, LONG), strict=True)))
 
-# Stripe periods along a wall [m]; a box's end faces, as long as one cell, carry as many stripes as its sides
-# per cell times its length, which is how MuJoCo repeats a texture.
-STRIPE_PERIODS = (4.0, 2.0, 1.0, 2 / 3)
 
-_NEIGHBORS = ((0, 2), (0, -2), (2, 0), (-2, 0))
+def course_named(course: str | Course) -> Course:
+    """A course, or the drawn one with that name.
+
+    Raises:
+        ValueError: there is none.
+    """
+    if isinstance(course, Course):
+        return course
+    if course not in DRAWN:
+        hint = did_you_mean(course, COURSES) if isinstance(course, str) else ""
+        raise ValueError(f"course = {course!r}: must be sim.Course or one of {', '.join(map(repr, COURSES))}{hint}")
+    return DRAWN[course]
 
 
-def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, mazes: int = 1) -> Layout:
-    """Add mazes drawn by `rng`, side by side (north of each other) and without a way from one to the next: an agent
-    starts in any of them, and what it learns is good for all."""
-    walls = np.concatenate([draw_maze(MAZE, rng) for _ in range(mazes)])
-    shape = walls.shape
-    materials.add_texture(spec, "stripes", materials.stripes((8, 256), 2, axis=1))
-    for i, period in enumerate(STRIPE_PERIODS):
-        materials.add_textured(spec, f"stripes_{i}", "stripes", repeat=(2 / period, 1), uniform=True)
-    add_floor(spec, (shape[1] * CELL, shape[0] * CELL))
-    for i, (row, column, n_rows, n_columns) in enumerate(merge_walls(walls, LONGEST_WALL)):
-        center = cell_centers(np.array(column + (n_columns - 1) / 2), np.array(row + (n_rows - 1) / 2), shape)
-        frequency = rng.integers(len(STRIPE_PERIODS))
-        add_wall(spec, f"wall_{i}", center, (n_columns * CELL, n_rows * CELL), f"stripes_{frequency}")
-    rows, columns = np.nonzero(~walls)
-    start = columns < START_COLUMNS
-    right = shape[1] * CELL / 2 - CELL
+def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, course: Course) -> Layout:
+    """Add the walls of a course, with stripes drawn by `rng`."""
+    rows, columns = course.walls.shape
+    add_floor(spec, (columns * CELL, rows * CELL))
+    # Nobody sees a wall that has no free cell next to it.
+    near = scipy.ndimage.binary_dilation(~course.walls, np.ones((3, 3)))
+    add_striped_walls(spec, course.walls & near, rng)
+    right, top = columns * CELL / 2 - CELL, rows * CELL / 2 - CELL
     return Layout(
         objects=(),
-        agent_spawn=cell_centers(columns[start], rows[start], shape),
+        starts=_starts(course, training=False),
+        training_starts=_starts(course, training=True),
         object_spawn=np.empty((0, 2)),
-        goal_region=np.array(
-            [right - GOAL_COLUMNS * CELL, CELL - shape[0] * CELL / 2, right, shape[0] * CELL / 2 - CELL]
-        ),
+        goal_region=np.array([right - GOAL_COLUMNS * CELL, -top, right, top]),
+        episode_steps=course.episode_steps,
     )
 
 
-def draw_maze(shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
-    """Walls of a maze without dead ends, boolean (row, column).
-
-    A depth-first walk joins all rooms into a tree; then every dead end gets a second door, so that an agent that
-    follows a corridor always gets somewhere.
-    """
-    walls = np.ones(shape, dtype=bool)
-    walls[1, 1] = False
-    path = [(1, 1)]
-    while path:
-        room = path[-1]
-        closed = [n for n in _rooms_next_to(room, shape) if walls[n]]
-        if not closed:
-            path.pop()
-            continue
-        room_next = closed[rng.integers(len(closed))]
-        walls[_between(room, room_next)] = walls[room_next] = False
-        path.append(room_next)
-    for row in range(1, shape[0], 2):
-        for column in range(1, shape[1], 2):
-            _open_dead_end(walls, (row, column), rng)
-    return walls
-
-
-def _open_dead_end(walls: np.ndarray, room: tuple[int, int], rng: np.random.Generator) -> None:
-    shape = (walls.shape[0], walls.shape[1])
-    shut = [d for n in _rooms_next_to(room, shape) if walls[d := _between(room, n)]]
-    doors = len(_rooms_next_to(room, shape)) - len(shut)
-    if doors < 2:
-        walls[shut[rng.integers(len(shut))]] = False
-
-
-def _rooms_next_to(room: tuple[int, int], shape: tuple[int, int]) -> list[tuple[int, int]]:
-    near = [(room[0] + dr, room[1] + dc) for dr, dc in _NEIGHBORS]
-    return [(r, c) for r, c in near if 0 < r < shape[0] - 1 and 0 < c < shape[1] - 1]
-
-
-def _between(a: tuple[int, int], b: tuple[int, int]) -> tuple[int, int]:
-    return (a[0] + b[0]) // 2, (a[1] + b[1]) // 2
-
-
-def merge_walls(walls: np.ndarray, longest: int) -> list[tuple[int, int, int, int]]:
-    """Cover wall cells by disjoint straight runs of at most `longest` cells: (row, column, rows, columns) each.
-
-    Greedy: of the two runs that start in the first uncovered cell, the longer one.
-    """
-    left = walls.copy()
-    runs = []
-    for row, column in np.argwhere(walls):
-        if not left[row, column]:
-            continue
-        along = _run_length(left[row, column : column + longest])
-        across = _run_length(left[row : row + longest, column])
-        rows, columns = (1, along) if along >= across else (across, 1)
-        left[row : row + rows, column : column + columns] = False
-        runs.append((int(row), int(column), rows, columns))
-    return runs
-
-
-def _run_length(cells: np.ndarray) -> int:
-    return len(cells) if cells.all() else int(np.argmin(cells))
+def _starts(course: Course, training: bool) -> Starts:
+    """Along the way everywhere."""
+    cells = course.training_starts if training else course.starts
+    return Starts(course.places(cells), np.array([course.heading(cell) for cell in cells]))

@@ -1,7 +1,7 @@
 """A task's world: what stands where, as a MuJoCo model, and where agent and objects may start.
 
 `build_world` compiles one. What all worlds have in common is added here; what is special about one is in
-`sim.worlds.detection`, `.foraging` and `.navigation`.
+`sim.worlds.detection`, `.foraging`, `.maze` and `.navigation`.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from optics.numerics.arguments import did_you_mean
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.scene.spectra import resolve
-from sim.worlds import detection, foraging, materials, navigation
+from sim.worlds import detection, foraging, materials, maze, navigation
 from sim.worlds.agent_model import AgentModel
 from sim.worlds.catalog import TASKS
-from sim.worlds.layout import WALL_CONAFFINITY
+from sim.worlds.course import Course
+from sim.worlds.layout import WALL_CONAFFINITY, Layout, Starts
 
-# Navigation's has an argument of its own, its number of mazes.
-_LAYOUTS = {"detection": detection.add_layout, "foraging": foraging.add_layout, "tracking": detection.add_layout}
+_FIELDS = {"detection": detection.add_layout, "foraging": foraging.add_layout, "tracking": detection.add_layout}
 
 TIMESTEP = 0.02  # [s], as published
 # Lag [s] of the agent's speed behind the commanded one, and speed reached per speed commanded: with them an agent goes
@@ -42,21 +42,32 @@ class World:
     model: static geoms; body "agent" with slide joints agent_x, agent_y and hinge agent_heading, actuators agent_x,
         agent_y (commanded velocity [m/s], world axes), sensor agent_touch (> 0: wall contact); mocap bodies for the
         objects; cameras eye_0 ... on the agent if it was built with eyes
-    objects: mocap sphere bodies: ("goal", "adversary_0", "adversary_1"), or () for navigation
-    agent_spawn: (n, 2) cell centres [m];  object_spawn (m, 2) cell centres [m]
-    goal_region: navigation: (x_min, y_min, x_max, y_max) [m]
+    objects: mocap sphere bodies: ("goal", "adversary_0", "adversary_1"), or () for navigation and maze
+    starts: of the agent, in cells' centres;  object_spawn: cells' centres (m, 2) [m]
+    goal_region: navigation and maze: (x_min, y_min, x_max, y_max) [m]
     spectra: measured spectra of materials and lights, by name: what the renderers use instead of their colours
     alone: the model's agent by itself; without, agents that may touch something are stepped in the whole model
+    training_starts: of the agent in training; None: the same
+    episode_steps: actions, then an episode is truncated; None: as many as everywhere
     """
 
     task: str
     model: mujoco.MjModel
     objects: tuple[str, ...]
-    agent_spawn: np.ndarray
+    starts: Starts
     object_spawn: np.ndarray
     goal_region: np.ndarray | None
     spectra: Mapping[str, Spectrum] = field(default_factory=dict)
     alone: AgentModel | None = None
+    training_starts: Starts | None = None
+    episode_steps: int | None = None
+
+    @property
+    def agent_spawn(self) -> np.ndarray:
+        """All places in which an agent may start, (n, 2) [m]."""
+        if self.training_starts is None:
+            return self.starts.position
+        return np.unique(np.concatenate([self.starts.position, self.training_starts.position]), axis=0)
 
 
 def build_world(
@@ -64,42 +75,54 @@ def build_world(
     *,
     seed: int = 0,
     mazes: int = 1,
+    course: str | Course = "short",
     eyes: Eyes | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
 ) -> World:
     """Build the world of a task.
 
     task: one of `sim.TASKS`
-    seed: draws the mazes of navigation; the field of the others is always the same
-    mazes: of navigation: so many different ones, and an episode begins in any of them
+    seed: draws mazes, and the stripes of walls; the field of the other tasks is always the same
+    mazes: of the task "maze": so many different ones, and an episode begins in any of them
+    course: of navigation: "short", "long" (twice as long, in half as many actions) or a `sim.Course`
     eyes: if given, the agent carries cameras eye_0 ..., left to right
     spectra: of materials and lights, by name ("wall", "floor", "light_0" ...), in addition to or instead of the task's
         own: `optics.Spectrum`, or names out of `optics.reflectance` and `optics.illuminant`
 
     Raises:
-        ValueError: an unknown task, a negative seed, mazes for another task than navigation, or spectra of what is not
-            there.
+        ValueError: an unknown task or course, a negative seed, mazes or a course for another task, or spectra of what
+            is not there.
     """
     if task not in TASKS:
         raise ValueError(f"unknown task {task!r}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")
     if seed < 0:
         raise ValueError(f"build_world: seed = {seed}: must be at least 0")
-    if mazes < 1 or (mazes > 1 and task != "navigation"):
-        raise ValueError(f"build_world: mazes = {mazes}: must be 1, or more for 'navigation'")
-    spec, rng = _empty_world(), np.random.default_rng(seed)
-    layout = navigation.add_layout(spec, rng, mazes) if task == "navigation" else _LAYOUTS[task](spec, rng)
-    _add_agent(spec, layout.agent_spawn[0], eyes)
+    if mazes < 1 or (mazes > 1 and task != "maze"):
+        raise ValueError(f"build_world: mazes = {mazes}: must be 1, or more for 'maze'")
+    if course != "short" and task != "navigation":
+        raise ValueError(f"build_world: course: must be left out for {task!r}, only 'navigation' has one")
+    spec = _empty_world()
+    layout = _layout(spec, task, np.random.default_rng(seed), mazes, course)
+    _add_agent(spec, layout.starts.position[0], eyes)
     model = spec.compile()
     return World(
         task=task,
         model=model,
         objects=layout.objects,
-        agent_spawn=layout.agent_spawn,
+        starts=layout.starts,
         object_spawn=layout.object_spawn,
         goal_region=layout.goal_region,
         spectra=resolve(model, {**layout.spectra, **(spectra or {})}),
         alone=AgentModel.of(spec, model),
+        training_starts=layout.training_starts,
+        episode_steps=layout.episode_steps,
     )
+
+
+def _layout(spec: mujoco.MjSpec, task: str, rng: np.random.Generator, mazes: int, course: str | Course) -> Layout:
+    if task == "navigation":
+        return navigation.add_layout(spec, rng, navigation.course_named(course))
+    return maze.add_layout(spec, rng, mazes) if task == "maze" else _FIELDS[task](spec, rng)
 
 
 def _empty_world() -> mujoco.MjSpec:

@@ -66,6 +66,7 @@ def resume(arguments: Namespace) -> int:
             if not arguments.json:
                 print(f"{run.path}: all {run.config.candidates} candidates have been evaluated")
             return _finish(run, arguments.json)
+        run.require_present_format()
         _note_changes(run)
         record_start(run.path, len(run.candidates))
         if not arguments.json:

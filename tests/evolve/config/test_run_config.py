@@ -3,7 +3,7 @@
 import pytest
 
 from evolve.config.assemble import assemble
-from evolve.config.run_config import ConfigError
+from evolve.config.run_config import ConfigError, WorldConfig
 from evolve.genome.genotype import group_members
 
 
@@ -38,14 +38,21 @@ def test_contradictions_are_refused():
         assemble("detection", assignments=["eye.optics=false", "genome.doe.open=true"])
 
 
-def test_only_navigation_has_mazes():
-    assert assemble("navigation", assignments=["world.mazes=4", "world.unseen=true"]).world.evaluation == {
+def test_only_the_maze_has_mazes_and_only_navigation_a_course():
+    assert assemble("maze", assignments=["world.mazes=4", "world.unseen=true"]).world.evaluation == {
         "mazes": 4,
         "world_seed": 1,
+        "course": "short",
     }
     for change in ("world.mazes=2", "world.unseen=true"):
-        with pytest.raises(ConfigError, match="detection has no mazes, only navigation has"):
-            assemble("detection", assignments=[change])
+        with pytest.raises(ConfigError, match="is for the task maze, not for navigation"):
+            assemble("navigation", assignments=[change])
+    for change in ("world.course=long", "world.evaluation_course=long"):
+        with pytest.raises(ConfigError, match="is for the task navigation, not for maze"):
+            assemble("maze", assignments=[change])
+        assert assemble("navigation", assignments=[change]).world != WorldConfig()
+    with pytest.raises(ConfigError, match=r"world\.course = 'lang': must be one of short, long"):
+        assemble("navigation", assignments=["world.course=lang"])
 
 
 def test_photons_are_counted_in_some_light():

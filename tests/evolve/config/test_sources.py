@@ -28,7 +28,7 @@ def test_a_tasks_file_is_what_its_task_sets(file):
 
 def test_what_is_no_task_sets_nothing():
     assert FILES
-    for name in ("detection", "../../presets/lens", "maze", 3, None):
+    for name in ("detection", "../../presets/lens", "paper", 3, None):
         assert task_defaults(name).tree == {}
 
 

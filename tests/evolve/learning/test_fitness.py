@@ -58,28 +58,32 @@ def test_same_seed_same_life(outcome, tmp_path):
     assert other.returns != evaluation.returns
 
 
-@pytest.mark.parametrize(("rays_per_eye", "expected"), [(1e6, None), (36.0, 3.0), (1.0, 1.0)])
-def test_training_looks_less_closely_than_evaluation(rays_per_eye, expected, tmp_path, monkeypatch):
-    """At most so many rays for an eye of 12 receptors, one per receptor at least; None: as many as the noise asks for.
-    Evaluation traces those in any case."""
-    rays = {}
+@pytest.mark.parametrize(("most", "expected"), [(4096.0, None), (3.0, 3.0)])
+@pytest.mark.parametrize("resolution", [(3, 4), (1, 1)])
+def test_training_looks_less_closely_than_evaluation(resolution, most, expected, tmp_path, monkeypatch):
+    """At most so many rays for a receptor, whatever the eye; None: as many as the noise asks for. Fitness is measured
+    with those in any case, and checkpoints as training is, in the same light."""
+    fidelities = []
 
     def recorded(make):
         def made(*args, **kwargs):
             worlds = make(*args, **kwargs)
-            rays[worlds.simulation.mode] = worlds.renderer.fidelity.rays_per_receptor
+            fidelities.append((worlds.simulation.mode, worlds.renderer.fidelity))
             return worlds
 
         return made
 
-    monkeypatch.setattr(sim, "make_vec_env", recorded(sim.make_vec_env))
     monkeypatch.setattr("evolve.learning.fitness.vec_env_in", recorded(vec_env_in))
     config = small_config()
-    learning = replace(config.learning, rays_per_eye=rays_per_eye)
+    learning = replace(config.learning, rays_per_receptor=most)
     config = replace(config, eye=replace(config.eye, rays_per_receptor="auto"), learning=learning)
-    assert evaluate(replace(PHENOTYPE, resolution=(3, 4)), config, 5, tmp_path / "0.safetensors").failure is None
-    assert rays["evaluation"] > 3
-    assert rays["training"] == (expected or rays["evaluation"])
+    animal = replace(PHENOTYPE, resolution=resolution)
+    assert evaluate(animal, config, 5, tmp_path / "0.safetensors").failure is None
+    (_, checkpoints), (_, finals), (_, lessons) = fidelities
+    assert [mode for mode, _ in fidelities] == ["evaluation", "evaluation", "training"]
+    assert finals.rays_per_receptor > 3
+    assert lessons.rays_per_receptor == (expected or finals.rays_per_receptor)
+    assert checkpoints == lessons == replace(finals, rays_per_receptor=lessons.rays_per_receptor)
 
 
 def test_a_training_that_diverges_is_a_failure_with_a_reason(tmp_path, monkeypatch):
@@ -102,7 +106,7 @@ def test_unseen_mazes_are_seen_by_the_evaluation_alone(tmp_path):
         "other": WorldConfig(unseen=True),
         "two": WorldConfig(mazes=2),
     }.items():
-        config = replace(small_config(), task="navigation", world=world)
+        config = replace(small_config(), task="maze", world=world)
         path = tmp_path / f"{name}.safetensors"
         outcomes[name] = evaluate(PHENOTYPE, config, 5, path).returns, path.read_bytes()
     (seen, taught), (unseen, taught_as_well), (_, of_two) = outcomes.values()

@@ -55,7 +55,7 @@ def redone(monkeypatch):
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-@pytest.mark.parametrize("task", ["detection", "foraging", "navigation", "tracking"])
+@pytest.mark.parametrize("task", ["detection", "foraging", "maze", "navigation", "tracking"])
 def test_agents_among_a_few_geoms_do_what_they_do_among_all(task, threads, redone):
     """Bit for bit, and hardly anyone is done again; so many agents that threads share them."""
     world = build_world(task)
@@ -72,7 +72,7 @@ def test_agents_among_a_few_geoms_do_what_they_do_among_all(task, threads, redon
 
 
 def test_agents_among_too_many_geoms_are_stepped_in_the_whole_world(redone):
-    world = build_world("navigation")
+    world = build_world("maze")
     state, command = begun_at_walls(world, 64)
     cramped = Physics(world, 1)
     cramped.local_contacts._slots = cramped.local_contacts._slots[:1]
@@ -85,7 +85,7 @@ def test_agents_among_too_many_geoms_are_stepped_in_the_whole_world(redone):
 @pytest.mark.parametrize("noticed", [True, False])
 def test_agents_that_stray_to_what_their_models_lack_are_done_again(monkeypatch, noticed):
     """With room for no geom at all, every agent at a wall strays into it; unnoticed, they would go through."""
-    world = build_world("navigation")
+    world = build_world("maze")
     state, command = begun_at_walls(world, 64)
     without_room = Physics(world, 1)
     without_room.local_contacts._slots = without_room.local_contacts._slots[:0]
@@ -97,7 +97,7 @@ def test_agents_that_stray_to_what_their_models_lack_are_done_again(monkeypatch,
 
 
 def test_an_agent_that_breaks_down_at_a_wall_is_what_the_whole_world_makes_of_it():
-    world = build_world("navigation")
+    world = build_world("maze")
     state, command = begun_at_walls(world, 64)
     touching = np.flatnonzero(Physics(world, 1).step(state, command).contact)
     velocity = state.velocity.copy()
@@ -112,7 +112,7 @@ def test_an_agent_that_breaks_down_at_a_wall_is_what_the_whole_world_makes_of_it
 @pytest.mark.parametrize("change", ["opt.iterations", "opt.timestep", "geom_conaffinity", "geom_friction", "body_mass"])
 def test_a_model_that_was_altered_has_no_parts(change):
     """Another number anywhere, and agents at walls are stepped in the whole of it."""
-    world = build_world("navigation")
+    world = build_world("maze")
     assert Physics(world, 1).local_contacts is not None
     if change.startswith("opt."):
         was = getattr(world.model.opt, change[4:])

@@ -19,7 +19,7 @@ def field():
 
 @pytest.fixture(scope="module")
 def maze():
-    return build_world("navigation")
+    return build_world("maze")
 
 
 def facing(simulation, targets, distance):

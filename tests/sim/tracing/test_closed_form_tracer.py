@@ -40,7 +40,13 @@ def radiances(world, state):
 
 @pytest.mark.parametrize(
     ("task", "seed", "mazes"),
-    [("detection", 0, 1), ("tracking", 1, 1), ("navigation", 8, 5), *(("navigation", seed, 1) for seed in range(8))],
+    [
+        ("detection", 0, 1),
+        ("tracking", 1, 1),
+        ("navigation", 0, 1),
+        ("maze", 8, 5),
+        *(("maze", seed, 1) for seed in range(8)),
+    ],
 )
 def test_every_ray_sees_what_mitsuba_sees(task, seed, mazes):
     """All rays agree to float32, but for the few that graze an edge (of a stripe, a wall, a shadow)."""

@@ -4,7 +4,10 @@ catalog: test_catalog.py
 world: test_world.py
 detection: test_world.py, test_balance.py
 foraging: test_foraging.py
-navigation: test_world.py
+course: test_course.py
+navigation: test_course.py
+maze: test_world.py
+striped_walls: test_world.py, test_course.py
 layout: test_world.py
 materials: test_world.py
 agent_model: physics/test_local_contacts.py

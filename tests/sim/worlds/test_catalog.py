@@ -9,7 +9,7 @@ import pytest
 import sim
 from evolve.config.run_config import TASKS as CONFIGURABLE
 from sim.envs.registration import IDS
-from sim.tasks.task import FindGoal, LeaveMaze, task_of
+from sim.tasks.task import FindGoal, FindWay, task_of
 from sim.worlds.catalog import TASKS
 
 
@@ -26,7 +26,7 @@ def test_every_task_has_a_world_and_rules(task):
     world = sim.build_world(task)
     assert world.task == task
     rules = task_of(world)
-    assert isinstance(rules, LeaveMaze if world.goal_region is not None else FindGoal)
+    assert isinstance(rules, FindWay if world.goal_region is not None else FindGoal)
     assert getattr(rules, "moving", False) == (task == "tracking")
 
 

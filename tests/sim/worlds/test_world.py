@@ -10,8 +10,9 @@ from sim.eyes.eyes import BODY_RADIUS, eye_positions
 from sim.physics.physics import Physics
 from sim.scene.color import decode_srgb
 from sim.scene.surfaces import image
-from sim.worlds import detection, materials, navigation
+from sim.worlds import detection, materials, maze
 from sim.worlds.layout import CELL
+from sim.worlds.striped_walls import merge_walls
 from sim.worlds.world import MAX_SPEED
 
 ACTION = 10  # substeps
@@ -127,7 +128,7 @@ def stripe_bounds(values):
 
 def test_mazes_have_a_way_and_no_dead_ends():
     for seed in range(20):
-        walls = navigation.draw_maze(navigation.MAZE, np.random.default_rng(seed))
+        walls = maze.draw_maze(maze.MAZE, np.random.default_rng(seed))
         assert walls[[0, -1]].all()
         assert walls[:, [0, -1]].all()
         free = ~walls
@@ -146,9 +147,9 @@ def test_mazes_have_a_way_and_no_dead_ends():
 
 
 def test_merged_walls_cover_the_maze_exactly():
-    walls = navigation.draw_maze(navigation.MAZE, np.random.default_rng(3))
+    walls = maze.draw_maze(maze.MAZE, np.random.default_rng(3))
     covered = np.zeros(walls.shape, int)
-    runs = navigation.merge_walls(walls, 4)
+    runs = merge_walls(walls, 4)
     for row, column, rows, columns in runs:
         covered[row : row + rows, column : column + columns] += 1
         assert min(rows, columns) == 1
@@ -159,7 +160,7 @@ def test_merged_walls_cover_the_maze_exactly():
 
 def test_a_maze_is_its_seeds():
     def walls(seed):
-        return sim.build_world("navigation", seed=seed).model.geom_pos
+        return sim.build_world("maze", seed=seed).model.geom_pos
 
     assert np.array_equal(walls(1), walls(1))
     assert walls(1).shape != walls(2).shape or not np.array_equal(walls(1), walls(2))
@@ -167,7 +168,7 @@ def test_a_maze_is_its_seeds():
 
 def test_several_mazes_are_different_and_apart():
     """Episodes begin in each of them; the first is what it is alone; a wall as long as the world parts neighbours."""
-    one, three = (sim.build_world("navigation", seed=4, mazes=mazes) for mazes in (1, 3))
+    one, three = (sim.build_world("maze", seed=4, mazes=mazes) for mazes in (1, 3))
     height = 13 * 2.0
     centers = np.array([-height, 0.0, height])
     starts = [three.agent_spawn[np.abs(three.agent_spawn[:, 1] - c) < height / 2] - [0, c] for c in centers]
@@ -183,7 +184,7 @@ def test_several_mazes_are_different_and_apart():
 
 
 def test_maze_starts_and_goal_lie_in_free_cells():
-    world = sim.build_world("navigation", seed=5)
+    world = sim.build_world("maze", seed=5)
     x_min, y_min, x_max, y_max = world.goal_region
     assert world.agent_spawn[:, 0].max() < x_min
     for x, y in world.agent_spawn:
@@ -202,7 +203,7 @@ def test_stripes_start_light_and_split_evenly():
 
 
 def test_bad_input_is_named():
-    with pytest.raises(ValueError, match="mazes = 2: must be 1, or more for 'navigation'"):
+    with pytest.raises(ValueError, match="mazes = 2: must be 1, or more for 'maze'"):
         sim.build_world("detection", mazes=2)
     with pytest.raises(ValueError, match="did you mean 'navigation'"):
         sim.build_world("navigate")

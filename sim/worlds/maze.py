@@ -1,0 +1,76 @@
+"""The maze: corridors between striped walls, drawn at random; the way leads from its west end to its east end."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from sim.worlds.layout import CELL, Layout, Starts, add_floor, cell_centers
+from sim.worlds.striped_walls import add_striped_walls
+
+MAZE = (13, 39)  # cells (rows, columns), odd: rooms at odd coordinates, walls or doors between them
+START_COLUMNS = 4  # the agent starts in the free cells west of this column
+GOAL_COLUMNS = 3  # the free cells of the last columns but the outer wall are the goal
+
+_NEIGHBORS = ((0, 2), (0, -2), (2, 0), (-2, 0))
+
+
+def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, mazes: int = 1) -> Layout:
+    """Add mazes drawn by `rng`, side by side (north of each other) and without a way from one to the next: an agent
+    starts in any of them, and what it learns is good for all."""
+    walls = np.concatenate([draw_maze(MAZE, rng) for _ in range(mazes)])
+    shape = walls.shape
+    add_floor(spec, (shape[1] * CELL, shape[0] * CELL))
+    add_striped_walls(spec, walls, rng)
+    rows, columns = np.nonzero(~walls)
+    start = columns < START_COLUMNS
+    right = shape[1] * CELL / 2 - CELL
+    return Layout(
+        objects=(),
+        starts=Starts(cell_centers(columns[start], rows[start], shape)),
+        object_spawn=np.empty((0, 2)),
+        goal_region=np.array(
+            [right - GOAL_COLUMNS * CELL, CELL - shape[0] * CELL / 2, right, shape[0] * CELL / 2 - CELL]
+        ),
+    )
+
+
+def draw_maze(shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
+    """Walls of a maze without dead ends, boolean (row, column).
+
+    A depth-first walk joins all rooms into a tree; then every dead end gets a second door, so that an agent that
+    follows a corridor always gets somewhere.
+    """
+    walls = np.ones(shape, dtype=bool)
+    walls[1, 1] = False
+    path = [(1, 1)]
+    while path:
+        room = path[-1]
+        closed = [n for n in _rooms_next_to(room, shape) if walls[n]]
+        if not closed:
+            path.pop()
+            continue
+        room_next = closed[rng.integers(len(closed))]
+        walls[_between(room, room_next)] = walls[room_next] = False
+        path.append(room_next)
+    for row in range(1, shape[0], 2):
+        for column in range(1, shape[1], 2):
+            _open_dead_end(walls, (row, column), rng)
+    return walls
+
+
+def _open_dead_end(walls: np.ndarray, room: tuple[int, int], rng: np.random.Generator) -> None:
+    shape = (walls.shape[0], walls.shape[1])
+    shut = [d for n in _rooms_next_to(room, shape) if walls[d := _between(room, n)]]
+    doors = len(_rooms_next_to(room, shape)) - len(shut)
+    if doors < 2:
+        walls[shut[rng.integers(len(shut))]] = False
+
+
+def _rooms_next_to(room: tuple[int, int], shape: tuple[int, int]) -> list[tuple[int, int]]:
+    near = [(room[0] + dr, room[1] + dc) for dr, dc in _NEIGHBORS]
+    return [(r, c) for r, c in near if 0 < r < shape[0] - 1 and 0 < c < shape[1] - 1]
+
+
+def _between(a: tuple[int, int], b: tuple[int, int]) -> tuple[int, int]:
+    return (a[0] + b[0]) // 2, (a[1] + b[1]) // 2
