@@ -109,22 +109,22 @@ def _row(run: Run, group: str, candidate: Candidate, champion: bool) -> Row:
         success_rate=candidate.success_rate,
         episodes=len(candidate.returns),
         parameters=parameters(PolicyConfig(shape, animal.neurons, animal.layers)),
-        full_return=full_return(config.task),
+        full_return=full_return(config.task, config.world.evaluation_course),
         **anatomy(animal, config.eye),
         **(_seen(config, animal) if champion and animal.relative_aperture is not None else {}),
     )
 
 
 @cache
-def full_return(task: str) -> float:
+def full_return(task: str, course: str = "short") -> float:
     """Fitness of who goes from start to goal in a straight line, on average over the starts; NaN where a goal that was
     reached is followed by another one."""
-    world = build_world(task)
+    world = build_world(task, course=course)
     if world.goal_region is None:
         return NO_NUMBER
     low, high = np.reshape(world.goal_region, (2, 2))
-    nearest = np.clip(world.agent_spawn, low, high)
-    distance = float(np.linalg.norm(nearest - world.agent_spawn, axis=1).mean())
+    nearest = np.clip(world.starts.position, low, high)
+    distance = float(np.linalg.norm(nearest - world.starts.position, axis=1).mean())
     return EVALUATION.progress * distance + EVALUATION.goal
 
 

@@ -133,7 +133,7 @@ def test_each_factor_has_its_exponent():
 
 def test_in_a_maze_what_is_missing_of_a_full_return_is_the_error():
     """Straight ways of 63 to 67 m at 1.5 per metre, and 10 for the goal."""
-    full = full_return("navigation")
+    full = full_return("maze")
     assert 1.5 * 63 + 10 < full < 1.5 * 67 + 10
     assert math.isnan(full_return("detection"))
     row = replace(ROW, full_return=full, fitness=0.25 * full, success_rate=0.0)

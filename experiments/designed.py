@@ -1,0 +1,119 @@
+"""Designed experiments: animals that nobody searched for, trained for several tasks, several times each."""
+
+from __future__ import annotations
+
+import itertools
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+
+from evolve.config.assemble import assemble
+from evolve.config.run_config import RunConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.search.job import Job
+from evolve.search.local_executor import LocalExecutor
+from evolve.search.worker import evaluate_candidate, prepare_device
+from evolve.store.evaluation import Evaluation
+from experiments.store import Origin, read_rows, write_rows
+
+__all__ = ["Design", "Trained", "crossed", "train_all"]
+
+
+@dataclass(frozen=True)
+class Design:
+    """An animal behind perfect lenses, what it is to learn and in which light, and the seed of its life."""
+
+    task: str
+    n_eyes: int
+    height: int
+    width: int
+    placement_range_deg: float
+    noise_sigma: float
+    seed: int
+    fov_deg: float = 45.0
+    memory_frames: int = 5
+    neurons: int = 64
+
+    @property
+    def animal(self) -> Phenotype:
+        return Phenotype(
+            n_eyes=self.n_eyes,
+            placement_range_deg=self.placement_range_deg,
+            fov_deg=self.fov_deg,
+            resolution=(self.height, self.width),
+            relative_aperture=None,
+            relief=None,
+            refractive_index=None,
+            memory_frames=self.memory_frames,
+            neurons=self.neurons,
+        )
+
+    def config(self, settings: Sequence[str]) -> RunConfig:
+        """Of a run of which it could be a candidate."""
+        own = ("eye.optics=false", f"eye.noise_sigma={self.noise_sigma}")
+        return assemble(self.task, assignments=(*own, *settings))
+
+
+@dataclass(frozen=True)
+class Trained(Design):
+    """What became of a design: means over its evaluation episodes, steps trained and seconds of a worker."""
+
+    failed: int = 0
+    fitness: float = 0.0
+    success_rate: float = 0.0
+    episodes: int = 0
+    steps: int = 0
+    seconds: float = 0.0
+
+    @property
+    def design(self) -> Design:
+        return Design(**{f.name: getattr(self, f.name) for f in fields(Design)})
+
+    @classmethod
+    def of(cls, design: Design, outcome: Evaluation) -> Trained:
+        return cls(
+            **asdict(design),
+            failed=int(outcome.failure is not None),
+            fitness=outcome.fitness,
+            success_rate=outcome.success_rate,
+            episodes=len(outcome.returns),
+            steps=outcome.steps,
+            seconds=outcome.seconds,
+        )
+
+
+def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, workers: int = 0) -> list[Trained]:
+    """Rows of all designs, in their order. Those that the file has are taken from it, the others are trained, and each
+    is written down as soon as it is done: whoever is stopped goes on later. Hours are added up beside the file.
+
+    settings: "section.name=value" of all of them, beside the tasks' own
+    workers: processes; 0: one per core
+    """
+    designs = list(designs)
+    known = {row.design: row for row in read_rows(Trained, path)}
+    waiting = dict(enumerate(design for design in designs if design not in known))
+    team = LocalExecutor(evaluate_candidate, workers, prepare_device)
+    with tempfile.TemporaryDirectory() as folder, team as executor:
+        jobs = [
+            Job(number, design.animal, design.config(settings), design.seed, Path(folder) / f"{number}.safetensors")
+            for number, design in waiting.items()
+        ]
+        for job, outcome in executor.run(jobs):
+            row = Trained.of(waiting[job.id], outcome)
+            known[row.design] = row
+            write_rows([known[design] for design in designs if design in known], path)
+            print(f"{len(known)} of {len(designs)}: {row}", flush=True)
+            hours = sum(each.seconds for each in known.values()) / 3600
+            Origin.here(hours, "worker").write(path.with_suffix(".json"))
+    return [known[design] for design in designs]
+
+
+def crossed(
+    animals: Iterable[Design], tasks: Iterable[str], noises: Iterable[float], seeds: Iterable[int]
+) -> list[Design]:
+    """Every animal in every task, light and life; in navigation an eye is one row of receptors."""
+    return [
+        replace(animal, task=task, height=animal.width if task != "navigation" else 1, noise_sigma=sigma, seed=seed)
+        for seed, sigma, task, animal in itertools.product(seeds, noises, tasks, animals)
+    ]

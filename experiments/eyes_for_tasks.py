@@ -1,0 +1,229 @@
+"""Eyes for tasks: the same animals in both tasks, and in less and less light
+
+python -m experiments.eyes_for_tasks [--compute] [--workers N] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.designed import Design, Trained, crossed, train_all
+from experiments.means import Interval
+from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
+from experiments.store import Origin, read_rows
+
+__all__ = ["Crossing", "crossing", "designs", "page"]
+
+NAME = "eyes_for_tasks"
+TASKS = ("navigation", "detection")
+COLORS = {"navigation": "#D55E00", "detection": "#0072B2"}
+SETTINGS = ("learning.total_steps=150000", "learning.eval_interval=50000")
+BRIGHT, DIM = 0.01, (0.05, 0.15)
+SEEDS, SEEDS_IN_DIM_LIGHT = range(6), range(3)
+# Eyes, receptors across each, and the arc over which they are spread: from a compound eye to a camera.
+SHAPES = ((10, 4, 135.0), (5, 8, 90.0), (2, 15, 45.0), (2, 15, 30.0), (1, 15, 0.0))
+COMPOUND, CAMERA = (10, 4), (2, 15)
+RESAMPLES = 10_000
+Floats = NDArray[np.float64]
+
+
+def designs() -> list[Design]:
+    """All trainings: every animal in both tasks in bright light, then in less."""
+    animals = [Design(TASKS[0], n, w, w, arc, BRIGHT, 0) for n, w, arc in SHAPES]
+    return [
+        *crossed(animals, TASKS, (BRIGHT,), SEEDS),
+        *crossed(animals, TASKS, DIM, SEEDS_IN_DIM_LIGHT),
+    ]
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Fitness of cameras less that of compound eyes in each task, and the interaction of eye and task.
+
+    interaction: of the difference, in standard deviations of a task's fitness, in detection less in navigation
+    p: of as large an interaction where it does not matter who has which eyes (permutations within each task)
+    """
+
+    differences: dict[str, Interval]
+    interaction: Interval
+    p: float
+
+
+def crossing(rows: Sequence[Trained], chance: np.random.Generator) -> Crossing:
+    """Of the trainings in one light."""
+    fitness = {task: (_of(rows, task, COMPOUND), _of(rows, task, CAMERA)) for task in TASKS}
+    spread = {task: float(np.concatenate(both).std(ddof=1)) for task, both in fitness.items()}
+    drawn = {task: _resampled(*both, chance) for task, both in fitness.items()}
+    means = {task: float(camera.mean() - compound.mean()) for task, (compound, camera) in fitness.items()}
+    differences = {task: _interval(means[task], drawn[task]) for task in TASKS}
+    apart = {task: (means[task] / spread[task], drawn[task] / spread[task]) for task in TASKS}
+    (there, many_there), (here, many_here) = apart["detection"], apart["navigation"]
+    permuted = {task: _permuted(*both, chance) / spread[task] for task, both in fitness.items()}
+    null = permuted["detection"] - permuted["navigation"]
+    p = (1 + int((np.abs(null) >= abs(there - here)).sum())) / (1 + null.size)
+    return Crossing(differences, _interval(there - here, many_there - many_here), p)
+
+
+def _of(rows: Sequence[Trained], task: str, eyes: tuple[int, int]) -> Floats:
+    """Fitness of all animals with such eyes, wherever they sit."""
+    return np.array([row.fitness for row in rows if row.task == task and (row.n_eyes, row.width) == eyes])
+
+
+def _resampled(compound: Floats, camera: Floats, chance: np.random.Generator) -> Floats:
+    """Differences of means over seeds drawn with replacement."""
+    drawn = [one[chance.integers(one.size, size=(RESAMPLES, one.size))].mean(axis=1) for one in (compound, camera)]
+    return np.asarray(drawn[1] - drawn[0])
+
+
+def _permuted(compound: Floats, camera: Floats, chance: np.random.Generator) -> Floats:
+    """The same over animals that have been dealt their eyes at random."""
+    mixed = chance.permuted(np.tile(np.concatenate([compound, camera]), (RESAMPLES, 1)), axis=1)
+    return np.asarray(mixed[:, compound.size :].mean(axis=1) - mixed[:, : compound.size].mean(axis=1))
+
+
+def _interval(mean: float, drawn: Floats) -> Interval:
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return Interval(mean, float(low), float(high))
+
+
+def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
+    """The page of stored rows."""
+    return Page(
+        name=NAME,
+        command=f"python -m experiments.{NAME} --compute",
+        values={
+            "answer": answer,
+            "steps": f"{max(row.steps for row in rows):,}",
+            "seeds": str(len(SEEDS)),
+            "fewer_seeds": str(len(SEEDS_IN_DIM_LIGHT)),
+            "bright": f"{BRIGHT:g}",
+            "dim": " and ".join(f"{sigma:g}" for sigma in DIM),
+            "fitness": _table(rows, lambda row: row.fitness),
+            "success": _table(rows, lambda row: row.success_rate),
+            "crossings": _crossings(rows),
+            "resamples": f"{RESAMPLES:,}",
+        },
+        figures=[Figure(NAME, lambda path: draw(rows, path))],
+        origin=origin,
+    )
+
+
+def _lights(rows: Iterable[Trained]) -> list[float]:
+    return sorted({row.noise_sigma for row in rows})
+
+
+def _table(rows: Sequence[Trained], value: Callable[[Trained], float]) -> str:
+    """A row per animal: mean and range over seeds in each task and light."""
+    lights = _lights(rows)
+    header = ["eyes", *(f"{task}, σ = {sigma:g}" for task in TASKS for sigma in lights)]
+    lines = []
+    for n, w, arc in SHAPES:
+        cells = []
+        for task in TASKS:
+            for sigma in lights:
+                found = [value(row) for row in _cell(rows, task, sigma, (n, w, arc))]
+                cells.append(f"{np.mean(found):.3g} [{min(found):.3g}, {max(found):.3g}]" if found else "-")
+        lines.append([_named(n, w, arc), *cells])
+    return markdown_table(header, lines)
+
+
+def _cell(rows: Sequence[Trained], task: str, sigma: float, shape: tuple[int, int, float]) -> list[Trained]:
+    return [
+        row
+        for row in rows
+        if row.task == task and row.noise_sigma == sigma and (row.n_eyes, row.width, row.placement_range_deg) == shape
+    ]
+
+
+def _named(n: int, w: int, arc: float) -> str:
+    return f"{n} of {w} over {arc:g}°" if n > 1 else f"{n} of {w}"
+
+
+def _of_lights(rows: Sequence[Trained]) -> dict[float, Crossing]:
+    by_light = {sigma: [row for row in rows if row.noise_sigma == sigma] for sigma in _lights(rows)}
+    return {sigma: crossing(mine, np.random.default_rng(0)) for sigma, mine in by_light.items()}
+
+
+def _crossings(rows: Sequence[Trained]) -> str:
+    lines = []
+    for sigma, found in _of_lights(rows).items():
+        differences = [str(found.differences[task]) for task in TASKS]
+        lines.append([f"σ = {sigma:g}", *differences, str(found.interaction), f"{found.p:.2g}"])
+    header = ["light", *(f"{task}: two of 15 less ten of 4" for task in TASKS), "interaction", "p"]
+    return markdown_table(header, lines)
+
+
+def draw(rows: Sequence[Trained], path: Path) -> None:
+    """Fitness of each animal in both tasks in bright light; then who is ahead in which light."""
+    figure, axes = new_figure(11, 4.6, columns=3, width_ratios=(1.2, 1.2, 1))
+    for place, task in zip(axes[0], TASKS, strict=False):
+        for x, shape in enumerate(SHAPES):
+            found = [row.fitness for row in _cell(rows, task, BRIGHT, shape)]
+            place.bar(x, np.mean(found), color=COLORS[task], alpha=0.35, width=0.7, label="mean" if x == 0 else None)
+            place.plot([x] * len(found), found, "o", color=COLORS[task], ms=4, label="one life" if x == 0 else None)
+        place.set_xticks(range(len(SHAPES)), [_named(*shape).replace(" over ", "\n") for shape in SHAPES], fontsize=8)
+        place.set(title=f"{task}: {_best(rows, task)} fare best", ylabel="fitness")
+        place.axhline(0, color="#777777", lw=0.6)
+        _draw_heads(place)
+        place.legend(fontsize=8, frameon=False)
+    for task in TASKS:
+        ahead = [found.differences[task] for found in _of_lights(rows).values()]
+        y = [one.mean for one in ahead]
+        error = [[one.mean - one.low for one in ahead], [one.high - one.mean for one in ahead]]
+        axes[0, 2].errorbar(_lights(rows), y, error, color=COLORS[task], marker="o", capsize=3, label=task)
+    axes[0, 2].axhline(0, color="#777777", lw=0.6)
+    axes[0, 2].set(xscale="log", xlabel="noise σ of a receptor (less light: →)", ylabel="two of 15 less ten of 4")
+    axes[0, 2].set_title("who is ahead, as light fades")
+    axes[0, 2].legend(fontsize=8, frameon=False)
+    save(figure, path)
+
+
+def _best(rows: Sequence[Trained], task: str) -> str:
+    return _named(*max(SHAPES, key=lambda shape: float(np.mean([r.fitness for r in _cell(rows, task, BRIGHT, shape)]))))
+
+
+def _draw_heads(place: Any) -> None:
+    """A head with its eyes below each animal's name, seen from above, looking up."""
+    from matplotlib.patches import Circle, Wedge
+
+    for x, (n, _, arc) in enumerate(SHAPES):
+        inset = place.inset_axes([(x + 0.1) / len(SHAPES), -0.42, 0.8 / len(SHAPES), 0.22])
+        inset.set(xlim=(-3, 3), ylim=(-1.2, 3), aspect="equal")
+        inset.axis("off")
+        for azimuth in np.linspace(-arc / 2, arc / 2, n) if n > 1 else [0.0]:
+            towards = 90 - azimuth
+            at = (math.cos(math.radians(towards)), math.sin(math.radians(towards)))
+            inset.add_patch(Wedge(at, 2.0, towards - 22.5, towards + 22.5, color="#777777", alpha=0.25, lw=0))
+            inset.add_patch(Circle(at, 0.16, color="#222222"))
+        inset.add_patch(Circle((0, 0), 0.95, color="#C9B79C"))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train what is missing if asked; make the page from the store."""
+    options = parser(__doc__ or "")
+    options.add_argument("--compute", action="store_true", help="train the animals that the stored numbers lack")
+    options.add_argument("--workers", type=int, default=0, help="processes; 0: one per core")
+    options.add_argument("--answer", help="the page's answer; kept from now on")
+    chosen = options.parse_args(arguments)
+    data = chosen.docs / "data" / f"{NAME}.csv"
+    data.parent.mkdir(parents=True, exist_ok=True)
+    said = data.with_suffix(".txt")
+    if chosen.compute:
+        train_all(designs(), SETTINGS, data, chosen.workers)
+    if chosen.answer:
+        said.write_text(chosen.answer + "\n", encoding="utf-8")
+    answer = said.read_text(encoding="utf-8").strip() if said.exists() else "(not written yet)"
+    page(read_rows(Trained, data), Origin.read(data.with_suffix(".json")), answer).publish(chosen.docs)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
