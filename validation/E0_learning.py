@@ -7,9 +7,9 @@ of one thread for rollouts and updates, without these tests; "update" is the sha
 % confidence interval of the last test (Wilson). Returns are undiscounted training returns per episode.
 
 One receptor stays at chance: where it reaches an object at all, that is the goal in one of three cases. Eyes of many
-receptors are sampled with one ray per receptor (in navigation 4), the single receptor with 96.
+receptors are sampled with one ray per receptor (in mazes 4), the single receptor with 96.
 
-In navigation the goal is not reached within such budgets. There the table gives how far an episode ends from its
+In the maze the goal is not reached within such budgets. There the table gives how far an episode ends from its
 start, and what it earned: 0.25 per metre, minus 1 for every action in contact with a wall; as fitness, 1.5 and 2.
 Standing still earns 0, and an animal with one eye learns little more than that. Animals with ten eyes travel. They
 get farther than a hand-written controller that knows the true distances of the walls in eleven directions and steers
@@ -84,12 +84,12 @@ CONTROLS = (
     Case("detection, 1 receptor", ONE_RECEPTOR, rays_per_receptor="auto"),
     Case("tracking, 2 x (15 x 15)", PAIR, task="tracking"),
     Case("tracking, 1 receptor", ONE_RECEPTOR, task="tracking", rays_per_receptor="auto"),
-    Case("navigation, 10 x (1 x 4)", ROW_OF_EYES, "navigation", assemble("navigation").learning, rays_per_receptor=4),
-    Case("navigation, 1 x (1 x 4)", ONE_EYE, "navigation", assemble("navigation").learning, rays_per_receptor=4),
+    Case("maze, 10 x (1 x 4)", ROW_OF_EYES, "maze", assemble("maze").learning, rays_per_receptor=4),
+    Case("maze, 1 x (1 x 4)", ONE_EYE, "maze", assemble("maze").learning, rays_per_receptor=4),
 )
 CASES = {case.name: case for case in (*SETTINGS, *CONTROLS)}
 # Stored, and trained no more: today's learner has no such units.
-FORMER = tuple(f"{task}, with tanh" for task in ("detection", "tracking", "navigation"))
+FORMER = tuple(f"{task}, with tanh" for task in ("detection", "tracking", "maze"))
 
 
 def store(case: Case, seed: int, path: Path) -> None:
@@ -127,7 +127,7 @@ def travelling(rows: Sequence[Row]) -> list[str]:
     head = f"{'case':32}{'seed':>5}{'steps':>12}{'CPU s':>7}{'return':>16}{'fitness':>14}{'distance [m]':>14}"
     lines = [head + f"{'contacts':>10}{'goal':>7}{'update':>8}"]
     for name, runs in trainings(rows).items():
-        for last in (run[-1] for run in runs if name.startswith("navigation")):
+        for last in (run[-1] for run in runs if name.startswith("maze")):
             lines.append(
                 f"{name:32}{last.seed:5}{last.steps:12,}{last.cpu_seconds:7.0f}"
                 f"{last.mean_return:9.2f} ± {1.96 * last.return_error:.2f}"
@@ -140,7 +140,7 @@ def travelling(rows: Sequence[Row]) -> list[str]:
 
 def seeking(rows: Sequence[Row]) -> list[str]:
     """A line per training with a goal: steps and CPU seconds to the threshold, and what was reached in the end."""
-    found = {name: runs for name, runs in trainings(rows).items() if not name.startswith("navigation")}
+    found = {name: runs for name, runs in trainings(rows).items() if not name.startswith("maze")}
     width = max(map(len, ("case", *found))) + 1
     head = f"{'case':{width}}{'seed':>5}{'80 % after':>12}{'CPU s':>7}{'steps':>9}{'goal first':>20}"
     lines = [head + f"{'adversary':>11}{'return':>8}{'update':>8}"]
@@ -171,14 +171,14 @@ def verdicts(rows: Sequence[Row]) -> list[str]:
             if low > CHANCE:
                 broken.append(f"{task}, 1 receptor, seed {run[0].seed}: better than chance")
     many, one = (
-        {run[0].seed: run[-1] for run in runs.get(f"navigation, {eyes}", [])}
+        {run[0].seed: run[-1] for run in runs.get(f"maze, {eyes}", [])}
         for eyes in ("10 x (1 x 4)", "1 x (1 x 4)")
     )
     for seed in sorted(many.keys() & one.keys()):
         for quantity, error in (("fitness", "fitness_error"), ("distance", "distance_error")):
             ahead = getattr(many[seed], quantity) - getattr(one[seed], quantity)
             if not ahead > 1.96 * math.hypot(getattr(many[seed], error), getattr(one[seed], error)):
-                broken.append(f"navigation, seed {seed}: ten eyes do not beat one ({quantity})")
+                broken.append(f"maze, seed {seed}: ten eyes do not beat one ({quantity})")
     return broken
 
 
@@ -192,7 +192,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     figure, axes = pyplot.subplots(figsize=(7, 4.5), layout="constrained")
     named = {"detection, 2 x (15 x 15)": OURS, "tracking, 2 x (15 x 15)": OURS_TOO}
     for name, runs in trainings(rows).items():
-        if name.startswith("navigation"):
+        if name.startswith("maze"):
             continue
         for i, run in enumerate(runs):
             x, y = [row.steps / 1e3 for row in run], [row.goals / row.episodes for row in run]

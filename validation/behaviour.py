@@ -26,7 +26,7 @@ import numpy as np
 import optics
 import sim
 
-TASKS = ("navigation", "detection", "tracking", "foraging")
+TASKS = ("navigation", "maze", "detection", "tracking", "foraging")
 MODES = ("training", "evaluation")
 WORLDS, STEPS = 24, 300
 PSFS = 5  # of each method

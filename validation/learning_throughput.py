@@ -25,7 +25,7 @@ from evolve.search.worker import prepare_device
 from validation.sim_throughput import CASES, Case, measure, with_pupil  # chooses OpenGL before MuJoCo is imported
 
 NEURONS = 64
-BARS = {"detection": 12.0, "navigation": 50.0}  # ratios to mujoco.Renderer
+BARS = {"detection": 12.0, "maze": 50.0}  # ratios to mujoco.Renderer
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def missed(task: str, rates: dict[str, float]) -> list[str]:
 
 
 def main() -> int:
-    """Measure detection and navigation; print a table, or JSON."""
+    """Measure detection and the maze; print a table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--steps", type=int, default=24_576, help="of each training (default 24576)")
     parser.add_argument("--json", action="store_true", help="print JSON")

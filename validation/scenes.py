@@ -41,9 +41,9 @@ TWO_EYES = sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_d
 TEN_EYES = sim.Eyes(n_eyes=10, resolution=(1, 4), fov_deg=30, placement_range_deg=150)
 SCENES = (
     Scene("detection", 0, TWO_EYES, 0.25),
-    Scene("navigation", 7, TEN_EYES, 0.25),
+    Scene("maze", 7, TEN_EYES, 0.25),
     Scene("tracking", 0, TWO_EYES, 0.5),
-    Scene("navigation", 12, TEN_EYES, 0.5),
+    Scene("maze", 12, TEN_EYES, 0.5),
 )
 
 

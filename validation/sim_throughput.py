@@ -55,12 +55,12 @@ class Case:
 CASES = (
     Case("detection", sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_deg=60)),
     Case("tracking", sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_deg=60)),
-    Case("navigation", sim.Eyes(n_eyes=10, resolution=(1, 4), fov_deg=30, placement_range_deg=150)),
+    Case("maze", sim.Eyes(n_eyes=10, resolution=(1, 4), fov_deg=30, placement_range_deg=150)),
 )
 SAMPLES = 4  # per receptor, of a perfect lens; behind the pupil as few rays as the receptors' noise allows
 # Bars with 64 worlds: ratios to `mujoco`, and the step's overhead.
 BARS = {
-    "navigation": {"render_optics": 400.0, "step": 150.0},
+    "maze": {"render_optics": 400.0, "step": 150.0},
     "detection": {"render_optics": 18.0, "step": 14.0},
 }
 OVERHEAD = 0.15

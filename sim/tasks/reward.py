@@ -5,19 +5,18 @@
     progress   metres in the task's sense, x the agent's place:
                |x_(t-1) - x_goal| - |x_t - x_goal|   detection, foraging, tracking; a goal that moves is where it
                                                      is at that time, and of several the nearest counts
-               |x_t - x_start| - |x_(t-1) - x_start| navigation; as the crow flies
-    goal       1 when the goal, or the maze's goal region, is reached
+               |x_t - x_start| - |x_(t-1) - x_start| navigation, maze; as the crow flies
+    goal       1 when the goal, or the goal region of a course or maze, is reached
     adversary  1 when an adversary is reached
     contact    1 when the agent touched a wall at any time during the action
 
                 λ      w_g    w_a    w_c
     training    0.25   1      -1     -1     an event ends the episode
-    evaluation  1.5    10     -10    -2     objects respawn and the episode goes on; only a maze's end still ends it
+    evaluation  1.5    10     -10    -2     objects respawn and the episode goes on; only the end of the way ends it
 
 Terms and weights are those of Tiwary, Young et al. (2025), "What if Eye...? Computationally Recreating Vision
 Evolution", as the text has them. Fitness is the mean of the evaluation episodes' sums. What differs here: the code
-published with it weighs a metre of progress in training as much as an action in contact, and ends a training episode
-at a sum of -50; ours does neither. Foraging is a task of our own, with detection's reward. A training may begin with
+published with it weighs a metre of progress in training as much as an action in contact; ours does not. Foraging is a task of our own, with detection's reward. A training may begin with
 a smaller w_c (`evolve`, `learning.contact_ramp`); its end and the fitness have the weights above.
 """
 

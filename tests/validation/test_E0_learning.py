@@ -87,12 +87,12 @@ def test_verdicts_name_what_is_not_learnt():
 def test_ten_eyes_must_beat_one_by_more_than_chance():
     """10 m and 2 contacts: fitness 1.5 x 10 - 2 x 2 = 11. Standard errors .3 m and .1 of the return make at most
     1.5 x .3 + 2 x (.25 x .3 + .1) = .8, so that of a difference is 1.13 and its 95 % limit 2.22, of distances .83 m."""
-    many = replace(ROW, case="navigation, 10 x (1 x 4)", goals=0, contacts=2.0, distance=10.0)
-    one = replace(many, case="navigation, 1 x (1 x 4)", contacts=2.4, distance=9.0)
+    many = replace(ROW, case="maze, 10 x (1 x 4)", goals=0, contacts=2.0, distance=10.0)
+    one = replace(many, case="maze, 1 x (1 x 4)", contacts=2.4, distance=9.0)
     assert E0_learning.verdicts([many, one]) == []  # 8.7 and 9 m
     assert E0_learning.verdicts([many, replace(one, contacts=1.8, distance=9.3)]) == [
-        "navigation, seed 0: ten eyes do not beat one (fitness)",
-        "navigation, seed 0: ten eyes do not beat one (distance)",
+        "maze, seed 0: ten eyes do not beat one (fitness)",
+        "maze, seed 0: ten eyes do not beat one (distance)",
     ]
     line = E0_learning.table([many])
     for shown in ("1.50 ± 0.20", "11.0 ± 1.6", "10.0 ± 0.6"):

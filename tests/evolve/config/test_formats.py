@@ -1,0 +1,70 @@
+"""Runs of a former format: opened as what they were, and continued by nobody."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from evolve.analysis.episode import Episode
+from evolve.config.assemble import assemble, from_text, from_toml, to_toml
+from evolve.config.formats import FORMAT, LAST_OF_FORMER
+from evolve.config.run_config import ConfigError
+from evolve.store.directory import Run, RunError
+
+RECORDS = Path(__file__).parents[3] / "docs/results/records"
+FORMER = 'task = "navigation"\n[world]\nmazes = 3\n[learning]\nrays_per_eye = 32.0\ngamma = 0.5\n'
+
+
+def test_what_is_written_names_its_format_and_is_read_back():
+    config = assemble("navigation", assignments=["world.course=long"])
+    assert to_toml(config).startswith(f"format = {FORMAT}\n")
+    assert from_text(to_toml(config)) == config
+
+
+def test_navigation_was_a_maze():
+    config = from_text(FORMER)
+    assert (config.task, config.world.mazes, config.learning.gamma) == ("maze", 3, 0.5)
+    assert from_text(FORMER.replace("navigation", "detection").replace("[world]\nmazes = 3\n", "")).task == "detection"
+
+
+def test_a_format_of_the_future_is_refused():
+    with pytest.raises(ConfigError, match=f"format = 9: must be a whole number up to {FORMAT}"):
+        from_text("format = 9\n" + FORMER)
+
+
+def test_what_somebody_asks_for_is_of_this_format(tmp_path):
+    """A file without a number is a wish, not a run; another run's whole config.toml may be one, too."""
+    file = tmp_path / "mine.toml"
+    file.write_text('task = "navigation"\n')
+    assert assemble(file=file).task == "navigation"
+    file.write_text(to_toml(assemble("maze")))
+    assert assemble(file=file) == assemble("maze") == from_toml(file)
+    file.write_text("format = 1\n")
+    with pytest.raises(ConfigError, match=r"mine\.toml: format = 1: must be 2"):
+        assemble("maze", file=file)
+
+
+def test_a_run_of_a_former_format_says_who_continues_it(tmp_path):
+    shutil.copytree(RECORDS / "navigation-0", tmp_path / "run")
+    run = Run.open(tmp_path / "run")
+    assert run.config.task == "maze"
+    with pytest.raises(RunError, match=rf"has format 1: must be {FORMAT} to be continued.* commit {LAST_OF_FORMER}"):
+        run.require_present_format()
+    Run.create(tmp_path / "new", assemble("maze")).require_present_format()
+
+
+def test_an_episode_recorded_in_a_maze_stays_there(tmp_path, episode):
+    """Recordings without a course are older than courses."""
+    import json
+
+    import numpy as np
+
+    replace(episode, task="navigation").save(tmp_path / "now.npz")
+    assert Episode.load(tmp_path / "now.npz").task == "navigation"
+    with np.load(tmp_path / "now.npz") as file:
+        arrays = dict(file)
+    rest = json.loads(str(arrays["rest"]))
+    del rest["world"]["course"], rest["world"]["evaluation_course"]
+    np.savez(tmp_path / "then.npz", **{**arrays, "rest": np.array(json.dumps(rest))})
+    assert Episode.load(tmp_path / "then.npz").task == "maze"
