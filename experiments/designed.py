@@ -106,7 +106,8 @@ def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, wo
             print(f"{len(known)} of {len(designs)}: {row}", flush=True)
             hours = sum(each.seconds for each in known.values()) / 3600
             Origin.here(hours, "worker").write(path.with_suffix(".json"))
-    return [known[design] for design in designs]
+    written = {row.design: row for row in read_rows(Trained, path)}
+    return [written[design] for design in designs]
 
 
 def crossed(

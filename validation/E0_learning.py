@@ -171,8 +171,7 @@ def verdicts(rows: Sequence[Row]) -> list[str]:
             if low > CHANCE:
                 broken.append(f"{task}, 1 receptor, seed {run[0].seed}: better than chance")
     many, one = (
-        {run[0].seed: run[-1] for run in runs.get(f"maze, {eyes}", [])}
-        for eyes in ("10 x (1 x 4)", "1 x (1 x 4)")
+        {run[0].seed: run[-1] for run in runs.get(f"maze, {eyes}", [])} for eyes in ("10 x (1 x 4)", "1 x (1 x 4)")
     )
     for seed in sorted(many.keys() & one.keys()):
         for quantity, error in (("fitness", "fitness_error"), ("distance", "distance_error")):

@@ -1,0 +1,111 @@
+"""The same animals in both tasks: what is trained is kept, and the interaction is that of closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments import eyes_for_tasks
+from experiments.designed import Design, Trained, crossed, train_all
+from experiments.eyes_for_tasks import BRIGHT, SEEDS, SHAPES, TASKS, crossing, designs, page
+from experiments.store import Origin, read_rows
+
+TINY = (
+    *("learning.total_steps=64", "learning.n_envs=4", "learning.n_steps=16", "learning.batch_size=32"),
+    *("learning.n_epochs=1", "learning.eval_interval=64", "evaluation.episodes=2", "eye.rays_per_receptor=1"),
+)
+ANIMAL = Design("navigation", 2, 3, 3, 45.0, 0.01, 0)
+
+
+def lived(design, fitness):
+    return Trained(**vars(design), fitness=fitness, success_rate=0.5, episodes=32, steps=1000, seconds=1.0)
+
+
+def rows(effect, spread=1.0, noises=(BRIGHT,), seed=0):
+    """Lives whose fitness in detection is `effect` higher for cameras, and in navigation as much lower."""
+    chance, found = np.random.default_rng(seed), []
+    for design in designs():
+        if design.noise_sigma in noises:
+            camera = design.width == 15
+            sign = 1 if design.task == "detection" else -1
+            found.append(lived(design, 50 + sign * effect * camera + spread * chance.normal()))
+    return found
+
+
+def test_every_animal_lives_in_both_tasks_and_in_every_light():
+    asked = designs()
+    assert len(set(asked)) == len(asked)
+    bright = [design for design in asked if design.noise_sigma == BRIGHT]
+    assert len(bright) == len(SHAPES) * len(TASKS) * len(SEEDS)
+    assert {design.height for design in asked if design.task == "navigation"} == {1}
+    assert all(design.height == design.width for design in asked if design.task == "detection")
+
+
+def test_an_animal_is_what_its_design_says():
+    animal = replace(ANIMAL, neurons=8, memory_frames=2).animal
+    assert (animal.n_eyes, animal.resolution, animal.neurons, animal.memory_frames) == (2, (3, 3), 8, 2)
+    config = replace(ANIMAL, noise_sigma=0.07).config(TINY)
+    assert (config.task, config.eye.noise_sigma, config.learning.total_steps) == ("navigation", 0.07, 64)
+
+
+def test_an_interaction_is_found_and_measured():
+    """Differences of 2 and -2 within a spread of about 1.4 per task: an interaction of 4 of their joint spreads."""
+    found = crossing(rows(2.0, spread=0.3), np.random.default_rng(0))
+    assert found.differences["detection"].low < 2 < found.differences["detection"].high
+    assert found.differences["navigation"].low < -2 < found.differences["navigation"].high
+    assert found.interaction.low > 2
+    assert found.p < 1e-3
+
+
+def test_no_interaction_where_eyes_matter_alike():
+    """One kind of eye is better in both tasks: a main effect is no interaction."""
+    alike = [
+        replace(row, fitness=row.fitness + 4 * (row.width == 15) * (row.task == "navigation")) for row in rows(2.0)
+    ]
+    found = crossing(alike, np.random.default_rng(0))
+    assert found.differences["navigation"].low > 0
+    assert found.interaction.low < 0 < found.interaction.high
+    assert found.p > 0.05
+
+
+def test_p_is_uniform_where_nothing_matters():
+    """Of 200 experiments without any effect as many have p < 0.1 as should (three standard errors of a binomial)."""
+    from unittest import mock
+
+    with mock.patch.object(eyes_for_tasks, "RESAMPLES", 200):
+        found = [crossing(rows(0.0, seed=seed), np.random.default_rng(seed)).p for seed in range(200)]
+    assert abs(np.mean(np.array(found) < 0.1) - 0.1) < 3 * np.sqrt(0.1 * 0.9 / 200)
+
+
+def test_what_has_been_trained_is_not_trained_again(tmp_path, capsys):
+    path = tmp_path / "lives.csv"
+    asked = crossed([ANIMAL, replace(ANIMAL, n_eyes=1)], ("navigation",), (0.01,), (0,))
+    first = train_all(asked[:1], TINY, path, workers=1)
+    assert first == read_rows(Trained, path)
+    assert not first[0].failed
+    assert first[0].steps == 64
+    assert first[0].episodes == 2
+    capsys.readouterr()
+    both = train_all(asked, TINY, path, workers=1)
+    assert both[0] == first[0]
+    assert capsys.readouterr().out.count("of 2") == 1, "only the second was trained"
+    assert Origin.read(path.with_suffix(".json")).whose == "worker"
+
+
+def test_the_page_is_made_from_the_stored_rows(tmp_path):
+    every = rows(2.0, noises=(BRIGHT, *eyes_for_tasks.DIM))
+    made = page(every, Origin.here(1.0, "worker"), "Yes.")
+    assert "Yes." in made.markdown
+    assert "| 10 of 4 over 135° |" in made.markdown
+    made.publish(tmp_path)
+    assert (tmp_path / "figures/eyes_for_tasks.png").stat().st_size > 10_000
+
+
+def test_rows_survive_the_file(tmp_path):
+    from experiments.store import write_rows
+
+    some = rows(1.0)[:4]
+    write_rows(some, tmp_path / "rows.csv")
+    back = read_rows(Trained, tmp_path / "rows.csv")
+    assert [row.design for row in back] == [row.design for row in some]
+    assert [row.fitness for row in back] == pytest.approx([row.fitness for row in some], rel=1e-5)
