@@ -16,8 +16,9 @@
 
 Terms and weights are those of Tiwary, Young et al. (2025), "What if Eye...? Computationally Recreating Vision
 Evolution", as the text has them. Fitness is the mean of the evaluation episodes' sums. What differs here: the code
-published with it weighs a metre of progress in training as much as an action in contact; ours does not. Foraging is a task of our own, with detection's reward. A training may begin with
-a smaller w_c (`evolve`, `learning.contact_ramp`); its end and the fitness have the weights above.
+published with it weighs a metre of progress in training as much as an action in contact; ours does not. Foraging is a
+task of our own, with detection's reward. A training may begin with a smaller w_c (`evolve`, `learning.contact_ramp`);
+its end and the fitness have the weights above.
 """
 
 from __future__ import annotations
