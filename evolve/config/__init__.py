@@ -8,6 +8,7 @@ provenance     where a setting stands
 checks         one line that says what would be right
 lint           what is odd, though nothing forbids it
 relief_starts  where the genes of a relief start
+square_eyes    one gene for both sides of an eye
 numbering      which id belongs to which generation
 tasks/         what a task sets unless a run says otherwise
 """

@@ -105,7 +105,7 @@ def _live(
         **config.world.training,
     )
     with closing(training_worlds), closing(evaluation_worlds):
-        brain = Brain(phenotype.neurons, phenotype.layers)
+        brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder)
         training = train(Worlds(training_worlds, evaluation_worlds), brain, config.learning, weights, progress, begun)
         return training, play(training.policy, evaluation_worlds, evaluation)
 

@@ -8,5 +8,6 @@ provenance: test_provenance.py
 checks: test_assemble.py, test_provenance.py
 lint: test_lint.py
 relief_starts: test_relief_starts.py
+square_eyes: test_square_eyes.py
 numbering: test_numbering.py
 """

@@ -87,7 +87,7 @@ WRONG = [
     ("genome.n_eye.open=false", "unknown gene 'n_eye'", "'n_eyes'"),
     ("genome.n_eyes.opn=false", "'genome.n_eyes.opn'", "'open'"),
     ("genome.n_eyes=3", "genome.n_eyes", ".start"),
-    ("genome.n_eyes.high=99", "genome.n_eyes.high = 99", "[1, 16]"),
+    ("genome.n_eyes.high=99", "genome.n_eyes.high = 99", "[1, 32]"),
     ("genome.n_eyes.start=1.5", "genome.n_eyes.start = 1.5", "an integer"),
     ("genome.fov_deg.low=60", "genome.fov_deg.start = 45", "[60, 100]"),
     ("genome.fov_deg.high=1", "genome.fov_deg", "not below"),
