@@ -14,8 +14,8 @@ from evolve.config.checks import check_gene_value, check_value, suggestion
 from evolve.config.provenance import Source
 from evolve.config.relief_starts import no_such_gene, with_relief
 from evolve.config.run_config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
-from evolve.config.square_eyes import no_such_side, with_square_eyes
 from evolve.config.sources import preset_sources, read_assignment, read_toml, task_defaults
+from evolve.config.square_eyes import no_such_side, with_square_eyes
 from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, SIDE, SIDES, GeneConfig, group_members
 
 __all__ = ["assemble", "from_text", "from_toml", "to_toml"]

@@ -31,7 +31,9 @@ class EyeConfig:
     """What all eyes of a run have in common."""
 
     optics: bool = setting(True, None, "see through the pupil and its relief; if false, through a perfect lens")
-    sensor_width: float = setting(200e-6, Interval(1e-6, 1e-2), "width of the retina [m]; unless receptor_pitch gives it")
+    sensor_width: float = setting(
+        200e-6, Interval(1e-6, 1e-2), "width of the retina [m]; unless receptor_pitch gives it"
+    )
     noise_sigma: float = setting(0.01, Interval(0, 10), "standard deviation of a receptor's noise [signal]")
     illuminance: float = setting(
         0.0, Interval(0, 1e6), "daylight on the scene [lx], of which receptors count the photons; 0: no shot noise"

@@ -17,6 +17,7 @@ __all__ = ["contradiction", "fitted", "retina_width", "sides"]
 
 Values = dict[str, float]
 Uses = Mapping[str, GeneConfig]
+Pair = tuple[float, float]
 Contradiction = tuple[str, tuple[str, ...]]
 SLACK = 1e-9  # of rounding: eyes that just touch do not overlap
 
@@ -59,19 +60,26 @@ def fitted(values: Values, uses: Uses, sizes: Sizes) -> Values:
         widest = _highest("placement_range_deg", uses)
         fits["placement_range_deg"] = min(needed, widest)
         fewest = receptors if sizes.receptor_pitch == 0 else _lowest(width, uses)
-        fits["n_eyes"], fits[width] = _thinned(eyes, (fewest, receptors), widest, sizes)
+        fits["n_eyes"], fits[width] = _thinned((eyes, receptors), (_lowest("n_eyes", uses), fewest), widest, sizes)
     return fits
 
 
-def _thinned(eyes: float, receptors: tuple[float, float], range_deg: float, sizes: Sizes) -> tuple[float, float]:
-    """The most like `eyes` eyes of `receptors[1]` receptors a row of those that fit, with `receptors[0]` at least.
+def _thinned(asked: Pair, least: Pair, range_deg: float, sizes: Sizes) -> Pair:
+    """The eyes and their receptors that are most like those asked for, of those that fit and are not below the least.
 
     Likeness is by ratios: the least sum of squared logarithms halves both rather than quarter one. Were one of them
-    always to give way, evolution would drift to the other; selection is to choose between eyes and receptors.
+    always to give way, evolution would drift to the other; selection is to choose between eyes and receptors. Room goes
+    with the gaps between eyes, one fewer than eyes; counted halfway, they keep their proportion to receptors best.
     """
-    fewest, most = (int(count) for count in receptors)
-    fitting = [(min(eyes, float(_most_eyes(range_deg, n, sizes))), float(n)) for n in range(fewest, most + 1)]
-    return min(fitting, key=lambda fit: math.log(eyes / fit[0]) ** 2 + math.log(most / fit[1]) ** 2)
+    (eyes, receptors), (fewest_eyes, fewest) = asked, least
+    counts = range(int(fewest), int(receptors) + 1)
+    fitting = [(min(eyes, float(_most_eyes(range_deg, count, sizes))), float(count)) for count in counts]
+    allowed = [fit for fit in fitting if fit[0] >= fewest_eyes]
+    return min(allowed, key=lambda fit: _ratio(eyes - 0.5, fit[0] - 0.5) ** 2 + _ratio(receptors, fit[1]) ** 2)
+
+
+def _ratio(one: float, other: float) -> float:
+    return math.log(one / other)
 
 
 def contradiction(uses: Uses, sizes: Sizes) -> Contradiction | None:

@@ -88,7 +88,9 @@ def test_bifurcations_have_room_for_few_large_eyes_or_many_small_ones(task):
 
     def changed(eyes, receptors, range_deg):
         values = {"n_eyes": eyes, width: receptors, "placement_range_deg": range_deg}
-        return repaired(np.array([g.encode(values[g.name], config.genome[g.name]) for g in genotype.open_genes]), config)
+        return repaired(
+            np.array([g.encode(values[g.name], config.genome[g.name]) for g in genotype.open_genes]), config
+        )
 
     for eyes, receptors, range_deg in ((2, 15, 45), (10, 4, 108)):
         assert changed(eyes, receptors, range_deg) == ()
