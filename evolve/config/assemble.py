@@ -164,11 +164,11 @@ def _merge(below: Tree, above: Tree) -> Tree:
     return merged
 
 
-def _require_genes(tree: Tree, eye: EyeConfig) -> None:
+def _require_genes(source: Source, eye: EyeConfig) -> None:
     """Genes that are named one by one must be genes of such eyes."""
-    for name in tree.get("genome", {}):
+    for name in with_relief(source.tree, eye).get("genome", {}):
         if name in (SIDE, *SIDES) and name not in eye.genes:
-            raise ConfigError(no_such_side(name, eye), f"genome.{name}", "eye.square")
+            raise ConfigError(no_such_side(name, eye, not source.name), f"genome.{name}", "eye.square")
         if name in ALL_GENES and name not in eye.genes:
             raise ConfigError(no_such_gene(name, eye), f"genome.{name}", "eye.relief_points", "eye.relief_symmetric")
 
@@ -179,7 +179,7 @@ def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
     table = eye.genes
     layers = [with_square_eyes(source, eye) for source in layers]
     for source in layers:
-        _require_genes(with_relief(source.tree, eye), eye)
+        _require_genes(source, eye)
     tree = _merged([with_relief(_checked(source), eye) for source in layers])
     sections = {name: cls(**tree.get(name, {})) for name, cls in SECTIONS.items()}
     genes = tree.get("genome", {})

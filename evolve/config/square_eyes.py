@@ -21,8 +21,10 @@ def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
     return replace(source, tree={**source.tree, "genome": {**rest, SIDE: height}})
 
 
-def no_such_side(name: str, eye: EyeConfig) -> str:
-    """Why these eyes have no such gene."""
+def no_such_side(name: str, eye: EyeConfig, of_task: bool) -> str:
+    """Why these eyes have no such gene; `of_task`: though the task says what it is."""
+    if of_task:
+        return f"eye.square = true: the task sets genome.{name}, so its eyes are not square; must be false"
     if eye.square:
         return f"genome.{name}: square eyes have the gene {SIDE} for both sides; set it, or eye.square = false"
     return f"genome.{name}: only square eyes have this gene, others have {' and '.join(SIDES)}; set eye.square = true"

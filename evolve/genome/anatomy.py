@@ -111,10 +111,9 @@ def _crowded_head(uses: Uses, sizes: Sizes) -> Contradiction | None:
     widest = _highest("placement_range_deg", uses)
     if eyes == 1 or eyes <= _most_eyes(widest, receptors, sizes):
         return None
-    source, keys = "eye.sensor_width", ("eye.sensor_width",)
-    if sizes.receptor_pitch > 0:
-        source = f"{receptors:g} receptors of eye.receptor_pitch"
-        keys = ("eye.receptor_pitch", f"genome.{width}.low", f"genome.{width}.start")
+    pitched = sizes.receptor_pitch > 0
+    source = f"{receptors:g} receptors of eye.receptor_pitch" if pitched else "eye.sensor_width"
+    keys = ("eye.receptor_pitch", f"genome.{width}.low", f"genome.{width}.start") if pitched else ("eye.sensor_width",)
     return (
         f"{eyes:g} eyes of {retina_width(receptors, sizes):g} m ({source}) do not fit side by side on {widest:g}° of a "
         f"head of radius {sizes.head_radius:g} m (eye.head_radius)",

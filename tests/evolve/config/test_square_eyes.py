@@ -54,7 +54,7 @@ def test_clusters_open_the_genes_that_there_are():
     [
         ("detection", (SQUARE, "genome.resolution_height.open=true"), "square eyes have the gene resolution for both"),
         ("detection", ("genome.resolution.open=true",), "only square eyes have this gene"),
-        ("navigation", (SQUARE,), r"genome.resolution_height: square eyes have the gene resolution for both sides"),
+        ("navigation", (SQUARE,), r"eye\.square = true: the task sets genome\.resolution_height"),
     ],
 )  # fmt: skip
 def test_genes_that_such_eyes_have_not_are_refused(task, settings, named):

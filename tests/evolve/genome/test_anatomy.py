@@ -116,7 +116,8 @@ def test_wide_eyes_give_way_as_little_as_will_do(eyes, receptors, range_deg, wid
 
 def test_repair_prefers_neither_eyes_nor_receptors():
     """Over all ranges ln(width / eyes) stays what was asked for, on average. Were eyes always to give way it would rise
-    by 1.4, were receptors, fall by 1.8; were eyes counted as eyes, or as the gaps between them, move by 0.15 or -0.09."""
+    by 1.4, were receptors, fall by 1.8; counting eyes, or the gaps
+    between them, moves it by 0.15 or -0.09."""
     config, random = pitched(), np.random.default_rng(0)
     moved = []
     for eyes, receptors in random.integers(1, 25, (1000, 2)):
