@@ -7,7 +7,6 @@ from evolve.config.run_config import TASKS, ConfigError
 from evolve.config.sources import preset_names
 from evolve.genome.genotype import GENES
 
-
 OBLONG = [name for name in preset_names() if name != "bifurcation-detection"]  # of which navigators can have the eyes
 
 
