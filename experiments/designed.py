@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -10,7 +11,7 @@ from pathlib import Path
 
 from evolve.config.assemble import assemble
 from evolve.config.run_config import RunConfig
-from evolve.genome.phenotype import Phenotype
+from evolve.genome.phenotype import NEURONS_PER_FEATURE, Phenotype
 from evolve.search.job import Job
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.worker import evaluate_candidate, prepare_device
@@ -47,6 +48,7 @@ class Design:
             refractive_index=None,
             memory_frames=self.memory_frames,
             neurons=self.neurons,
+            encoder=math.ceil(self.neurons / NEURONS_PER_FEATURE),
         )
 
     def config(self, settings: Sequence[str]) -> RunConfig:

@@ -19,7 +19,7 @@ import evolve.cli.commands.run
 import sim
 from evolve.config.assemble import assemble
 from evolve.config.run_config import SECTIONS, GeneConfig, RunConfig
-from evolve.genome.genes import LAMBDA_MAX
+from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, SIDE, gene_table
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.fitness import evaluate
@@ -39,10 +39,10 @@ SMALL = (
     "evaluation.episodes=1",
     "search.population=3",
     "search.generations=2",
-    "genome.resolution_height.start=4",
-    "genome.resolution_width.start=4",
 )
+OBLONG = ("genome.resolution_height.start=4", "genome.resolution_width.start=4")  # genes that square eyes have not
 PERFECT = ("eye.optics=false",)
+SQUARE = ("eye.square=true", "genome.resolution.start=4", *PERFECT)
 FOUR_TYPES = ("eye.receptors=genes", "genome.receptor_types.start=4", *PERFECT)
 
 
@@ -153,6 +153,8 @@ FIELDS = {
     "eye.rays_per_receptor": Case("eye.rays_per_receptor=2", life),
     "eye.relief_points": Case("eye.relief_points=5", history, ()),
     "eye.relief_symmetric": Case("eye.relief_symmetric=true", history, ()),
+    "eye.square": Case("eye.square=true", history, ("eye.square=false", *PERFECT)),
+    "eye.receptor_pitch": Case("eye.receptor_pitch=40e-6", point_image, ()),
     "eye.head_radius": Case("eye.head_radius=100e-6", sight),
     "eye.receptor_width": Case("eye.receptor_width=100e-6", sight),
     "world.mazes": Case("world.mazes=2", life, NAVIGATING, "maze"),
@@ -196,6 +198,7 @@ GENE_OUTPUTS = {
     "fov_deg": sight,
     "resolution_height": sight,
     "resolution_width": sight,
+    "resolution": sight,
     "relative_aperture": point_image,
     **DOE,
     "refractive_index": point_image,
@@ -209,10 +212,16 @@ GENE_OUTPUTS = {
 }
 
 
+def small(task, settings):
+    """A small run with these settings."""
+    oblong = () if any(setting.startswith("eye.square") for setting in settings) else OBLONG
+    return assemble(task, "quick", assignments=(*SMALL, *oblong, *settings))
+
+
 @cache
 def _settled(output, task, given):
     """The output before the change. Computed twice: one that moves by itself could not show anything."""
-    config = assemble(task, "quick", assignments=(*SMALL, *given))
+    config = small(task, given)
     animal = develop(Genotype(config.genome).start, config)
     first = output(config, animal)
     assert output(config, animal) == first, "the output does not repeat"
@@ -232,7 +241,7 @@ def _names(cls, prefix=""):
 
 def test_tables_name_every_setting_and_every_gene():
     assert set(FIELDS) == set(_names(RunConfig))
-    assert set(GENE_OUTPUTS) == set(GENES)
+    assert set(GENE_OUTPUTS) == set(GENES) | set(gene_table(square=True))
     assert all(is_dataclass(section) for section in SECTIONS.values())
 
 
@@ -242,19 +251,19 @@ def test_every_setting_moves_its_output(name):
     before = _settled(case.output, case.task, case.given)
     task = case.change.removeprefix("task=") if name == "task" else case.task
     change = () if name == "task" else (case.change,)
-    config = assemble(task, "quick", assignments=(*SMALL, *case.given, *change))
+    config = small(task, (*case.given, *change))
     assert case.output(config, develop(Genotype(config.genome).start, config)) != before
 
 
 @pytest.mark.parametrize("name", GENE_OUTPUTS)
 def test_every_gene_moves_its_output(name):
     output = GENE_OUTPUTS[name]
-    spectral = GENES[name].cluster == "spectral"
+    spectral = ALL_GENES[name].cluster == "spectral"
     task = "foraging" if spectral else "detection"  # of the tasks, foraging alone is not grey
-    given = FOUR_TYPES if spectral else () if output is point_image else PERFECT
+    given = FOUR_TYPES if spectral else SQUARE if name == SIDE else () if output is point_image else PERFECT
     before = _settled(output, task, given)
-    opened = () if GENES[name].default.open else (f"genome.{name}.open=true",)
-    config = assemble(task, "quick", assignments=(*SMALL, *given, *opened))
+    opened = () if ALL_GENES[name].default.open else (f"genome.{name}.open=true",)
+    config = small(task, (*given, *opened))
     genotype = Genotype(config.genome)
     genome = genotype.start
     place = [gene.name for gene in genotype.open_genes].index(name)
@@ -264,6 +273,6 @@ def test_every_gene_moves_its_output(name):
 
 def test_pupil_lets_light_in_by_its_area():
     """A wider pupil not only sharpens or blurs: throughput goes with the square of the relative aperture."""
-    config = assemble("detection", "quick", assignments=SMALL)
+    config = small("detection", ())
     animal = develop(Genotype(config.genome).start, config)
     assert np.isclose(throughput(config, animal), animal.relative_aperture**2)

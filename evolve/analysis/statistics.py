@@ -139,14 +139,17 @@ def _quantiles(values: Floats) -> tuple[float, float, float]:
 def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str, float]:
     """Value of every gene that shows in the phenotype, under the genes' names; optical ones only with optics on,
     spectral ones where receptors are inherited: NaN for the peaks of types that the animal has not. With `eye`, of the
-    genes alone that a run with such eyes has: of a symmetric relief an eighth."""
+    genes alone that a run with such eyes has: of a symmetric relief an eighth, of a square eye one side."""
+    height, width = phenotype.resolution
     values = {
         "n_eyes": float(phenotype.n_eyes),
         "placement_range_deg": phenotype.placement_range_deg,
         "fov_deg": phenotype.fov_deg,
-        "resolution_height": float(phenotype.resolution[0]),
-        "resolution_width": float(phenotype.resolution[1]),
+        "resolution_height": float(height),
+        "resolution_width": float(width),
     }
+    if height == width:
+        values["resolution"] = float(width)
     if phenotype.relative_aperture is not None:
         values["relative_aperture"] = phenotype.relative_aperture
     if phenotype.relief is not None:

@@ -8,12 +8,12 @@ from typing import Any
 
 from evolve.analysis.statistics import gene_values
 from evolve.config.provenance import Source
-from evolve.genome.genes import ALL_GENES, INHERITED
+from evolve.genome.genes import ALL_GENES, INHERITED, SIDE
 from evolve.store.directory import Run
 
 __all__ = ["starts_from"]
 
-LENGTHS = ("sensor_width", "relief_height")  # settings that genes of optics are multiplied with
+LENGTHS = ("sensor_width", "receptor_pitch", "relief_height")  # settings that genes of optics are multiplied with
 
 
 def starts_from(text: str) -> Source:
@@ -27,6 +27,7 @@ def starts_from(text: str) -> Source:
     run = Run.open(path)
     candidate = run.candidate(candidate_id)
     values = gene_values(candidate.phenotype)
+    values.pop(SIDE, None)  # height and width say the same, and do so in runs whose eyes are not square
     genome = {name: {"start": _exact(name, value)} for name, value in values.items() if not math.isnan(value)}
     tree: dict[str, Any] = {"genome": genome, "eye": {}}
     if candidate.phenotype.relief is not None:

@@ -9,6 +9,7 @@ checks         one line that says what would be right
 lint           what is odd, though nothing forbids it
 relief_starts  where the genes of a relief start
 formats        formats of config.toml, and how former ones are read
+square_eyes    one gene for both sides of an eye
 numbering      which id belongs to which generation
 tasks/         what a task sets unless a run says otherwise
 """

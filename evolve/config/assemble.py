@@ -16,7 +16,8 @@ from evolve.config.provenance import Source
 from evolve.config.relief_starts import no_such_gene, with_relief
 from evolve.config.run_config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
 from evolve.config.sources import preset_sources, read_assignment, read_toml, task_defaults
-from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, GeneConfig, group_members
+from evolve.config.square_eyes import no_such_side, with_square_eyes
+from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, SIDE, SIDES, GeneConfig, group_members
 
 __all__ = ["assemble", "from_text", "from_toml", "to_toml"]
 
@@ -149,7 +150,7 @@ def _checked_genome(section: Tree) -> Tree:
     for group in sorted(section, key=lambda name: -len(group_members(name))):
         key, members, use = f"genome.{group}", group_members(group), section[group]
         if not members:
-            raise ConfigError(f"unknown gene {group!r}; {suggestion(group, (*GENES, *CLUSTERS, *FAMILIES))}", key)
+            raise ConfigError(f"unknown gene {group!r}; {suggestion(group, (*GENES, SIDE, *CLUSTERS, *FAMILIES))}", key)
         if not isinstance(use, dict):
             raise ConfigError(f"{key} = {use!r}: set {key}.open, .low, .high, .start or .opens_at", key)
         for name in use:
@@ -176,17 +177,23 @@ def _merge(below: Tree, above: Tree) -> Tree:
     return merged
 
 
+def _require_genes(source: Source, eye: EyeConfig) -> None:
+    """Genes that are named one by one must be genes of such eyes."""
+    for name in with_relief(source.tree, eye).get("genome", {}):
+        if name in (SIDE, *SIDES) and name not in eye.genes:
+            raise ConfigError(no_such_side(name, eye, not source.name), f"genome.{name}", "eye.square")
+        if name in ALL_GENES and name not in eye.genes:
+            raise ConfigError(no_such_gene(name, eye), f"genome.{name}", "eye.relief_points", "eye.relief_symmetric")
+
+
 def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
     """RunConfig from checked trees, later ones winning, defaults filled in."""
     eye = EyeConfig(**_merged(trees).get("eye", {}))
     table = eye.genes
+    layers = [with_square_eyes(source, eye) for source in layers]
     for source in layers:
-        for name in with_relief(source.tree, eye).get("genome", {}):
-            if name in ALL_GENES and name not in table:
-                raise ConfigError(
-                    no_such_gene(name, eye), f"genome.{name}", "eye.relief_points", "eye.relief_symmetric"
-                )
-    tree = _merged([with_relief(tree, eye) for tree in trees])
+        _require_genes(source, eye)
+    tree = _merged([with_relief(_checked(source), eye) for source in layers])
     sections = {name: cls(**tree.get(name, {})) for name, cls in SECTIONS.items()}
     genes = tree.get("genome", {})
     genome = {}

@@ -76,6 +76,12 @@ class RunConfig:
                 *("learning.batch_size", "learning.n_envs", "learning.n_steps"),
             )
         self._check_budget_stages(rollout)
+        if self.eye.receptor_pitch > 0 and self.eye.sensor_width != EyeConfig.sensor_width:
+            raise ConfigError(
+                f"eye.sensor_width = {self.eye.sensor_width:g}: retinas are as wide as eye.receptor_pitch = "
+                f"{self.eye.receptor_pitch:g} makes them: set one of the two",
+                *("eye.sensor_width", "eye.receptor_pitch"),
+            )
         if (cramped := anatomy.contradiction(self.genome, self.eye)) is not None:
             message, keys = cramped
             raise ConfigError(message, *keys)

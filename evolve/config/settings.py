@@ -31,7 +31,9 @@ class EyeConfig:
     """What all eyes of a run have in common."""
 
     optics: bool = setting(True, None, "see through the pupil and its relief; if false, through a perfect lens")
-    sensor_width: float = setting(200e-6, Interval(1e-6, 1e-2), "width of the retina [m]")
+    sensor_width: float = setting(
+        200e-6, Interval(1e-6, 1e-2), "width of the retina [m]; unless receptor_pitch gives it"
+    )
     noise_sigma: float = setting(0.01, Interval(0, 10), "standard deviation of a receptor's noise [signal]")
     illuminance: float = setting(
         0.0, Interval(0, 1e6), "daylight on the scene [lx], of which receptors count the photons; 0: no shot noise"
@@ -57,6 +59,14 @@ class EyeConfig:
     rays_per_receptor: float | str = setting(
         AUTO, Interval(0, 4096, open_low=True), "rays traced per receptor and frame; auto: as few as the noise allows"
     )
+    square: bool = setting(
+        False, None, "eyes are square: the gene resolution in place of resolution_height and resolution_width"
+    )
+    receptor_pitch: float = setting(
+        0.0,
+        Interval(0, 1e-4),
+        "width of a receptor [m], so that eyes of more receptors are wider; 0: all retinas are sensor_width wide",
+    )
     head_radius: float = setting(
         1e-3, Interval(0, 10, open_low=True), "radius of the head [m]; eyes on it do not overlap"
     )
@@ -67,7 +77,7 @@ class EyeConfig:
     @property
     def genes(self) -> Mapping[str, Gene]:
         """Every gene that animals with such eyes have, by name."""
-        return gene_table(self.relief_points, self.relief_symmetric)
+        return gene_table(self.relief_points, self.relief_symmetric, self.square)
 
 
 @dataclass(frozen=True)

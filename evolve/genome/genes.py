@@ -22,6 +22,8 @@ __all__ = [
     "INHERITED",
     "LAMBDA_MAX",
     "RELIEF_POINTS",
+    "SIDE",
+    "SIDES",
     "Gene",
     "GeneConfig",
     "gene_table",
@@ -33,6 +35,8 @@ Cluster = Literal["morphological", "optical", "neural", "spectral"]
 CLUSTERS: tuple[Cluster, ...] = ("morphological", "optical", "neural", "spectral")
 FAMILIES = ("doe", "lambda_max")  # genes of one kind: what their names begin with
 RELIEF_POINTS = Interval(4, 9)  # of a relief along one side; names of its genes have a digit for each side
+SIDE = "resolution"  # of a square eye, which has it in place of the two
+SIDES = ("resolution_height", "resolution_width")
 REAL: Literal["real"] = "real"
 INTEGER: Literal["integer"] = "integer"
 APERTURE_SHAPES = ("circle", "annulus", "slit", "triangle", "square", "pentagon", "hexagon")
@@ -93,23 +97,32 @@ class Gene:
 
 
 @lru_cache
-def gene_table(relief_points: int = 4, relief_symmetric: bool = False) -> Mapping[str, Gene]:
+def gene_table(relief_points: int = 4, relief_symmetric: bool = False, square: bool = False) -> Mapping[str, Gene]:
     """Every gene by name, in the order in which they stand in a genome; the relief has relief_points² of them, or those
-    of an eighth of it."""
+    of an eighth of it, and square eyes have one for both their sides."""
     relief = set(representatives(relief_points, relief_symmetric))
-    genes = [*_body(), *_optics(relief_points), *_brain(), *_spectra()]
-    genes = [gene for gene in genes if gene.name in relief or not gene.name.startswith("doe_")]
+    absent = SIDES if square else (SIDE,)
+    return {
+        name: gene
+        for name, gene in _all_genes(relief_points).items()
+        if name not in absent and (name in relief or not name.startswith("doe_"))
+    }
+
+
+def _all_genes(relief_points: int) -> dict[str, Gene]:
+    genes = (*_body(), *_optics(relief_points), *_brain(), *_spectra())
     return {gene.name: gene for gene in genes}
 
 
 def _body() -> list[Gene]:
     gene = partial(_gene, "morphological")
     return [
-        gene("n_eyes", INTEGER, (1, 16), (1, 16, 1), "", "eyes around the body"),
+        gene("n_eyes", INTEGER, (1, 32), (1, 16, 1), "", "eyes around the body"),
         gene("placement_range_deg", REAL, (0, 180), (0, 180, 90), "deg", "arc over which the eyes are spread"),
         gene("fov_deg", REAL, (1, 100), (1, 100, 45), "deg", "an eye's horizontal field of view"),
         gene("resolution_height", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, top to bottom"),
         gene("resolution_width", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, left to right"),
+        gene(SIDE, INTEGER, (1, 64), (1, 16, 1), "receptors", "a square eye's receptors, along either side"),
     ]
 
 
@@ -174,7 +187,7 @@ def _held(gene: Gene) -> Gene:
 
 
 GENES: Mapping[str, Gene] = gene_table()
-ALL_GENES: Mapping[str, Gene] = gene_table(int(RELIEF_POINTS.high))
+ALL_GENES: Mapping[str, Gene] = _all_genes(int(RELIEF_POINTS.high))  # of eyes of any kind; no animal has them all
 
 
 def group_members(name: str) -> tuple[str, ...]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isqrt
+from math import ceil, isqrt
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.genome.anatomy import Sizes, fitted
+from evolve.genome.anatomy import Sizes, fitted, retina_width, sides
 from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, GeneConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.relief_genes import representatives
@@ -19,10 +19,14 @@ if TYPE_CHECKING:
     import optics
     import sim
 
-__all__ = ["Phenotype", "develop", "repaired"]
+__all__ = ["FORMER_ENCODER", "Phenotype", "develop", "repaired"]
 
 ANNULUS_INNER = 0.5  # radius of what an annulus leaves out, in pupil radii
 SLIT_ASPECT = 4.0  # height of an upright slit / its width
+# A small brain must not see through a large encoder. With 64 neurons encoders are 16 wide, and wider ones, which cost
+# more, learnt no faster (docs/measurements/learning.md).
+NEURONS_PER_FEATURE = 4
+FORMER_ENCODER = 16  # of animals and policies on record that do not say: whatever their neurons
 
 
 class EyeSettings(Sizes, Protocol):
@@ -65,6 +69,7 @@ class Phenotype:
     `relief` holds N x N heights in [0, 1], row-major (y, x): for N = 4 control points of a bicubic B-spline patch, for
     more the heights at cell centres that a cubic spline goes through.
     `aperture_shape` is a place in APERTURE_SHAPES, `dispersion` the inverse of the relief's Abbe number.
+    `encoder` is the width of the layers that each eye's signals go through first.
     `lambda_max_nm` are the peaks of its receptor types' pigments; None: the receptors that all eyes of the run have.
     """
 
@@ -81,6 +86,7 @@ class Phenotype:
     dispersion: float = 0.0
     layers: int = 2
     lambda_max_nm: tuple[float, ...] | None = None
+    encoder: int = FORMER_ENCODER
 
     def pupil(self, eye: EyeSettings) -> optics.Pupil | None:
         """Pupil of each of the eyes; None for the perfect lens."""
@@ -92,7 +98,7 @@ class Phenotype:
         heights = eye.relief_height * np.reshape(self.relief, (side, side))
         abbe_number = np.inf if self.dispersion == 0 else 1 / self.dispersion
         return optics.Pupil(
-            aperture_radius=0.5 * self.relative_aperture * eye.sensor_width,
+            aperture_radius=0.5 * self.relative_aperture * retina_width(self.resolution[1], eye),
             height=optics.BSplineRelief(heights) if side == 4 else heights,
             n=optics.RefractiveIndex.from_abbe(self.refractive_index, abbe_number),
             aperture=_aperture(APERTURE_SHAPES[self.aperture_shape]),
@@ -109,7 +115,7 @@ class Phenotype:
             fov_deg=self.fov_deg,
             placement_range_deg=self.placement_range_deg,
             optics=self.pupil(eye),
-            sensor_width=eye.sensor_width,
+            sensor_width=retina_width(self.resolution[1], eye),
             noise_sigma=eye.noise_sigma,
             photon_budget=optics.PhotonBudget(eye.illuminance, eye.integration_time) if eye.illuminance else None,
             bands=eye.bands,
@@ -141,7 +147,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
         n_eyes=int(values["n_eyes"]),
         placement_range_deg=values["placement_range_deg"],
         fov_deg=values["fov_deg"],
-        resolution=(int(values["resolution_height"]), int(values["resolution_width"])),
+        resolution=sides(values),
         relative_aperture=values["relative_aperture"] if seen_through else None,
         relief=relief if seen_through else None,
         refractive_index=values["refractive_index"] if seen_through else None,
@@ -151,6 +157,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
         dispersion=values["dispersion"] if seen_through else 0.0,
         layers=int(values["layers"]),
         lambda_max_nm=peaks if config.eye.receptors == INHERITED else None,
+        encoder=ceil(values["neurons"] / NEURONS_PER_FEATURE),
     )
 
 

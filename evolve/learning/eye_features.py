@@ -1,7 +1,7 @@
 """What an eye's signals become before actor and critic see them: an MLP per eye over a memory of frames.
 
-Every eye has weights of its own, and one encoder serves all its remembered frames: signals -> 16 -> 16 -> 16 per
-frame, then `memory` x 16 -> 16 over the frames. The eyes' features are joined with contact and previous action.
+Every eye has weights of its own, and one encoder serves all its remembered frames: signals -> w -> w -> w per frame,
+then `memory` x w -> w over the frames. The eyes' features are joined with contact and previous action.
 Units are leaky rectifiers: tanh learnt detection from a third more samples, at ten times the cost per unit.
 Receptors adapt: the first layer sees signals less their running mean, in units of their spread, as learning has met
 them.
@@ -19,8 +19,7 @@ from torch import Tensor, nn
 
 __all__ = ["CONTRAST", "UNITS", "AdaptedLinear", "EyeFeatures", "PerEyeLinear"]
 
-ENCODER_WIDTHS = (16, 16, 16)  # hidden, hidden, code of one frame
-EYE_FEATURES = 16  # what the temporal layer makes of an eye's remembered codes
+ENCODER_LAYERS = 3  # hidden, hidden, code of one frame
 DARK = 1e-6  # spread of signals that all are the same: keeps weights finite
 CONTRAST = 0.4  # what a signal one spread off its mean counts, where 675 move a unit together; 1 learnt no faster
 UNITS = nn.LeakyReLU  # of all hidden layers; leaky, so that none dies
@@ -74,7 +73,7 @@ class AdaptedLinear(PerEyeLinear):
 
 
 class EyeFeatures(BaseFeaturesExtractor):
-    """Features of an observation: 16 per eye, then contact and previous action.
+    """Features of an observation: `width` per eye, as wide as each layer below, then contact and previous action.
 
     Two forms are understood. Stacked, as environments give it: `eyes` (sample, memory, eye, channel, height, width).
     Unstacked, as rollouts keep it, each frame once: `frames` (segment, memory - 1 + step, eye, channel, height, width)
@@ -82,26 +81,25 @@ class EyeFeatures(BaseFeaturesExtractor):
     Both give the same features: an episode's first frame stands in for those before it, as in sim's environments.
     """
 
-    def __init__(self, observation_space: spaces.Dict) -> None:
+    def __init__(self, observation_space: spaces.Dict, width: int) -> None:
         self.memory, self.n_eyes, *retina = observation_space["eyes"].shape
         others = observation_space["contact"].shape[0] + observation_space["previous_action"].shape[0]
-        super().__init__(observation_space, EYE_FEATURES * self.n_eyes + others)
+        super().__init__(observation_space, width * self.n_eyes + others)
+        self.width = width
         self.n_receptors = math.prod(retina)
-        widths = (self.n_receptors, *ENCODER_WIDTHS)
+        widths = (self.n_receptors, *(width,) * ENCODER_LAYERS)
         layers: list[nn.Module] = [AdaptedLinear(self.n_eyes, *widths[:2]), UNITS()]
         for inputs, outputs in itertools.pairwise(widths[1:]):
             layers += [PerEyeLinear(self.n_eyes, inputs, outputs), UNITS()]
         self.encoder = nn.Sequential(*layers)
-        self.temporal = nn.Sequential(
-            PerEyeLinear(self.n_eyes, ENCODER_WIDTHS[-1] * self.memory, EYE_FEATURES), UNITS()
-        )
+        self.temporal = nn.Sequential(PerEyeLinear(self.n_eyes, width * self.memory, width), UNITS())
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
         if "frames" in observation:
             codes = self._windows(self._encode(observation["frames"]), observation["age"])
         else:
             codes = self._encode(observation["eyes"]).permute(0, 1, 3, 2)
-        codes = codes.reshape(self.n_eyes, ENCODER_WIDTHS[-1] * self.memory, -1)
+        codes = codes.reshape(self.n_eyes, self.width * self.memory, -1)
         features = self.temporal(codes).permute(2, 0, 1).flatten(1)
         return torch.cat([features, observation["contact"], observation["previous_action"]], dim=1)
 

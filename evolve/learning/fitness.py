@@ -90,7 +90,7 @@ def _live(
     weights, *seeds = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     lessons, checkpoints, finals = _worlds(phenotype, config, *seeds)
     with closing(lessons), closing(checkpoints), closing(finals):
-        brain = Brain(phenotype.neurons, phenotype.layers)
+        brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder)
         training = train(Worlds(lessons, checkpoints), brain, config.learning, weights, progress, begun)
         return training, play(training.policy, finals, seeds[1])
 

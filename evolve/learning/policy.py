@@ -21,6 +21,7 @@ from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor
 
+from evolve.genome.phenotype import FORMER_ENCODER
 from evolve.learning.adam import Adam
 from evolve.learning.eye_features import UNITS, EyeFeatures
 from evolve.store.atomic_files import write_whole
@@ -34,10 +35,12 @@ class TrainingDiverged(FloatingPointError):
 
 @dataclass(frozen=True)
 class Brain:
-    """Size of actor and critic: each has `layers` hidden layers of `neurons`."""
+    """Size of a brain: actor and critic have `layers` hidden layers of `neurons` each; all layers of its eyes' encoders
+    are `encoder` wide."""
 
     neurons: int
     layers: int = 2
+    encoder: int = FORMER_ENCODER
 
 
 @dataclass(frozen=True)
@@ -45,12 +48,13 @@ class PolicyConfig:
     """The shape of a policy: all that is needed to build it again.
 
     eyes: shape of the observation's `eyes` (memory, eye, channel, height, width)
-    neurons, layers: see `Brain`
+    neurons, layers, encoder: see `Brain`
     """
 
     eyes: tuple[int, ...]
     neurons: int
     layers: int = 2
+    encoder: int = FORMER_ENCODER
 
     def observation_space(self) -> spaces.Dict:
         """The observation that sim's environments give with these eyes."""
@@ -83,7 +87,8 @@ class _Within(torch.autograd.Function):
 
 
 class EyePolicy(MultiInputActorCriticPolicy):
-    """SB3's actor-critic over EyeFeatures, with `layers` hidden layers of `neurons` each for actor and critic.
+    """SB3's actor-critic over EyeFeatures of width `encoder`, with `layers` hidden layers of `neurons` each for actor
+    and critic.
 
     first_speed: mean of the untrained policy's speeds, and twice their standard deviation, as a part of the highest.
     """
@@ -96,17 +101,19 @@ class EyePolicy(MultiInputActorCriticPolicy):
         *,
         neurons: int,
         layers: int = 2,
+        encoder: int = FORMER_ENCODER,
         first_speed: float = 0.5,
         **kwargs: Any,
     ) -> None:
         kwargs |= {
             "features_extractor_class": EyeFeatures,
+            "features_extractor_kwargs": {"width": encoder},
             "net_arch": [neurons] * layers,
             "activation_fn": UNITS,
             "optimizer_class": Adam,
         }
         super().__init__(observation_space, action_space, lr_schedule, **kwargs)
-        self.config = PolicyConfig(tuple(observation_space["eyes"].shape), neurons, layers)
+        self.config = PolicyConfig(tuple(observation_space["eyes"].shape), neurons, layers, encoder)
         with torch.no_grad():
             self.action_net.bias.copy_(torch.tensor([2 * first_speed - 1, 0.0]))
             self.log_std.copy_(torch.tensor([first_speed, FIRST_TURN]).log())
@@ -127,7 +134,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
 def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy:
     """An untrained policy, drawn from torch's random state."""
     action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-    shape = {"neurons": config.neurons, "layers": config.layers}
+    shape = {"neurons": config.neurons, "layers": config.layers, "encoder": config.encoder}
     return EyePolicy(config.observation_space(), action_space, lambda _: learning_rate, **shape)
 
 
@@ -156,7 +163,10 @@ def load_policy(path: Path | str) -> EyePolicy:
         if stored.get("units") != UNITS.__name__:
             raise ValueError(f"its units are not {UNITS.__name__}, as those of this version's policies are")
         config = PolicyConfig(
-            tuple(int(n) for n in stored["eyes"]), int(stored["neurons"]), int(stored.get("layers", 2))
+            eyes=tuple(int(n) for n in stored["eyes"]),
+            neurons=int(stored["neurons"]),
+            layers=int(stored.get("layers", 2)),
+            encoder=int(stored.get("encoder", FORMER_ENCODER)),
         )
         if not all(torch.isfinite(tensor).all() for tensor in tensors.values()):
             raise ValueError("it holds numbers that are not finite")

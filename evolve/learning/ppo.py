@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import torch
@@ -89,7 +89,7 @@ class AdaptingPPO(PPO):
             vf_coef=config.value_weight,
             seed=seed,
             device="cpu",
-            policy_kwargs={"neurons": brain.neurons, "layers": brain.layers, "first_speed": config.first_speed},
+            policy_kwargs={**asdict(brain), "first_speed": config.first_speed},
             rollout_buffer_class=FrameRolloutBuffer,
             rollout_buffer_kwargs={"seed": seed},
         )

@@ -22,7 +22,9 @@ ROW = Row(*("a", 0, 0, 0, 0, 0, 1.0, 0.5, 4, 2, 60.0, 45.0, 8, 8, 0.1, 5, 64, 10
 
 
 def test_random_fitness_moves_genes_that_are_open_and_no_others():
-    config = assemble("navigation", "bifurcation-navigation", assignments=("search.generations=6",))
+    config = assemble(
+        "navigation", "bifurcation-navigation", assignments=("search.generations=6", "genome.fov_deg.open=true")
+    )
     quantities = {"fov": lambda row: row.fov_deg, "up": lambda row: row.height, "fitness": lambda row: row.fitness}
     drift = drifted(config, "navigation", quantities, 4)
     assert {one.quantity for one in drift} == {"fov", "up"}, "nobody lived"

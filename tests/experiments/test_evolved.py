@@ -69,7 +69,7 @@ def test_parameters_are_those_of_a_stored_policy(tmp_path):
 
 
 def test_candidates_with_more_receptors_have_more_parameters(tmp_path):
-    wider = (*SMALL, "genome.resolution_width.start=9")
+    wider = (*SMALL, "genome.resolution.start=9")
     small, large = (
         rows_of(run_of(tmp_path / name, "bifurcation-detection", settings, (1.0, 1.0)), "detection")[0].parameters
         for name, settings in (("small", SMALL), ("large", wider))

@@ -32,6 +32,7 @@ def genes(arguments: Namespace) -> int:
         f"\n{len(GENES)} genes. Open or freeze one, or a cluster: --set genome.NAME.open=true or false\n"
         "From generation N on: --set genome.NAME.opens_at=N. A relief of N x N genes: --set eye.relief_points=N,\n"
         "of an eighth of them, that looks the same mirrored and turned: --set eye.relief_symmetric=true\n"
+        "Square eyes have one gene, resolution, for height and width: --set eye.square=true\n"
         "Spectral genes count where --set eye.receptors=genes; else all eyes of a run have the receptors named there.\n"
         "Mutations are those of search.optimizer=mutation; CMA begins with Gaussian steps of the same size."
     )

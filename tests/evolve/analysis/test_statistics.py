@@ -126,6 +126,15 @@ def test_gene_values_know_every_gene():
     assert set(gene_values(phenotype(lambda_max_nm=(500.0,)))) == set(GENES)
 
 
+def test_gene_values_of_square_eyes_are_of_one_side():
+    sides = {"resolution_height", "resolution_width", "resolution"}
+    shown = {
+        square: {name: value for name, value in gene_values(phenotype(resolution=(7, 7)), eye).items() if name in sides}
+        for square, eye in ((True, EyeConfig(square=True)), (False, EyeConfig()))
+    }
+    assert shown == {True: {"resolution": 7}, False: {"resolution_height": 7, "resolution_width": 7}}
+
+
 def test_gene_values_of_receptor_types_that_an_animal_has_not_are_none():
     values = gene_values(phenotype(lambda_max_nm=(510.0, 350.0)))
     assert [values[name] for name in ("receptor_types", "lambda_max_0_nm", "lambda_max_1_nm")] == [2, 510, 350]

@@ -4,10 +4,13 @@ import pytest
 
 from evolve.cli.start_from import starts_from
 from evolve.config.assemble import assemble
+from evolve.config.numbering import Place
 from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, RunError
+from evolve.store.evaluation import Evaluation
 from tests.evolve.search.test_loop import carry
 
 
@@ -37,3 +40,13 @@ def test_an_animals_lens_keeps_its_size_in_another_run(tmp_path, optics):
     eye = assemble("detection", starts=starts_from(f"{parent.path}:0")).eye
     lengths = (50e-6, 300e-6) if optics == "true" else (100e-6, 200e-6)
     assert (eye.relief_height, eye.sensor_width) == lengths, "a perfect lens has no size to keep"
+
+
+@pytest.mark.parametrize("settings", [("eye.square=true",), ()])
+def test_an_animal_with_square_eyes_starts_a_run_with_either(tmp_path, settings):
+    config = assemble("detection", assignments=["eye.square=true", "eye.optics=false", "genome.resolution.start=6"])
+    run, genome = Run.create(tmp_path / "run", config), Genotype(config.genome).start
+    outcome = Evaluation(1.0, (1.0,), 0.0, 10, 1.0)
+    run.append(Candidate.of(Place(0, 0, 0), tuple(genome), develop(genome, config), 1, outcome))
+    other = assemble("detection", assignments=settings, starts=starts_from(f"{run.path}:0"))
+    assert develop(Genotype(other.genome).start, other).resolution == (6, 6)

@@ -9,5 +9,6 @@ checks: test_assemble.py, test_provenance.py
 lint: test_lint.py
 relief_starts: test_relief_starts.py
 formats: test_formats.py
+square_eyes: test_square_eyes.py
 numbering: test_numbering.py
 """

@@ -16,7 +16,7 @@ from evolve.config.provenance import Source
 from evolve.config.run_config import ConfigError
 from evolve.config.sources import SCALES, preset_names
 from evolve.genome.genotype import Genotype
-from evolve.genome.phenotype import develop
+from evolve.genome.phenotype import develop, repaired
 from evolve.search.search import Search
 
 EXPERIMENTS = ("bifurcation-detection", "bifurcation-navigation", "lens", "pupil", "scaling", "ultraviolet")
@@ -62,17 +62,41 @@ def test_every_open_gene_changes_something_and_colours_are_seen_as_they_are(pres
 
 
 def test_bifurcations_differ_in_their_task_and_begin_with_one_photoreceptor():
+    """And in that of a navigator's eye only the width counts."""
     maze, field = (assemble(preset=f"bifurcation-{task}") for task in ("navigation", "detection"))
     assert (maze.task, field.task) == ("navigation", "detection")
-    rows = field.genome["resolution_height"]
-    same = {"task": field.task, "search": field.search, "learning": field.learning}
-    assert replace(maze, **same, genome={**maze.genome, "resolution_height": rows}) == field
-    assert maze.learning.total_steps > maze.learning.contact_ramp, "contact has its price in the end"
+    assert replace(maze.eye, square=True) == field.eye
+    assert maze.search == field.search
+    assert maze.learning.total_steps == field.learning.total_steps
+    genes = {"n_eyes", "placement_range_deg"}
+    assert (open_in(maze, 0), open_in(field, 0)) == (genes | {"resolution_width"}, genes | {"resolution"})
+    assert maze.genome["resolution_width"] == field.genome["resolution"]
+    assert all(maze.genome[name] == field.genome[name] for name in maze.genome.keys() & field.genome.keys())
     for config in (maze, field):
         start = animal(config)
         assert (start.n_eyes, start.resolution, start.fov_deg, start.relief) == (1, (1, 1), 45.0, None)
-    assert open_in(field, 0) - open_in(maze, 0) == {"resolution_height"}
-    assert not {"memory_frames", "neurons"} & open_in(field, 0)
+    assert (maze.genome["n_eyes"].high, maze.genome["resolution_width"].high) == (24, 24)
+
+
+@pytest.mark.parametrize("task", ["navigation", "detection"])
+def test_bifurcations_have_room_for_few_large_eyes_or_many_small_ones(task):
+    """A receptor takes 3° of the head: two eyes of 15 fit within 45°, ten of 4 within 108°, with less than a
+    receptor to spare."""
+    config = assemble(preset=f"bifurcation-{task}")
+    genotype = Genotype(config.genome)
+    width = "resolution_width" if task == "navigation" else "resolution"
+
+    def changed(eyes, receptors, range_deg):
+        values = {"n_eyes": eyes, width: receptors, "placement_range_deg": range_deg}
+        return repaired(
+            np.array([g.encode(values[g.name], config.genome[g.name]) for g in genotype.open_genes]), config
+        )
+
+    for eyes, receptors, range_deg in ((2, 15, 45), (10, 4, 108)):
+        assert changed(eyes, receptors, range_deg) == ()
+        assert changed(eyes, receptors, range_deg - 3) == ("placement_range_deg",)
+        assert changed(eyes, receptors + 1, range_deg) == ("placement_range_deg",)
+    assert changed(24, 24, 180) == ("n_eyes", width)
 
 
 @pytest.mark.parametrize("scale", SCALES)

@@ -1,6 +1,7 @@
 """Nothing overlaps in any animal, and what had to change for that is counted."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from evolve.config.assemble import assemble
 from evolve.config.run_config import ConfigError
+from evolve.genome.anatomy import fitted
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop, repaired
 
@@ -75,9 +77,82 @@ def test_too_many_eyes_are_fewer_on_the_widest_arc():
     assert repaired(vector, CROWDED) == ("n_eyes", "placement_range_deg")
 
 
+# --- receptors of one width
+
+
+def pitched(*settings):
+    """Room for 30 receptors within 180°, of eyes side by side."""
+    sizes = ("eye.square=true", f"eye.receptor_pitch={math.pi / 30 * 0.2e-3}", "eye.head_radius=0.2e-3")
+    high = ("genome.n_eyes.high=24", "genome.resolution.high=24")
+    return assemble("detection", assignments=[*sizes, *high, *settings])
+
+
+def alike(asked, fit):
+    """How far `fit` is from `asked`, pairs of eyes and receptors, in ratios."""
+    return math.log((asked[0] - 0.5) / (fit[0] - 0.5)) ** 2 + math.log(asked[1] / fit[1]) ** 2
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.integers(3, 24), st.integers(2, 24), st.floats(0, 180), st.sampled_from([60.0, 140.0, 180.0]), st.booleans())
+def test_wide_eyes_give_way_as_little_as_will_do(eyes, receptors, range_deg, widest, bounded):
+    """Held against all pairs that fit, from the lowest up."""
+    low_eyes, low_receptors = (3, 2) if bounded else (1, 1)
+    bounds = [f"genome.n_eyes.{key}={low_eyes}" for key in ("low", "start")]
+    bounds += [f"genome.resolution.{key}={low_receptors}" for key in ("low", "start")]
+    config = pitched(f"genome.placement_range_deg.high={widest}", "genome.placement_range_deg.start=50", *bounds)
+    asked = {"n_eyes": eyes, "resolution": receptors, "placement_range_deg": min(range_deg, widest)}
+    fits = fitted({**asked}, config.genome, config.eye)
+    room = widest / 6
+    pair = fits["n_eyes"], fits["resolution"]
+    pairs = product(range(low_eyes, eyes + 1), range(low_receptors, receptors + 1))
+    possible = [(n, w) for n, w in pairs if (n - 1) * w <= room + 1e-6]
+    assert pair in possible
+    assert alike((eyes, receptors), pair) == pytest.approx(min(alike((eyes, receptors), p) for p in possible))
+    needed = (pair[0] - 1) * pair[1] * 6
+    assert max(needed, asked["placement_range_deg"]) - 1e-6 <= fits["placement_range_deg"] <= widest
+    if pair == (eyes, receptors):
+        assert fits["placement_range_deg"] == pytest.approx(max(needed, asked["placement_range_deg"]))
+
+
+def test_repair_prefers_neither_eyes_nor_receptors():
+    """Over all ranges ln(width / eyes) stays what was asked for, on average. Were eyes always to give way it would rise
+    by 1.4, were receptors, fall by 1.8; counting eyes, or the gaps
+    between them, moves it by 0.15 or -0.09."""
+    config, random = pitched(), np.random.default_rng(0)
+    moved = []
+    for eyes, receptors in random.integers(1, 25, (1000, 2)):
+        values = {"n_eyes": float(eyes), "resolution": float(receptors), "placement_range_deg": 180.0}
+        fits = fitted(values, config.genome, config.eye)
+        moved += [math.log(fits["resolution"] / fits["n_eyes"] * eyes / receptors)] if fits != values else []
+    assert len(moved) > 300
+    assert abs(np.mean(moved)) < 0.06  # 0.03, and a standard error of 0.008
+
+
+def test_a_gene_that_is_held_does_not_give_way():
+    held = {"n_eyes": "resolution", "resolution": "n_eyes"}
+    for name, other in held.items():
+        config = pitched(f"genome.{name}.open=false", f"genome.{name}.start=6")
+        values = {name: 6.0, other: 24.0, "placement_range_deg": 90.0}
+        fits = fitted(values, config.genome, config.eye)
+        assert fits == {name: 6.0, other: 6.0, "placement_range_deg": 180.0}  # 5 x 6 = 30
+
+
+def test_eyes_of_more_receptors_are_wider_and_so_are_their_pupils():
+    config = pitched("genome.relative_aperture.start=0.3", "genome.resolution.start=7")
+    animal = develop(Genotype(config.genome).start, config)
+    eyes = animal.eyes(config.eye)
+    assert eyes.sensor_width == pytest.approx(7 * config.eye.receptor_pitch)
+    assert eyes.optics.aperture_radius == pytest.approx(0.15 * 7 * config.eye.receptor_pitch)
+
+
 @pytest.mark.parametrize(
     ("settings_", "message"),
     [
+        (("eye.receptor_pitch=2e-6", "eye.receptor_width=3e-6"),
+         r"eye\.receptor_pitch = 2e-06: must be 0 or at least eye\.receptor_width = 3e-06"),
+        (("eye.receptor_pitch=1e-4", "genome.n_eyes.low=9", "genome.n_eyes.start=9", "genome.resolution_width.low=4",
+          "genome.resolution_width.start=4"), r"9 eyes of 0\.0004 m \(4 receptors of eye\.receptor_pitch\)"),
+        (("eye.receptor_pitch=1e-5", "eye.sensor_width=3e-4"), r"eye\.sensor_width = 0\.0003: retinas are as wide as"),
         (("eye.sensor_width=1e-3", "genome.n_eyes.start=8", "genome.n_eyes.open=false"), "8 eyes of 0.001 m"),
         (("genome.n_eyes.low=2", "genome.n_eyes.start=2", "genome.placement_range_deg.open=false",
           "genome.placement_range_deg.start=5"), "2 eyes of 0.0002 m"),

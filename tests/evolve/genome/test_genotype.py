@@ -105,6 +105,13 @@ def test_phenotype_survives_being_written():
     assert Phenotype.from_json(perfect.to_json()) == perfect
 
 
+def test_animals_on_record_that_name_no_encoder_have_one_of_16():
+    record = replace(develop(GENOTYPE.start, CONFIG), neurons=4, encoder=1).to_json()
+    assert Phenotype.from_json(record).encoder == 1
+    del record["encoder"]
+    assert Phenotype.from_json(record).encoder == 16
+
+
 def test_quick_preset_starts_behind_a_lens_in_focus():
     """Its relief is the paraboloid h0 - r²/(2 f (n - 1)), to Rayleigh's quarter wave of optical path over the pupil."""
     config = assemble("detection", "quick")

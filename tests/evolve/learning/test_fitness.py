@@ -33,6 +33,13 @@ def test_fitness_is_the_mean_return_of_the_evaluation_episodes(outcome):
     assert [steps for steps, _ in evaluation.curve] == [512]
 
 
+def test_the_policy_is_as_wide_as_the_animals_brain(tmp_path):
+    narrow = replace(PHENOTYPE, neurons=3, layers=1, encoder=2)
+    evaluate(narrow, small_config(), 5, tmp_path / "0.safetensors")
+    config = load_policy(tmp_path / "0.safetensors").config
+    assert (config.neurons, config.layers, config.encoder) == (3, 1, 2)
+
+
 def test_progress_is_told(outcome):
     assert outcome[2] == [(256, 512), (512, 512)]
 

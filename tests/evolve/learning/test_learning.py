@@ -46,7 +46,7 @@ def accuracy_of_telling_goal_from_adversary(resolution, seed):
     known = SCENES * TRAINING_SCENES
 
     torch.manual_seed(seed)
-    features = EyeFeatures(PolicyConfig((1, *signals.shape[2:]), 1).observation_space())
+    features = EyeFeatures(PolicyConfig((1, *signals.shape[2:]), 64).observation_space(), width=16)
     features.adapt(signals[:known])
     unit = nn.Linear(features.features_dim, 1)
     optimizer = torch.optim.Adam([*features.parameters(), *unit.parameters()], 3e-3)

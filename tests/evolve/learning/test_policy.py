@@ -1,13 +1,18 @@
 """The policy's features against a plain loop, and its files."""
 
+import json
 import os
 import pickle
 
 import numpy as np
 import pytest
+import safetensors.torch
 import torch
 from gymnasium import spaces
 
+from evolve.config.assemble import assemble
+from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop
 from evolve.learning.eye_features import CONTRAST
 from evolve.learning.policy import EyePolicy, PolicyConfig, build_policy, learnt, load_policy, save_policy
 
@@ -120,6 +125,50 @@ def test_a_stored_policy_acts_the_same(policy, tmp_path):
         stored.predict(observation, deterministic=True)[0], policy.predict(observation, deterministic=True)[0]
     )
     assert [path.name for path in tmp_path.iterdir()] == ["a.safetensors"]
+
+
+def test_a_policy_whose_file_names_no_encoder_has_one_of_16(tmp_path):
+    """As all had: such a file loads, and acts the same."""
+    torch.manual_seed(0)
+    policy = build_policy(PolicyConfig((3, 2, 3, 2, 4), neurons=8, layers=2, encoder=16))
+    path = tmp_path / "a.safetensors"
+    save_policy(policy, path)
+    with safetensors.safe_open(path, framework="pt") as file:
+        stored = json.loads(file.metadata()["config"])
+        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no mapping)
+    assert stored.pop("encoder") == 16
+    assert stored == {"eyes": [3, 2, 3, 2, 4], "neurons": 8, "layers": 2, "units": "LeakyReLU"}
+    safetensors.torch.save_file(tensors, path, {"config": json.dumps(stored)})
+    observation = random_observation(CONFIG, 5)
+    np.testing.assert_array_equal(
+        load_policy(path).predict(observation, deterministic=True)[0],
+        policy.predict(observation, deterministic=True)[0],
+    )
+
+
+@pytest.mark.parametrize(("neurons", "encoder"), [(1, 1), (4, 1), (5, 2), (64, 16), (512, 128)])
+def test_a_brain_is_as_narrow_as_its_gene_says_everywhere(neurons, encoder, tmp_path):
+    """Of all its layers the encoder's are a quarter as wide, and all of them learn."""
+    config = assemble("detection", assignments=["eye.optics=false", f"genome.neurons.start={neurons}"])
+    animal = develop(Genotype(config.genome).start, config)
+    torch.manual_seed(0)
+    policy = build_policy(PolicyConfig((3, 2, 3, 2, 4), animal.neurons, animal.layers, animal.encoder))
+    widths = {
+        name: parameter.shape[-2] if "features_extractor" in name else parameter.shape[0]
+        for name, parameter in policy.named_parameters()
+        if name.endswith("weight")
+    }
+    features = {width for name, width in widths.items() if name.startswith(("features", "pi_features", "vf_features"))}
+    hidden = {width for name, width in widths.items() if name.startswith("mlp_extractor")}
+    assert (features, hidden) == ({encoder}, {neurons})
+    assert policy.features_dim == 2 * encoder + 3
+    values, log_prob, _ = policy.evaluate_actions(
+        {name: torch.from_numpy(array) for name, array in random_observation(CONFIG, 20).items()}, torch.ones(20, 2)
+    )
+    (values.sum() + log_prob.sum()).backward()
+    assert all(parameter.grad.abs().max() > 0 for parameter in policy.parameters())
+    save_policy(policy, tmp_path / "a.safetensors")
+    assert load_policy(tmp_path / "a.safetensors").config == policy.config
 
 
 def test_a_policy_of_other_units_is_refused(policy, tmp_path):

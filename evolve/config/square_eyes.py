@@ -1,0 +1,30 @@
+"""Square eyes have one gene for both sides; what was said alike of height and width holds for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from evolve.config.provenance import Source
+from evolve.config.run_config import EyeConfig
+from evolve.genome.genes import SIDE, SIDES
+
+__all__ = ["no_such_side", "with_square_eyes"]
+
+
+def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
+    """`source`, whose settings of height and width, if they are the same, are those of a square eye's gene."""
+    genes = source.tree.get("genome", {})
+    height, width = (genes.get(name) for name in SIDES)
+    if not eye.square or height is None or height != width or SIDE in genes:
+        return source
+    rest = {name: use for name, use in genes.items() if name not in SIDES}
+    return replace(source, tree={**source.tree, "genome": {**rest, SIDE: height}})
+
+
+def no_such_side(name: str, eye: EyeConfig, of_task: bool) -> str:
+    """Why these eyes have no such gene; `of_task`: though the task says what it is."""
+    if of_task:
+        return f"eye.square = true: the task sets genome.{name}, so its eyes are not square; must be false"
+    if eye.square:
+        return f"genome.{name}: square eyes have the gene {SIDE} for both sides; set it, or eye.square = false"
+    return f"genome.{name}: only square eyes have this gene, others have {' and '.join(SIDES)}; set eye.square = true"
