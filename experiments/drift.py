@@ -20,7 +20,7 @@ from evolve.search.search import Search
 from experiments.candidates import NO_NUMBER, Row, anatomy
 from experiments.means import LAST
 
-__all__ = ["SEEDS", "Drift", "drifted", "of_the_end", "shade"]
+__all__ = ["POOLS", "SEEDS", "Drift", "drifted", "of_the_end", "shade"]
 
 SEEDS = 1000
 POOLS = 20_000  # of searches drawn together, where several runs are compared with the null model as one

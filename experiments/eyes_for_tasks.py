@@ -5,7 +5,6 @@ python -m experiments.eyes_for_tasks [--compute] [--workers N] [--docs DIR]
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -15,9 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import sim
 from experiments.designed import Design, Trained, crossed, train_all
 from experiments.means import Interval
 from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
+from experiments.portraits import draw_head
 from experiments.store import Origin, read_rows
 
 __all__ = ["Crossing", "crossing", "designs", "page"]
@@ -102,10 +103,7 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
         values={
             "answer": answer,
             "steps": f"{max(row.steps for row in rows):,}",
-            "seeds": str(len(SEEDS)),
-            "fewer_seeds": str(len(SEEDS_IN_DIM_LIGHT)),
-            "bright": f"{BRIGHT:g}",
-            "dim": " and ".join(f"{sigma:g}" for sigma in DIM),
+            "lives": ", ".join(_lives(rows, sigma) for sigma in _lights(rows)),
             "fitness": _table(rows, lambda row: row.fitness),
             "success": _table(rows, lambda row: row.success_rate),
             "crossings": _crossings(rows),
@@ -118,6 +116,13 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
 
 def _lights(rows: Iterable[Trained]) -> list[float]:
     return sorted({row.noise_sigma for row in rows})
+
+
+def _lives(rows: Sequence[Trained], sigma: float) -> str:
+    """How many lives every animal has lived in this light: as many as all of them have."""
+    counts = [len(_cell(rows, task, sigma, shape)) for task in TASKS for shape in SHAPES]
+    least, most = min(counts), max(counts)
+    return f"{least}{f' to {most}' if most > least else ''} at σ = {sigma:g}"
 
 
 def _table(rows: Sequence[Trained], value: Callable[[Trained], float]) -> str:
@@ -191,19 +196,10 @@ def _best(rows: Sequence[Trained], task: str) -> str:
 
 
 def _draw_heads(place: Any) -> None:
-    """A head with its eyes below each animal's name, seen from above, looking up."""
-    from matplotlib.patches import Circle, Wedge
-
-    for x, (n, _, arc) in enumerate(SHAPES):
-        inset = place.inset_axes([(x + 0.1) / len(SHAPES), -0.42, 0.8 / len(SHAPES), 0.22])
-        inset.set(xlim=(-3, 3), ylim=(-1.2, 3), aspect="equal")
-        inset.axis("off")
-        for azimuth in np.linspace(-arc / 2, arc / 2, n) if n > 1 else [0.0]:
-            towards = 90 - azimuth
-            at = (math.cos(math.radians(towards)), math.sin(math.radians(towards)))
-            inset.add_patch(Wedge(at, 2.0, towards - 22.5, towards + 22.5, color="#777777", alpha=0.25, lw=0))
-            inset.add_patch(Circle(at, 0.16, color="#222222"))
-        inset.add_patch(Circle((0, 0), 0.95, color="#C9B79C"))
+    """Below each animal's name its head, with its eyes."""
+    for x, (n, w, arc) in enumerate(SHAPES):
+        inset = place.inset_axes([(x + 0.1) / len(SHAPES), -0.45, 0.8 / len(SHAPES), 0.25])
+        draw_head(inset, sim.Eyes(n_eyes=n, resolution=(1, w), fov_deg=45, placement_range_deg=arc))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -5,22 +5,27 @@ python -m experiments.goals_shape_eyes [--runs navigation=DIR ... detection=DIR 
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from experiments import evolved
 from experiments.candidates import Row
-from experiments.drift import SEEDS, shade
+from experiments.drift import POOLS, SEEDS, shade
 from experiments.evolved import Store, conduct_table, null_model, null_table
-from experiments.means import LAST, last_mean, of_generation
+from experiments.means import LAST, last_mean, last_values, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 
-__all__ = ["page"]
+__all__ = ["contrast", "page"]
 
 NAME = "goals_shape_eyes"
 COLORS = {"navigation": "#D55E00", "detection": "#0072B2"}
+TOGETHER = "ln(width / eyes)"  # chosen before the runs: fine eyes have much of it, many eyes little
 QUANTITIES: dict[str, Callable[[Row], float]] = {
+    TOGETHER: lambda row: math.log(row.width / row.n_eyes),
     "eyes": lambda row: row.n_eyes,
     "receptors per eye, across": lambda row: row.width,
     "receptors per eye, up": lambda row: row.height,
@@ -30,9 +35,10 @@ QUANTITIES: dict[str, Callable[[Row], float]] = {
     "fitness": lambda row: row.fitness,
     "success rate": lambda row: row.success_rate,
 }
+CONTRASTED = ("navigation", "detection")
 PUBLISHED = {
-    "navigation": ("10", "4", "1", "135", "", "", "", ""),
-    "detection": ("2", "15", "15", "forward", "", "", "", ""),
+    "navigation": ("-0.92", "10", "4", "1", "135", "", "", "", ""),
+    "detection": ("2.01", "2", "15", "15", "forward", "", "", "", ""),
 }
 
 
@@ -53,11 +59,32 @@ def page(store: Store) -> Page:
             "means": table(store),
             "seeds": seeds_table(store),
             "p_of_runs": null_table(store, QUANTITIES),
+            "contrast": contrast(store, *CONTRASTED),
             "runs": conduct_table(store),
         },
         figures=[Figure(NAME, lambda path: draw(store, path))],
         origin=store.origin,
     )
+
+
+def contrast(store: Store, less: str, more: str) -> str:
+    """TOGETHER in one group less that in the other, and as much under the null model, in words; seeds are drawn from
+    the null model's searches as often as there were runs of each group. "-" where it was not computed."""
+    found = {group: list(last_values(store.group(group), QUANTITIES[TOGETHER])) for group in (less, more)}
+    null = {group: null_model(store, group, TOGETHER, store.group(group)) for group in (less, more)}
+    if not all(found.values()) or not all(null.values()):
+        return "-"
+    value = {group: float(np.mean([seed.mean() for seed in found[group]])) for group in found}
+    chance = np.random.default_rng(0)
+    drawn = {
+        group: chance.choice(np.array(one.ends.split(), float), (POOLS, len(found[group]))).mean(axis=1)
+        for group, one in null.items()
+        if one is not None
+    }
+    apart, by_luck = value[more] - value[less], drawn[more] - drawn[less]
+    low, high = np.quantile(by_luck, [0.025, 0.975])
+    p = (1 + int((np.abs(by_luck - by_luck.mean()) >= abs(apart - by_luck.mean())).sum())) / (1 + by_luck.size)
+    return f"{apart:.2f} (null model: {np.median(by_luck):.2f} [{low:.2f}, {high:.2f}]; p = {p:.2g})"
 
 
 def _legend(store: Store) -> str:
@@ -97,7 +124,10 @@ def _shown(rows: Sequence[Row], value: Callable[[Row], float]) -> str:
 
 def draw(store: Store, path: Path) -> None:
     """A panel per quantity, a line per seed."""
-    figure, axes = new_figure(11, 5.2, columns=4, rows=2, sharex=True)
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    figure, axes = new_figure(11, 7.4, columns=3, rows=3, sharex=True)
     for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=True):
         for i, group in enumerate(store.groups):
             rows, color = store.group(group), COLORS.get(group, "#777777")
@@ -110,8 +140,12 @@ def draw(store: Store, path: Path) -> None:
                 place.plot([end, end], [found.low, found.high], color=color, lw=2.5, alpha=0.5)
                 place.plot(end, found.mean, "o", color=color, ms=4)
         place.set_title(name, fontsize=10)
-    for place in axes[1]:
+    for place in axes[-1]:
         place.set_xlabel("generation")
+    lines = [Line2D([], [], color=COLORS.get(group, "#777777"), label=group) for group in store.groups]
+    lines.append(Patch(color="#777777", alpha=0.25, label="null model: selection by luck"))
+    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), frameon=False)
+    figure.suptitle("What each task makes of one photoreceptor, generation by generation")
     save(figure, path)
 
 
