@@ -115,19 +115,20 @@ class CameraRays:
             if k in self._suns:
                 towards = mi.Vector3f(*list(dr.gather(mi.Vector4f, pose, mi.UInt32(_VIEW + k)))[:3])
                 weight = mi.Spectrum(dr.gather(mi.Vector4f, inputs["weights"], mi.UInt32(k)))
-                valid_light, shadow = valid, si.spawn_ray(towards)
+                reaches, shadow = valid, si.spawn_ray(towards)
             else:
                 drawn = mi.Point2f(mi.sample_tea_float32(codes, 2 * k), mi.sample_tea_float32(codes, 2 * k + 1))
                 sample, weight = light.sample_direction(si, drawn, valid)
-                towards, valid_light, shadow = sample.d, valid & (sample.pdf != 0), si.spawn_ray_to(sample.p)
+                towards, reaches, shadow = sample.d, valid & (sample.pdf != 0), si.spawn_ray_to(sample.p)
+            # New arrays: Dr.Jit's `&=` would change what both names stand for.
             if reflected is not None:
                 value = reflected * dr.abs(dr.dot(si.sh_frame.n, towards))
-                valid_light &= dr.dot(si.n, towards) * seen_from > 0
+                reaches = reaches & (dr.dot(si.n, towards) * seen_from > 0)
             else:
-                value = bsdf.eval(mi.BSDFContext(), si, si.to_local(towards), valid_light)
-                valid_light &= dr.max(value) > 0
-            valid_light &= ~scene.ray_test(shadow, valid_light)
-            total += dr.select(valid_light, value * weight, 0)
+                value = bsdf.eval(mi.BSDFContext(), si, si.to_local(towards), reaches)
+                reaches = reaches & (dr.max(value) > 0)
+            reaches = reaches & ~scene.ray_test(shadow, reaches)
+            total += dr.select(reaches, value * weight, 0)
         return total
 
 

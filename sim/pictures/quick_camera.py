@@ -29,11 +29,21 @@ _DISPLAYED = np.rint(255 * encode_srgb(np.arange(LEVELS) / (LEVELS - 1))).astype
 @dataclass(frozen=True)
 class Look:
     """picture: sRGB, (y, x, 3) uint8
-    nearness: 1 / depth along the camera's axis through pixels' middles [1/m], 0 for none, (y, x)
+    planes: that rays' ends lie in, see `RayLight`, (3, ray) · ray: which of them shows what a pixel's middle does, (pixel,)
+    fovy_deg: of the camera
     """
 
     picture: np.ndarray
-    nearness: np.ndarray
+    planes: np.ndarray
+    ray: np.ndarray
+    fovy_deg: float
+
+    def nearness(self, pixels: np.ndarray) -> np.ndarray:
+        """1 / depth along the camera's axis through the middles of pixels, counted row by row [1/m], 0 for none."""
+        across, above = plane_coordinates(self.fovy_deg, self.picture.shape[:2])
+        y, x = np.divmod(pixels, self.picture.shape[1])
+        slope_x, slope_y, ahead = self.planes[:, self.ray[pixels]]
+        return np.asarray(slope_x * across[x] + slope_y * above[y] + ahead)
 
 
 class QuickCamera:
@@ -66,31 +76,29 @@ class QuickCamera:
         if size not in self._lattices:
             self._lattices[size] = Lattice.of(size)
         lattice = self._lattices[size]
-        shown, planes = self._middles(view, lattice)
-        self._smooth(view, lattice.size, shown)
-        across, above = plane_coordinates(view.fovy_deg, size)
-        slope_x, slope_y, nearness = (plane.reshape(size) for plane in planes)
-        picture = np.ascontiguousarray(shown.T).reshape(height, width, 3)
-        return Look(picture, slope_x * across.astype(np.float32) + slope_y * above.astype(np.float32)[:, None] + nearness)
+        look, linear = self._middles(view, lattice)
+        edges = np.flatnonzero(_on_edges(look.picture))
+        if len(edges):
+            codes = CODES * edges[:, None] + np.arange(1, len(SAMPLES))
+            more = self._rays.trace(view, size, codes.ravel()).linear.reshape(3, len(edges), -1).sum(axis=2)
+            mean = (linear[:, look.ray[edges]] + more) / len(SAMPLES)
+            look.picture.reshape(-1, 3)[edges] = _displayed(mean).T
+        return look
 
-    def _middles(self, view: Viewpoint, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
-        """What the middles of all pixels show, (3, pixel) uint8, and the planes seen there (3, pixel)."""
-        first = self._rays.trace(view, lattice.size, CODES * lattice.pixels)
-        shown, planes = _displayed(first.linear), first.plane
-        between = lattice.between(_differ(shown[:, lattice.pairs[0]], shown[:, lattice.pairs[1]], SAME))
-        shown, planes = shown.take(lattice.nearest, axis=1), planes.take(lattice.nearest, axis=1)
+    def _middles(self, view: Viewpoint, lattice: Lattice) -> tuple[Look, np.ndarray]:
+        """What the middles of all pixels show, and linear sRGB along the rays that were traced, (3, ray)."""
+        found = self._rays.trace(view, lattice.size, CODES * lattice.pixels)
+        linear, planes, ray, shown = found.linear, found.plane, lattice.nearest, _displayed(found.linear)
+        picture = shown.T.copy().take(ray, axis=0)
+        rough = [np.abs(np.subtract(*(row[pair] for pair in lattice.pairs))) > SAME for row in shown.astype(np.int16)]
+        between = lattice.between(rough[0] | rough[1] | rough[2])
         if len(between):
             more = self._rays.trace(view, lattice.size, CODES * between)
-            shown[:, between], planes[:, between] = _displayed(more.linear), more.plane
-        return shown, planes
-
-    def _smooth(self, view: Viewpoint, size: tuple[int, int], shown: np.ndarray) -> None:
-        """Take more samples of pixels on edges, in place."""
-        edges = np.flatnonzero(_on_edges(shown.reshape(3, *size)))
-        if len(edges):
-            codes = CODES * edges[:, None] + np.arange(len(SAMPLES))
-            samples = self._rays.trace(view, size, codes.ravel()).linear.reshape(3, len(edges), -1)
-            shown[:, edges] = _displayed(samples.mean(axis=2))
+            picture[between] = _displayed(more.linear).T
+            ray = ray.copy()
+            ray[between] = planes.shape[1] + np.arange(len(between))
+            planes, linear = np.concatenate([planes, more.plane], axis=1), np.concatenate([linear, more.linear], axis=1)
+        return Look(picture.reshape(*lattice.size, 3), planes, ray, view.fovy_deg), linear
 
 
 def _displayed(linear: np.ndarray) -> np.ndarray:
@@ -99,11 +107,10 @@ def _displayed(linear: np.ndarray) -> np.ndarray:
     return _DISPLAYED.take((level + 0.5).astype(np.uint16))
 
 
-def _on_edges(shown: np.ndarray) -> np.ndarray:
-    """Pixels unlike a neighbour beside, above or below, (y, x); shown: (3, y, x)."""
-    across = _differ(shown[:, :, 1:], shown[:, :, :-1], EDGE)
-    along = _differ(shown[:, 1:], shown[:, :-1], EDGE)
-    found = np.zeros(shown.shape[1:], bool)
+def _on_edges(picture: np.ndarray) -> np.ndarray:
+    """Pixels unlike a neighbour beside, above or below, (y, x)."""
+    across, along = _step(picture[:, 1:], picture[:, :-1]), _step(picture[1:], picture[:-1])
+    found = np.zeros(picture.shape[:2], bool)
     found[:, 1:] |= across
     found[:, :-1] |= across
     found[1:] |= along
@@ -111,5 +118,7 @@ def _on_edges(shown: np.ndarray) -> np.ndarray:
     return found
 
 
-def _differ(a: np.ndarray, b: np.ndarray, tolerance: int) -> np.ndarray:
-    return np.asarray((np.maximum(a, b) - np.minimum(a, b)).max(axis=0) > tolerance)
+def _step(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Where pixels (y, x, 3) uint8 differ by more than EDGE."""
+    seen = np.maximum(a, b) - np.minimum(a, b) > EDGE
+    return np.asarray(seen[..., 0] | seen[..., 1] | seen[..., 2])
