@@ -57,7 +57,7 @@ class _Field:
 
     def visible(self, reach: np.ndarray) -> np.ndarray:
         """Opacity of what lies no farther than the rays of the fan reach [m], (n,)."""
-        end = reach[self.ray] + self.share * (reach[self.ray + 1] - reach[self.ray])
+        end = reach.take(self.ray) + self.share * np.diff(reach).take(self.ray)
         return np.where(self.distance <= end, self.opacity, np.float32(0))
 
 
@@ -92,15 +92,18 @@ class FieldsOfView:
     def draw(self, picture: np.ndarray, nearness: Nearness, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         """A picture (y, x, 3) uint8 with the field of every eye where nothing hides it; data: where everything is."""
         shown = picture.reshape(-1, 3).copy()
-        light = shown[self._pixels].astype(np.float32)
+        channels = [shown[:, c].take(self._pixels).astype(np.float32) for c in range(3)]
         seen = nearness(self._pixels) * self._depth < 1
         heading = float(data.joint("agent_heading").qpos[0])
         azimuths = self.eyes.azimuths() + heading
         skin = data.qpos[:2] + eye_positions(azimuths)[:, :2]
         for i, (azimuth, eye, field) in enumerate(zip(azimuths, skin, self._fields, strict=True)):
-            opacity = field.visible(_reach(azimuth + _fan(self.eyes), eye, model, data)) * seen[field.rows]
-            light[field.rows] += opacity[:, None] * (_color(i) - light[field.rows])
-        shown[self._pixels] = np.rint(light)
+            opacity = field.visible(_reach(azimuth + _fan(self.eyes), eye, model, data)) * seen.take(field.rows)
+            for light, goal in zip(channels, _color(i), strict=True):
+                before = light.take(field.rows)
+                light[field.rows] = before + opacity * (goal - before)
+        for c, light in enumerate(channels):
+            shown[self._pixels, c] = np.rint(light)
         for i, dot in enumerate(self._dots):
             _draw_dot(shown, dot, nearness, _color(i))
         return shown.reshape(picture.shape)

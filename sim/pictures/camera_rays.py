@@ -26,9 +26,9 @@ from sim.scene.variant import MitsubaObject, variant
 WAVELENGTHS_NM = (450.0, 525.0, 590.0, 630.0)
 SRGB = np.array(  # linear sRGB per radiance at these, (3, wavelength); fitted such that daylight is white
     [
-        [0.01283959, -0.38766848, 0.83202915, 0.79739912],
-        [-0.05518082, 0.81233384, 0.31467067, -0.09294204],
-        [0.84896127, 0.08213897, -0.13852297, 0.04358525],
+        [0.01277, -0.38566, 0.82772, 0.79327],
+        [-0.05517, 0.81225, 0.31464, -0.09293],
+        [0.85403, 0.08263, -0.13935, 0.04385],
     ]
 )
 

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum
+from sim.render.frozen_kernels import aligned
 from sim.scene import lights, shapes, surfaces, tessellation
 from sim.scene.mirror import VISIBLE_GROUPS, Mirror
 from sim.scene.cameras import Viewpoint
@@ -35,6 +36,10 @@ class MergedMirror(Mirror):
         outer = {f"geom_{g}_" for g in self._parts if g not in planes}
         self.closed = frozenset(n for n in self._names.values() if n.startswith("still_") or n[: n.rfind("_") + 1] in outer)
         self._parts = {g: parts for g, parts in self._parts.items() if _moves(model, g)}
+        with in_variant(self.variant):
+            for geom, parts in self._parts.items():
+                self._move(geom, parts, self._poses[geom])
+            self._params.update()
 
     @property
     def shape_names(self) -> Mapping[int, str]:
@@ -69,6 +74,16 @@ class MergedMirror(Mirror):
         box = self.model.geom_aabb[self.geoms]
         inside = (np.abs(local - box[:, :3]) <= box[:, 3:] + self.near).all(axis=1)
         return bool((inside & bounded & (sizes > 0)).any())
+
+    def _move(self, geom: int, parts: list[Part], pose: np.ndarray) -> None:
+        """As the mirror does, but arrays are aligned: a kernel is recorded anew for every alignment."""
+        for k, part in enumerate(parts):
+            for key, value in part.placement(pose).items():
+                if isinstance(value, np.ndarray):
+                    rows = aligned(len(value), np.float32)
+                    rows[:] = value
+                    value = rows
+                self._params[f"geom_{geom}_{k}.{key}"] = value
 
     def _build(self) -> MitsubaObject:
         description: Description = {"type": "scene"}

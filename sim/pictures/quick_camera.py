@@ -42,8 +42,9 @@ class Look:
         """1 / depth along the camera's axis through the middles of pixels, counted row by row [1/m], 0 for none."""
         across, above = plane_coordinates(self.fovy_deg, self.picture.shape[:2])
         y, x = np.divmod(pixels, self.picture.shape[1])
-        slope_x, slope_y, ahead = self.planes[:, self.ray[pixels]]
-        return np.asarray(slope_x * across[x] + slope_y * above[y] + ahead)
+        ray = self.ray.take(pixels)
+        slope_x, slope_y, ahead = (plane.take(ray) for plane in self.planes)
+        return np.asarray(slope_x * across.take(x) + slope_y * above.take(y) + ahead)
 
 
 class QuickCamera:
