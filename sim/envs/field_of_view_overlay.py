@@ -84,9 +84,7 @@ class FieldsOfView:
         fields = [_field(level, eyes, azimuth, eye[:2]) for azimuth, eye in zip(azimuths, places, strict=True)]
         used = np.unique(np.concatenate([field.rows for field in fields]))
         self._pixels, self._depth = level.pixels[used], level.depth[used].astype(np.float32)
-        self._fields = [
-            _Field(np.searchsorted(used, f.rows), f.opacity, f.distance, f.ray, f.share) for f in fields
-        ]
+        self._fields = [_Field(np.searchsorted(used, f.rows), f.opacity, f.distance, f.ray, f.share) for f in fields]
         self._dots = [_dot(eye + [0, 0, EYE_HEIGHT], view, size, _radius(eyes)) for eye in places]
 
     def draw(self, picture: np.ndarray, nearness: Nearness, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:

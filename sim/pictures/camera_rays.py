@@ -63,7 +63,9 @@ class CameraRays:
             self._suns = {k: light.id() for k, light in enumerate(self._lights) if _is_sun(light)}
             self._glows = any(not _is_delta(light) for light in self._lights)
             self._matt = all(_is_matt(shape.bsdf()) for shape in scene.shapes())
-            weights = np.array([_sun_weight(light) if k in self._suns else [0.0] * 4 for k, light in enumerate(self._lights)])
+            weights = np.array(
+                [_sun_weight(light) if k in self._suns else [0.0] * 4 for k, light in enumerate(self._lights)]
+            )
             samples = np.pad(SAMPLES, ((0, CODES - len(SAMPLES)), (0, 0)))
             self._inputs: dict[str, Any] = {
                 "samples": mi.Float(samples.astype(np.float32).ravel()),
@@ -106,7 +108,9 @@ class CameraRays:
         plane = [dr.select(si.is_valid() & (away != 0), dr.dot(si.n, axis) / away, 0) for axis in axes.directions]
         return *rgb, *plane
 
-    def _direct_light(self, scene: MitsubaObject, si: Array, codes: Array, pose: Array, inputs: dict[str, Array]) -> Array:
+    def _direct_light(
+        self, scene: MitsubaObject, si: Array, codes: Array, pose: Array, inputs: dict[str, Array]
+    ) -> Array:
         bsdf, valid = si.bsdf(), si.is_valid()
         reflected = bsdf.eval_diffuse_reflectance(si, valid) * dr.inv_pi if self._matt else None
         seen_from = dr.dot(si.n, si.to_world(si.wi))

@@ -16,8 +16,8 @@ import numpy as np
 from optics.spectra.spectrum import Spectrum
 from sim.render.frozen_kernels import aligned
 from sim.scene import lights, shapes, surfaces, tessellation
-from sim.scene.mirror import VISIBLE_GROUPS, Mirror
 from sim.scene.cameras import Viewpoint
+from sim.scene.mirror import VISIBLE_GROUPS, Mirror
 from sim.scene.shapes import Part
 from sim.scene.tessellation import Triangles
 from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject
@@ -34,7 +34,9 @@ class MergedMirror(Mirror):
         super().__init__(model, None, bodies=None, groups=VISIBLE_GROUPS, variant=DEFAULT_VARIANT, spectra=spectra)
         planes = {g for g in self._parts if surfaces.geom_type(model, g) == mujoco.mjtGeom.mjGEOM_PLANE}
         outer = {f"geom_{g}_" for g in self._parts if g not in planes}
-        self.closed = frozenset(n for n in self._names.values() if n.startswith("still_") or n[: n.rfind("_") + 1] in outer)
+        self.closed = frozenset(
+            n for n in self._names.values() if n.startswith("still_") or n[: n.rfind("_") + 1] in outer
+        )
         self._parts = {g: parts for g, parts in self._parts.items() if _moves(model, g)}
         with in_variant(self.variant):
             for geom, parts in self._parts.items():

@@ -4,6 +4,7 @@ First a fifth of the pixels is looked at, through their middles (`Lattice`). Wha
 looks like them; between others, all pixels are looked at. Where these differ from their neighbours, four more rays per
 pixel smooth the edge.
 """
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -29,7 +30,8 @@ _DISPLAYED = np.rint(255 * encode_srgb(np.arange(LEVELS) / (LEVELS - 1))).astype
 @dataclass(frozen=True)
 class Look:
     """picture: sRGB, (y, x, 3) uint8
-    planes: that rays' ends lie in, see `RayLight`, (3, ray) · ray: which of them shows what a pixel's middle does, (pixel,)
+    planes: that rays' ends lie in, see `RayLight`, (3, ray)
+    ray: which of them shows what a pixel's middle does, (pixel,)
     fovy_deg: of the camera
     """
 
