@@ -35,7 +35,8 @@ Nearness = Callable[[np.ndarray], np.ndarray]  # of pixels, counted row by row: 
 class _Level:
     """The level of the eyes, where the camera looks at it; all in the agent's frame.
 
-    pixels: (n,) · depth: along the camera's axis [m], (n,) · points: (n, 2) [m] · pixel: size of a pixel there [m], (n,)
+    pixels: (n,) · depth: along the camera's axis [m], (n,) · points: (n, 2) [m]
+    pixel: size of a pixel there [m], (n,)
     """
 
     pixels: np.ndarray
@@ -85,7 +86,7 @@ class FieldsOfView:
         used = np.unique(np.concatenate([field.rows for field in fields]))
         self._pixels, self._depth = level.pixels[used], level.depth[used].astype(np.float32)
         self._fields = [_Field(np.searchsorted(used, f.rows), f.opacity, f.distance, f.ray, f.share) for f in fields]
-        self._dots = [_dot(eye + [0, 0, EYE_HEIGHT], view, size, _radius(eyes)) for eye in places]
+        self._dots = [_dot(eye + np.array([0, 0, EYE_HEIGHT]), view, size, _radius(eyes)) for eye in places]
 
     def draw(self, picture: np.ndarray, nearness: Nearness, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         """A picture (y, x, 3) uint8 with the field of every eye where nothing hides it; data: where everything is."""
