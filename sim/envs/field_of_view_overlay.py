@@ -1,13 +1,20 @@
-"""What eyes look at, drawn into a picture of their world: fields of view on the eyes' level, and receptors' rays."""
+"""What eyes look at, drawn into a picture of their world: the eyes, their fields of view on their own level, and
+receptors' rays.
+
+The camera follows the agent, so that in the picture the fields are always in the same place: what changes is how far
+one sees, and what hides them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions
+from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, eye_positions
+from sim.pictures.camera_rays import plane_coordinates
 from sim.scene.cameras import Viewpoint
 
 # One colour per eye, from left to right, then again (Okabe and Ito 2008: told apart by the colour-blind, too).
@@ -19,66 +26,135 @@ FARTHEST = 30.0  # [m] of a ray that meets nothing
 MOST_RAYS = 15  # drawn of one eye, beside the rims
 FAN = 64  # rays that find out how far a field reaches
 LINE = 1.2  # [pixels] width
+IRIS, PUPIL = 0.07, 0.045  # [m] radii of an eye: of its colour, and of the black in it
+
+Nearness = Callable[[np.ndarray], np.ndarray]  # of pixels, counted row by row: 1 / depth of what is seen [1/m]
 
 
 @dataclass(frozen=True)
-class HorizontalSection:
-    """The part of a picture in which the level of the eyes is seen, nothing in front of it.
+class _Level:
+    """The level of the eyes, where the camera looks at it; all in the agent's frame.
 
-    seen: (y, x) bool · points: (y, x, 2) [m] in the world · pixel: size of a pixel there [m], (y, x)
+    pixels: (n,) · depth: along the camera's axis [m], (n,) · points: (n, 2) [m]
+    pixel: size of a pixel there [m], (n,)
     """
 
-    seen: np.ndarray
+    pixels: np.ndarray
+    depth: np.ndarray
     points: np.ndarray
     pixel: np.ndarray
 
 
-def level_of(view: Viewpoint, depth: np.ndarray) -> HorizontalSection:
-    """depth: (y, x) [m] along the camera's axis."""
-    height, width = depth.shape
-    half = np.tan(np.radians(view.fovy_deg) / 2)
-    y, x = np.indices(depth.shape)
-    right, up = (x + 0.5 - width / 2) / (height / 2) * half, -(y + 0.5 - height / 2) / (height / 2) * half
-    directions = np.stack([right, up, -np.ones_like(right)], axis=-1) @ view.rotation.T
+@dataclass(frozen=True)
+class _Field:
+    """One eye's field as it is if nothing ends it. rows: in _Level, (n,) · opacity, distance [m]: there, (n,)
+    ray, share: the ray of the fan to the right of a pixel, and how far it is to the next one, (n,)"""
+
+    rows: np.ndarray
+    opacity: np.ndarray
+    distance: np.ndarray
+    ray: np.ndarray
+    share: np.ndarray
+
+    def visible(self, reach: np.ndarray) -> np.ndarray:
+        """Opacity of what lies no farther than the rays of the fan reach [m], (n,)."""
+        end = reach.take(self.ray) + self.share * np.diff(reach).take(self.ray)
+        return np.where(self.distance <= end, self.opacity, np.float32(0))
+
+
+@dataclass(frozen=True)
+class _Dot:
+    """One eye as it is if nothing hides it. pixels: (n,) · iris, pupil: opacities (n,) · depth: of the eye [m]"""
+
+    pixels: np.ndarray
+    iris: np.ndarray
+    pupil: np.ndarray
+    depth: float
+
+
+class FieldsOfView:
+    """Draws the fields of view of one agent's eyes into pictures.
+
+    view: of the camera, in the agent's frame, whose origin is on the floor · size: of the pictures (height, width)
+    """
+
+    def __init__(self, eyes: Eyes, view: Viewpoint, size: tuple[int, int]) -> None:
+        self.eyes, level = eyes, _level(view, size)
+        azimuths = eyes.azimuths()
+        places = eye_positions(azimuths)
+        fields = [_field(level, eyes, azimuth, eye[:2]) for azimuth, eye in zip(azimuths, places, strict=True)]
+        used = np.unique(np.concatenate([field.rows for field in fields]))
+        self._pixels, self._depth = level.pixels[used], level.depth[used].astype(np.float32)
+        self._fields = [_Field(np.searchsorted(used, f.rows), f.opacity, f.distance, f.ray, f.share) for f in fields]
+        self._dots = [_dot(eye + np.array([0, 0, EYE_HEIGHT]), view, size, _radius(eyes)) for eye in places]
+
+    def draw(self, picture: np.ndarray, nearness: Nearness, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+        """A picture (y, x, 3) uint8 with the field of every eye where nothing hides it; data: where everything is."""
+        shown = picture.reshape(-1, 3).copy()
+        channels = [shown[:, c].take(self._pixels).astype(np.float32) for c in range(3)]
+        seen = nearness(self._pixels) * self._depth < 1
+        heading = float(data.joint("agent_heading").qpos[0])
+        azimuths = self.eyes.azimuths() + heading
+        skin = data.qpos[:2] + eye_positions(azimuths)[:, :2]
+        for i, (azimuth, eye, field) in enumerate(zip(azimuths, skin, self._fields, strict=True)):
+            opacity = field.visible(_reach(azimuth + _fan(self.eyes), eye, model, data)) * seen.take(field.rows)
+            for light, goal in zip(channels, _color(i), strict=True):
+                before = light.take(field.rows)
+                light[field.rows] = before + opacity * (goal - before)
+        for c, light in enumerate(channels):
+            shown[self._pixels, c] = np.rint(light)
+        for i, dot in enumerate(self._dots):
+            _draw_dot(shown, dot, nearness, _color(i))
+        return shown.reshape(picture.shape)
+
+
+def _draw_dot(shown: np.ndarray, dot: _Dot, nearness: Nearness, color: np.ndarray) -> None:
+    """In place; an agent's own body does not hide its eyes, so that one sees where it looks."""
+    free = nearness(dot.pixels) * (dot.depth - 2 * BODY_RADIUS) < 1
+    under = shown[dot.pixels].astype(np.float32)
+    colored = under + (free * dot.iris)[:, None] * (color - under)
+    shown[dot.pixels] = np.rint(colored * (1 - free * dot.pupil)[:, None])
+
+
+def _color(eye: int) -> np.ndarray:
+    return COLORS[eye % len(COLORS)].astype(np.float32)
+
+
+def _level(view: Viewpoint, size: tuple[int, int]) -> _Level:
+    across, above = plane_coordinates(view.fovy_deg, size)
+    x, y = (a.ravel() for a in np.meshgrid(across, above))
+    directions = np.stack([x, y, -np.ones_like(x)], axis=-1) @ view.rotation.T
     with np.errstate(divide="ignore"):
-        t = (EYE_HEIGHT - view.position[2]) / directions[..., 2]
-    seen = (t > 0) & (t < depth) & np.isfinite(t)
-    t = np.where(seen, t, 0.0)
-    return HorizontalSection(seen, view.position[:2] + t[..., None] * directions[..., :2], t * 2 * half / height)
+        depth = (EYE_HEIGHT - view.position[2]) / directions[:, 2]
+    pixels = np.flatnonzero((depth > 0) & np.isfinite(depth))
+    depth = depth[pixels]
+    points = view.position[:2] + depth[:, None] * directions[pixels, :2]
+    return _Level(pixels, depth, points, depth * 2 * np.tan(np.radians(view.fovy_deg) / 2) / size[0])
 
 
-def draw_fields(
-    picture: np.ndarray, view: Viewpoint, depth: np.ndarray, eyes: Eyes, model: mujoco.MjModel, data: mujoco.MjData
-) -> np.ndarray:
-    """A picture (y, x, 3) uint8 with the field of every eye where nothing hides it; data: where everything is."""
-    level = level_of(view, depth)
-    position, heading = data.qpos[:2], float(data.joint("agent_heading").qpos[0])
-    out = picture.astype(float)
-    azimuths = eyes.azimuths() + heading
-    skin = position + eye_positions(azimuths)[:, :2]
-    for i, (azimuth, eye) in enumerate(zip(azimuths, skin, strict=True)):
-        opacity = np.where(level.seen, _opacity(level, eyes, azimuth, eye, model, data), 0.0)[..., None]
-        out += opacity * (COLORS[i % len(COLORS)] - out)
-    return np.rint(out).astype(np.uint8)
-
-
-def _opacity(
-    level: HorizontalSection, eyes: Eyes, azimuth: float, eye: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData
-) -> np.ndarray:
-    """Of one eye's field, (y, x)."""
+def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field:
+    """That of the eye at `eye` (2,) [m]."""
     half = np.radians(eyes.fov_deg) / 2
     offset = level.points - eye
     distance = np.linalg.norm(offset, axis=-1)
-    angle = (np.arctan2(offset[..., 1], offset[..., 0]) - azimuth + np.pi) % (2 * np.pi) - np.pi
-    fan = np.linspace(-half, half, FAN)
-    reach = np.interp(angle, fan, _reach(azimuth + fan, eye, model, data))
-    opacity = np.where((np.abs(angle) <= half) & (distance <= reach), FILL, 0.0)
+    angle = (np.arctan2(offset[:, 1], offset[:, 0]) - azimuth + np.pi) % (2 * np.pi) - np.pi
+    opacity = np.where(np.abs(angle) <= half, FILL, 0.0)
     rims = [(ray, RIM) for ray in (-half, half)]
     for ray, strength in [*((ray, RAY) for ray in _receptor_rays(eyes)), *rims]:
         off = distance * np.abs(np.sin(angle - ray)) / np.maximum(level.pixel, 1e-9)
-        near = (np.cos(angle - ray) > 0) & (distance <= reach)
-        opacity = np.maximum(opacity, np.where(near, strength * np.clip(LINE / 2 + 0.5 - off, 0, 1), 0.0))
-    return opacity
+        line = np.where(np.cos(angle - ray) > 0, strength * np.clip(LINE / 2 + 0.5 - off, 0, 1), 0.0)
+        opacity = np.maximum(opacity, line)
+    rows = np.flatnonzero((opacity > 0) & (distance <= FARTHEST))
+    place = np.clip((angle[rows] + half) / (2 * half), 0, 1) * (FAN - 1)
+    ray = np.minimum(place.astype(np.int32), FAN - 2)
+    share = (place - ray).astype(np.float32)
+    return _Field(rows, opacity[rows].astype(np.float32), distance[rows].astype(np.float32), ray, share)
+
+
+def _fan(eyes: Eyes) -> np.ndarray:
+    """Azimuths from the eye's axis."""
+    half = np.radians(eyes.fov_deg) / 2
+    return np.linspace(-half, half, FAN)
 
 
 def _receptor_rays(eyes: Eyes) -> np.ndarray:
@@ -89,6 +165,22 @@ def _receptor_rays(eyes: Eyes) -> np.ndarray:
     return -np.arctan((2 * shown + 1 - columns) / columns * across)
 
 
+def _radius(eyes: Eyes) -> float:
+    """Of an iris [m]: such that eyes do not overlap."""
+    apart = np.abs(np.diff(eyes.azimuths())).min(initial=np.pi)
+    return float(min(IRIS, BODY_RADIUS * np.sin(apart / 2)))
+
+
+def _dot(eye: np.ndarray, view: Viewpoint, size: tuple[int, int], radius: float) -> _Dot:
+    x, y, z = (eye - view.position) @ view.rotation
+    across, above = plane_coordinates(view.fovy_deg, size)
+    off = np.hypot(across - x / -z, above[:, None] - y / -z).ravel() * -z
+    pixel = -z * float(above[0] - above[-1]) / max(size[0] - 1, 1)
+    iris, pupil = (np.clip((r - off) / pixel + 0.5, 0, 1) for r in (radius, radius * PUPIL / IRIS))
+    pixels = np.flatnonzero(iris > 0)
+    return _Dot(pixels, iris[pixels].astype(np.float32), pupil[pixels].astype(np.float32), float(-z))
+
+
 def _reach(azimuths: np.ndarray, eye: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """How far one sees along these azimuths [m], looking through the agent's own body."""
     n = len(azimuths)
@@ -97,4 +189,4 @@ def _reach(azimuths: np.ndarray, eye: np.ndarray, model: mujoco.MjModel, data: m
     origin, groups = np.array([*eye, EYE_HEIGHT]), np.array([1, 1, 1, 0, 0, 0], np.uint8)
     agent = model.body("agent").id
     mujoco.mj_multiRay(model, data, origin, rays.ravel(), groups, True, agent, hit, distance, None, n, FARTHEST)
-    return np.where(hit >= 0, distance, FARTHEST)
+    return np.where(hit >= 0, distance, FARTHEST).astype(np.float32)

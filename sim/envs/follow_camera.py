@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 
-from sim.envs.field_of_view_overlay import draw_fields
+from sim.envs.field_of_view_overlay import FieldsOfView, Nearness
 from sim.eyes.eyes import Eyes
+from sim.pictures.quick_camera import QuickCamera
 from sim.scene.cameras import Viewpoint
 from sim.scene.color import encode_srgb, preview
-from sim.scene.mirror import mirror
+from sim.scene.mirror import Mirror, mirror
 from sim.worlds.state import WorldState, pose
 from sim.worlds.world import World
 
 # [m] of the camera from the agent, and of its target ahead of it; steep enough to look over a wall behind.
 BEHIND, ABOVE, AHEAD = 4.0, 5.0, 3.0
 FOVY_DEG = 50.0
-WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m]
-SPP = 12
+WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m] of slow pictures
 SIZE = (360, 480)  # pixels (height, width)
 
 
@@ -38,31 +40,63 @@ def check_render_mode(render_mode: str | None) -> None:
 class FollowCamera:
     """A camera that follows the agent; it holds its own mirror of the world.
 
-    eyes: whose fields of view are drawn; None: no one's
+    eyes: that are drawn, with their fields of view; None: no one's
+    samples: None: quick pictures (`sim.pictures.quick_camera`); a number: so many rays through every pixel, traced by
+        Mitsuba at eight wavelengths, which takes some fifty times as long
+
+    Raises:
+        ValueError: samples below 1.
     """
 
-    def __init__(self, world: World, eyes: Eyes | None = None) -> None:
-        self.world, self.eyes = world, eyes
+    def __init__(self, world: World, eyes: Eyes | None = None, samples: int | None = None) -> None:
+        if samples is not None and (isinstance(samples, bool) or samples != int(samples) or samples < 1):
+            raise ValueError(f"samples = {samples!r}: must be a whole number, at least 1, or None, quick pictures")
+        self.world, self.eyes, self.samples = world, eyes, samples
         self._data = mujoco.MjData(world.model)
-        self._mirror = mirror(world.model, spectra=world.spectra)
+        self._quick = QuickCamera(world.model, world.spectra) if samples is None else None
+        self._mirror = mirror(world.model, spectra=world.spectra) if samples is not None else None
+        self._fields: dict[tuple[int, int], FieldsOfView] = {}
 
     def picture(self, state: WorldState, index: int = 0, size: tuple[int, int] = SIZE) -> np.ndarray:
         """sRGB picture (height, width, 3) uint8 of one world of a state."""
         pose(self._data, self.world, state, index)
-        self._mirror.sync(self._data)
         height, width = size
         view = _follow(state, index)
-        radiance = self._mirror.render(view, width, height, spp=SPP, wavelengths=WAVELENGTHS, sampler="multijitter")
-        linear = np.clip(preview(radiance, WAVELENGTHS * 1e9), 0.0, 1.0)
-        picture = np.rint(255 * encode_srgb(linear)).astype(np.uint8)
+        nearness: Nearness
+        if self._mirror is None:
+            assert self._quick is not None
+            look = self._quick.look(self._data, view, width, height)
+            picture, nearness = look.picture, look.nearness
+        else:
+            picture, nearness = self._slow_look(self._mirror, view, size)
         if self.eyes is None:
             return picture
-        depth = self._mirror.render_depth(view, width, height)
-        return draw_fields(picture, view, depth, self.eyes, self.world.model, self._data)
+        if size not in self._fields:
+            self._fields[size] = FieldsOfView(self.eyes, _behind(np.zeros(2), 0.0), size)
+        return self._fields[size].draw(picture, nearness, self.world.model, self._data)
+
+    def _slow_look(self, scene: Mirror, view: Viewpoint, size: tuple[int, int]) -> tuple[np.ndarray, Nearness]:
+        scene.sync(self._data)
+        height, width = size
+        spp = self.samples or 1
+        radiance = scene.render(view, width, height, spp=spp, wavelengths=WAVELENGTHS, sampler=_sampler(spp))
+        linear = np.clip(preview(radiance, WAVELENGTHS * 1e9), 0.0, 1.0)
+        depth = scene.render_depth(view, width, height).ravel()
+        return np.rint(255 * encode_srgb(linear)).astype(np.uint8), lambda pixels: 1 / depth[pixels]
+
+
+def _sampler(spp: int) -> str:
+    """Multijitter makes less noise; it lays samples out in rows, and rounds numbers for which it cannot."""
+    return "multijitter" if spp % math.isqrt(spp) == 0 else "independent"
 
 
 def _follow(state: WorldState, index: int) -> Viewpoint:
-    x, y = state.position[index]
-    cos, sin = np.cos(state.heading[index]), np.sin(state.heading[index])
+    return _behind(state.position[index], float(state.heading[index]))
+
+
+def _behind(position: np.ndarray, heading: float) -> Viewpoint:
+    """Where an agent there is seen from."""
+    x, y = position
+    cos, sin = np.cos(heading), np.sin(heading)
     origin = np.array([x - BEHIND * cos, y - BEHIND * sin, ABOVE])
     return Viewpoint.looking_at(origin, np.array([x + AHEAD * cos, y + AHEAD * sin, 0.0]), FOVY_DEG)

@@ -219,9 +219,15 @@ class Mirror:
                 self._params[f"geom_{geom}_{k}.{key}"] = value
 
     def _move_light(self, name: str, to_world: MitsubaObject) -> None:
-        key = f"{name}.to_world"
-        if not np.array_equal(np.array(to_world.matrix), np.array(self._params[key].matrix).reshape(4, 4)):
-            self._params[key] = mi.Transform4f(np.array(to_world.matrix))
+        matrix = np.array(to_world.matrix)
+        if f"{name}.position" in self._params:  # a light at a point, which looks the same from all sides
+            key, there = f"{name}.position", mi.Point3f(*map(float, matrix[:3, 3]))
+            same = np.array_equal(np.ravel(there), np.ravel(self._params[key]))
+        else:
+            key, there = f"{name}.to_world", mi.Transform4f(matrix)
+            same = np.array_equal(matrix, np.array(self._params[key].matrix).reshape(4, 4))
+        if not same:
+            self._params[key] = there
 
 
 def _visible(model: mujoco.MjModel, bodies: Sequence[str] | None, groups: Sequence[int]) -> list[int]:

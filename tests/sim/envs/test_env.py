@@ -94,7 +94,8 @@ def test_picture_follows_the_agent():
     assert first.dtype == np.uint8
     env.step(np.array([-1.0, 1.0]))  # turns on the spot: the body stays, the world turns
     second = env.render()
-    state, mirror = env.state, env._batch._follow_camera._mirror
+    state, camera = env.state, env._batch._follow_camera
+    mirror = sim.mirror(camera.world.model, camera._data)
     ids = mirror.render_ids(_follow(state, 0), 480, 360)
     y, x = np.nonzero(ids == mirror.model.geom("agent").id)
     assert len(y) > 50
@@ -135,6 +136,22 @@ def test_fields_are_drawn_on_the_eyes_level_and_end_where_sight_ends():
     assert at(6.0, 1.6)  # past it
     assert not at(-1.0, 0.0)
     assert 0.005 < changed.mean() < 0.3
+
+
+def test_slow_pictures_are_there_for_the_asking_and_show_the_same_fields():
+    """Both draw the same overlay from depths of their own; what differs is noise on edges, see test_quick_camera.py."""
+    env = sim.make_env("detection", EYES, rays_per_receptor=1)
+    env.reset(seed=0)
+    world, state, size = env._batch.simulation.world, env.state, (144, 192)
+    quick, slow = (FollowCamera(world, EYES, samples).picture(state, size=size).astype(int) for samples in (None, 12))
+    bare = FollowCamera(world).picture(state, size=size).astype(int)
+    assert np.abs(quick - slow).mean() < 2
+    fields = np.abs(quick - bare).max(axis=2) > 8
+    assert fields.mean() > 0.02
+    assert np.abs(quick - slow)[fields].mean() < 3
+    assert np.abs(bare - slow)[fields].mean() > 10
+    with pytest.raises(ValueError, match="samples = 0: must be a whole number, at least 1"):
+        FollowCamera(world, samples=0)
 
 
 @pytest.mark.parametrize("receptors", ["rgb", (500,), "goldfish", "mosaic"])

@@ -1,0 +1,224 @@
+"""The rays of a picture as one frozen Dr.Jit kernel, and the direct light that they find.
+
+A ray is given by a whole number: 8 times its pixel, plus which of the pixel's samples it is. Every light is asked for
+once per ray, whereas Mitsuba's `direct` draws one of them at random: lights that shine from a point or in one direction
+then make no noise. Skies and glowing geoms do, but the fixed samples of a pixel keep theirs in place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.pictures.merged_mirror import MergedMirror
+from sim.render.frozen_kernels import aligned, garbage_kept
+from sim.scene.cameras import Viewpoint
+from sim.scene.variant import MitsubaObject, variant
+
+# Four wavelengths are one mi.Spectrum. Of all sets of them, 5 nm apart and at least 25 nm from each other, these come
+# closest to `sim.scene.color.preview` at the eight of the slow picture, over colours and white in daylight.
+WAVELENGTHS_NM = (450.0, 525.0, 590.0, 630.0)
+SRGB = np.array(  # linear sRGB per radiance at these, (3, wavelength); fitted such that daylight is white
+    [
+        [0.01277, -0.38566, 0.82772, 0.79327],
+        [-0.05517, 0.81225, 0.31464, -0.09293],
+        [0.85403, 0.08263, -0.13935, 0.04385],
+    ]
+)
+
+# A pixel's samples, from its middle [pixels]: the middle first, and no two in one column or row of fifths.
+SAMPLES = np.array([[0, 0], [0.2, 0.4], [0.4, -0.2], [-0.2, -0.4], [-0.4, 0.2]])
+CODES = 8  # per pixel
+NESTED = 64  # bodies in each other that a camera may be inside of
+_VIEW = 5  # rows of four of a view: position, columns of the rotation, (half, near, width, height)
+
+
+@dataclass(frozen=True)
+class RayLight:
+    """What rays found.
+
+    linear: sRGB, not clipped, (3, ray)
+    plane: 1 / depth [1/m] = plane @ (across, above, 1) of the plane that touches what was met, for all rays of the
+        picture (`plane_coordinates`); 0 where nothing was met, (3, ray)
+    """
+
+    linear: np.ndarray
+    plane: np.ndarray
+
+
+class CameraRays:
+    """Traces rays of cameras through one mirror, in the pose that the mirror has when it is asked."""
+
+    def __init__(self, mirror: MergedMirror) -> None:
+        self.mirror = mirror
+        with variant(mirror.variant):
+            scene = mirror.scene
+            self._lights = list(scene.emitters())
+            self._suns = {k: light.id() for k, light in enumerate(self._lights) if _is_sun(light)}
+            self._glows = any(not _is_delta(light) for light in self._lights)
+            self._matt = all(_is_matt(shape.bsdf()) for shape in scene.shapes())
+            weights = np.array(
+                [_sun_weight(light) if k in self._suns else [0.0] * 4 for k, light in enumerate(self._lights)]
+            )
+            samples = np.pad(SAMPLES, ((0, CODES - len(SAMPLES)), (0, 0)))
+            self._inputs: dict[str, Any] = {
+                "samples": mi.Float(samples.astype(np.float32).ravel()),
+                "weights": mi.Float(np.append(weights, np.zeros(4)).astype(np.float32)),
+                "closed": mi.UInt32(_closed(mirror)),
+                # BSDFs among the inputs make the recording collect their textures.
+                "bsdfs": mi.BSDFPtr([shape.bsdf() for shape in scene.shapes()]),
+            }
+            self._outside: Any = dr.freeze(lambda *args: self._trace(*args, inside=False))
+            self._inside: Any = dr.freeze(lambda *args: self._trace(*args, inside=True))
+
+    def trace(self, view: Viewpoint, size: tuple[int, int], codes: np.ndarray) -> RayLight:
+        """Light along rays of a picture of size (height, width)."""
+        traced = self._inside if self.mirror.surrounds(view.position) else self._outside
+        suns = {k: self.mirror.towards(name, view) for k, name in self._suns.items()}
+        with variant(self.mirror.variant), garbage_kept():
+            pose = mi.Float(_pose(view, size, self.mirror.near, suns, len(self._lights)))
+            lanes = aligned(len(codes), np.uint32)
+            lanes[:] = codes
+            found = traced(self.mirror.scene, mi.UInt32(lanes), pose, self._inputs)
+            rows = np.stack([component.numpy() for component in found])
+        return RayLight(rows[:3], rows[3:])
+
+    @property
+    def recordings(self) -> int:
+        """How often the kernels were recorded."""
+        return int(self._outside.n_recordings + self._inside.n_recordings)
+
+    def _trace(
+        self, scene: MitsubaObject, codes: Array, pose: Array, inputs: dict[str, Array], inside: bool
+    ) -> tuple[Array, ...]:
+        ray, axes = _ray(codes, pose, inputs["samples"])
+        si = scene.ray_intersect(ray)
+        if inside:
+            si = _looked_out_of(scene, si, ray, inputs["closed"])
+        si.wavelengths = mi.Spectrum(*WAVELENGTHS_NM)
+        light = self._direct_light(scene, si, codes, pose, inputs)
+        rgb = [sum(float(w) * light[b] for b, w in enumerate(row)) for row in SRGB]
+        away = dr.dot(si.n, si.p - axes.position)
+        plane = [dr.select(si.is_valid() & (away != 0), dr.dot(si.n, axis) / away, 0) for axis in axes.directions]
+        return *rgb, *plane
+
+    def _direct_light(
+        self, scene: MitsubaObject, si: Array, codes: Array, pose: Array, inputs: dict[str, Array]
+    ) -> Array:
+        bsdf, valid = si.bsdf(), si.is_valid()
+        reflected = bsdf.eval_diffuse_reflectance(si, valid) * dr.inv_pi if self._matt else None
+        seen_from = dr.dot(si.n, si.to_world(si.wi))
+        total = si.emitter(scene).eval(si) if self._glows else mi.Spectrum(0)
+        for k, light in enumerate(self._lights):
+            if k in self._suns:
+                towards = mi.Vector3f(*list(dr.gather(mi.Vector4f, pose, mi.UInt32(_VIEW + k)))[:3])
+                weight = mi.Spectrum(dr.gather(mi.Vector4f, inputs["weights"], mi.UInt32(k)))
+                reaches, shadow = valid, si.spawn_ray(towards)
+            else:
+                drawn = mi.Point2f(mi.sample_tea_float32(codes, 2 * k), mi.sample_tea_float32(codes, 2 * k + 1))
+                sample, weight = light.sample_direction(si, drawn, valid)
+                towards, reaches, shadow = sample.d, valid & (sample.pdf != 0), si.spawn_ray_to(sample.p)
+            # New arrays: Dr.Jit's `&=` would change what both names stand for.
+            if reflected is not None:
+                value = reflected * dr.abs(dr.dot(si.sh_frame.n, towards))
+                reaches = reaches & (dr.dot(si.n, towards) * seen_from > 0)
+            else:
+                value = bsdf.eval(mi.BSDFContext(), si, si.to_local(towards), reaches)
+                reaches = reaches & (dr.max(value) > 0)
+            reaches = reaches & ~scene.ray_test(shadow, reaches)
+            total += dr.select(reaches, value * weight, 0)
+        return total
+
+
+def _looked_out_of(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
+    """What rays meet that go through the inner sides of closed shapes."""
+
+    def leaving(si: Array, ray: Array, turn: Array) -> Array:
+        out = si.is_valid() & (dr.dot(si.n, ray.d) > 0) & (turn < NESTED)
+        shape = dr.reinterpret_array(mi.UInt32, si.shape)
+        return out & (dr.gather(mi.UInt32, closed, shape, out) == 1)
+
+    def further(si: Array, ray: Array, turn: Array) -> tuple[Array, ...]:
+        # As `sim.scene.rays` has it: along the ray alone.
+        step = si.t * (1 + 1e-5) + 4e-6 * (1 + dr.max(dr.abs(ray.o)))
+        onwards = mi.Ray3f(ray(step), ray.d)
+        return scene.ray_intersect(onwards), onwards, turn + 1
+
+    return dr.while_loop((si, ray, mi.UInt32(0)), leaving, further, label="inner sides")[0]
+
+
+@dataclass(frozen=True)
+class _Axes:
+    """position: of the camera · directions: to the right, up and ahead."""
+
+    position: Array
+    directions: tuple[Array, Array, Array]
+
+
+def _ray(codes: Array, pose: Array, samples: Array) -> tuple[Array, _Axes]:
+    position, right, up, back, more = (dr.gather(mi.Vector4f, pose, mi.UInt32(k)) for k in range(_VIEW))
+    half, near, width, height = more
+    pixel = codes // CODES
+    offset = dr.gather(mi.Point2f, samples, codes - pixel * CODES)
+    # In floats: whole numbers divided by 0 in a packet's idle lanes end the process.
+    row = dr.floor((mi.Float(pixel) + 0.5) / width)
+    x, y = mi.Float(pixel) - row * width + 0.5 + offset.x, row + 0.5 + offset.y
+    axes = _Axes(mi.Point3f(*list(position)[:3]), tuple(mi.Vector3f(*list(v)[:3]) for v in (right, up, -back)))
+    across, above = (2 * x - width) / height * half, (1 - 2 * y / height) * half
+    along = across * axes.directions[0] + above * axes.directions[1] + axes.directions[2]
+    return mi.Ray3f(axes.position + near * along, dr.normalize(along)), axes
+
+
+def plane_coordinates(fovy_deg: float, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """How far the rays through pixels' middles go to the right (x,) and up (y,) per unit of depth."""
+    height, width = size
+    half = np.tan(np.radians(fovy_deg) / 2)
+    across = (2 * (np.arange(width) + 0.5) - width) / height * half
+    return across, (1 - 2 * (np.arange(height) + 0.5) / height) * half
+
+
+def _pose(
+    view: Viewpoint, size: tuple[int, int], near: float, suns: Mapping[int, np.ndarray], n_lights: int
+) -> np.ndarray:
+    """All that changes from frame to frame, in fours."""
+    rows = aligned(4 * (_VIEW + n_lights), np.float32).reshape(-1, 4)
+    rows[0, :3], rows[1:4, :3] = view.position, view.rotation.T
+    rows[4] = np.tan(np.radians(view.fovy_deg) / 2), near, size[1], size[0]
+    for k, towards in suns.items():
+        rows[_VIEW + k, :3] = towards
+    return rows.ravel()
+
+
+def _closed(mirror: MergedMirror) -> np.ndarray:
+    """By the shapes' ids: whether a camera within looks out of it."""
+    names = mirror.shape_names
+    return np.array([names.get(i, "") in mirror.closed for i in range(max(names) + 1)], np.uint32)
+
+
+def _is_delta(light: MitsubaObject) -> bool:
+    """Whether it shines from a point or in one direction."""
+    return bool(int(light.flags()) & (int(mi.EmitterFlags.DeltaPosition) | int(mi.EmitterFlags.DeltaDirection)))
+
+
+def _is_sun(light: MitsubaObject) -> bool:
+    return bool(light.class_name() == "DirectionalEmitter")
+
+
+def _sun_weight(light: MitsubaObject) -> np.ndarray:
+    """Irradiance on a surface that faces it, (wavelength,)."""
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wavelengths = mi.Spectrum(*WAVELENGTHS_NM)
+    _, weight = light.sample_direction(si, mi.Point2f(0.5))
+    return np.array(weight, dtype=float).ravel()
+
+
+def _is_matt(bsdf: MitsubaObject) -> bool:
+    """Whether it is a Lambertian reflector, on one side or both."""
+    sides = int(mi.BSDFFlags.FrontSide) | int(mi.BSDFFlags.BackSide) | int(mi.BSDFFlags.SpatiallyVarying)
+    return int(bsdf.flags()) & ~sides == int(mi.BSDFFlags.DiffuseReflection)

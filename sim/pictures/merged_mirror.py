@@ -1,0 +1,119 @@
+"""A mirror of fewer shapes: what never moves is one mesh per material.
+
+Every shape costs time in every launch of a kernel, and every geom in every `sync`. Which geom is seen can no longer be
+told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from optics.spectra.spectrum import Spectrum
+from sim.render.frozen_kernels import aligned
+from sim.scene import lights, shapes, surfaces, tessellation
+from sim.scene.cameras import Viewpoint
+from sim.scene.mirror import VISIBLE_GROUPS, Mirror
+from sim.scene.shapes import Part
+from sim.scene.tessellation import Triangles
+from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject
+from sim.scene.variant import variant as in_variant
+
+
+class MergedMirror(Mirror):
+    """A Mitsuba scene that mirrors all of a model; shapes that move are "geom_<geom id>_<part>", others "still_<n>".
+
+    closed: names of the shapes that a camera within them looks out of
+    """
+
+    def __init__(self, model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None = None) -> None:
+        super().__init__(model, None, bodies=None, groups=VISIBLE_GROUPS, variant=DEFAULT_VARIANT, spectra=spectra)
+        planes = {g for g in self._parts if surfaces.geom_type(model, g) == mujoco.mjtGeom.mjGEOM_PLANE}
+        outer = {f"geom_{g}_" for g in self._parts if g not in planes}
+        self.closed = frozenset(
+            n for n in self._names.values() if n.startswith("still_") or n[: n.rfind("_") + 1] in outer
+        )
+        self._parts = {g: parts for g, parts in self._parts.items() if _moves(model, g)}
+        with in_variant(self.variant):
+            for geom, parts in self._parts.items():
+                self._move(geom, parts, self._poses[geom])
+            self._params.update()
+
+    @property
+    def shape_names(self) -> Mapping[int, str]:
+        """Of the scene's shapes, by the ids that Dr.Jit gave them."""
+        return self._names
+
+    @property
+    def near(self) -> float:
+        """How far from a camera anything is seen [m], along its axis."""
+        return self._near()
+
+    def face(self, view: Viewpoint) -> None:
+        """Turn the camera's headlight, if there is one, to where the camera looks."""
+        if any(emitter.name == lights.HEADLIGHT for emitter in self._emitters):
+            with in_variant(self.variant):
+                self._move_light(lights.HEADLIGHT, lights.aimed(view.position, -view.rotation[:, 2]))
+                self._params.update()
+
+    def towards(self, name: str, view: Viewpoint) -> np.ndarray:
+        """Unit vector (3,) towards a light that shines in one direction; the headlight shines as the camera looks."""
+        if name == lights.HEADLIGHT:
+            return view.rotation[:, 2]
+        (light,) = (emitter.light for emitter in self._emitters if emitter.name == name)
+        direction = -self._data.light_xdir[light]
+        return np.asarray(direction / np.linalg.norm(direction))
+
+    def surrounds(self, point: np.ndarray) -> bool:
+        """Whether a point may be inside of a geom: whether it is inside of one's bounding sphere or box."""
+        sizes, bounded = self.model.geom_rbound[self.geoms], self.model.geom_rbound[self.geoms] > 0
+        offset = point - self._data.geom_xpos[self.geoms]
+        local = np.einsum("gij,gi->gj", self._data.geom_xmat[self.geoms].reshape(-1, 3, 3), offset)
+        box = self.model.geom_aabb[self.geoms]
+        inside = (np.abs(local - box[:, :3]) <= box[:, 3:] + self.near).all(axis=1)
+        return bool((inside & bounded & (sizes > 0)).any())
+
+    def _move(self, geom: int, parts: list[Part], pose: np.ndarray) -> None:
+        """As the mirror does, but arrays are aligned: a kernel is recorded anew for every alignment."""
+        for k, part in enumerate(parts):
+            for key, value in part.placement(pose).items():
+                if isinstance(value, np.ndarray):
+                    rows = aligned(len(value), np.float32)
+                    rows[:] = value
+                    value = rows
+                self._params[f"geom_{geom}_{k}.{key}"] = value
+
+    def _build(self) -> MitsubaObject:
+        description: Description = {"type": "scene"}
+        still: dict[tuple[int, bool, bool], tuple[MitsubaObject, list[Triangles]]] = {}
+        for geom, parts in self._parts.items():
+            glow = self._glow(geom)
+            for k, part in enumerate(parts):
+                name, bsdf = f"geom_{geom}_{k}", self._bsdf(geom, part.mirrors)
+                if part.triangles is None or glow is not None or _moves(self.model, geom):
+                    description[name] = shapes.build(part, self._poses[geom], name, bsdf, glow)
+                    continue
+                placed = _placed(part.triangles, self._poses[geom])
+                key = id(bsdf), placed.uv is None, placed.normals is None
+                still.setdefault(key, (bsdf, []))[1].append(placed)
+        for i, (bsdf, triangles) in enumerate(still.values()):
+            whole = Part(triangles=tessellation.join(triangles))
+            description[f"still_{i}"] = shapes.build(whole, np.eye(4), f"still_{i}", bsdf, None)
+        for emitter in self._emitters:
+            description[emitter.name] = emitter.description
+        return mi.load_dict(description, optimize=False)
+
+
+def _moves(model: mujoco.MjModel, geom: int) -> bool:
+    body = model.geom_bodyid[geom]
+    return bool(model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0)
+
+
+def _placed(triangles: Triangles, pose: np.ndarray) -> Triangles:
+    """Triangles of a geom's frame in the world's."""
+    normals = None if triangles.normals is None else triangles.normals @ pose[:3, :3].T
+    return replace(triangles, vertices=triangles.vertices @ pose[:3, :3].T + pose[:3, 3], normals=normals)

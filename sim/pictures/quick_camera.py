@@ -1,0 +1,127 @@
+"""Pictures with smooth edges, from few rays.
+
+First a fifth of the pixels is looked at, through their middles (`Lattice`). What lies between two that look the same
+looks like them; between others, all pixels are looked at. Where these differ from their neighbours, four more rays per
+pixel smooth the edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from optics.spectra.spectrum import Spectrum
+from sim.pictures.camera_rays import CODES, SAMPLES, CameraRays, plane_coordinates
+from sim.pictures.lattice import Lattice
+from sim.pictures.merged_mirror import MergedMirror
+from sim.scene.cameras import Viewpoint
+from sim.scene.color import encode_srgb
+from sim.scene.rays import check_size
+
+# Of 255. Steps between neighbours up to EDGE are not seen to be jagged; what differs by up to SAME is the same.
+EDGE, SAME = 8, 1
+LEVELS = 1 << 14  # of linear light in the table of sRGB values: finer than the steps of 8 bits where it is dark
+_DISPLAYED = np.rint(255 * encode_srgb(np.arange(LEVELS) / (LEVELS - 1))).astype(np.uint8)
+
+
+@dataclass(frozen=True)
+class Look:
+    """picture: sRGB, (y, x, 3) uint8
+    planes: that rays' ends lie in, see `RayLight`, (3, ray)
+    ray: which of them shows what a pixel's middle does, (pixel,)
+    fovy_deg: of the camera
+    """
+
+    picture: np.ndarray
+    planes: np.ndarray
+    ray: np.ndarray
+    fovy_deg: float
+
+    def nearness(self, pixels: np.ndarray) -> np.ndarray:
+        """1 / depth along the camera's axis through the middles of pixels, counted row by row [1/m], 0 for none."""
+        across, above = plane_coordinates(self.fovy_deg, self.picture.shape[:2])
+        y, x = np.divmod(pixels, self.picture.shape[1])
+        ray = self.ray.take(pixels)
+        slope_x, slope_y, ahead = (plane.take(ray) for plane in self.planes)
+        return np.asarray(slope_x * across.take(x) + slope_y * above.take(y) + ahead)
+
+
+class QuickCamera:
+    """Looks at any MuJoCo model as its mirror shows it in direct light (`sim.mirror`), without OpenGL.
+
+    model, spectra: as `sim.mirror` has them
+    """
+
+    def __init__(self, model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None = None) -> None:
+        self.mirror = MergedMirror(model, spectra)
+        self._rays = CameraRays(self.mirror)
+        self._lattices: dict[tuple[int, int], Lattice] = {}
+
+    def picture(self, data: mujoco.MjData, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
+        """sRGB picture (height, width, 3) uint8 of where data has everything.
+
+        camera: name or id of a camera of the model, or a Viewpoint
+
+        Raises:
+            ValueError: an unknown camera, less than one pixel, and what `Mirror.sync` refuses.
+        """
+        return self.look(data, camera, width, height).picture
+
+    def look(self, data: mujoco.MjData, camera: str | int | Viewpoint, width: int, height: int) -> Look:
+        """The same, and how near everything is."""
+        check_size(width, height, 1)
+        self.mirror.sync(data)
+        view, size = self.mirror.viewpoint(camera), (height, width)
+        self.mirror.face(view)
+        if size not in self._lattices:
+            self._lattices[size] = Lattice.of(size)
+        lattice = self._lattices[size]
+        look, linear = self._middles(view, lattice)
+        edges = np.flatnonzero(_on_edges(look.picture))
+        if len(edges):
+            codes = CODES * edges[:, None] + np.arange(1, len(SAMPLES))
+            more = self._rays.trace(view, size, codes.ravel()).linear.reshape(3, len(edges), -1).sum(axis=2)
+            mean = (linear[:, look.ray[edges]] + more) / len(SAMPLES)
+            look.picture.reshape(-1, 3)[edges] = _displayed(mean).T
+        return look
+
+    def _middles(self, view: Viewpoint, lattice: Lattice) -> tuple[Look, np.ndarray]:
+        """What the middles of all pixels show, and linear sRGB along the rays that were traced, (3, ray)."""
+        found = self._rays.trace(view, lattice.size, CODES * lattice.pixels)
+        linear, planes, ray, shown = found.linear, found.plane, lattice.nearest, _displayed(found.linear)
+        picture = shown.T.copy().take(ray, axis=0)
+        rough = [np.abs(np.subtract(*(row[pair] for pair in lattice.pairs))) > SAME for row in shown.astype(np.int16)]
+        between = lattice.between(rough[0] | rough[1] | rough[2])
+        if len(between):
+            more = self._rays.trace(view, lattice.size, CODES * between)
+            picture[between] = _displayed(more.linear).T
+            ray = ray.copy()
+            ray[between] = planes.shape[1] + np.arange(len(between))
+            planes, linear = np.concatenate([planes, more.plane], axis=1), np.concatenate([linear, more.linear], axis=1)
+        return Look(picture.reshape(*lattice.size, 3), planes, ray, view.fovy_deg), linear
+
+
+def _displayed(linear: np.ndarray) -> np.ndarray:
+    level = np.clip(linear, 0.0, 1.0)
+    level *= LEVELS - 1
+    return _DISPLAYED.take((level + 0.5).astype(np.uint16))
+
+
+def _on_edges(picture: np.ndarray) -> np.ndarray:
+    """Pixels unlike a neighbour beside, above or below, (y, x)."""
+    across, along = _step(picture[:, 1:], picture[:, :-1]), _step(picture[1:], picture[:-1])
+    found = np.zeros(picture.shape[:2], bool)
+    found[:, 1:] |= across
+    found[:, :-1] |= across
+    found[1:] |= along
+    found[:-1] |= along
+    return found
+
+
+def _step(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Where pixels (y, x, 3) uint8 differ by more than EDGE."""
+    seen = np.maximum(a, b) - np.minimum(a, b) > EDGE
+    return np.asarray(seen[..., 0] | seen[..., 1] | seen[..., 2])

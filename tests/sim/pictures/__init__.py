@@ -1,0 +1,7 @@
+"""Quick pictures against slow ones.
+
+quick_camera: test_quick_camera.py
+camera_rays: test_quick_camera.py
+lattice: test_lattice.py
+merged_mirror: test_quick_camera.py
+"""
