@@ -42,7 +42,7 @@ class FollowCamera:
 
     eyes: that are drawn, with their fields of view; None: no one's
     samples: None: quick pictures (`sim.pictures.quick_camera`); a number: so many rays through every pixel, traced by
-        Mitsuba at eight wavelengths, which takes some fifty times as long
+        Mitsuba at eight wavelengths, which takes twenty to fifty times as long
 
     Raises:
         ValueError: samples below 1.

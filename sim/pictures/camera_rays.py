@@ -74,8 +74,8 @@ class CameraRays:
                 # BSDFs among the inputs make the recording collect their textures.
                 "bsdfs": mi.BSDFPtr([shape.bsdf() for shape in scene.shapes()]),
             }
-            self._outside: Any = dr.freeze(lambda *args: self._trace(*args, inside=False))
-            self._inside: Any = dr.freeze(lambda *args: self._trace(*args, inside=True))
+            self._outside: Any = dr.freeze(lambda *args: self._trace(False, *args))
+            self._inside: Any = dr.freeze(lambda *args: self._trace(True, *args))
 
     def trace(self, view: Viewpoint, size: tuple[int, int], codes: np.ndarray) -> RayLight:
         """Light along rays of a picture of size (height, width)."""
@@ -95,7 +95,7 @@ class CameraRays:
         return int(self._outside.n_recordings + self._inside.n_recordings)
 
     def _trace(
-        self, scene: MitsubaObject, codes: Array, pose: Array, inputs: dict[str, Array], inside: bool
+        self, inside: bool, scene: MitsubaObject, codes: Array, pose: Array, inputs: dict[str, Array]
     ) -> tuple[Array, ...]:
         ray, axes = _ray(codes, pose, inputs["samples"])
         si = scene.ray_intersect(ray)
@@ -141,7 +141,7 @@ def _looked_out_of(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -
 
     def leaving(si: Array, ray: Array, turn: Array) -> Array:
         out = si.is_valid() & (dr.dot(si.n, ray.d) > 0) & (turn < NESTED)
-        shape = dr.reinterpret_array(mi.UInt32, si.shape)
+        shape: Array = dr.reinterpret_array(mi.UInt32, si.shape)
         return out & (dr.gather(mi.UInt32, closed, shape, out) == 1)
 
     def further(si: Array, ray: Array, turn: Array) -> tuple[Array, ...]:
@@ -169,7 +169,8 @@ def _ray(codes: Array, pose: Array, samples: Array) -> tuple[Array, _Axes]:
     # In floats: whole numbers divided by 0 in a packet's idle lanes end the process.
     row = dr.floor((mi.Float(pixel) + 0.5) / width)
     x, y = mi.Float(pixel) - row * width + 0.5 + offset.x, row + 0.5 + offset.y
-    axes = _Axes(mi.Point3f(*list(position)[:3]), tuple(mi.Vector3f(*list(v)[:3]) for v in (right, up, -back)))
+    rightwards, upwards, ahead = (mi.Vector3f(*list(axis)[:3]) for axis in (right, up, -back))
+    axes = _Axes(mi.Point3f(*list(position)[:3]), (rightwards, upwards, ahead))
     across, above = (2 * x - width) / height * half, (1 - 2 * y / height) * half
     along = across * axes.directions[0] + above * axes.directions[1] + axes.directions[2]
     return mi.Ray3f(axes.position + near * along, dr.normalize(along)), axes
@@ -212,7 +213,7 @@ def _is_sun(light: MitsubaObject) -> bool:
 
 def _sun_weight(light: MitsubaObject) -> np.ndarray:
     """Irradiance on a surface that faces it, (wavelength,)."""
-    si = dr.zeros(mi.SurfaceInteraction3f)
+    si: Array = dr.zeros(mi.SurfaceInteraction3f)
     si.wavelengths = mi.Spectrum(*WAVELENGTHS_NM)
     _, weight = light.sample_direction(si, mi.Point2f(0.5))
     return np.array(weight, dtype=float).ravel()

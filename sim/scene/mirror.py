@@ -220,14 +220,12 @@ class Mirror:
 
     def _move_light(self, name: str, to_world: MitsubaObject) -> None:
         matrix = np.array(to_world.matrix)
-        if f"{name}.position" in self._params:  # a light at a point, which looks the same from all sides
-            key, there = f"{name}.position", mi.Point3f(*map(float, matrix[:3, 3]))
-            same = np.array_equal(np.ravel(there), np.ravel(self._params[key]))
-        else:
-            key, there = f"{name}.to_world", mi.Transform4f(matrix)
-            same = np.array_equal(matrix, np.array(self._params[key].matrix).reshape(4, 4))
-        if not same:
-            self._params[key] = there
+        if (key := f"{name}.position") in self._params:  # a light at a point, which looks the same from all sides
+            place = matrix[:3, 3].astype(np.float32)
+            if not np.array_equal(place, np.array(self._params[key]).ravel()):
+                self._params[key] = mi.Point3f(*place.tolist())
+        elif not np.array_equal(matrix, np.array(self._params[key := f"{name}.to_world"].matrix).reshape(4, 4)):
+            self._params[key] = mi.Transform4f(matrix)
 
 
 def _visible(model: mujoco.MjModel, bodies: Sequence[str] | None, groups: Sequence[int]) -> list[int]:
