@@ -201,6 +201,8 @@ def _write_whole(path: Path, write: Any) -> None:
     """Write to a neighbouring temporary file, flush it to the disk, and give it its name."""
     temporary = str(path.with_name(f".{path.name}.{os.getpid()}.tmp"))  # not tempfile's, which none but we may read
     try:
+        Path(temporary).unlink(missing_ok=True)  # a link, maybe, that leads elsewhere
+        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
         write(temporary)
         with open(temporary, "rb+") as file:
             os.fsync(file.fileno())

@@ -74,6 +74,7 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
     body = f"<header><h1>{len(runs)} runs</h1></header>\n" + section(
         "runs", "Side by side", f'<div class="figures">{drawn}</div>\n{table(header, rows, "comparison")}'
     )
+    path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, document("runs side by side", body))
 
 

@@ -13,6 +13,7 @@ from evolve.config.numbering import Place
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import Genotype
 from evolve.store.candidate import Candidate
+from evolve.store.regular_files import opened, read
 
 __all__ = ["Record", "RunError"]
 
@@ -46,7 +47,7 @@ class Record:
             RunError: the file cannot be read, or a line is damaged; names file and line.
         """
         try:
-            content = path.read_bytes()
+            content = read(path)
         except OSError as error:
             raise RunError(f"{path}: cannot be read: {error.strerror}") from error
         whole_bytes = content.rfind(b"\n") + 1
@@ -76,12 +77,14 @@ class Record:
             raise RunError(f"{self.path.parent}: candidate {candidate.id} has been evaluated already")
         line = candidate.to_line().encode()
         try:
-            with self.path.open("ab") as file:
+            with opened(self.path, "ab") as file:
                 if file.tell() != self._whole_bytes:  # the directory was deleted, say, and another run begun in it
                     raise RunError(f"{self.path}: is no longer as this process left it; nothing is added")
                 file.write(line)
                 file.flush()
                 os.fsync(file.fileno())
+        except FileNotFoundError:
+            raise RunError(f"{self.path}: is no longer as this process left it; nothing is added") from None
         except OSError as error:
             raise RunError(f"{self.path}: cannot be written: {error.strerror}") from error
         self._whole_bytes += len(line)
@@ -95,7 +98,7 @@ class Record:
             RunError: the file cannot be written.
         """
         try:
-            with self.path.open("r+b") as file:
+            with opened(self.path, "r+b") as file:
                 file.truncate(self._whole_bytes)
                 os.fsync(file.fileno())
         except OSError as error:
