@@ -10,7 +10,7 @@ import errno
 import os
 import stat
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Literal
 
 __all__ = [
     "StrangeFileError",
@@ -37,7 +37,7 @@ class StrangeFileError(OSError):
     """Something else stands where a run has a file or a folder of its own; `strerror` and `filename` say what."""
 
 
-def opened(path: Path, mode: str = "rb", create: bool = False) -> BinaryIO:
+def opened(path: Path, mode: Literal["rb", "r+b", "ab"] = "rb", create: bool = False) -> BinaryIO:
     """A run's file, opened: "rb", "r+b" or "ab". None of them truncates, and only `create` makes one that is missing.
 
     Raises:

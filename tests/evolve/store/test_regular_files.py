@@ -1,4 +1,4 @@
-"""A stranger's run directory: whatever bears the name of a file in it, nothing outside is read, written or waited for."""
+"""A stranger's run: whatever bears the name of a file in it, nothing outside is read, written or waited for."""
 
 import os
 import socket
