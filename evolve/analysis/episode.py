@@ -15,6 +15,7 @@ import sim
 from evolve.config.formats import task_then
 from evolve.config.run_config import EyeConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
+from evolve.genome.plain_values import parsed
 from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run, RunError
@@ -97,7 +98,7 @@ class Episode:
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays = dict(file)
-            rest = json.loads(str(arrays.pop("rest")))
+            rest = parsed(str(arrays.pop("rest")))
             rest |= {"phenotype": Phenotype.from_json(rest["phenotype"]), "eye": EyeConfig(**rest["eye"])}
             if "course" not in rest.setdefault("world", {}):
                 rest["task"] = task_then(rest["task"])

@@ -17,6 +17,7 @@ from evolve.store.regular_files import opened, read
 
 __all__ = ["Record", "RunError"]
 
+LAST_LINE = "; it is the last line: without it, the run goes on, and evaluates this candidate again"
 Lines = dict[tuple[int, int], Candidate]  # (candidate id, rung) -> the candidate as it was there
 
 
@@ -62,7 +63,8 @@ class Record:
                 candidate = Candidate.from_line(text.decode())
                 _require_agreement(candidate, config, dimension, lines)
             except ValueError as error:
-                raise RunError(f"{path}, line {number}: is damaged: {error}") from error
+                hint = LAST_LINE if number == len(texts) else ""
+                raise RunError(f"{path}, line {number}: is damaged: {error}{hint}") from error
             lines[candidate.id, candidate.rung] = candidate
         return cls(path, lines, _furthest(lines), notice, whole_bytes)
 

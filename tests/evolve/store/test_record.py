@@ -87,7 +87,7 @@ DAMAGE = {
     "zeros": (b"\0" * 64 + b"\n", "Expecting"),
     "no record": ("[1]\n", "must hold exactly"),
     "missing": (damaged(lambda r: r.pop("genome")), "must hold exactly"),
-    "wrong type": (damaged(lambda r: r.update(genome=None)), "wrong type"),
+    "wrong type": (damaged(lambda r: r.update(genome=None)), "genome = None: must be a list"),
     "wrong phenotype": (damaged(lambda r: r["phenotype"].pop("n_eyes")), "n_eyes"),
     "wrong genome": (damaged(lambda r: r["genome"].pop()), f"{DIMENSION} genes are open"),
     "wrong place": (damaged(lambda r: r.update(index=3)), "can't be number 3 of generation 0"),
