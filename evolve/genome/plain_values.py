@@ -32,7 +32,7 @@ def whole(value: Any, name: str, low: int, high: int) -> int:
         ValueError: it is none, or not within the range.
     """
     if type(value) is not int or not low <= value <= high:
-        raise ValueError(f"{name} = {_shown(value)}: must be a whole number from {low} to {high:_}".replace("_", ","))
+        raise ValueError(f"{name} = {_shown(value)}: must be a whole number from {low} to {high:,}")
     return value
 
 

@@ -5,11 +5,14 @@ They run in worker processes, so they live in a module of their own.
 
 import errno
 import os
+import shutil
 import signal
 import time
 from pathlib import Path
 
 from evolve.config.assemble import assemble
+from evolve.store.atomic_files import write_whole
+from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
 
 TINY = ("search.population=4", "search.generations=3", "genome.optical.open=false", "learning.total_steps=4096")
@@ -94,3 +97,24 @@ def calls(run_path):
     lines = (Path(run_path) / "policies" / "calls.log").read_text().splitlines()
     names = [int(line.split()[0]) for line in lines]
     return {name: names.count(name) for name in names}
+
+
+def deletes_the_run(phenotype, config, seed, policy_path, progress):
+    """While the first candidate trains, somebody deletes the run's directory; its policy cannot be written."""
+    shutil.rmtree(policy_path.parents[1])
+    write_whole(policy_path, b"policy")
+    return Evaluation(1.0, (1.0,))
+
+
+def deletes_the_run_at_last(phenotype, config, seed, policy_path, progress):
+    """The same, when its policy has been written already."""
+    write_whole(policy_path, b"policy")
+    shutil.rmtree(policy_path.parents[1])
+    return Evaluation(1.0, (1.0,))
+
+
+def begins_another_run(phenotype, config, seed, policy_path, progress):
+    """Somebody deletes the run and begins another one in its place."""
+    shutil.rmtree(policy_path.parents[1])
+    Run.create(policy_path.parents[1], tiny("seed=77"))
+    return Evaluation(1.0, (1.0,))

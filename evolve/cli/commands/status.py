@@ -9,6 +9,7 @@ import time
 from argparse import Namespace
 from typing import Any
 
+from evolve.cli.output import as_it_is
 from evolve.search.successive_halving import finished
 from evolve.store.directory import Run
 from evolve.store.lock import holder
@@ -43,8 +44,9 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
         return
     if now["notice"]:
         print(f"note: {now['notice']}", file=sys.stderr)
-    clear = "\x1b[H\x1b[2J" if arguments.watch and sys.stdout.isatty() else ""
-    print(clear + "\n".join(_lines(now)), flush=True)
+    if arguments.watch and sys.stdout.isatty():
+        print("\x1b[H\x1b[2J", end="", file=as_it_is(sys.stdout))
+    print("\n".join(_lines(now)), flush=True)
 
 
 def standing(run: Run) -> dict[str, Any]:

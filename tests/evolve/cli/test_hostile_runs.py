@@ -1,4 +1,4 @@
-"""A stranger's run directory, given to every command: one line that names what is wrong, exit code 2, and no traceback."""
+"""A stranger's run, given to every command: one line that names what is wrong, exit code 2, and no traceback."""
 
 import os
 import time

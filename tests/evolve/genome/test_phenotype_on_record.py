@@ -46,7 +46,7 @@ def test_ends_of_a_genes_range_are_the_last_values_allowed(name):
 
 def test_values_are_of_their_type_and_quoted_in_short():
     for wrong in (True, 1.0, "1", None, [1]):
-        with pytest.raises(ValueError, match="count = .*: must be a whole number from 0 to 5"):
+        with pytest.raises(ValueError, match=r"count = .*: must be a whole number from 0 to 5"):
             whole(wrong, "count", 0, 5)
     for wrong in (True, "1", None, float("nan"), float("inf"), 10**400):
         with pytest.raises(ValueError, match=r"share = .*: must be a number in \[0, 1\]"):
