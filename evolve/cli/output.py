@@ -16,7 +16,7 @@ from typing import Any, TextIO, cast
 
 __all__ = ["Voice", "as_it_is", "printable", "voices"]
 
-_UNSEEN = ("Cc", "Cf", "Cs", "Zl", "Zp")  # controls, marks that turn a line around, halves of letters, line ends
+_UNSEEN = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")  # controls, marks that turn a line around, no letters, line ends
 _LAYOUT = "\n\t"
 
 

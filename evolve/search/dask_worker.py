@@ -20,7 +20,7 @@ from evolve.config.assemble import from_text
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.training_stage import TrainingStage
 from evolve.search.job import ATTEMPTS, Job
-from evolve.search.worker import evaluated, prepare_device
+from evolve.search.worker import evaluated, prepare_device, refusal
 from evolve.store.evaluation import Evaluation
 from evolve.store.regular_files import read
 from evolve.store.versions import present
@@ -99,10 +99,8 @@ def evaluate(order: Order) -> Reply:
         module, name = order.function.split(":")
         try:
             return _evaluate(getattr(import_module(module), name), order, progress)
-        except OSError as error:
-            raise UnfitWorker(
-                f"a worker's machine refuses: {error}; mend that, and go on with evolve resume"
-            ) from error
+        except (OSError, MemoryError) as error:
+            raise UnfitWorker(f"a worker's machine refuses: {refusal(error)}, and go on with evolve resume") from error
 
 
 def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:

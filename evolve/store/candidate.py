@@ -25,6 +25,7 @@ class Candidate:
 
     parents: ids of the candidates from which the search made it; () where it drew from none
     rung: budget stage after which it was evaluated, 0 the first; steps and seconds are from the beginning
+    policy: SHA-256 of the file of its trained policy; None where it has none, or was written down by a former version
     """
 
     id: int
@@ -42,6 +43,7 @@ class Candidate:
     failure: str | None
     parents: tuple[int, ...] = ()
     rung: int = 0
+    policy: str | None = None
 
     @property
     def place(self) -> Place:
@@ -83,7 +85,7 @@ class Candidate:
         """
         record = parsed(line)
         if isinstance(record, dict):
-            record = {"parents": [], "rung": 0, **record}  # not written by the first runs
+            record = {"parents": [], "rung": 0, "policy": None, **record}  # not written by the first runs
         names = [f.name for f in fields(cls)]
         if not isinstance(record, dict) or sorted(record) != sorted(names):
             raise ValueError(f"wrong fields: must hold exactly {', '.join(names)}")
@@ -97,7 +99,8 @@ class Candidate:
                 success_rate=_real_or_none(record["success_rate"], "success_rate", Interval(0, 1)),
                 seconds=real(record["seconds"], "seconds", Interval(0, 1e300)),
                 curve=tuple(_point(entry) for entry in listed(record["curve"], "curve", 0, _LONGEST)),
-                failure=_reason(record["failure"]),
+                failure=_text(record["failure"], "failure"),
+                policy=_text(record["policy"], "policy"),
                 parents=tuple(
                     whole(one, "parents", 0, _COUNTS["id"]) for one in listed(record["parents"], "parents", 0, _LONGEST)
                 ),
@@ -137,10 +140,10 @@ def _point(entry: Any) -> tuple[int, float]:
     return whole(steps, "curve", 0, _COUNTS["steps"]), _real_or_none(value, "curve", _ANY)
 
 
-def _reason(value: Any) -> str | None:
-    """Why a candidate failed, as it can be printed: a file's name in it may be no text at all."""
+def _text(value: Any, name: str) -> str | None:
+    """Text as it can be printed: a file's name in it, say in why a candidate failed, may be no text at all."""
     if value is not None and not isinstance(value, str):
-        raise ValueError("failure: must be text or null")
+        raise ValueError(f"{name}: must be text or null")
     return value if value is None else value.encode(errors="backslashreplace").decode()
 
 

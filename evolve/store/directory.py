@@ -21,6 +21,7 @@ from evolve.config.sources import parsed_toml
 from evolve.store.atomic_files import UNFINISHED, sweep, write_whole
 from evolve.store.candidate import Candidate
 from evolve.store.lock import LONGEST, RunLock
+from evolve.store.policies import lost
 from evolve.store.record import Record, RunError
 from evolve.store.regular_files import folder, opened, read, require_folder, require_regular
 from evolve.store.versions import FILE as VERSIONS
@@ -150,8 +151,8 @@ class Run:
 
     @property
     def notice(self) -> str | None:
-        """One line on what had to be left out when the record was read; None if nothing had to."""
-        return self.record.notice
+        """One line on what was left out when the record was read, or on policies that are lost; None if there is neither."""
+        return self.record.notice or lost(self.candidates, self.policy_path)
 
     @property
     def best(self) -> Candidate | None:

@@ -6,6 +6,7 @@ It is read whole, checked line by line, and only ever added to.
 from __future__ import annotations
 
 import os
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -91,7 +92,7 @@ class Record:
             raise RunError(f"{self.path}: cannot be written: {error.strerror}") from error
         self._whole_bytes += len(line)
         self.lines[candidate.id, candidate.rung] = candidate
-        self.candidates = _furthest(self.lines)
+        self.candidates = _with(self.candidates, candidate)
 
     def cut_off_unfinished(self) -> None:
         """Remove an unfinished last line from the file.
@@ -111,6 +112,15 @@ def _furthest(lines: Lines) -> tuple[Candidate, ...]:
     """Each candidate as it is on the highest rung that it has reached, in order of ids."""
     furthest = {candidate_id: lines[candidate_id, rung] for candidate_id, rung in sorted(lines)}
     return tuple(furthest.values())
+
+
+def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate, ...]:
+    """The same as `_furthest` makes of all lines, one more among them, without a look at each."""
+    at = bisect_left(candidates, new.id, key=lambda candidate: candidate.id)
+    known = at < len(candidates) and candidates[at].id == new.id
+    if known and candidates[at].rung > new.rung:
+        return candidates
+    return (*candidates[:at], new, *candidates[at + known :])
 
 
 def _require_agreement(candidate: Candidate, config: RunConfig, dimension: int, earlier: Lines) -> None:

@@ -33,6 +33,12 @@ def bowl(phenotype, config, seed, policy_path, progress):
     return Evaluation(fitness, (fitness,) * config.evaluation.episodes, 0.5, config.learning.total_steps, 0.01)
 
 
+def leaves_a_policy(phenotype, config, seed, policy_path, progress):
+    """As `bowl`, with a file where a policy belongs."""
+    write_whole(policy_path, f"policy {seed}".encode())
+    return bowl(phenotype, config, seed, policy_path, progress)
+
+
 def slow_for_some(phenotype, config, seed, policy_path, progress):
     """As `bowl`, but candidates finish in another order than they are handed out."""
     time.sleep(0.2 * (int(policy_path.stem) % 2 == 0))
@@ -61,6 +67,28 @@ def killed_always(phenotype, config, seed, policy_path, progress):
     if int(policy_path.stem) == 1:
         os.kill(os.getpid(), signal.SIGSEGV)
     return outcome
+
+
+def starved(phenotype, config, seed, policy_path, progress):
+    """The system kills the process for want of memory whenever candidate 1 is evaluated."""
+    outcome = bowl(phenotype, config, seed, policy_path, progress)
+    if int(policy_path.stem) == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return outcome
+
+
+def memory_full(phenotype, config, seed, policy_path, progress):
+    """There is no memory for the second candidate."""
+    if int(policy_path.stem) == 1:
+        raise MemoryError("Unable to allocate 3.00 GiB")
+    return bowl(phenotype, config, seed, policy_path, progress)
+
+
+def torch_memory_full(phenotype, config, seed, policy_path, progress):
+    """The same, as PyTorch says it."""
+    if int(policy_path.stem) == 1:
+        raise RuntimeError("[enforce fail] DefaultCPUAllocator: can't allocate memory: you tried to allocate 4 bytes")
+    return bowl(phenotype, config, seed, policy_path, progress)
 
 
 def disk_full(phenotype, config, seed, policy_path, progress):

@@ -7,10 +7,12 @@ import statistics
 import sys
 import time
 from argparse import Namespace
+from collections.abc import Sequence
 from typing import Any
 
 from evolve.cli.output import as_it_is
 from evolve.search.successive_halving import finished
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.lock import holder
 
@@ -70,12 +72,18 @@ def standing(run: Run) -> dict[str, Any]:
         "best": None
         if best is None
         else {"id": best.id, "fitness": best.fitness, "phenotype": best.phenotype.to_json()},
-        "generations": [_generation(run, number) for number in range(run.config.search.generations)],
+        "generations": _generations(run),
     }
 
 
-def _generation(run: Run, number: int) -> dict[str, Any]:
-    members = run.generation(number)
+def _generations(run: Run) -> list[dict[str, Any]]:
+    members: dict[int, list[Candidate]] = {}
+    for candidate in run.candidates:
+        members.setdefault(candidate.generation, []).append(candidate)
+    return [_generation(members.get(number, [])) for number in range(run.config.search.generations)]
+
+
+def _generation(members: Sequence[Candidate]) -> dict[str, Any]:
     fitness = [candidate.fitness for candidate in members if candidate.failure is None]
     return {
         "evaluated": len(members),

@@ -1,7 +1,6 @@
 """A stranger's run, given to every command: one line that names what is wrong, exit code 2, and no traceback."""
 
 import os
-import time
 
 import pytest
 
@@ -42,14 +41,12 @@ def refused(call, command, path, complaint):
 
 
 @pytest.mark.parametrize("damage", VALUES)
-def test_damaged_records_are_named_by_every_command_in_no_time(call, run, damage):
+def test_damaged_records_are_named_by_every_command(call, run, damage):
     with (run.path / "candidates.jsonl").open("a") as file:
         file.write(line(*VALUES[damage]))
     before = {path: path.read_bytes() for path in run.path.rglob("*") if path.is_file()}
     for command in COMMANDS:
-        began = time.process_time()
         refused(call, command, run.path, "candidates.jsonl, line 2: is damaged: ")
-        assert time.process_time() - began < 5.0, "libraries are loaded once; nothing else may take its time"
     assert {path: path.read_bytes() for path in run.path.rglob("*") if path.is_file()} == before
 
 

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import resource
+from dataclasses import replace
 
 import pytest
 
@@ -12,6 +13,7 @@ from evolve.config.numbering import Place
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, RunError
 from evolve.store.evaluation import Evaluation
+from evolve.store.record import _furthest
 from tests.evolve.store.records import CONFIG, DIMENSION, candidate
 
 
@@ -131,3 +133,17 @@ def test_a_record_that_may_not_grow_loses_nothing(run):
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert record.read_bytes() == kept
     assert [c.id for c in run.candidates] == [0], "what is not on disk is not on record"
+
+
+def test_one_line_more_looks_at_few_others(run, monkeypatch):
+    """What `append` makes of the candidates is what a new reader makes of the lines, in any order of ids."""
+    monkeypatch.setattr("evolve.store.record._furthest", None)
+    for identity in (5, 0, 7, 3, 11, 4):
+        run.append(candidate(identity))
+        assert [c.id for c in run.candidates] == sorted(c.id for c in run.record.lines.values())
+    run.append(replace(candidate(5), rung=1))
+    run.append(replace(candidate(0), rung=2))
+    run.append(replace(candidate(0), rung=1))
+    monkeypatch.undo()
+    assert run.candidates == _furthest(run.record.lines)
+    assert [c.rung for c in run.candidates] == [2, 0, 0, 1, 0, 0]

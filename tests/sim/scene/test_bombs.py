@@ -1,7 +1,5 @@
 """Models too large to build, or standing nowhere, are refused by name before anything of their size is built."""
 
-import time
-
 import mujoco
 import pytest
 
@@ -38,15 +36,13 @@ BOMBS = {
 
 @pytest.mark.parametrize("bomb", BOMBS)
 @pytest.mark.parametrize("as_file", [False, True], ids=["text", "file"])
-def test_bombs_are_refused_by_name_in_under_a_second(tmp_path, bomb, as_file):
+def test_bombs_are_refused_by_name_before_they_are_built(tmp_path, bomb, as_file):
     text, reason = BOMBS[bomb]
     if as_file:
         (tmp_path / "model.xml").write_text(text)
         text = tmp_path / "model.xml"
-    began = time.process_time()
     with pytest.raises(ValueError, match=r"^mirror: ") as error:
         load(text)
-    assert time.process_time() - began < 1.0
     assert reason in str(error.value)
     assert "\n" not in str(error.value)
 
