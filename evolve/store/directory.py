@@ -151,7 +151,7 @@ class Run:
 
     @property
     def notice(self) -> str | None:
-        """One line on what was left out when the record was read, or on policies that are lost; None if there is neither."""
+        """One line on what was left out when the record was read, or on policies that are lost; None if neither."""
         return self.record.notice or lost(self.candidates, self.policy_path)
 
     @property
