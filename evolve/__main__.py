@@ -2,7 +2,12 @@
 
 import sys
 
-from evolve.cli.main import main
-
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        from evolve.cli.main import main
+
+        code = main()
+    except KeyboardInterrupt:  # while it was being loaded
+        print("evolve: interrupted", file=sys.stderr)
+        code = 130
+    sys.exit(code)

@@ -26,6 +26,7 @@ from sim.scene.color import preview
 LAYOUT_VERSION = "1.0"
 UNITS = "W.m^-2.sr^-1"
 SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 at 560 nm"
+MOST_BYTES = 2**30  # of pixels; sixteen eyes of 128 x 128 in 64 bands have a fifteenth of that
 _HELD = "rhabdom"  # attribute: JSON of what the channels cannot hold
 _HASH = "sha256"
 _PREVIEW = ("R", "G", "B")
@@ -102,11 +103,13 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
     _write_whole(Path(path), lambda name: OpenEXR.File(parts).write(name))
 
 
-def read_exr(path: str | os.PathLike[str]) -> list[View]:
+def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list[View]:
     """Read what `write_exr` wrote.
 
+    most_bytes: of pixels that the file may unpack to; a small file can promise any number of them
+
     Raises:
-        ExrError: one line, for a truncated, damaged or foreign file.
+        ExrError: one line, for a truncated, damaged, foreign, forged or too large file.
         FileNotFoundError: there is none.
     """
     import OpenEXR
@@ -114,7 +117,10 @@ def read_exr(path: str | os.PathLike[str]) -> list[View]:
     if not Path(path).is_file():
         raise FileNotFoundError(f"no such file: {path}")
     try:
-        expected = len(OpenEXR.File(str(path), header_only=True).parts)
+        headers = OpenEXR.File(str(path), header_only=True).parts
+        expected = len(headers)
+        if (unpacked := sum(_pixel_bytes(part.header) for part in headers)) > most_bytes:
+            raise ExrError(f"unpacks to {unpacked:,} bytes: must be at most most_bytes = {most_bytes:,}")
         parts = OpenEXR.File(str(path), separate_channels=True).parts
         held = [_checked(part, expected) for part in parts]
     except ExrError as error:
@@ -123,7 +129,18 @@ def read_exr(path: str | os.PathLike[str]) -> list[View]:
         raise ExrError(f"{path}: no readable OpenEXR file ({str(error).splitlines()[0]})") from None
     if len(parts) != expected:
         raise ExrError(f"{path}: truncated ({len(parts)} of {expected} parts are whole)")
-    return _views(held)
+    try:
+        return _views(held)
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise ExrError(f"{path}: holds no views, though its hash is right ({type(error).__name__}: {reason})") from None
+
+
+def _pixel_bytes(header: Mapping[str, Any]) -> int:
+    """Memory that a part's pixels take, by what its header says."""
+    low, high = (np.asarray(corner, dtype=np.int64) for corner in header["dataWindow"])
+    width, height = (int(side) for side in np.maximum(high - low + 1, 0))
+    return width * height * len(header["channels"]) * 4
 
 
 def _channel(nm: float) -> str:
@@ -185,9 +202,13 @@ def _views(parts: list[tuple[str, dict[str, np.ndarray], dict[str, Any]]]) -> li
     fields: dict[str, dict[str, Any]] = {}
     for part_name, channels, held in parts:
         name, _, kind = part_name.rpartition(".")
+        if kind not in ("spectral", "receptors") or not isinstance(held["attributes"], dict):
+            raise ValueError(f"part {part_name!r}: must be spectral or receptors, with attributes")
         view = fields.setdefault(name, {"name": name, "attributes": held["attributes"]})
         if kind == "spectral":
-            nm = np.array(held["wavelengths_nm"])
+            nm = np.array(held["wavelengths_nm"], dtype=np.float64)
+            if nm.ndim != 1 or not np.all(np.isfinite(nm)):
+                raise ValueError("wavelengths_nm: must be finite numbers")
             view["wavelengths_nm"] = nm
             view["radiance"] = np.stack([channels[_channel(x)] for x in nm])
             view["rgb"] = np.stack([channels[c] for c in _PREVIEW], axis=-1)
@@ -201,6 +222,8 @@ def _write_whole(path: Path, write: Any) -> None:
     """Write to a neighbouring temporary file, flush it to the disk, and give it its name."""
     temporary = str(path.with_name(f".{path.name}.{os.getpid()}.tmp"))  # not tempfile's, which none but we may read
     try:
+        Path(temporary).unlink(missing_ok=True)  # a link, maybe, that leads elsewhere
+        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
         write(temporary)
         with open(temporary, "rb+") as file:
             os.fsync(file.fileno())

@@ -15,9 +15,11 @@ import sim
 from evolve.config.formats import task_then
 from evolve.config.run_config import EyeConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
+from evolve.genome.plain_values import parsed
 from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run, RunError
+from evolve.store.policies import require
 from sim.worlds.state import WorldState, concatenate
 
 __all__ = ["Episode", "record"]
@@ -97,7 +99,7 @@ class Episode:
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays = dict(file)
-            rest = json.loads(str(arrays.pop("rest")))
+            rest = parsed(str(arrays.pop("rest")))
             rest |= {"phenotype": Phenotype.from_json(rest["phenotype"]), "eye": EyeConfig(**rest["eye"])}
             if "course" not in rest.setdefault("world", {}):
                 rest["task"] = task_then(rest["task"])
@@ -117,6 +119,7 @@ def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_ev
         RunError: there is no such candidate, or its policy is missing or no policy.
     """
     candidate = run.candidate(candidate_id)
+    require(candidate, run.policy_path(candidate.id))
     try:
         policy = load_policy(run.policy_path(candidate.id))
     except ValueError as error:

@@ -2,6 +2,7 @@
 
 main         arguments, exit codes
 commands     what each command does
+output       the one door to the terminal
 progress     how a run is going
 run_plan     what a run is going to do
 pace         how fast this machine is

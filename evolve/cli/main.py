@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NoReturn, TypeAlias
 
 from evolve.cli.commands import INTERRUPTED
+from evolve.cli.output import voices
 
 __all__ = ["main"]
 
@@ -32,17 +33,27 @@ _Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    parsed = _parser().parse_args(arguments)
-    # Numerical libraries read this as they load. More threads than one sum in another order, and a run must repeat.
-    os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
+    given = list(sys.argv[1:] if arguments is None else arguments)
     try:
+        with voices(patient=given[:1] in (["run"], ["resume"])):  # these go on when nobody reads any more
+            return _outcome(given)
+    except BrokenPipeError:
+        return 0  # `evolve genes | head`
+
+
+def _outcome(arguments: Sequence[str]) -> int:
+    """The exit code of a command; what is the user's to mend is said in one line."""
+    try:
+        parsed = _parser().parse_args(arguments)
+        # Numerical libraries read this as they load. More threads than one sum in another order, and a run must repeat.
+        os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
         command = import_module(f"evolve.cli.commands.{parsed.module}")
         return int(getattr(command, parsed.function)(parsed))
     except KeyboardInterrupt:
         print("evolve: interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
-        return 0  # `evolve genes | head`
+        raise
     except Exception as error:
         if not _is_users(error):
             raise

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, TextIO
 
+from evolve.cli.output import as_it_is, printable
 from evolve.config.numbering import Place
 from evolve.search.successive_halving import evaluations
 from evolve.store.candidate import Candidate
@@ -182,7 +183,7 @@ class Bar(_Watcher):
 
         super().__init__(run, out, workers)
         columns: list[Any] = [BarColumn(), TextColumn("{task.percentage:>3.0f}%"), TimeElapsedColumn()]
-        self._progress = Progress(*columns, TextColumn("{task.description}"), console=Console(file=out))
+        self._progress = Progress(*columns, TextColumn("{task.description}"), console=Console(file=as_it_is(out)))
         self._bar = self._progress.add_task(self.tally.summary(), total=self.tally.planned)
 
     def __enter__(self) -> Bar:
@@ -202,7 +203,7 @@ class Bar(_Watcher):
         super().evaluated(candidate)
         if candidate.failure:
             self._progress.console.print(
-                f"candidate {candidate.id} failed: {candidate.failure}", markup=False, highlight=False
+                f"candidate {candidate.id} failed: {printable(candidate.failure)}", markup=False, highlight=False
             )
         self._update()
 

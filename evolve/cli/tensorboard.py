@@ -17,6 +17,7 @@ from evolve.search.job import ExecutorError
 from evolve.search.successive_halving import complete
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
+from evolve.store.regular_files import folder
 
 __all__ = ["TensorBoardWriter"]
 
@@ -38,6 +39,7 @@ class TensorBoardWriter:
         shutil.rmtree(run.path / FOLDER, ignore_errors=True)
 
     def __enter__(self) -> TensorBoardWriter:
+        folder(self._run.path / FOLDER)
         for candidate in self._run.in_order_of_finish:
             self.evaluated(candidate)
         return self

@@ -3,7 +3,6 @@ animal, `--set key=value`. Later ones win, but a preset made for the task wins o
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from dataclasses import asdict, fields, replace
 from functools import reduce
@@ -15,7 +14,7 @@ from evolve.config.formats import FORMAT, format_of, upgraded
 from evolve.config.provenance import Source
 from evolve.config.relief_starts import no_such_gene, with_relief
 from evolve.config.run_config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
-from evolve.config.sources import preset_sources, read_assignment, read_toml, task_defaults
+from evolve.config.sources import parsed_toml, preset_sources, read_assignment, read_toml, task_defaults
 from evolve.config.square_eyes import no_such_side, with_square_eyes
 from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, SIDE, SIDES, GeneConfig, group_members
 
@@ -75,9 +74,9 @@ def from_toml(path: Path) -> RunConfig:
     return _read_back(read_toml(path))
 
 
-def from_text(text: str) -> RunConfig:
-    """As `from_toml`, from the text itself."""
-    return _read_back(Source("config.toml", tomllib.loads(text), text))
+def from_text(text: bytes | str, name: str = "config.toml") -> RunConfig:
+    """As `from_toml`, from the text itself, which messages call `name`."""
+    return _read_back(parsed_toml(text, name))
 
 
 def _read_back(written: Source) -> RunConfig:

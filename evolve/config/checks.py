@@ -12,6 +12,7 @@ from optics.numerics.arguments import close_match
 
 __all__ = ["AUTO", "ConfigError", "check_gene_value", "check_value", "suggestion"]
 
+SHOWN = 200  # letters of a value that a message quotes
 AUTO = "auto"  # in place of a number: chosen when it is needed
 
 
@@ -67,12 +68,23 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> Any:
     """`value`, if it is of this kind (a whole number may stand for a number) and in `valid`."""
     names = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
-    shown = str(value).lower() if isinstance(value, bool) else repr(value)
-    if kind is float and type(value) is int:
-        value = float(value)
+    shown = str(value).lower() if isinstance(value, bool) else _quoted(value)
     allowed = names[kind] if valid is None else f"{names[kind]} in {valid}"
-    if type(value) is not kind:
-        raise ConfigError(f"{key} = {shown}: must be {allowed}", key)
-    if valid is not None and value not in valid:
-        raise ConfigError(f"{key} = {shown}: must be in {valid}", key)
+    try:
+        if kind is float and type(value) is int:
+            value = float(value)
+        if type(value) is not kind:
+            raise ConfigError(f"{key} = {shown}: must be {allowed}", key)
+        if valid is not None and value not in valid:
+            raise ConfigError(f"{key} = {shown}: must be in {valid}", key)
+    except OverflowError:  # a whole number that no float comes near
+        raise ConfigError(f"{key} = {shown}: must be {allowed}", key) from None
     return value
+
+
+def _quoted(value: Any) -> str:
+    try:
+        whole = repr(value)
+    except ValueError:  # more digits than Python writes
+        return "a number of thousands of digits"
+    return whole if len(whole) <= SHOWN else f"{whole[:SHOWN]}..."

@@ -12,6 +12,7 @@ from evolve.genome.genes import groups_of
 __all__ = ["Source"]
 
 Tree = dict[str, Any]
+LONGEST_VALUE = 100  # lines
 
 
 @dataclass(frozen=True)
@@ -49,16 +50,32 @@ def _spellings(key: str) -> Iterator[list[str]]:
 def _line_of(text: str, path: list[str]) -> int | None:
     """The line that ends the setting of `path`: the first after which the file, cut off there, holds it.
 
-    tomllib keeps no positions. Cut inside a value that spans lines, the file does not parse, and the search goes on.
+    tomllib keeps no positions. What a file cut off at a line holds, it holds when cut off later, so halving finds the
+    line. None where a value spans more lines than LONGEST_VALUE.
     """
     lines = text.splitlines(keepends=True)
-    for count in range(1, len(lines) + 1):
+    low, high = 0, len(lines)  # cut off at low, it does not hold it; at high it does
+    while high - low > 1:
+        middle = (low + high) // 2
+        cut, tree = _parsed_from(lines, middle)
+        if tree is None:
+            return None
+        if _holds(tree, path):
+            high = middle
+        else:
+            low = min(cut, high - 1)
+    return _parsed_from(lines, high)[0]
+
+
+def _parsed_from(lines: list[str], count: int) -> tuple[int, Tree | None]:
+    """The first place from `count` on where the file can be cut off, and what it holds then: inside a value that spans
+    lines it does not parse."""
+    for cut in range(count, min(count + LONGEST_VALUE, len(lines)) + 1):
         try:
-            if _holds(tomllib.loads("".join(lines[:count])), path):
-                return count
+            return cut, tomllib.loads("".join(lines[:cut]))
         except tomllib.TOMLDecodeError:
             continue
-    return None
+    return count, None
 
 
 def _holds(tree: Any, path: list[str]) -> bool:

@@ -12,7 +12,15 @@ from evolve.config.checks import ConfigError, suggestion
 from evolve.config.provenance import Source
 from evolve.config.run_config import TASKS
 
-__all__ = ["SCALES", "preset_names", "preset_sources", "read_assignment", "read_toml", "task_defaults"]
+__all__ = [
+    "SCALES",
+    "parsed_toml",
+    "preset_names",
+    "preset_sources",
+    "read_assignment",
+    "read_toml",
+    "task_defaults",
+]
 
 Tree = dict[str, Any]
 SCALES = ("laptop", "paper")  # of the presets that have scales; the first unless asked otherwise
@@ -62,14 +70,30 @@ def read_toml(path: Path) -> Source:
         ConfigError: one line, naming file and, where there is one to name, line.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-        return Source(str(path), tomllib.loads(text), text)
+        return parsed_toml(path.read_bytes(), str(path))
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def parsed_toml(text: bytes | str, name: str) -> Source:
+    """TOML, from the place that messages call `name`.
+
+    Raises:
+        ConfigError: one line, as `read_toml`.
+    """
+    try:
+        text = text.decode("utf-8") if isinstance(text, bytes) else text
+        return Source(name, tomllib.loads(text), text)
     except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: is not UTF-8 text") from error
+        raise ConfigError(f"{name}: is not UTF-8 text") from error
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: is not valid TOML: {error}") from error
+        raise ConfigError(f"{name}: is not valid TOML: {error}") from error
+    except (ValueError, RecursionError) as error:  # a number of 6,000 digits, brackets within brackets
+        raise ConfigError(f"{name}: is not valid TOML: {_first_line(error)}") from error
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).partition(";")[0].partition("\n")[0]
 
 
 def read_assignment(text: str) -> Source:

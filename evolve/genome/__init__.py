@@ -3,7 +3,9 @@
 genes         GENES: what evolution may change
 genotype      Genotype: the encoding
 phenotype     Phenotype, develop
+phenotype_on_record  one as a file has it, checked
 anatomy       eyes and receptors take room
 relief_genes  the genes of a relief
 interval      ranges of values
+plain_values  values from a file, or one line
 """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import ceil, isqrt
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from evolve.genome.anatomy import Sizes, fitted, retina_width, sides
 from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, GeneConfig
 from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype_on_record import checked_fields
 from evolve.genome.relief_genes import representatives
 
 if TYPE_CHECKING:
@@ -131,10 +132,10 @@ class Phenotype:
         """Inverse of `to_json`.
 
         Raises:
-            TypeError: a field is missing or unknown.
+            ValueError: a field is unknown, of another type, or outside the range of its genes.
+            TypeError: a field is missing.
         """
-        values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in record.items()}
-        return cls(**values)
+        return cls(**checked_fields(record, [f.name for f in fields(cls)]))
 
 
 def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:

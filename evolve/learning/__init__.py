@@ -7,6 +7,7 @@ eye_features      the network behind each eye
 training_rewards  rewards in the learner's units, contact at a share of its price
 rollout_buffer    frames kept once
 adam              the optimiser
+tensor_file       tensors from a run's files
 checkpoint        a training as it stands
 training_stage    how far a training goes
 """

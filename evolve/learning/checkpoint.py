@@ -11,7 +11,9 @@ import safetensors
 import safetensors.torch
 from torch import Tensor
 
+from evolve.learning.tensor_file import read_tensors
 from evolve.store.atomic_files import write_whole
+from evolve.store.regular_files import StrangeFileError
 
 __all__ = ["Checkpoint", "load_checkpoint", "save_checkpoint"]
 
@@ -51,11 +53,14 @@ def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
 
 
 def load_checkpoint(path: Path) -> Checkpoint | None:
-    """Inverse of `save_checkpoint`; None where there is none, or a file that is none. Nothing in it is executed."""
+    """Inverse of `save_checkpoint`; None where there is none, or a file that is none. Nothing in it is executed.
+
+    Raises:
+        StrangeFileError: a link, FIFO or directory bears its name.
+    """
     try:
-        with safetensors.safe_open(str(path), framework="pt") as file:
-            rest = json.loads((file.metadata() or {})["training"])
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no mapping)
+        metadata, tensors = read_tensors(path)
+        rest = json.loads(metadata["training"])
         return Checkpoint(
             steps=int(rest["steps"]),
             curve=tuple((int(steps), float(value)) for steps, value in rest["curve"]),
@@ -64,7 +69,9 @@ def load_checkpoint(path: Path) -> Checkpoint | None:
             best=_part(tensors, "best"),
             adam={**_part(tensors, "adam"), "steps": int(rest["adam_steps"])},
         )
-    except (OSError, safetensors.SafetensorError, KeyError, TypeError, ValueError):
+    except StrangeFileError:
+        raise
+    except (OSError, safetensors.SafetensorError, KeyError, TypeError, ValueError, OverflowError, RecursionError):
         return None
 
 

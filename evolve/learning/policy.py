@@ -6,6 +6,7 @@ A policy is stored as safetensors: tensors, and its shape in the metadata. Nothi
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -24,8 +25,11 @@ from torch import Tensor
 from evolve.genome.phenotype import FORMER_ENCODER
 from evolve.learning.adam import Adam
 from evolve.learning.eye_features import UNITS, EyeFeatures
+from evolve.learning.tensor_file import read_tensors
 from evolve.store.atomic_files import write_whole
 
+LARGEST_COUNT = 4096  # of anything in a policy's shape; genes allow 512
+MOST_SIGNALS = 2**24  # in what a policy remembers at once; genes allow half as many
 FIRST_TURN = 0.5  # standard deviation of the first turns: with 1, a third of them are clipped
 
 
@@ -154,11 +158,10 @@ def load_policy(path: Path | str) -> EyePolicy:
     Raises:
         ValueError: one line, naming the file, if it is no policy written by `save_policy` (a pickle, say, or cut
             short).
+        StrangeFileError: a link, FIFO or directory bears its name.
     """
     try:
-        with safetensors.safe_open(str(path), framework="pt") as file:
-            metadata = file.metadata() or {}
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no mapping)
+        metadata, tensors = read_tensors(Path(path))
         stored = json.loads(metadata["config"])
         if stored.get("units") != UNITS.__name__:
             raise ValueError(f"its units are not {UNITS.__name__}, as those of this version's policies are")
@@ -170,11 +173,12 @@ def load_policy(path: Path | str) -> EyePolicy:
         )
         if not all(torch.isfinite(tensor).all() for tensor in tensors.values()):
             raise ValueError("it holds numbers that are not finite")
+        _require_shape(config, tensors)
         policy = build_policy(config)
         set_learnt(policy, tensors)
     except FileNotFoundError:
         raise ValueError(f"no policy at {path}") from None
-    except (safetensors.SafetensorError, KeyError, TypeError, ValueError, RuntimeError) as error:
+    except (safetensors.SafetensorError, KeyError, TypeError, ValueError, RuntimeError, OverflowError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ValueError(f"{path} is not a rhabdom policy (safetensors expected): {reason}") from None
     policy.set_training_mode(False)
@@ -195,9 +199,25 @@ def set_learnt(policy: EyePolicy, tensors: Mapping[str, Tensor]) -> None:
         ValueError: a name or a shape that the policy has not.
     """
     own = learnt(policy)
+    _require_same_shapes(own, tensors)
+    for name, tensor in own.items():
+        tensor.copy_(tensors[name])
+
+
+def _require_shape(config: PolicyConfig, tensors: Mapping[str, Tensor]) -> None:
+    """Whether a policy of this shape has these tensors, found out before anything of its size is built."""
+    counts = [count for value in asdict(config).values() for count in (value if isinstance(value, tuple) else (value,))]
+    if min(counts) < 1 or max(counts) > LARGEST_COUNT or math.prod(config.eyes) > MOST_SIGNALS:
+        raise ValueError(f"its shape is impossible: {config}")
+    if config.layers > len(tensors):
+        raise ValueError(f"it has {len(tensors)} tensors, too few for {config.layers} layers")
+    with torch.device("meta"):  # shapes alone, no numbers
+        _require_same_shapes(learnt(build_policy(config)), tensors)
+
+
+def _require_same_shapes(own: Mapping[str, Tensor], tensors: Mapping[str, Tensor]) -> None:
     if tensors.keys() != own.keys():
         raise ValueError(f"tensors missing or unknown: {sorted(tensors.keys() ^ own.keys())}")
     for name, tensor in own.items():
         if tensors[name].shape != tensor.shape:
             raise ValueError(f"{name} has shape {tuple(tensors[name].shape)}, expected {tuple(tensor.shape)}")
-        tensor.copy_(tensors[name])

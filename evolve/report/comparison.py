@@ -10,7 +10,7 @@ from typing import Any
 
 from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, generation_statistics
 from evolve.report.figures import comparison_figure
-from evolve.report.markup import document, figure, section, table, text
+from evolve.report.markup import document, figure, html, section, table
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run
 
@@ -65,15 +65,16 @@ def comparison_lines(runs: Sequence[Run]) -> list[str]:
 def write_page(runs: Sequence[Run], path: Path) -> None:
     """An HTML page of best fitness over the generations and the table, whole or not at all."""
     columns = [_column(run_summary(run)) for run in runs]
-    rows = [[text(name), *(text(column[name]) for column in columns)] for name in list(columns[0])[1:]]
-    rows += [[text(name), *(text(_shown(v)) for v in row)] for name, row in differing_settings(runs).items()]
+    rows = [[name, *(column[name] for column in columns)] for name in list(columns[0])[1:]]
+    rows += [[name, *(_shown(v) for v in row)] for name, row in differing_settings(runs).items()]
     curves = {str(run.path): generation_statistics(run.candidates) for run in runs}
-    caption = "<b>Best fitness so far</b> over the generations, a line per run."
+    caption = html("<b>Best fitness so far</b> over the generations, a line per run.")
     drawn = figure(comparison_figure({name: rows for name, rows in curves.items() if rows}), caption)
-    header = ["", *(text(column["run"]) for column in columns)]
-    body = f"<header><h1>{len(runs)} runs</h1></header>\n" + section(
-        "runs", "Side by side", f'<div class="figures">{drawn}</div>\n{table(header, rows, "comparison")}'
+    found = table(["", *(column["run"] for column in columns)], rows, "comparison")
+    body = html("<header><h1>{} runs</h1></header>\n", len(runs)) + section(
+        "runs", "Side by side", html('<div class="figures">{}</div>\n{}', drawn, found)
     )
+    path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, document("runs side by side", body))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import sim
 from evolve.analysis.episode import Episode, record
 from evolve.store.directory import Run
+from evolve.store.regular_files import folder, require_regular
 
 __all__ = ["export_episode", "export_run"]
 
@@ -29,10 +30,11 @@ def export_episode(episode: Episode, directory: Path) -> list[Path]:
 
     Files are named after candidate, episode seed and time, so that another export doesn't overwrite this one.
     """
-    directory.mkdir(parents=True, exist_ok=True)
+    folder(directory)
     files = []
     for frame, t in enumerate(episode.radiance_frames):
         path = directory / f"candidate{episode.candidate_id:06d}_seed{episode.seed}_t{t:04d}.exr"
+        require_regular(path)
         sim.write_exr(path, _views(episode, frame))
         files.append(path)
     return files

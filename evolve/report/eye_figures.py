@@ -15,7 +15,7 @@ import optics
 from evolve.analysis.statistics import polychromatic
 from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.report.markup import KEY, figure, rounded
+from evolve.report.markup import Html, figure, html, joined, key, rounded
 from evolve.report.svg import drawing, inline
 from evolve.report.theme import ACCENT, INK, MUTED, VERMILLION
 from optics.eye.summary import noise_of
@@ -49,17 +49,17 @@ class WhiteLight:
         return self.eye.sensor_distance * np.pi / 180
 
 
-def eye_figures(phenotype: Phenotype, config: EyeConfig) -> str:
+def eye_figures(phenotype: Phenotype, config: EyeConfig) -> Html:
     """Figures with captions; for a perfect lens a sentence instead."""
     eye = phenotype.eyes(config).eye()
     if eye.pupil is None:
-        return "<p>Optics are off in this run: every eye has a perfect lens, which neither blurs nor dims.</p>\n"
+        return html("<p>Optics are off in this run: every eye has a perfect lens, which neither blurs nor dims.</p>\n")
     light = WhiteLight.through(eye)
     parts = [_pupil(eye, phenotype), _psf(light), _cuts(light), _mtf(light)]
-    return f'<div class="figures pairs">{"".join(parts)}</div>\n'
+    return html('<div class="figures pairs">{}</div>\n', joined(parts))
 
 
-def _pupil(eye: optics.Eye, phenotype: Phenotype) -> str:
+def _pupil(eye: optics.Eye, phenotype: Phenotype) -> Html:
     """Height of the relief over the pupil."""
     pupil = eye.pupil
     assert pupil is not None
@@ -80,10 +80,11 @@ def _pupil(eye: optics.Eye, phenotype: Phenotype) -> str:
         svg = inline(drawn, "pupil", f"Height map of the pupil's relief, from {low:.3g} to {high:.3g} µm.")
     index = phenotype.refractive_index or 1.0
     waves = (index - 1) * (high - low) / 0.55
-    caption = (
-        f"<b>Pupil.</b> Height of its relief, {rounded(low)} to {rounded(high)} µm within a radius of "
-        f"{rounded(radius)} µm (a = {rounded(eye.relative_aperture)}). With n = {rounded(index, 4)} the relief delays "
-        f"green light (550 nm) by up to {rounded(waves)} waves from place to place."
+    caption = html(
+        "<b>Pupil.</b> Height of its relief, {} to {} µm within a radius of {} µm (a = {}). With n = {} the relief "
+        "delays green light (550 nm) by up to {} waves from place to place.",
+        *(rounded(low), rounded(high), rounded(radius), rounded(eye.relative_aperture)),
+        *(rounded(index, 4), rounded(waves)),
     )
     return figure(svg, caption)
 
@@ -105,7 +106,7 @@ def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
     return heights.reshape(shape), np.reshape(pupil.aperture.contains(x, y), shape)
 
 
-def _psf(light: WhiteLight) -> str:
+def _psf(light: WhiteLight) -> Html:
     """The polychromatic PSF, logarithmic, with a receptor's outline."""
     picture, half = _shown(light)
     edge, pitch = 1e6 * half, 1e6 * light.eye.receptor_pitch
@@ -126,10 +127,10 @@ def _psf(light: WhiteLight) -> str:
         _degrees(axes, light.eye, edge)
         svg = inline(drawn, "psf", f"Point spread function over {2 * edge:.3g} µm, peak {peak / 1e12:.3g} per µm².")
     plan = light.psf.plan
-    caption = (
-        f"<b>Point spread function</b> of a distant point, all bands as white daylight weighs them; logarithmic, "
-        f"{DECADES} decades. White square: one receptor, {rounded(pitch)} µm wide. Least accurate band: "
-        f"{plan.method.replace('_', ' ')}, predicted error {plan.predicted_error:.1g}."
+    caption = html(
+        "<b>Point spread function</b> of a distant point, all bands as white daylight weighs them; logarithmic, "
+        "{} decades. White square: one receptor, {} µm wide. Least accurate band: {}, predicted error {}.",
+        *(DECADES, rounded(pitch), plan.method.replace("_", " "), f"{plan.predicted_error:.1g}"),
     )
     return figure(svg, caption)
 
@@ -150,7 +151,7 @@ def _shown(light: WhiteLight) -> tuple[np.ndarray, float]:
     return cut.reshape(cells, block, cells, block).mean(axis=(1, 3)), cells * block * dx / 2
 
 
-def _cuts(light: WhiteLight) -> str:
+def _cuts(light: WhiteLight) -> Html:
     """Each band's PSF along x through the axis."""
     psf = light.psf
     _, half = _shown(light)
@@ -169,10 +170,11 @@ def _cuts(light: WhiteLight) -> str:
         axes.legend(frameon=False, loc="best", handlelength=1.2, labelcolor=MUTED)
         _degrees(axes, light.eye, 1e6 * half)
         svg = inline(drawn, "psf-bands", "Cuts through the point spread function, one per spectral band.")
-    return figure(svg, "<b>PSF per band</b>: cuts along x through the optical axis; dark lines are short wavelengths.")
+    caption = html("<b>PSF per band</b>: cuts along x through the optical axis; dark lines are short wavelengths.")
+    return figure(svg, caption)
 
 
-def _mtf(light: WhiteLight) -> str:
+def _mtf(light: WhiteLight) -> Html:
     """Contrast over spatial frequency beside what the aperture allows at best."""
     eye, scale = light.eye, light.per_degree
     cutoff = optics.mtf(light.psf).cutoff
@@ -194,12 +196,12 @@ def _mtf(light: WhiteLight) -> str:
     strehl = optics.strehl_ratio(light.psf)[green]
     of_whom = "" if _is_round(eye.pupil) else " of a circle as wide"
     quality = optics.image_quality(light.white, nyquist, eye.throughput, noise_of(eye))[0]
-    caption = (
-        f"<b>Modulation transfer function</b> in white daylight, mean of all orientations ({KEY.format('accent')}), "
-        f"and the diffraction limit{of_whom} (dashed). Dotted: the receptors' Nyquist frequency, "
-        f"{rounded(nyquist * scale)} cycles per degree; contrast there {rounded(at_nyquist)}. Strehl ratio "
-        f"{rounded(strehl)} at {1e9 * light.psf.wavelengths[green]:.0f} nm; image quality {rounded(quality)} "
-        "(in 0 to 1: contrast above the noise, times throughput)."
+    caption = html(
+        "<b>Modulation transfer function</b> in white daylight, mean of all orientations ({}), and the diffraction "
+        "limit{} (dashed). Dotted: the receptors' Nyquist frequency, {} cycles per degree; contrast there {}. Strehl "
+        "ratio {} at {} nm; image quality {} (in 0 to 1: contrast above the noise, times throughput).",
+        *(key("accent"), of_whom, rounded(nyquist * scale), rounded(at_nyquist)),
+        *(rounded(strehl), f"{1e9 * light.psf.wavelengths[green]:.0f}", rounded(quality)),
     )
     return figure(svg, caption)
 

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from evolve.analysis.genealogy import descent, nearest_parent
 from evolve.analysis.statistics import GenerationStatistics, Trajectory, bootstrap_interval, champions, succeeded
-from evolve.report.svg import drawing, inline
+from evolve.report.markup import Html
+from evolve.report.svg import drawing, inline, label
 from evolve.report.theme import ACCENT, LINE, MUTED, VERMILLION
 from evolve.store.candidate import Candidate
 
@@ -31,7 +32,7 @@ SIZE = (370, 260)
 Generations = Sequence[int] | NDArray[np.int64]
 
 
-def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Candidate]) -> str:
+def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Candidate]) -> Html:
     """Every candidate's fitness as a dot, the population's spread and median, the best so far."""
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
@@ -47,14 +48,14 @@ def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Ca
         return inline(figure, "fitness", alt)
 
 
-def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> str:
+def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> Html:
     """Best fitness so far of several runs, each under its name."""
     with drawing(740, 320) as figure:
         axes = figure.subplots()
         for place, (name, rows) in enumerate(curves.items()):
             colour = colormaps["viridis"](0.05 + 0.8 * place / max(len(curves) - 1, 1))
             generations, best = [row.generation for row in rows], [row.best_so_far for row in rows]
-            axes.plot(generations, best, color=colour, lw=2, marker="o", ms=4, label=name)
+            axes.plot(generations, best, color=colour, lw=2, marker="o", ms=4, label=label(name))
         longest = max((len(rows) for rows in curves.values()), default=1)
         _generation_axis(axes, range(longest))
         axes.set_ylabel("best fitness so far")
@@ -63,7 +64,7 @@ def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> s
         return inline(figure, "comparison", f"Best fitness so far of {len(curves)} runs over the generations.")
 
 
-def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> str:
+def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
     """Every candidate beside its generation, at its fitness, joined with the nearest of its parents; the best one's
     line of descent in the accent colour."""
     known = {candidate.id: candidate for candidate in candidates}
@@ -87,7 +88,7 @@ def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> str:
         return inline(figure, "genealogy", f"Descent of candidate {best.id} over {len(line)} generations of its line.")
 
 
-def vision_figure(name: str, label: str, generations: Sequence[int], values: Sequence[float]) -> str:
+def vision_figure(name: str, label: str, generations: Sequence[int], values: Sequence[float]) -> Html:
     """One measure of the best eye so far over the generations."""
     with drawing(250, 165, font=10.5) as figure:
         axes = figure.subplots()
@@ -98,7 +99,7 @@ def vision_figure(name: str, label: str, generations: Sequence[int], values: Seq
         return inline(figure, f"vision-{name}", f"{name}: {values[-1]:.3g} in the best eye of all.")
 
 
-def success_figure(candidates: Sequence[Candidate]) -> str:
+def success_figure(candidates: Sequence[Candidate]) -> Html:
     """Share of evaluation episodes solved, against fitness's generation."""
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
@@ -113,7 +114,7 @@ def success_figure(candidates: Sequence[Candidate]) -> str:
         return inline(figure, "success", f"Mean success rate of the last generation: {means[-1]:.0f} %.")
 
 
-def learning_figure(candidates: Sequence[Candidate], best: Candidate) -> str:
+def learning_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
     """Mean evaluation return while each candidate learned; the best one's curve in the accent colour."""
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
@@ -134,7 +135,7 @@ def learning_figure(candidates: Sequence[Candidate], best: Candidate) -> str:
 
 def gene_figure(
     name: str, label: str, path: Trajectory, limits: tuple[float, float] | None, whole: bool = False
-) -> str:
+) -> Html:
     """One gene over the generations, on the range that evolution may search; ticks at whole numbers only if `whole`."""
     with drawing(250, 165, font=10.5) as figure:
         axes = figure.subplots()
@@ -148,7 +149,7 @@ def gene_figure(
         return inline(figure, f"gene-{name}", alt)
 
 
-def relief_figure(paths: dict[str, Trajectory]) -> str:
+def relief_figure(paths: dict[str, Trajectory]) -> Html:
     """The relief's genes, laid out as they lie over the pupil (row 0 at y = -a, at the bottom)."""
     with drawing(440, 340) as figure:
         rows = sorted({name[-2] for name in paths}, reverse=True)

@@ -1,25 +1,95 @@
-"""Pieces of HTML. Whatever comes from a file or a config passes through `text`."""
+"""HTML by construction: text reaches a page through `html` alone, which escapes whatever is no Html already.
+
+`html` fills a template that stands in the code. A string that somebody forgot to think of is escaped; and the browser
+runs and applies only what the page's policy names by its hash.
+"""
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import math
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from html import escape
 from importlib import resources
 from typing import Any
 
-__all__ = ["KEY", "asset", "document", "exact", "figure", "json_script", "rounded", "section", "table", "text"]
+__all__ = [
+    "Html",
+    "asset",
+    "document",
+    "exact",
+    "figure",
+    "html",
+    "joined",
+    "json_script",
+    "key",
+    "look",
+    "rounded",
+    "section",
+    "table",
+]
 
-# The browser itself refuses anything from outside this file.
-_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-
-KEY = '<span class="key {}" aria-hidden="true"></span>'  # a line of a legend, in the colour of that class
+_CONTROLS = dict.fromkeys((*range(9), 11, 12, *range(14, 32), 127), "\ufffd")  # HTML allows none of them
+_SLOT = "{}"
 
 
-def text(value: object) -> str:
-    """Escaped for HTML, in attributes too."""
-    return escape(str(value), quote=True)
+@dataclass(frozen=True)
+class Html:
+    """A piece of a page. Outside this module and `svg`, only `html` and what is made of it make one.
+
+    markup: the HTML itself
+    rules: what elements in it look like, by the value of their attribute `data-look`
+    """
+
+    markup: str = ""
+    rules: Mapping[str, str] = field(default_factory=dict)
+
+    def __add__(self, other: Html) -> Html:
+        return Html(self.markup + other.markup, {**self.rules, **other.rules})
+
+    def __bool__(self) -> bool:
+        return bool(self.markup)
+
+
+def html(template: str, *pieces: object) -> Html:
+    """A template with its "{}" filled, one after the other: Html as it is, everything else as text.
+
+    Raises:
+        ValueError: more or fewer pieces than the template has room for.
+    """
+    literal = template.split(_SLOT)
+    if len(literal) != len(pieces) + 1:
+        raise ValueError(f"html: template has room for {len(literal) - 1} pieces, got {len(pieces)}")
+    filled = [piece if isinstance(piece, Html) else Html(_escaped(piece)) for piece in pieces]
+    markup = literal[0] + "".join(piece.markup + rest for piece, rest in zip(filled, literal[1:], strict=True))
+    return Html(markup, {name: rule for piece in filled for name, rule in piece.rules.items()})
+
+
+def joined(pieces: Iterable[Html]) -> Html:
+    """One after the other."""
+    listed = list(pieces)
+    return html(_SLOT * len(listed), *listed)
+
+
+def look(declarations: str) -> Html:
+    """An element's own look, "width:5px", as an attribute: the page's policy allows no `style`.
+
+    Raises:
+        ValueError: more than declarations.
+    """
+    if re.search(r"[{}<>@\\\x00-\x1f]|/\*", declarations):
+        raise ValueError(f"declarations = {declarations!r}: must be CSS declarations")
+    name = hashlib.sha256(declarations.encode()).hexdigest()[:10]
+    return Html(f'data-look="{name}"', {name: declarations})
+
+
+def key(kind: str) -> Html:
+    """A line of a legend, in the colour of that class."""
+    return html('<span class="key {}" aria-hidden="true"></span>', kind)
 
 
 def rounded(value: float, digits: int = 3) -> str:
@@ -38,32 +108,39 @@ def exact(value: float) -> str:
     return f"{value:g}".replace("-", "−")
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[str]], name: str, highlight: int | None = None) -> str:
-    """A table that scrolls sideways where it must; cells are HTML already; row `highlight` stands out."""
-    head = "".join(f'<th scope="col">{cell}</th>' for cell in header)
-    body = "".join(
-        f"<tr{' class=best' if i == highlight else ''}>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>\n"
+def table(
+    header: Sequence[str | Html], rows: Iterable[Sequence[str | Html]], name: str, highlight: int | None = None
+) -> Html:
+    """A table that scrolls sideways where it must; row `highlight` stands out."""
+    head = joined(html('<th scope="col">{}</th>', cell) for cell in header)
+    body = joined(
+        html(
+            "<tr{}>{}</tr>\n",
+            html(" class=best") if i == highlight else Html(),
+            joined(html("<td>{}</td>", cell) for cell in row),
+        )
         for i, row in enumerate(rows)
     )
-    return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{text(name)}"><table id="{text(name)}">\n'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table></div>\n"
+    return html(
+        '<div class="scroll" tabindex="0" role="region" aria-label="{}"><table id="{}">\n'
+        "<thead><tr>{}</tr></thead>\n<tbody>\n{}</tbody></table></div>\n",
+        *(name, name, head, body),
     )
 
 
-def figure(content: str, caption: str, kind: str = "") -> str:
-    """A figure with its caption (HTML)."""
-    return f'<figure class="{text(kind)}">{content}<figcaption>{caption}</figcaption></figure>\n'
+def figure(content: Html, caption: Html, kind: str = "") -> Html:
+    """A figure with its caption."""
+    return html('<figure class="{}">{}<figcaption>{}</figcaption></figure>\n', kind, content, caption)
 
 
-def section(name: str, title: str, content: str) -> str:
-    return f'<section id="{text(name)}"><h2>{text(title)}</h2>\n{content}</section>\n'
+def section(name: str, title: str, content: Html) -> Html:
+    return html('<section id="{}"><h2>{}</h2>\n{}</section>\n', name, title, content)
 
 
-def json_script(value: Any, kind: str) -> str:
+def json_script(value: Any, kind: str) -> Html:
     """Data for a script; "<" cannot end the element early."""
     encoded = json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    return f'<script type="application/json" class="{text(kind)}">{encoded}</script>'
+    return html('<script type="application/json" class="{}">{}</script>', kind, Html(encoded))
 
 
 def asset(name: str) -> str:
@@ -71,16 +148,38 @@ def asset(name: str) -> str:
     return resources.files("evolve.report").joinpath(name).read_text(encoding="utf-8")
 
 
-def document(title: str, body: str, scripts: Sequence[str] = ()) -> bytes:
-    """A whole page that needs nothing but itself."""
+def document(title: str, body: Html, scripts: Sequence[str] = ()) -> bytes:
+    """A whole page that needs nothing but itself, and lets nothing else be loaded, applied or run."""
     from evolve.report.theme import CSS
 
-    script = "".join(f"<script>\n{asset(name)}</script>\n" for name in scripts)
-    return (
+    looks = "".join(f'[data-look="{name}"]{{{rule}}}\n' for name, rule in sorted(body.rules.items()))
+    style, programs = f"\n{CSS}{asset('style.css')}{looks}", [f"\n{asset(name)}" for name in scripts]
+    page = html(
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+        '<meta http-equiv="Content-Security-Policy" content="{}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n'
-        f"<title>{text(title)}</title>\n<style>\n{CSS}{asset('style.css')}</style>\n</head>\n<body>\n"
-        f"{body}{script}</body>\n</html>\n"
-    ).encode()
+        "<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n{}{}</body>\n</html>\n",
+        Html(_policy([style], programs)),
+        *(title, Html(style), body, joined(html("<script>{}</script>\n", Html(program)) for program in programs)),
+    )
+    return page.markup.encode()
+
+
+def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
+    """The browser itself refuses anything from outside this file, and of what is in it all but these."""
+    return (
+        f"default-src 'none'; img-src data:; base-uri 'none'; form-action 'none'; "
+        f"style-src {_hashes(styles)}; script-src {_hashes(scripts)}"
+    )
+
+
+def _hashes(contents: Sequence[str]) -> str:
+    digests = (hashlib.sha256(content.encode()).digest() for content in contents)
+    return " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests) or "'none'"
+
+
+def _escaped(value: object) -> str:
+    """For elements and quoted attributes; what UTF-8 or HTML cannot hold is replaced."""
+    whole = str(value).encode("utf-8", "replace").decode()
+    return escape(whole.translate(_CONTROLS), quote=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from evolve.analysis.episode import Episode
 from evolve.report.ground_plan import GroundPlan
-from evolve.report.markup import document, exact, json_script, rounded, text
+from evolve.report.markup import Html, document, exact, html, joined, json_script, key, look, rounded
 from evolve.report.picture import data_uri, display, film_sheet
 from evolve.store.atomic_files import write_whole
 from sim.envs.simulation import MAX_TURN
@@ -24,98 +24,107 @@ TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # as in player.js
 def write_player(episode: Episode, path: Path) -> Path:
     """Write the playable episode as a page of its own; returns its path."""
     name = f"{episode.task.capitalize()}: candidate {episode.candidate_id} plays"
-    body = (
-        f'<header><p class="kicker">rhabdom · replay</p>\n<h1>{text(name)}</h1>\n'
-        f"<p>{episode_sentence(episode)}</p></header>\n{player(episode, GroundPlan.of(episode))}"
+    body = html(
+        '<header><p class="kicker">rhabdom · replay</p>\n<h1>{}</h1>\n<p>{}</p></header>\n{}',
+        *(name, episode_sentence(episode), player(episode, GroundPlan.of(episode))),
     )
     write_whole(Path(path), document(name, body, ["player.js"]))
     return Path(path)
 
 
 def episode_sentence(episode: Episode) -> str:
-    """One sentence of HTML on how the episode went."""
+    """One sentence on how the episode went."""
     total = rounded(float(episode.reward.sum(dtype=np.float64)), 4)
-    terms = ", ".join(f"{text(name)} {rounded(float(term.sum()))}" for name, term in episode.reward_terms.items())
+    terms = ", ".join(f"{name} {rounded(float(term.sum()))}" for name, term in episode.reward_terms.items())
     return f"Evaluation episode with seed {episode.seed}: {len(episode)} actions, return {total} ({terms})."
 
 
-def player(episode: Episode, stage: GroundPlan) -> str:
+def player(episode: Episode, stage: GroundPlan) -> Html:
     """The player's element; the page that holds it needs player.js."""
     film = json_script(_film(episode, stage), "film")
     left, right = _world(stage) + _controls(episode), _sights(stage) + _score(episode)
-    return f'<div class="player"><div>{left}</div><div>{right}</div>{film}</div>\n'
+    return html('<div class="player"><div>{}</div><div>{}</div>{}</div>\n', left, right, film)
 
 
-def _world(stage: GroundPlan) -> str:
+def _world(stage: GroundPlan) -> Html:
     x0, y0, x1, y1 = stage.bounds
-    legend = ""
+    legend = Html()
     if stage.object_radius:
-        legend = (
+        legend = html(
             ' <b class="green">G</b> goal, <b class="vermillion">A</b> adversary; a ring marks where one was reached.'
         )
     if stage.goal_region is not None:
-        legend = ' The <b class="green">tinted</b> area is the goal.'
-    caption = (
-        f"<b>From above</b>, {exact(x1 - x0)} m × {exact(y1 - y0)} m: the path so far, the agent (its tip points where "
-        f"it heads) and the horizontal fields of view of its eyes.{legend}"
+        legend = html(' The <b class="green">tinted</b> area is the goal.')
+    caption = html(
+        "<b>From above</b>, {} m × {} m: the path so far, the agent (its tip points where it heads) and the "
+        "horizontal fields of view of its eyes.{}",
+        *(exact(x1 - x0), exact(y1 - y0), legend),
     )
-    return (
+    return html(
         '<figure><canvas class="world" role="img" aria-label="The world from above: walls, objects, the agent, its '
-        f'path and the fields of view of its eyes" style="aspect-ratio:{x1 - x0:g}/{y1 - y0:g}"></canvas>'
-        f"<figcaption>{caption}</figcaption></figure>\n"
+        'path and the fields of view of its eyes" {}></canvas><figcaption>{}</figcaption></figure>\n',
+        *(look(f"aspect-ratio:{x1 - x0:g}/{y1 - y0:g}"), caption),
     )
 
 
-def _sights(stage: GroundPlan) -> str:
+def _sights(stage: GroundPlan) -> Html:
     """A pair of canvases per eye: what it signals, and what it would signal behind a perfect lens."""
     eyes = stage.eyes
     height, width = eyes.resolution
     room = 140 if eyes.n_eyes <= 2 else 88 if eyes.n_eyes <= 6 else 60
     scale = room / max(height, width)
-    size = f'width="{width}" height="{height}" style="width:{scale * width:.4g}px;aspect-ratio:{width}/{height}"'
+    shape = look(f"width:{scale * width:.4g}px;aspect-ratio:{width}/{height}")
+    size = html('width="{}" height="{}" {}', width, height, shape)
     pairs = [_pair(eye, name, size) for eye, name in enumerate(eyes.names())]
     brighter = (
         "" if stage.gain == 1 else f", brightened {rounded(stage.gain)} times (1/a², the light the pupil leaves out)"
     )
-    note = (
-        f"<b>What the eyes see</b>, left to right: receptor signals shown as linear red, green and blue, noise "
-        f"included{brighter}; beside them the same receptors behind a perfect lens, without noise."
+    note = html(
+        "<b>What the eyes see</b>, left to right: receptor signals shown as linear red, green and blue, noise "
+        "included{}; beside them the same receptors behind a perfect lens, without noise.",
+        brighter,
     )
-    return f'<figure class="sights"><div class="eyes">{"".join(pairs)}</div><figcaption>{note}</figcaption></figure>\n'
+    return html(
+        '<figure class="sights"><div class="eyes">{}</div><figcaption>{}</figcaption></figure>\n', joined(pairs), note
+    )
 
 
-def _pair(eye: int, name: str, size: str) -> str:
-    canvases = "".join(
-        f'<div><canvas data-eye="{eye}" data-sheet="{sheet}" {size} role="img" aria-label="{text(name)} eye: {label}">'
-        f"</canvas><span>{label}</span></div>"
+def _pair(eye: int, name: str, size: Html) -> Html:
+    canvases = joined(
+        html(
+            '<div><canvas data-eye="{}" data-sheet="{}" {} role="img" aria-label="{} eye: {}"></canvas>'
+            "<span>{}</span></div>",
+            *(eye, sheet, size, name, label, label),
+        )
         for sheet, label in (("seen", "signals"), ("perfect", "perfect lens"))
     )
-    return f'<div class="sight"><span class="name">{text(name)}</span><div class="pair">{canvases}</div></div>'
+    return html('<div class="sight"><span class="name">{}</span><div class="pair">{}</div></div>', name, canvases)
 
 
-def _controls(episode: Episode) -> str:
-    return (
-        f'<div class="controls"><input type="range" min="0" max="{len(episode) - 1}" value="0" step="1" '
+def _controls(episode: Episode) -> Html:
+    return html(
+        '<div class="controls"><input type="range" min="0" max="{}" value="0" step="1" '
         'aria-label="Time in the episode"><button type="button" class="play" aria-pressed="false">Play</button>'
         '<label>Speed <select><option value="1">1×</option><option value="2" selected>2×</option>'
-        '<option value="4">4×</option></select></label><span class="time"></span><span class="action"></span></div>\n'
+        '<option value="4">4×</option></select></label><span class="time"></span><span class="action"></span></div>\n',
+        len(episode) - 1,
     )
 
 
-def _score(episode: Episode) -> str:
+def _score(episode: Episode) -> Html:
     """Cumulated reward, term by term."""
     names = [*episode.reward_terms, "total"]
     colours = [TERM_COLOURS[i % len(TERM_COLOURS)] for i in range(len(names) - 1)] + ["ink"]
-    cells = "".join(
-        f'<div><dt><span class="key {colour}" aria-hidden="true"></span> {text(name)}</dt>'
-        f'<dd data-term="{text(name)}"></dd></div>'
+    cells = joined(
+        html('<div><dt>{} {}</dt><dd data-term="{}"></dd></div>', key(colour), name, name)
         for name, colour in zip(names, colours, strict=True)
     )
-    return (
+    return html(
         '<figure class="score"><canvas class="rewards" role="img" aria-label="Cumulated reward terms over time">'
-        f"</canvas><dl>{cells}</dl><figcaption><b>Reward so far</b> (dimensionless), by term, weighted as in fitness; "
+        "</canvas><dl>{}</dl><figcaption><b>Reward so far</b> (dimensionless), by term, weighted as in fitness; "
         "the action at this instant counted in. Arrow keys step (with shift: ten steps), space plays."
-        "</figcaption></figure>\n"
+        "</figcaption></figure>\n",
+        cells,
     )
 
 

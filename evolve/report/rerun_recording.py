@@ -9,7 +9,6 @@ its eyes, each a camera that shows what it signals; `signals` the same as number
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from evolve.analysis.episode import Episode
 from evolve.config.run_config import ConfigError
 from evolve.report.ground_plan import GroundPlan
 from evolve.report.picture import display
-from evolve.store.atomic_files import UNFINISHED
+from evolve.store.atomic_files import unfinished
 from sim.eyes.eyes import EYE_HEIGHT, eye_positions, eye_rotations
 from sim.worlds.layout import WALL_HEIGHT
 
@@ -52,23 +51,21 @@ def write_recording(episode: Episode, path: Path) -> Path:
     stage = GroundPlan.of(episode)
     name = f"{episode.task}, candidate {episode.candidate_id}, seed {episode.seed}"
     stream = rr.RecordingStream("rhabdom", recording_id=name, send_properties=False)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}{UNFINISHED}")
-    stream.save(unfinished)
-    stream.set_log_time_enabled(False)  # when it was written says nothing about the episode
-    stream.set_log_tick_enabled(False)
     strict = rr.strict_mode()
     rr.set_strict_mode(True)  # else it warns and leaves out what it does not understand
     try:
-        _furnish(rr, stream, stage)
-        _move(rr, stream, episode, stage)
-        _look(rr, stream, episode, stage)
-        _count(rr, stream, episode, stage)
-        stream.flush()
-        stream.disconnect()
-        unfinished.replace(path)
+        with unfinished(path) as neighbour:
+            stream.save(neighbour)
+            stream.set_log_time_enabled(False)  # when it was written says nothing about the episode
+            stream.set_log_tick_enabled(False)
+            _furnish(rr, stream, stage)
+            _move(rr, stream, episode, stage)
+            _look(rr, stream, episode, stage)
+            _count(rr, stream, episode, stage)
+            stream.flush()
+            stream.disconnect()
     finally:
         rr.set_strict_mode(strict)
-        unfinished.unlink(missing_ok=True)
     return path
 
 

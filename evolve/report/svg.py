@@ -6,16 +6,17 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from html import escape
+from html import unescape
 from typing import Any
 
 import matplotlib
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from evolve.report.markup import Html, html, joined, look
 from evolve.report.theme import INK, LINE, MUTED, VARIABLES
 
-__all__ = ["drawing", "inline"]
+__all__ = ["drawing", "inline", "label"]
 
 _STYLE = {
     "svg.fonttype": "none",  # real text: the reader's own font, selectable, small
@@ -52,20 +53,35 @@ def drawing(width: float, height: float, font: float = 11.0) -> Iterator[Figure]
         yield Figure(figsize=(width / 72, height / 72), dpi=72, layout="constrained")
 
 
-def inline(figure: Figure, name: str, alt: str) -> str:
-    """The figure as an <svg> element; `name` keeps its ids apart from other figures' on the page."""
+def label(name: str) -> str:
+    """A name from outside as Matplotlib writes it: as it is, not as a formula, without what no font has."""
+    plain = "".join(letter if letter.isprintable() else "\ufffd" for letter in name)
+    return plain.replace("$", r"\$")
+
+
+def inline(figure: Figure, name: str, alt: str) -> Html:
+    """The figure as an <svg> element; `name` keeps its ids apart from other figures' on the page. What it looks like
+    is left to the page's style sheet, as its policy demands."""
     buffer = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
         nothing: dict[str, Any] = {"Date": None, "Creator": None, "Format": None, "Type": None}
         FigureCanvasSVG(figure).print_svg(buffer, metadata=nothing)
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->\s*", "", text, flags=re.DOTALL)
+    # Matplotlib's one rule for all its figures is in style.css.
+    text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->\s*|<style.*?</style>\s*", "", text, flags=re.DOTALL)
     view_box = re.search(r'viewBox="[^"]*"', text)
     assert view_box is not None
-    text = re.sub(r"<svg[^>]*>", f'<svg {view_box[0]} role="img" aria-label="{escape(alt)}">', text, count=1)
+    text = re.sub(r"^<svg[^>]*>", "", text)
     text = re.sub("#[0-9a-f]{6}", lambda colour: VARIABLES.get(colour[0], colour[0]), text)
-    return _with_own_ids(text, name)
+    opening = html('<svg {} role="img" aria-label="{}">', Html(view_box[0]), alt)
+    return opening + _with_looks(_with_own_ids(text, name))
+
+
+def _with_looks(text: str) -> Html:
+    """Attributes `style` as looks. None can stand in what a figure says: its quotes are written as such."""
+    pieces = re.split(r' style="([^"]*)"', text)
+    return joined(html(" {}", look(unescape(piece))) if at % 2 else Html(piece) for at, piece in enumerate(pieces))
 
 
 def _with_own_ids(text: str, name: str) -> str:

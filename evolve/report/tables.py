@@ -6,7 +6,7 @@ from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, gene_valu
 from evolve.config.assemble import to_toml
 from evolve.genome.genes import ALL_GENES
 from evolve.genome.phenotype import Phenotype
-from evolve.report.markup import exact, rounded, table, text
+from evolve.report.markup import Html, exact, html, joined, rounded, table
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.versions import recorded
@@ -14,7 +14,7 @@ from evolve.store.versions import recorded
 __all__ = ["all_candidates", "best_genes", "failures", "headline", "run_facts"]
 
 
-def headline(run: Run) -> str:
+def headline(run: Run) -> Html:
     """The numbers one asks for first."""
     failed = sum(not succeeded(c) for c in run.candidates)
     generations = len({c.generation for c in run.candidates})
@@ -32,8 +32,8 @@ def headline(run: Run) -> str:
     ]
     if (best := run.best) is not None:
         tiles = [*_best_tiles(best), *tiles]
-    items = "".join(f"<div><dt>{label}</dt><dd>{value}<small>{note}</small></dd></div>" for label, value, note in tiles)
-    return f'<dl class="tiles">{items}</dl>\n'
+    items = joined(html("<div><dt>{}</dt><dd>{}<small>{}</small></dd></div>", *tile) for tile in tiles)
+    return html('<dl class="tiles">{}</dl>\n', items)
 
 
 def _best_tiles(best: Candidate) -> list[tuple[str, str, str]]:
@@ -49,7 +49,7 @@ def _best_tiles(best: Candidate) -> list[tuple[str, str, str]]:
     ]
 
 
-def best_genes(run: Run, best: Candidate) -> str:
+def best_genes(run: Run, best: Candidate) -> Html:
     """Every gene of the best candidate beside where it started."""
     values = gene_values(best.phenotype, run.config.eye)
     relief = sorted({name[:-1] for name in values if name.startswith("doe_")})
@@ -59,7 +59,7 @@ def best_genes(run: Run, best: Candidate) -> str:
     return table(["gene", "meaning", "best", "start", "searched", "unit"], rows, "genes-of-the-best")
 
 
-def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str]:
+def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str | Html]:
     """One gene, or a row of the relief's side by side."""
     genes, uses = [ALL_GENES[name] for name in names], [run.config.genome[name] for name in names]
     name, meaning = names[0], genes[0].meaning
@@ -68,13 +68,13 @@ def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str]
     best = [exact(values[g.name]) if g.kind == "integer" else rounded(values[g.name]) for g in genes]
     searched = list(dict.fromkeys(f"{exact(u.low)} to {exact(u.high)}" if u.open else "frozen" for u in uses))
     columns = (best, [exact(u.start) for u in uses], searched)
-    return [f"<code>{name}</code>", text(meaning), *("&ensp;".join(c) for c in columns), text(genes[0].unit) or "–"]
+    return [html("<code>{}</code>", name), meaning, *("\u2002".join(c) for c in columns), genes[0].unit or "–"]
 
 
-def all_candidates(run: Run) -> str:
+def all_candidates(run: Run) -> Html:
     """One row per candidate, in the order of their ids; the best one stands out."""
     header = [
-        *("no.", "gener&shy;ation", "fitness", "lowest", "highest", "solved [%]"),
+        *("no.", "gener\u00adation", "fitness", "lowest", "highest", "solved [%]"),
         *("eyes", "placement [°]", "fov [°]", "receptors (h × w)", "acuity [cpd]"),
         *("aperture a", "index n", "memory", "neurons", "steps [k]", "minutes"),
     ]
@@ -104,16 +104,16 @@ def _traits(phenotype: Phenotype) -> list[str]:
     ]
 
 
-def failures(run: Run) -> str:
+def failures(run: Run) -> Html:
     """Which candidates failed, and why; "" if none did."""
     failed = [c for c in run.candidates if not succeeded(c)]
     if not failed:
-        return ""
-    rows = [[str(c.id), str(c.generation), text(c.failure or f"fitness is {c.fitness}")] for c in failed]
-    return f"<h3>Failed candidates</h3>\n{table(['no.', 'generation', 'reason'], rows, 'failures')}"
+        return Html()
+    rows = [[str(c.id), str(c.generation), c.failure or f"fitness is {c.fitness}"] for c in failed]
+    return html("<h3>Failed candidates</h3>\n{}", table(["no.", "generation", "reason"], rows, "failures"))
 
 
-def run_facts(run: Run) -> str:
+def run_facts(run: Run) -> Html:
     """Settings, seeds and software."""
     versions = recorded(run.path)
     commit = versions.pop("commit", "") or "not recorded"
@@ -128,11 +128,13 @@ def run_facts(run: Run) -> str:
     }
     if run.notice:
         facts["notice"] = run.notice.replace(str(run.path), run.path.name)
-    entries = "".join(f"<dt>{name}</dt><dd>{text(value)}</dd>" for name, value in facts.items())
-    config = f"<details><summary>config.toml, every setting</summary><pre>{text(to_toml(run.config))}</pre></details>\n"
-    return f'<dl class="facts">{entries}</dl>\n{config}{_seeds(run)}'
+    entries = joined(html("<dt>{}</dt><dd>{}</dd>", name, value) for name, value in facts.items())
+    config = html(
+        "<details><summary>config.toml, every setting</summary><pre>{}</pre></details>\n", to_toml(run.config)
+    )
+    return html('<dl class="facts">{}</dl>\n{}{}', entries, config, _seeds(run))
 
 
-def _seeds(run: Run) -> str:
+def _seeds(run: Run) -> Html:
     seeds = "\n".join(f"{c.id:6d}  {c.seed}" for c in run.candidates)
-    return f"<details><summary>training seeds of the candidates</summary><pre>{seeds}</pre></details>\n"
+    return html("<details><summary>training seeds of the candidates</summary><pre>{}</pre></details>\n", seeds)

@@ -8,7 +8,7 @@ import optics
 from evolve.analysis.episode import Episode
 from evolve.analysis.statistics import psnr
 from evolve.report.ground_plan import GroundPlan
-from evolve.report.markup import rounded, text
+from evolve.report.markup import Html, html, joined, look, rounded
 from evolve.report.picture import data_uri, display
 
 __all__ = ["through", "what_it_sees"]
@@ -17,24 +17,25 @@ WIDTH = 120  # CSS pixels of one picture, where there are few eyes
 MOST_EYES = 6
 
 
-def what_it_sees(episode: Episode, stage: GroundPlan) -> str:
+def what_it_sees(episode: Episode, stage: GroundPlan) -> Html:
     """Pictures and their caption."""
     frame = _busiest(episode)
     time = int(episode.radiance_frames[frame])
     lens = stage.eyes.eye()
     names = stage.eyes.names()
     shown = range(min(len(names), MOST_EYES))
-    rows = "".join(_row(episode, eye, names[eye], frame, lens) for eye in shown)
+    rows = joined(_row(episode, eye, names[eye], frame, lens) for eye in shown)
     brighter = f", brightened {rounded(stage.gain)} times (1/a²)" if stage.gain != 1 else ""
     rest = f" The first {MOST_EYES} of {len(names)} eyes." if len(names) > MOST_EYES else ""
     quality = psnr(episode.signals, episode.perfect_signals, stage.gain)
-    caption = (
-        f"<b>What it sees</b> at {rounded(time * stage.seconds)} s of the episode below, left to right: the scene, "
-        "finely sampled; what its receptors would signal behind a perfect lens; what its own optics make of it"
-        f"{brighter}; and the same with the receptors' noise, as the brain gets it.{rest} Over the whole episode "
-        f"the signals have a PSNR of {rounded(quality)} dB against the perfect lens."
+    caption = html(
+        "<b>What it sees</b> at {} s of the episode below, left to right: the scene, finely sampled; what its "
+        "receptors would signal behind a perfect lens; what its own optics make of it{}; and the same with the "
+        "receptors' noise, as the brain gets it.{} Over the whole episode the signals have a PSNR of {} dB against "
+        "the perfect lens.",
+        *(rounded(time * stage.seconds), brighter, rest, rounded(quality)),
     )
-    return f'<figure class="views"><div class="eyes">{rows}</div><figcaption>{caption}</figcaption></figure>\n'
+    return html('<figure class="views"><div class="eyes">{}</div><figcaption>{}</figcaption></figure>\n', rows, caption)
 
 
 def _busiest(episode: Episode) -> int:
@@ -43,7 +44,7 @@ def _busiest(episode: Episode) -> int:
     return int(np.argmax(episode.radiance.mean(axis=2).var(axis=-1).mean(axis=(1, 2))))
 
 
-def _row(episode: Episode, eye: int, name: str, frame: int, lens: optics.Eye) -> str:
+def _row(episode: Episode, eye: int, name: str, frame: int, lens: optics.Eye) -> Html:
     time = episode.radiance_frames[frame]
     scene = np.einsum("cb,byx->cyx", lens.spectral_bands.weights, episode.radiance[frame, eye])
     gain = 1 / lens.throughput
@@ -55,12 +56,12 @@ def _row(episode: Episode, eye: int, name: str, frame: int, lens: optics.Eye) ->
     )
     height, width = episode.signals.shape[-2:]
     scale = WIDTH / max(height, width)
-    size = f'style="width:{scale * width:.4g}px;aspect-ratio:{width}/{height}"'
-    cells = "".join(
-        f'<div><img src="{data_uri(pixels)}" {size} alt="{text(name)} eye: {label}"><span>{label}</span></div>'
+    size = look(f"width:{scale * width:.4g}px;aspect-ratio:{width}/{height}")
+    cells = joined(
+        html('<div><img src="{}" {} alt="{} eye: {}"><span>{}</span></div>', data_uri(pixels), size, name, label, label)
         for label, pixels in pictures
     )
-    return f'<div class="sight"><span class="name">{text(name)}</span><div class="pair">{cells}</div></div>'
+    return html('<div class="sight"><span class="name">{}</span><div class="pair">{}</div></div>', name, cells)
 
 
 def through(eye: optics.Eye, radiance: np.ndarray) -> np.ndarray:

@@ -20,8 +20,9 @@ from evolve.config.assemble import from_text
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.training_stage import TrainingStage
 from evolve.search.job import ATTEMPTS, Job
-from evolve.search.worker import evaluated, prepare_device
+from evolve.search.worker import evaluated, prepare_device, refusal
 from evolve.store.evaluation import Evaluation
+from evolve.store.regular_files import read
 from evolve.store.versions import present
 
 __all__ = ["Order", "UnfitWorker", "decode", "encode", "evaluate"]
@@ -70,7 +71,7 @@ def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Orde
     order = Order(function, job.id, phenotype, toml, job.seed, counter, topic, _software())
     if job.stage is None:
         return order
-    kept = [(number, path.read_bytes()) for number, path in enumerate(job.stage.checkpoints[:-1]) if path.exists()]
+    kept = [(number, read(path)) for number, path in enumerate(job.stage.checkpoints[:-1]) if path.exists()]
     return replace(order, ends=job.stage.ends, begun=kept[-1] if kept else None)
 
 
@@ -98,10 +99,8 @@ def evaluate(order: Order) -> Reply:
         module, name = order.function.split(":")
         try:
             return _evaluate(getattr(import_module(module), name), order, progress)
-        except OSError as error:
-            raise UnfitWorker(
-                f"a worker's machine refuses: {error}; mend that, and go on with evolve resume"
-            ) from error
+        except (OSError, MemoryError) as error:
+            raise UnfitWorker(f"a worker's machine refuses: {refusal(error)}, and go on with evolve resume") from error
 
 
 def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:

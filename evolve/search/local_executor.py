@@ -23,6 +23,11 @@ __all__ = ["ExecutorError", "Job", "LocalExecutor", "Progress", "cores"]
 # Several processes share the cores, so each keeps to one thread; read when the numerical libraries are loaded.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 STOPPING_S = 5.0
+KILLED = "by SIGKILL"
+OUT_OF_MEMORY = (
+    f"the worker of candidate {{}} was killed {ATTEMPTS} times (SIGKILL), as systems do that run out of memory; take "
+    "fewer workers (workers in config.toml), or free some, and go on with evolve resume"
+)
 
 
 @dataclass
@@ -42,7 +47,9 @@ class LocalExecutor:
     prepare: called once in each new worker; an exception there ends the run, because no candidate could be evaluated
 
     An exception in `evaluate` is that candidate's failure, but an OSError, which ends the run. A worker that dies takes
-    nobody with it: it is replaced and its candidate evaluated again, `ATTEMPTS` times in all.
+    nobody with it: it is replaced and its candidate evaluated again, `ATTEMPTS` times in all. Only what the animal may
+    have caused is then its failure: a worker that is killed each time, as the system does for want of memory, ends the
+    run.
     """
 
     evaluate: Callable[..., Evaluation]
@@ -69,10 +76,10 @@ class LocalExecutor:
         """Evaluate all jobs; each comes out as soon as it is done, in any order. A deque may be added to meanwhile.
 
         Raises:
-            ExecutorError: a worker could not be made ready, or the machine refuses something, such as a file.
+            ExecutorError: a worker could not be made ready, or the machine refuses something, such as a file or memory.
         """
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
-        deaths: dict[int, int] = {}
+        deaths: dict[int, list[str]] = {}
         while waiting or any(worker.job for worker in self._workers):
             self._hand_out(waiting)
             for worker, message in self._messages():
@@ -88,10 +95,12 @@ class LocalExecutor:
                     how = self._bury(worker)
                     if job is None:
                         continue
-                    deaths[job.id] = deaths.get(job.id, 0) + 1
-                    if deaths[job.id] < ATTEMPTS:
+                    deaths.setdefault(job.id, []).append(how)
+                    if len(deaths[job.id]) < ATTEMPTS:
                         waiting.appendleft(job)
                         continue
+                    if set(deaths[job.id]) == {KILLED}:
+                        raise ExecutorError(OUT_OF_MEMORY.format(job.id))
                     yield job, Evaluation.failed(f"its worker process died {ATTEMPTS} times, at last {how}")
 
     def _hand_out(self, waiting: deque[Job]) -> None:

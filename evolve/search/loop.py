@@ -22,6 +22,7 @@ from evolve.search.successive_halving import budgets, reaching
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
+from evolve.store.policies import digest
 
 __all__ = ["Executor", "Watcher", "evolve"]
 
@@ -115,6 +116,8 @@ def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, wat
         candidate = replace(candidate, rung=job.stage.number)
         if (before := run.on_record(candidate.id, candidate.rung - 1)) is not None:
             candidate = replace(candidate, seconds=before.seconds + candidate.seconds)
+    if candidate.failure is None:
+        candidate = replace(candidate, policy=digest(job.policy_path))
     run.append(candidate)
     watcher.evaluated(candidate)
     return candidate

@@ -72,10 +72,19 @@ def reaching(run: Run, generation: int, stage: int) -> set[int]:
 
 def complete(run: Run, generation: int) -> bool:
     """Whether all of a generation has been evaluated, after every stage that it reaches."""
-    stages = range(run.config.search.rungs)
-    return all(reaching(run, generation, stage) <= run.evaluated_at(stage) for stage in stages)
+    return _complete(run, generation, _evaluated(run))
 
 
 def finished(run: Run) -> bool:
     """Whether all of a run has been evaluated."""
-    return all(complete(run, generation) for generation in range(run.config.search.generations))
+    evaluated = _evaluated(run)
+    return all(_complete(run, generation, evaluated) for generation in range(run.config.search.generations))
+
+
+def _evaluated(run: Run) -> list[set[int]]:
+    """Ids of all candidates that have been evaluated after each stage."""
+    return [run.evaluated_at(stage) for stage in range(run.config.search.rungs)]
+
+
+def _complete(run: Run, generation: int, evaluated: Sequence[set[int]]) -> bool:
+    return all(reaching(run, generation, stage) <= done for stage, done in enumerate(evaluated))

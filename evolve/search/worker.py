@@ -20,7 +20,9 @@ from evolve.genome.phenotype import Phenotype
 from evolve.learning.training_stage import TrainingStage
 from evolve.store.evaluation import Evaluation
 
-__all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "work"]
+__all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "refusal", "work"]
+
+NO_MEMORY = ("allocate memory", "out of memory", "bad_alloc", "bad allocation")  # as PyTorch's and Dr.Jit's errors say
 
 
 @dataclass(frozen=True)
@@ -47,8 +49,8 @@ def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: C
             return
         try:
             outcome = evaluated(evaluate, arguments, lambda *steps: connection.send(Message("progress", steps)))
-        except OSError as error:
-            connection.send(Message("unfit", f"{error}; mend that, and go on with evolve resume"))
+        except (OSError, MemoryError) as error:
+            connection.send(Message("unfit", f"{refusal(error)}, and go on with evolve resume"))
             return
         connection.send(Message("done", outcome))
 
@@ -86,20 +88,31 @@ def evaluated(
     evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], progress: Callable[[int, int], None]
 ) -> Evaluation:
     """The candidate's evaluation; whatever goes wrong in it becomes its failure, but what the machine refuses: a disk
-    that is full says nothing about an animal.
+    that is full says nothing about an animal, and neither does memory that others have taken.
 
     Raises:
         OSError: its policy cannot be written, say.
+        MemoryError: there is no more.
     """
     began = time.perf_counter()
     try:
         return evaluate(*arguments, progress=progress)
-    except OSError:
+    except (OSError, MemoryError):
         raise
     except Exception as error:
+        if isinstance(error, RuntimeError) and any(words in str(error) for words in NO_MEMORY):
+            raise MemoryError(_one_line(error)) from error
         return Evaluation.failed(_one_line(error), time.perf_counter() - began)
     finally:
         _give_back_memory()
+
+
+def refusal(error: OSError | MemoryError) -> str:
+    """What the machine refuses, and what to do about it."""
+    if isinstance(error, OSError):
+        return f"{error}; mend that"
+    reason = " ".join(str(error).split())[:200]
+    return f"out of memory ({reason}); take fewer workers (workers in config.toml), or free some"
 
 
 def _give_back_memory() -> None:

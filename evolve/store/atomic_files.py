@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+
+from evolve.store.regular_files import created, folder, require_regular, sync_folder
 
 UNFINISHED = ".unfinished"
 
@@ -16,22 +20,39 @@ def sweep(folder: Path) -> None:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that a reader, or a machine that dies meanwhile, sees the old one or all of the new one.
+    """Write a file so that a reader, or a machine that dies meanwhile, sees the old one or all of the new one. Its
+    folder is made if it is missing, but not what that stands in: a run that was deleted stays so.
 
     Raises:
+        StrangeFileError: a link, FIFO, device or directory bears its name.
         OSError: it cannot be written; names `path`.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}{UNFINISHED}")
+    with unfinished(path) as neighbour, neighbour.open("r+b") as file:
+        file.write(content)
+
+
+@contextmanager
+def unfinished(path: Path) -> Iterator[Path]:
+    """A neighbour of `path` to write to, empty at first; afterwards it is on the disk, under the name of `path`.
+
+    Raises:
+        StrangeFileError: a link, FIFO, device or directory bears its name.
+        OSError: it cannot be written; names `path`.
+    """
+    neighbour = path.with_name(f".{path.name}.{os.getpid()}{UNFINISHED}")
     try:
-        with unfinished.open("wb") as file:
-            file.write(content)
-            file.flush()
+        require_regular(path)
+        if not path.parent.is_dir():
+            folder(path.parent)
+        created(neighbour).close()
+        yield neighbour
+        with neighbour.open("rb") as file:
             os.fsync(file.fileno())
-        unfinished.replace(path)
+        neighbour.replace(path)
+        sync_folder(path.parent)
     except BaseException as error:
         with contextlib.suppress(OSError):  # what went wrong first is what is told
-            unfinished.unlink(missing_ok=True)
+            neighbour.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise OSError(error.errno, error.strerror, str(path)) from error
+            raise type(error)(error.errno, error.strerror, str(path)) from error
         raise

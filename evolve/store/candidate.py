@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evolve.config.numbering import Place
+from evolve.genome.interval import Interval
 from evolve.genome.phenotype import Phenotype
+from evolve.genome.plain_values import listed, parsed, real, whole
 from evolve.store.evaluation import Evaluation
 
 __all__ = ["Candidate"]
@@ -23,6 +25,7 @@ class Candidate:
 
     parents: ids of the candidates from which the search made it; () where it drew from none
     rung: budget stage after which it was evaluated, 0 the first; steps and seconds are from the beginning
+    policy: SHA-256 of the file of its trained policy; None where it has none, or was written down by a former version
     """
 
     id: int
@@ -40,6 +43,7 @@ class Candidate:
     failure: str | None
     parents: tuple[int, ...] = ()
     rung: int = 0
+    policy: str | None = None
 
     @property
     def place(self) -> Place:
@@ -79,36 +83,68 @@ class Candidate:
         Raises:
             ValueError: says what is wrong with the line.
         """
-        record = json.loads(line)
+        record = parsed(line)
         if isinstance(record, dict):
-            record = {"parents": [], "rung": 0, **record}  # not written by the first runs
+            record = {"parents": [], "rung": 0, "policy": None, **record}  # not written by the first runs
         names = [f.name for f in fields(cls)]
         if not isinstance(record, dict) or sorted(record) != sorted(names):
             raise ValueError(f"wrong fields: must hold exactly {', '.join(names)}")
         try:
-            return cls(
-                id=int(record["id"]),
-                generation=int(record["generation"]),
-                index=int(record["index"]),
-                genome=tuple(float(u) for u in record["genome"]),
+            candidate = cls(
+                **{name: whole(record[name], name, 0, most) for name, most in _COUNTS.items()},
+                genome=_reals(record, "genome"),
                 phenotype=Phenotype.from_json(record["phenotype"]),
-                seed=int(record["seed"]),
-                fitness=-math.inf if record["fitness"] is None else float(record["fitness"]),
-                returns=tuple(_number(value) for value in record["returns"]),
-                success_rate=_number(record["success_rate"]),
-                steps=int(record["steps"]),
-                seconds=float(record["seconds"]),
-                curve=tuple((int(steps), _number(value)) for steps, value in record["curve"]),
-                failure=None if record["failure"] is None else str(record["failure"]),
-                parents=tuple(int(parent) for parent in record["parents"]),
-                rung=int(record["rung"]),
+                fitness=-math.inf if record["fitness"] is None else real(record["fitness"], "fitness", _ANY),
+                returns=_reals(record, "returns", or_none=True),
+                success_rate=_real_or_none(record["success_rate"], "success_rate", Interval(0, 1)),
+                seconds=real(record["seconds"], "seconds", Interval(0, 1e300)),
+                curve=tuple(_point(entry) for entry in listed(record["curve"], "curve", 0, _LONGEST)),
+                failure=_text(record["failure"], "failure"),
+                policy=_text(record["policy"], "policy"),
+                parents=tuple(
+                    whole(one, "parents", 0, _COUNTS["id"]) for one in listed(record["parents"], "parents", 0, _LONGEST)
+                ),
             )
-        except (TypeError, AttributeError, KeyError) as error:
+        except TypeError as error:
             raise ValueError(f"a value has the wrong type ({error})") from error
+        candidate._require_success()
+        return candidate
+
+    def _require_success(self) -> None:
+        """Whoever has not failed has a fitness, and returns that it comes from."""
+        if self.failure is not None:
+            return
+        if not math.isfinite(self.fitness):
+            raise ValueError("fitness = null: must be a number, or failure must say why there is none")
+        if not self.returns or not all(map(math.isfinite, (*self.returns, self.success_rate))):
+            raise ValueError("returns, success_rate: must be numbers, as nothing has failed")
 
 
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)
+_ANY = Interval(-1e300, 1e300)
+_LONGEST = 1_000_000  # entries of a list
+# The largest of each: ids and generations are as many as settings allow, seeds what generators take.
+_COUNTS = {"id": 10**9, "generation": 10**5, "index": 10**4, "seed": 2**64 - 1, "steps": 10**12, "rung": 9}
+
+
+def _reals(record: dict[str, Any], name: str, or_none: bool = False) -> tuple[float, ...]:
+    values = listed(record[name], name, 0, _LONGEST)
+    return tuple(_real_or_none(value, name, _ANY) if or_none else real(value, name, _ANY) for value in values)
+
+
+def _real_or_none(value: Any, name: str, valid: Interval) -> float:
+    return math.nan if value is None else real(value, name, valid)
+
+
+def _point(entry: Any) -> tuple[int, float]:
+    steps, value = listed(entry, "curve", 2, 2)
+    return whole(steps, "curve", 0, _COUNTS["steps"]), _real_or_none(value, "curve", _ANY)
+
+
+def _text(value: Any, name: str) -> str | None:
+    """Text as it can be printed: a file's name in it, say in why a candidate failed, may be no text at all."""
+    if value is not None and not isinstance(value, str):
+        raise ValueError(f"{name}: must be text or null")
+    return value if value is None else value.encode(errors="backslashreplace").decode()
 
 
 def _finite(value: Any) -> Any:

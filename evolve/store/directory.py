@@ -14,14 +14,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from evolve.config.assemble import from_toml, to_toml
+from evolve.config.assemble import from_text, to_toml
 from evolve.config.formats import FORMAT, LAST_OF_FORMER, format_of
 from evolve.config.run_config import RunConfig
-from evolve.config.sources import read_toml
+from evolve.config.sources import parsed_toml
 from evolve.store.atomic_files import UNFINISHED, sweep, write_whole
 from evolve.store.candidate import Candidate
-from evolve.store.lock import RunLock
+from evolve.store.lock import LONGEST, RunLock
+from evolve.store.policies import lost
 from evolve.store.record import Record, RunError
+from evolve.store.regular_files import folder, opened, read, require_folder, require_regular
 from evolve.store.versions import FILE as VERSIONS
 from evolve.store.versions import fingerprint, record_start
 
@@ -31,6 +33,7 @@ CONFIG = "config.toml"
 CANDIDATES = "candidates.jsonl"
 POLICIES = "policies"
 TRAININGS = "trainings"
+PRODUCTS = ("exr", "tensorboard")  # folders of what is made from a run
 
 
 @dataclass
@@ -40,6 +43,7 @@ class Run:
     path: Path
     config: RunConfig
     record: Record
+    _lock: RunLock | None = None
 
     @classmethod
     def create(cls, path: Path | str, config: RunConfig, origin: str | None = None) -> Run:
@@ -55,13 +59,13 @@ class Run:
             _require_no_run(path)  # before the lock, which leaves a file
             with RunLock(path):
                 _require_no_run(path)
-                (path / POLICIES).mkdir(exist_ok=True)
-                (path / CANDIDATES).touch()
+                folder(path / POLICIES)
+                opened(path / CANDIDATES, "ab", create=True).close()
                 text = to_toml(config)
                 record_start(path, 0, origin, fingerprint(text))
                 write_whole(path / CONFIG, text.encode())
         except OSError as error:
-            raise RunError(f"{path} cannot be written: {error.strerror}") from error
+            raise RunError(f"{error.filename or path} cannot be written: {error.strerror}") from error
         return cls(path, config, Record(path / CANDIDATES))
 
     @classmethod
@@ -71,13 +75,16 @@ class Run:
         Raises:
             RunError: no run there, or its candidates cannot be read; names file and line.
             ConfigError: its config cannot be used.
+            StrangeFileError: a link, FIFO or device bears the name of one of its files or folders.
         """
         path = Path(path)
         if not path.is_dir():
             raise RunError(f"{path} is no run: there is no such directory")
-        if not (path / CONFIG).is_file():
-            raise RunError(f"{path} is no run: it holds no {CONFIG}")
-        config = from_toml(path / CONFIG)
+        _require_plain(path)
+        try:
+            config = from_text(read(path / CONFIG), str(path / CONFIG))
+        except FileNotFoundError:
+            raise RunError(f"{path} is no run: it holds no {CONFIG}") from None
         return cls(path, config, Record.read(path / CANDIDATES, config))
 
     def require_present_format(self) -> None:
@@ -86,7 +93,7 @@ class Run:
         Raises:
             RunError: the run's format is a former one; names the version that carries it on.
         """
-        number = format_of(read_toml(self.path / CONFIG).tree)
+        number = format_of(parsed_toml(read(self.path / CONFIG), str(self.path / CONFIG)).tree)
         if number != FORMAT:
             raise RunError(
                 f"{self.path} has format {number}: must be {FORMAT} to be continued; rhabdom at commit "
@@ -99,7 +106,8 @@ class Run:
         Raises:
             LockedError: another process has it.
         """
-        return RunLock(self.path)
+        self._lock = RunLock(self.path)
+        return self._lock
 
     def repair(self) -> None:
         """Cut off an unfinished last line and remove files half written (after `lock`); read the rest anew."""
@@ -118,6 +126,8 @@ class Run:
             RunError: the candidate is there already, somebody else has changed the record, or it cannot be written;
                 what was there before still is.
         """
+        if self._lock is not None and not self._lock.stands:
+            raise RunError(f"{self.record.path}: is no longer as this process left it; nothing is added")
         self.record.append(candidate)
 
     def policy_path(self, candidate_id: int) -> Path:
@@ -141,8 +151,8 @@ class Run:
 
     @property
     def notice(self) -> str | None:
-        """One line on what had to be left out when the record was read; None if nothing had to."""
-        return self.record.notice
+        """One line on what was left out when the record was read, or on policies that are lost; None if neither."""
+        return self.record.notice or lost(self.candidates, self.policy_path)
 
     @property
     def best(self) -> Candidate | None:
@@ -192,10 +202,20 @@ def _require_no_run(path: Path) -> None:
     makes it one, is written last."""
     begun = {RunLock.NAME, VERSIONS, CANDIDATES, POLICIES}
     names = {entry.name for entry in path.iterdir() if not entry.name.endswith(UNFINISHED)}
-    record, policies = path / CANDIDATES, path / POLICIES
-    filled = (record.exists() and record.stat().st_size) or (policies.exists() and any(policies.iterdir()))
+    _require_plain(path)
+    most = {CANDIDATES: 0, RunLock.NAME: LONGEST}  # bytes
+    filled = any((path / name).exists() and (path / name).stat().st_size > size for name, size in most.items())
+    filled = filled or ((path / POLICIES).exists() and any((path / POLICIES).iterdir()))
     if filled or not names <= begun:
         raise RunError(f"{path} is not empty: choose another name, or continue it with: evolve resume {path}")
+
+
+def _require_plain(path: Path) -> None:
+    """What bears the name of a run's file must be a file, and of a folder a folder: named before anything is read."""
+    for name in (CONFIG, VERSIONS, CANDIDATES, RunLock.NAME):
+        require_regular(path / name)
+    for name in (POLICIES, TRAININGS, *PRODUCTS):
+        require_folder(path / name)
 
 
 def next_directory(task: str, preset: str, base: Path = Path("runs")) -> Path:

@@ -30,4 +30,5 @@ class Evaluation:
     @classmethod
     def failed(cls, failure: str, seconds: float = 0.0) -> Evaluation:
         """The evaluation of a candidate that has none, in one line."""
-        return cls(fitness=-math.inf, seconds=seconds, failure=" ".join(failure.split()))
+        told = failure.encode(errors="backslashreplace").decode()  # a file's name in it may be no text at all
+        return cls(fitness=-math.inf, seconds=seconds, failure=" ".join(told.split()))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import fcntl
 import os
 import time
 from pathlib import Path
 from types import TracebackType
+from typing import BinaryIO
+
+from evolve.store.regular_files import StrangeFileError, opened
 
 __all__ = ["LockedError", "RunLock", "holder"]
 
 PATIENCE_S = 0.5  # someone asking `holder` has the lock for an instant
+LONGEST = 400  # bytes of a lock's text: a process and the name of its machine
 
 
 class LockedError(ValueError):
@@ -25,47 +28,70 @@ class RunLock:
 
     def __init__(self, run: Path) -> None:
         self._path = run / self.NAME
-        self._descriptor: int | None = None
+        self._file: BinaryIO | None = None
 
     def __enter__(self) -> RunLock:
         try:
-            self._descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
+            file = opened(self._path, "r+b", create=True)
         except OSError as error:
-            raise LockedError(f"{self._path.parent} cannot be written: {error.strerror}") from error
+            raise LockedError(f"{self._path.parent} cannot be written: {_told(error, self._path)}") from error
         deadline = time.monotonic() + PATIENCE_S
-        while True:
-            try:
-                fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                if time.monotonic() > deadline:
-                    os.close(self._descriptor)
-                    raise LockedError(
-                        f"{self._path.parent} is in use by process {_written(self._path)}; wait for it or stop it"
-                    ) from None
-                time.sleep(0.05)
-        os.ftruncate(self._descriptor, 0)
-        os.write(self._descriptor, f"{os.getpid()} on {os.uname().nodename}\n".encode())
+        while not _taken(file, fcntl.LOCK_EX):
+            if time.monotonic() > deadline:
+                by = _written(file)
+                file.close()
+                raise LockedError(f"{self._path.parent} is in use by process {by}; wait for it or stop it")
+            time.sleep(0.05)
+        file.truncate(0)
+        file.write(f"{os.getpid()} on {os.uname().nodename}\n".encode())
+        file.flush()
+        self._file = file
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._descriptor is not None:
-            os.ftruncate(self._descriptor, 0)
-            os.close(self._descriptor)
-            self._descriptor = None
+        if self._file is not None:
+            self._file.truncate(0)
+            self._file.close()
+            self._file = None
+
+    @property
+    def stands(self) -> bool:
+        """Whether the lock that is held is still the run's: its directory may have been deleted, and begun anew."""
+        if self._file is None:
+            return False
+        try:
+            return os.path.samestat(os.fstat(self._file.fileno()), self._path.lstat())
+        except OSError:
+            return False
 
 
 def holder(run: Path) -> str | None:
-    """The process that works on a run ("1234 on host"), None if nobody does."""
-    with contextlib.suppress(FileNotFoundError), (run / RunLock.NAME).open() as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return _written(run / RunLock.NAME)
-    return None
+    """The process that works on a run ("1234 on host"), None if nobody does.
+
+    Raises:
+        OSError: its lock cannot be read.
+    """
+    try:
+        with opened(run / RunLock.NAME) as file:
+            return None if _taken(file, fcntl.LOCK_SH) else _written(file)
+    except FileNotFoundError:
+        return None
 
 
-def _written(path: Path) -> str:
-    return path.read_text().strip() or "unknown"
+def _taken(file: BinaryIO, kind: int) -> bool:
+    try:
+        fcntl.flock(file, kind | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _written(file: BinaryIO) -> str:
+    file.seek(0)
+    return file.read(LONGEST).decode(errors="replace").strip() or "unknown"
+
+
+def _told(error: OSError, path: Path) -> str:
+    return f"{path.name} {error.strerror}" if isinstance(error, StrangeFileError) else str(error.strerror)

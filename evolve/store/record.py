@@ -6,6 +6,7 @@ It is read whole, checked line by line, and only ever added to.
 from __future__ import annotations
 
 import os
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,9 +14,11 @@ from evolve.config.numbering import Place
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import Genotype
 from evolve.store.candidate import Candidate
+from evolve.store.regular_files import opened, read
 
 __all__ = ["Record", "RunError"]
 
+LAST_LINE = "; it is the last line: without it, the run goes on, and evaluates this candidate again"
 Lines = dict[tuple[int, int], Candidate]  # (candidate id, rung) -> the candidate as it was there
 
 
@@ -46,7 +49,7 @@ class Record:
             RunError: the file cannot be read, or a line is damaged; names file and line.
         """
         try:
-            content = path.read_bytes()
+            content = read(path)
         except OSError as error:
             raise RunError(f"{path}: cannot be read: {error.strerror}") from error
         whole_bytes = content.rfind(b"\n") + 1
@@ -61,7 +64,8 @@ class Record:
                 candidate = Candidate.from_line(text.decode())
                 _require_agreement(candidate, config, dimension, lines)
             except ValueError as error:
-                raise RunError(f"{path}, line {number}: is damaged: {error}") from error
+                hint = LAST_LINE if number == len(texts) else ""
+                raise RunError(f"{path}, line {number}: is damaged: {error}{hint}") from error
             lines[candidate.id, candidate.rung] = candidate
         return cls(path, lines, _furthest(lines), notice, whole_bytes)
 
@@ -76,17 +80,19 @@ class Record:
             raise RunError(f"{self.path.parent}: candidate {candidate.id} has been evaluated already")
         line = candidate.to_line().encode()
         try:
-            with self.path.open("ab") as file:
+            with opened(self.path, "ab") as file:
                 if file.tell() != self._whole_bytes:  # the directory was deleted, say, and another run begun in it
                     raise RunError(f"{self.path}: is no longer as this process left it; nothing is added")
                 file.write(line)
                 file.flush()
                 os.fsync(file.fileno())
+        except FileNotFoundError:
+            raise RunError(f"{self.path}: is no longer as this process left it; nothing is added") from None
         except OSError as error:
             raise RunError(f"{self.path}: cannot be written: {error.strerror}") from error
         self._whole_bytes += len(line)
         self.lines[candidate.id, candidate.rung] = candidate
-        self.candidates = _furthest(self.lines)
+        self.candidates = _with(self.candidates, candidate)
 
     def cut_off_unfinished(self) -> None:
         """Remove an unfinished last line from the file.
@@ -95,7 +101,7 @@ class Record:
             RunError: the file cannot be written.
         """
         try:
-            with self.path.open("r+b") as file:
+            with opened(self.path, "r+b") as file:
                 file.truncate(self._whole_bytes)
                 os.fsync(file.fileno())
         except OSError as error:
@@ -106,6 +112,15 @@ def _furthest(lines: Lines) -> tuple[Candidate, ...]:
     """Each candidate as it is on the highest rung that it has reached, in order of ids."""
     furthest = {candidate_id: lines[candidate_id, rung] for candidate_id, rung in sorted(lines)}
     return tuple(furthest.values())
+
+
+def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate, ...]:
+    """The same as `_furthest` makes of all lines, one more among them, without a look at each."""
+    at = bisect_left(candidates, new.id, key=lambda candidate: candidate.id)
+    known = at < len(candidates) and candidates[at].id == new.id
+    if known and candidates[at].rung > new.rung:
+        return candidates
+    return (*candidates[:at], new, *candidates[at + known :])
 
 
 def _require_agreement(candidate: Candidate, config: RunConfig, dimension: int, earlier: Lines) -> None:

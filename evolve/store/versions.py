@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from evolve.store.atomic_files import write_whole
+from evolve.store.regular_files import read
 
 __all__ = ["altered", "fingerprint", "origin", "present", "record_start", "recorded"]
 
@@ -68,7 +69,7 @@ def altered(run: Path) -> bool:
 
 
 def _settings(run: Path) -> str:
-    return fingerprint((run / "config.toml").read_text(encoding="utf-8"))
+    return fingerprint(read(run / "config.toml").decode())
 
 
 def record_start(run: Path, candidates: int, origin: str | None = None, settings: str | None = None) -> None:
@@ -94,9 +95,9 @@ def origin(run: Path) -> str | None:
 def _starts(run: Path) -> list[dict[str, Any]]:
     """Earlier starts. The file informs and decides nothing, so one that is lost or damaged begins anew."""
     try:
-        starts = json.loads((run / FILE).read_text())
+        starts = json.loads(read(run / FILE))
         return [start for start in starts if isinstance(start["versions"], dict)]
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import mujoco
 
+from sim.scene.bombs import require_finite, require_modest
+
 
 def load(source: mujoco.MjModel | mujoco.MjSpec | str | Path) -> mujoco.MjModel:
     """The model of an MjModel, an MjSpec, a file (MJCF, URDF, or MJB) or MJCF text (which starts with "<").
@@ -20,6 +22,7 @@ def load(source: mujoco.MjModel | mujoco.MjSpec | str | Path) -> mujoco.MjModel:
     if isinstance(source, mujoco.MjSpec):
         return _compiled(source.compile, f"MjSpec {source.modelname!r}")
     if isinstance(source, str) and source.lstrip().startswith("<"):
+        require_modest(source, "this MJCF text")
         return _compiled(lambda: mujoco.MjModel.from_xml_string(source), "this MJCF text")
     if not isinstance(source, str | Path):
         raise ValueError(
@@ -29,12 +32,13 @@ def load(source: mujoco.MjModel | mujoco.MjSpec | str | Path) -> mujoco.MjModel:
         raise ValueError(f"mirror: no file {str(source)!r}; give the path of an MJCF, URDF or MJB file")
     if Path(source).suffix == ".mjb":
         return _compiled(lambda: mujoco.MjModel.from_binary_path(str(source)), repr(str(source)))
+    require_modest(Path(source).read_text(encoding="utf-8", errors="replace"), repr(str(source)))
     return _compiled(lambda: mujoco.MjModel.from_xml_path(str(source)), repr(str(source)))
 
 
 def _compiled(compile_it: Callable[[], mujoco.MjModel], name: str) -> mujoco.MjModel:
     try:
-        return compile_it()
+        model = compile_it()
     except (ValueError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ").removeprefix("XML Error: ")
         missing = re.search(r"opening file '([^']*)'|resource not found|file not found", reason, re.IGNORECASE)
@@ -44,3 +48,5 @@ def _compiled(compile_it: Callable[[], mujoco.MjModel], name: str) -> mujoco.MjM
             else "correct what MuJoCo names"
         )
         raise ValueError(f"mirror: {name} does not compile: {reason}; {fix}") from error
+    require_finite(model, name)
+    return model

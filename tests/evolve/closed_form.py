@@ -5,11 +5,14 @@ They run in worker processes, so they live in a module of their own.
 
 import errno
 import os
+import shutil
 import signal
 import time
 from pathlib import Path
 
 from evolve.config.assemble import assemble
+from evolve.store.atomic_files import write_whole
+from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
 
 TINY = ("search.population=4", "search.generations=3", "genome.optical.open=false", "learning.total_steps=4096")
@@ -28,6 +31,12 @@ def bowl(phenotype, config, seed, policy_path, progress):
     progress(config.learning.total_steps // 2, config.learning.total_steps)
     fitness = -abs(phenotype.fov_deg - BEST_FOV_DEG) + 1e-9 * (seed % 1000)
     return Evaluation(fitness, (fitness,) * config.evaluation.episodes, 0.5, config.learning.total_steps, 0.01)
+
+
+def leaves_a_policy(phenotype, config, seed, policy_path, progress):
+    """As `bowl`, with a file where a policy belongs."""
+    write_whole(policy_path, f"policy {seed}".encode())
+    return bowl(phenotype, config, seed, policy_path, progress)
 
 
 def slow_for_some(phenotype, config, seed, policy_path, progress):
@@ -58,6 +67,28 @@ def killed_always(phenotype, config, seed, policy_path, progress):
     if int(policy_path.stem) == 1:
         os.kill(os.getpid(), signal.SIGSEGV)
     return outcome
+
+
+def starved(phenotype, config, seed, policy_path, progress):
+    """The system kills the process for want of memory whenever candidate 1 is evaluated."""
+    outcome = bowl(phenotype, config, seed, policy_path, progress)
+    if int(policy_path.stem) == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return outcome
+
+
+def memory_full(phenotype, config, seed, policy_path, progress):
+    """There is no memory for the second candidate."""
+    if int(policy_path.stem) == 1:
+        raise MemoryError("Unable to allocate 3.00 GiB")
+    return bowl(phenotype, config, seed, policy_path, progress)
+
+
+def torch_memory_full(phenotype, config, seed, policy_path, progress):
+    """The same, as PyTorch says it."""
+    if int(policy_path.stem) == 1:
+        raise RuntimeError("[enforce fail] DefaultCPUAllocator: can't allocate memory: you tried to allocate 4 bytes")
+    return bowl(phenotype, config, seed, policy_path, progress)
 
 
 def disk_full(phenotype, config, seed, policy_path, progress):
@@ -94,3 +125,24 @@ def calls(run_path):
     lines = (Path(run_path) / "policies" / "calls.log").read_text().splitlines()
     names = [int(line.split()[0]) for line in lines]
     return {name: names.count(name) for name in names}
+
+
+def deletes_the_run(phenotype, config, seed, policy_path, progress):
+    """While the first candidate trains, somebody deletes the run's directory; its policy cannot be written."""
+    shutil.rmtree(policy_path.parents[1])
+    write_whole(policy_path, b"policy")
+    return Evaluation(1.0, (1.0,))
+
+
+def deletes_the_run_at_last(phenotype, config, seed, policy_path, progress):
+    """The same, when its policy has been written already."""
+    write_whole(policy_path, b"policy")
+    shutil.rmtree(policy_path.parents[1])
+    return Evaluation(1.0, (1.0,))
+
+
+def begins_another_run(phenotype, config, seed, policy_path, progress):
+    """Somebody deletes the run and begins another one in its place."""
+    shutil.rmtree(policy_path.parents[1])
+    Run.create(policy_path.parents[1], tiny("seed=77"))
+    return Evaluation(1.0, (1.0,))

@@ -1,13 +1,16 @@
 """EXR files: what goes in comes out, others can read it, and damage never passes for data."""
 
+import json
+import os
 import shutil
 import subprocess
+import tracemalloc
 
 import numpy as np
 import pytest
 
 from optics.spectra.bands import daylight
-from sim.exr import ExrError, View, read_exr, write_exr
+from sim.exr import ExrError, View, _digest, read_exr, write_exr
 from sim.scene.color import preview
 
 NM = np.array([410.0, 450.125, 1640 / 3, 690.0])
@@ -133,6 +136,66 @@ def test_foreign_and_missing_files(tmp_path):
         read_exr(tmp_path / "text.exr")
     with pytest.raises(FileNotFoundError, match="no such file"):
         read_exr(tmp_path / "none.exr")
+
+
+FORGED = {
+    "no attributes": ("left.spectral", {"wavelengths_nm": [500.0]}),
+    "attributes of a list": ("left.spectral", {"attributes": [], "wavelengths_nm": [500.0]}),
+    "a list": ("left.spectral", []),
+    "null": ("left.spectral", None),
+    "no wavelengths": ("left.spectral", {"attributes": {}}),
+    "wavelengths of text": ("left.spectral", {"attributes": {}, "wavelengths_nm": "500"}),
+    "other wavelengths": ("left.spectral", {"attributes": {}, "wavelengths_nm": [510.0]}),
+    "wavelengths of null": ("left.spectral", {"attributes": {}, "wavelengths_nm": [None]}),
+    "infinite wavelengths": ("left.spectral", {"attributes": {}, "wavelengths_nm": [float("inf")]}),
+    "nested wavelengths": ("left.spectral", {"attributes": {}, "wavelengths_nm": [[500.0]]}),
+    "no wavelength": ("left.spectral", {"attributes": {}, "wavelengths_nm": []}),
+    "no receptors": ("left.receptors", {"attributes": {}}),
+    "no name": (".spectral", {"attributes": {}, "wavelengths_nm": [500.0]}),
+    "another kind": ("left.thermal", {"attributes": {}, "wavelengths_nm": [500.0]}),
+    "10**400": ("left.spectral", {"attributes": {}, "wavelengths_nm": [10**400]}),
+}
+
+
+@pytest.mark.parametrize("forgery", FORGED)
+def test_forged_metadata_with_the_right_hash_raises_the_same_error(tmp_path, forgery):
+    import OpenEXR
+
+    name, held = FORGED[forgery]
+    plane = np.ones((2, 3), np.float32)
+    channels = {key: plane.copy() for key in ("R", "G", "B", "S0.500,000000nm")}
+    attributes = {"rhabdom": json.dumps(held), "parts": "1"}
+    attributes["sha256"] = _digest(name, channels, attributes)
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, **attributes}
+    OpenEXR.File([OpenEXR.Part(header, channels, name)]).write(str(tmp_path / "a.exr"))
+    with pytest.raises(ExrError, match=r"a\.exr: ") as error:
+        read_exr(tmp_path / "a.exr")
+    assert "\n" not in str(error.value)
+
+
+def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path):
+    import OpenEXR
+
+    channels = {key: np.zeros((2000, 4000), np.float32) for key in ("R", "G", "B", "receptor_0")}
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
+    OpenEXR.File([OpenEXR.Part(header, channels, "left.receptors")]).write(str(tmp_path / "bomb.exr"))
+    assert (tmp_path / "bomb.exr").stat().st_size < 10**6
+    tracemalloc.start()
+    with pytest.raises(ExrError, match=r"unpacks to 128,000,000 bytes: must be at most most_bytes = 10,000,000"):
+        read_exr(tmp_path / "bomb.exr", most_bytes=10**7)
+    assert tracemalloc.get_traced_memory()[1] < 10**7
+    tracemalloc.stop()
+    with pytest.raises(ExrError, match="was not written by rhabdom"):
+        read_exr(tmp_path / "bomb.exr")
+
+
+def test_link_that_waits_under_the_temporary_name_leads_nowhere(tmp_path):
+    victim = tmp_path / "thesis.tex"
+    victim.write_text("all of it")
+    (tmp_path / f".a.exr.{os.getpid()}.tmp").symlink_to(victim)
+    write_exr(tmp_path / "a.exr", views())
+    assert victim.read_text() == "all of it"
+    assert len(read_exr(tmp_path / "a.exr")) == 3
 
 
 def test_a_failed_write_leaves_the_old_file_alone(tmp_path):

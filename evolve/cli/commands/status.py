@@ -7,9 +7,12 @@ import statistics
 import sys
 import time
 from argparse import Namespace
+from collections.abc import Sequence
 from typing import Any
 
+from evolve.cli.output import as_it_is
 from evolve.search.successive_halving import finished
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.lock import holder
 
@@ -43,8 +46,9 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
         return
     if now["notice"]:
         print(f"note: {now['notice']}", file=sys.stderr)
-    clear = "\x1b[H\x1b[2J" if arguments.watch and sys.stdout.isatty() else ""
-    print(clear + "\n".join(_lines(now)), flush=True)
+    if arguments.watch and sys.stdout.isatty():
+        print("\x1b[H\x1b[2J", end="", file=as_it_is(sys.stdout))
+    print("\n".join(_lines(now)), flush=True)
 
 
 def standing(run: Run) -> dict[str, Any]:
@@ -68,12 +72,18 @@ def standing(run: Run) -> dict[str, Any]:
         "best": None
         if best is None
         else {"id": best.id, "fitness": best.fitness, "phenotype": best.phenotype.to_json()},
-        "generations": [_generation(run, number) for number in range(run.config.search.generations)],
+        "generations": _generations(run),
     }
 
 
-def _generation(run: Run, number: int) -> dict[str, Any]:
-    members = run.generation(number)
+def _generations(run: Run) -> list[dict[str, Any]]:
+    members: dict[int, list[Candidate]] = {}
+    for candidate in run.candidates:
+        members.setdefault(candidate.generation, []).append(candidate)
+    return [_generation(members.get(number, [])) for number in range(run.config.search.generations)]
+
+
+def _generation(members: Sequence[Candidate]) -> dict[str, Any]:
     fitness = [candidate.fitness for candidate in members if candidate.failure is None]
     return {
         "evaluated": len(members),

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from evolve.cli.commands.status import standing
 from evolve.config.numbering import Place
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
@@ -15,13 +16,13 @@ from tests.evolve.closed_form import tiny
 
 def test_status_tells_what_the_record_holds(call, finished):
     run = Run.open(finished)
-    standing = json.loads(call("status", finished, "--json")[1])
-    assert standing["state"] == "finished"
-    assert standing["candidates"] == {"evaluated": 12, "failed": 0, "planned": 12}
-    assert standing["best"]["id"] == run.best.id
-    assert standing["steps"] == 12 * 4096
+    told = json.loads(call("status", finished, "--json")[1])
+    assert told["state"] == "finished"
+    assert told["candidates"] == {"evaluated": 12, "failed": 0, "planned": 12}
+    assert told["best"]["id"] == run.best.id
+    assert told["steps"] == 12 * 4096
     fitness = sorted(candidate.fitness for candidate in run.generation(1))
-    assert standing["generations"][1]["median"] == pytest.approx((fitness[1] + fitness[2]) / 2)
+    assert told["generations"][1]["median"] == pytest.approx((fitness[1] + fitness[2]) / 2)
     text = call("status", finished)[1]
     assert f"best: candidate {run.best.id}, fitness {run.best.fitness:.4g}" in text
 
@@ -86,3 +87,15 @@ def test_a_single_episode_has_no_interval(call, failed):
     (line,) = (line for line in call("compare", failed.path)[1].splitlines() if line.startswith("95 % interval"))
     assert line.split() == ["95", "%", "interval", "-"]
     assert json.loads(call("compare", failed.path, "--json")[1])["runs"][0]["fitness_interval"] is None
+
+
+def test_status_of_many_generations_looks_at_each_candidate_once(finished, monkeypatch):
+    """With 100,000 generations, a look at all candidates for each is too many."""
+    run, looks = Run.open(finished), []
+    whole = Run.evaluated_at
+    monkeypatch.setattr(Run, "generation", None)
+    monkeypatch.setattr(Run, "evaluated_at", lambda run, stage: looks.append(stage) or whole(run, stage))
+    now = standing(run)
+    assert [g["evaluated"] for g in now["generations"]] == [4, 4, 4]
+    assert now["state"] == "finished"
+    assert looks == [0]

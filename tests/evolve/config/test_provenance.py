@@ -1,8 +1,11 @@
 """Errors name the file and the line, or the option, that made them."""
 
+import tomllib
+
 import pytest
 
 from evolve.config.assemble import assemble
+from evolve.config.provenance import _line_of
 from evolve.config.run_config import ConfigError
 
 LINES = {
@@ -51,3 +54,44 @@ def test_contradiction_names_every_place_that_made_it(tmp_path):
         ConfigError, match=r"must be below search\.generations = 3.*mine\.toml, line 3; preset quick, line"
     ):
         assemble("detection", "quick", file=tmp_path / "mine.toml")
+
+
+def test_lines_are_found_by_halving(tmp_path, monkeypatch):
+    """A file of 6,000 remarks was parsed 6,000 times."""
+    parsed = []
+    whole = tomllib.loads
+    monkeypatch.setattr(tomllib, "loads", lambda text: parsed.append(len(text)) or whole(text))
+    for place in (1, 3000, 5999):
+        lines = ["# remark"] * 6000
+        lines[place] = "search.population = 0"
+        (tmp_path / "mine.toml").write_text("\n".join(lines))
+        parsed.clear()
+        with pytest.raises(ConfigError, match=f"line {place + 1}: search.population = 0"):
+            assemble("detection", file=tmp_path / "mine.toml")
+        assert len(parsed) < 40
+
+
+@pytest.mark.parametrize("spread", [1, 2, 7, 60])
+def test_line_is_the_same_as_by_trying_each(spread):
+    """Values that span lines cannot be cut; settings stand before, after and within them."""
+    value = "[\n" + ",\n".join("1" for _ in range(spread)) + "\n]"
+    long = "text\n" * spread
+    text = f'a = {value}\n# remark\n[t]\nb = """\n{long}"""\nc = {value}\n[t.u]\nd = 1\n'
+    lines = text.splitlines(keepends=True)
+
+    def tried(path):
+        for count in range(1, len(lines) + 1):
+            try:
+                tree = tomllib.loads("".join(lines[:count]))
+            except tomllib.TOMLDecodeError:
+                continue
+            for part in path:
+                tree = tree.get(part) if isinstance(tree, dict) else None
+            if tree is not None:
+                return count
+        return None
+
+    for path in (["a"], ["t"], ["t", "b"], ["t", "c"], ["t", "u"], ["t", "u", "d"]):
+        assert _line_of(text, path) == tried(path)
+    many = "1,\n" * 300
+    assert _line_of(f"x = [\n{many}]\ny = 1\nz = 1\n", ["z"]) in (None, 304)

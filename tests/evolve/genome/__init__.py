@@ -6,4 +6,6 @@ phenotype: test_genotype.py, test_anatomy.py
 anatomy: test_anatomy.py
 relief_genes: config/test_relief_starts.py
 interval: test_interval.py
+phenotype_on_record: test_phenotype_on_record.py, cli/test_hostile_runs.py
+plain_values: test_phenotype_on_record.py
 """

@@ -7,6 +7,7 @@ eye_features: test_policy.py, test_learning.py
 training_rewards: test_ppo.py
 rollout_buffer: test_rollout_buffer.py
 adam: test_adam.py
+tensor_file: test_policy.py, store/test_regular_files.py
 checkpoint: search/test_successive_halving.py
 training_stage: search/test_successive_halving.py
 """

@@ -3,18 +3,22 @@
 import json
 import os
 import pickle
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 import safetensors.torch
 import torch
 from gymnasium import spaces
+from safetensors.torch import save_file
 
 from evolve.config.assemble import assemble
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
-from evolve.learning.eye_features import CONTRAST
+from evolve.learning import policy as policy_module
+from evolve.learning.eye_features import CONTRAST, UNITS
 from evolve.learning.policy import EyePolicy, PolicyConfig, build_policy, learnt, load_policy, save_policy
+from evolve.store.regular_files import StrangeFileError
 
 CONFIG = PolicyConfig(eyes=(3, 2, 3, 2, 4), neurons=8)
 
@@ -241,3 +245,36 @@ def test_first_actions_are_as_fast_as_asked():
     for values, mean, spread in ((speed, 0.25, 0.125), (turn, 0.0, 0.5)):
         assert abs(values.mean() - mean) < 5 * spread / n**0.5
         assert abs(values.std() - spread) < 5 * spread / (2 * n) ** 0.5
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {"neurons": 20_000},
+        {"layers": 10**9},
+        {"eyes": [3, 10**9, 3, 1, 1]},
+        {"eyes": [10**6, 10**6, 3, 1, 1]},
+        {"eyes": [0, 2, 3, 4, 5]},
+        {"neurons": float("inf")},
+    ],
+    ids=str,
+)
+def test_a_shape_that_the_tensors_do_not_have_is_refused_before_it_is_built(policy, tmp_path, shape, monkeypatch):
+    """A forged file of some kilobytes must not ask for gigabytes."""
+    path = tmp_path / "forged.safetensors"
+    config = {**asdict(policy.config), "units": UNITS.__name__, **shape}
+    save_file({n: t.detach().clone() for n, t in learnt(policy).items()}, path, {"config": json.dumps(config)})
+    built, whole = [], policy_module.build_policy
+    monkeypatch.setattr(policy_module, "build_policy", lambda c: built.append(torch.empty(1).device.type) or whole(c))
+    with pytest.raises(ValueError, match=r"forged\.safetensors is not a rhabdom policy"):
+        load_policy(path)
+    assert set(built) <= {"meta"}
+
+
+def test_a_policy_that_is_a_link_or_a_fifo_is_refused(policy, tmp_path):
+    save_policy(policy, tmp_path / "mine.safetensors")
+    (tmp_path / "link").symlink_to(tmp_path / "mine.safetensors")
+    os.mkfifo(tmp_path / "fifo")
+    for name in ("link", "fifo"):
+        with pytest.raises(StrangeFileError, match="must be a regular file"):
+            load_policy(tmp_path / name)

@@ -2,10 +2,10 @@
 
 page: test_report_page.py
 write: test_report_page.py
-markup: test_report_page.py
+markup: test_markup.py, test_report_page.py
 tables: test_report_page.py
 figures: test_report_page.py
-svg: test_theme.py, test_report_page.py
+svg: test_theme.py, test_markup.py, test_report_page.py
 theme: test_theme.py
 eye_figures: test_eye_figures.py
 views: test_eye_figures.py

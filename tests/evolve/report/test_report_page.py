@@ -155,10 +155,10 @@ def test_reliefs_of_more_genes_and_receptors_of_genes_are_reported(tmp_path):
     genome = Genotype(config.genome).start
     animal = develop(genome, config)
     run.append(Candidate.of(Place(0, 0, 0), tuple(genome.tolist()), animal, 1, Evaluation(1.0, (0.5, 1.5), 0.5)))
-    genes = {row[0]: row[2] for row in Page(best_genes(run, run.best)).rows["genes-of-the-best"][1:]}
+    genes = {row[0]: row[2] for row in Page(best_genes(run, run.best).markup).rows["genes-of-the-best"][1:]}
     assert genes["doe_40 … doe_44"].split() == ["0.500"] * 5
     assert genes["lambda_max_3_nm"] == "–", "three types have no fourth peak"
-    text = Page(genes_section(run)).texts["all"]
+    text = Page(genes_section(run).markup).texts["all"]
     assert "doe_00 … doe_44: the relief" in text
     assert "lambda_max_0_nm:" in text
 
@@ -169,7 +169,7 @@ def test_symmetric_reliefs_are_reported_by_the_genes_that_they_have(tmp_path):
     genome = Genotype(config.genome).start
     outcome = Evaluation(1.0, (0.5, 1.5), 0.5)
     run.append(Candidate.of(Place(0, 0, 0), tuple(genome.tolist()), develop(genome, config), 1, outcome))
-    genes = {row[0]: row[2] for row in Page(best_genes(run, run.best)).rows["genes-of-the-best"][1:]}
+    genes = {row[0]: row[2] for row in Page(best_genes(run, run.best).markup).rows["genes-of-the-best"][1:]}
     assert [name for name in genes if name.startswith("doe_")] == ["doe_00 … doe_01", "doe_11"]
-    text = Page(genes_section(run)).texts["all"]
+    text = Page(genes_section(run).markup).texts["all"]
     assert "Frozen genes, and genes that mirror others, are left out." in text

@@ -19,6 +19,8 @@ def test_figures_are_drawn_in_the_pages_colours():
     with drawing(100, 80) as figure:
         figure.add_subplot().plot([0, 1], [1, 0], color=ACCENT)
     drawn = inline(figure, "line", "a line that falls")
-    assert VARIABLES[ACCENT] in drawn
-    assert not set(VARIABLES) & set(re.findall("#[0-9a-f]{6}", drawn))
-    assert 'aria-label="a line that falls"' in drawn
+    looks = " ".join(drawn.rules.values())
+    assert VARIABLES[ACCENT] in looks
+    assert not set(VARIABLES) & set(re.findall("#[0-9a-f]{6}", drawn.markup + looks))
+    assert set(re.findall('data-look="([^"]*)"', drawn.markup)) == set(drawn.rules)
+    assert 'aria-label="a line that falls"' in drawn.markup

@@ -21,9 +21,12 @@ from tests.evolve.closed_form import (
     killed_always,
     killed_once,
     leaves_gaps,
+    memory_full,
     slow_for_some,
+    starved,
     threads,
     tiny,
+    torch_memory_full,
     unfit,
 )
 
@@ -59,6 +62,19 @@ def test_every_job_comes_out_once_with_its_own_outcome(tmp_path, evaluate):
 def test_a_full_disk_is_no_animals_failure(tmp_path):
     with pytest.raises(ExecutorError, match=r"No space left on device.*000001.*go on with evolve resume"):
         outcomes(disk_full, tmp_path, workers=1)
+
+
+@pytest.mark.parametrize(
+    ("evaluate", "reason"),
+    [
+        (memory_full, r"^out of memory \(Unable to allocate 3\.00 GiB\); take fewer workers .* evolve resume$"),
+        (torch_memory_full, r"^out of memory \(RuntimeError: \[enforce fail\] DefaultCPUAllocator: .* evolve resume$"),
+        (starved, r"^the worker of candidate 1 was killed 3 times \(SIGKILL\), .* evolve resume$"),
+    ],
+)
+def test_memory_that_is_wanting_is_no_animals_failure(tmp_path, evaluate, reason):
+    with pytest.raises(ExecutorError, match=reason):
+        outcomes(evaluate, tmp_path, workers=1)
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="tells a process's memory on Linux alone")

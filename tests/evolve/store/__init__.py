@@ -4,7 +4,9 @@ directory: test_directory.py
 record: test_record.py
 candidate: test_record.py
 evaluation: test_record.py
-lock: test_lock.py
+policies: test_policies.py
+lock: test_lock.py, test_regular_files.py
+regular_files: test_regular_files.py
 atomic_files: test_atomic_files.py
 versions: test_versions.py
 """

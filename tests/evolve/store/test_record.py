@@ -1,9 +1,11 @@
 """The record: read back bit for bit, never overwritten, whole after any crash, and damage named by file and line."""
 
+import errno
 import json
 import math
 import os
 import resource
+from dataclasses import replace
 
 import pytest
 
@@ -11,6 +13,7 @@ from evolve.config.numbering import Place
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, RunError
 from evolve.store.evaluation import Evaluation
+from evolve.store.record import _furthest
 from tests.evolve.store.records import CONFIG, DIMENSION, candidate
 
 
@@ -53,7 +56,8 @@ def test_a_run_that_is_somebody_elses_by_now_gets_no_more_lines(run, begun_anew)
         record.write_text(candidate(0).to_line() + candidate(1).to_line())
     with pytest.raises(RunError, match="no longer as this process left it"):
         run.append(candidate(2))
-    assert len(record.read_text().splitlines()) == 2 * begun_anew
+    assert (len(record.read_text().splitlines()) if record.exists() else 0) == 2 * begun_anew
+    assert record.exists() == begun_anew, "what was deleted stays deleted"
 
 
 @pytest.mark.parametrize("kept", [1, 40, -2, -1])
@@ -85,7 +89,7 @@ DAMAGE = {
     "zeros": (b"\0" * 64 + b"\n", "Expecting"),
     "no record": ("[1]\n", "must hold exactly"),
     "missing": (damaged(lambda r: r.pop("genome")), "must hold exactly"),
-    "wrong type": (damaged(lambda r: r.update(genome=None)), "wrong type"),
+    "wrong type": (damaged(lambda r: r.update(genome=None)), "genome = None: must be a list"),
     "wrong phenotype": (damaged(lambda r: r["phenotype"].pop("n_eyes")), "n_eyes"),
     "wrong genome": (damaged(lambda r: r["genome"].pop()), f"{DIMENSION} genes are open"),
     "wrong place": (damaged(lambda r: r.update(index=3)), "can't be number 3 of generation 0"),
@@ -105,10 +109,11 @@ def test_damage_is_named_by_file_and_line(run, kind):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
-def test_full_disk_is_named(run):
-    (run.path / "candidates.jsonl").unlink()
-    (run.path / "candidates.jsonl").symlink_to("/dev/full")
+def test_full_disk_is_named(run, monkeypatch):
+    def full(descriptor):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(RunError, match=r"candidates\.jsonl: cannot be written: No space left"):
         run.append(candidate(0))
     assert run.candidates == (), "what is not on disk is not on record"
@@ -128,3 +133,17 @@ def test_a_record_that_may_not_grow_loses_nothing(run):
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert record.read_bytes() == kept
     assert [c.id for c in run.candidates] == [0], "what is not on disk is not on record"
+
+
+def test_one_line_more_looks_at_few_others(run, monkeypatch):
+    """What `append` makes of the candidates is what a new reader makes of the lines, in any order of ids."""
+    monkeypatch.setattr("evolve.store.record._furthest", None)
+    for identity in (5, 0, 7, 3, 11, 4):
+        run.append(candidate(identity))
+        assert [c.id for c in run.candidates] == sorted(c.id for c in run.record.lines.values())
+    run.append(replace(candidate(5), rung=1))
+    run.append(replace(candidate(0), rung=2))
+    run.append(replace(candidate(0), rung=1))
+    monkeypatch.undo()
+    assert run.candidates == _furthest(run.record.lines)
+    assert [c.rung for c in run.candidates] == [2, 0, 0, 1, 0, 0]

@@ -2,6 +2,7 @@
 
 mirror: test_mirror.py, test_mirror_light.py
 source: test_mirror_source.py
+bombs: test_bombs.py
 inventory: test_mirror.py
 rays: test_mirror.py
 cameras: test_mirror.py

@@ -1,0 +1,64 @@
+"""A phenotype as a file has it, field by field: of its type, and within what its genes range over.
+
+Whoever builds an animal builds arrays as large as it says, so it is looked at before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from math import isqrt
+from typing import Any
+
+from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RELIEF_POINTS
+from evolve.genome.interval import Interval
+from evolve.genome.plain_values import listed, real, whole
+
+__all__ = ["checked_fields"]
+
+SIDES = ("resolution_height", "resolution_width")
+SEEN_THROUGH = ("relative_aperture", "relief", "refractive_index")
+LARGEST_COUNT = 4096  # of what no gene counts
+
+
+def checked_fields(record: Any, names: Iterable[str]) -> dict[str, Any]:
+    """The fields of a phenotype, each as `Phenotype` takes it.
+
+    Raises:
+        ValueError: one of them is unknown, of another type, or outside its range; says which.
+    """
+    if not isinstance(record, Mapping):
+        raise ValueError("phenotype: must be a table of its fields")
+    if unknown := sorted(set(record) - set(names)):
+        raise ValueError(f"phenotype.{unknown[0][:40]}: unknown")
+    fields = {name: _checked(name, value) for name, value in record.items()}
+    if len({fields.get(name) is None for name in SEEN_THROUGH}) > 1:
+        raise ValueError(f"phenotype: {', '.join(SEEN_THROUGH)} must be null together, or none of them")
+    return fields
+
+
+def _checked(name: str, value: Any) -> Any:
+    key = f"phenotype.{name}"
+    if value is None and name in (*SEEN_THROUGH, "lambda_max_nm"):
+        return None
+    if name == "resolution":
+        sides = zip(SIDES, listed(value, key, 2, 2), strict=True)
+        return tuple(_of_gene(side, f"phenotype.{side}", number) for side, number in sides)
+    if name == "relief":
+        points = tuple(
+            _of_gene("doe_00", key, height) for height in listed(value, key, 1, int(RELIEF_POINTS.high) ** 2)
+        )
+        if isqrt(len(points)) ** 2 != len(points) or isqrt(len(points)) not in RELIEF_POINTS:
+            raise ValueError(f"{key} has {len(points)} entries: must have N x N, N in {RELIEF_POINTS}")
+        return points
+    if name == "lambda_max_nm":
+        peaks = zip(LAMBDA_MAX, listed(value, key, 1, len(LAMBDA_MAX)), strict=False)
+        return tuple(_of_gene(gene, key, peak) for gene, peak in peaks)
+    return _of_gene(name, key, value)
+
+
+def _of_gene(gene: str, key: str, value: Any) -> float | int:
+    """A gene's value; where there is no such gene, a count of something."""
+    valid = ALL_GENES[gene].range if gene in ALL_GENES else Interval(1, LARGEST_COUNT)
+    if gene not in ALL_GENES or ALL_GENES[gene].kind == "integer":
+        return whole(value, key, int(valid.low), int(valid.high))
+    return real(value, key, valid)

@@ -1,0 +1,54 @@
+"""A policy that is lost or exchanged is noticed, and the message says what to do."""
+
+from dataclasses import replace
+
+import pytest
+
+from evolve.search.local_executor import LocalExecutor
+from evolve.search.loop import evolve
+from evolve.store.atomic_files import write_whole
+from evolve.store.directory import Run, RunError
+from evolve.store.policies import digest, lost, require
+from tests.evolve.closed_form import leaves_a_policy, tiny
+from tests.evolve.conftest import Silent
+from tests.evolve.store.records import candidate
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    run = Run.create(tmp_path_factory.mktemp("trained") / "run", tiny("search.generations=1"))
+    with LocalExecutor(leaves_a_policy, 1) as executor:
+        evolve(run, executor, Silent())
+    return run.path
+
+
+def test_checksums_are_on_record_and_policies_that_are_there_are_not_lost(trained):
+    run = Run.open(trained)
+    assert run.notice is None
+    for one in run.candidates:
+        assert one.policy == digest(run.policy_path(one.id))
+        require(one, run.policy_path(one.id))
+    assert len({one.policy for one in run.candidates}) == 4
+
+
+def test_lost_policies_are_noticed_at_once(run, call):
+    for number in range(8):
+        run.append(replace(candidate(number), policy="00"))
+        write_whole(run.policy_path(number), b"policy")
+    assert Run.open(run.path).notice is None
+    for number in (1, 2, 3, 5, 6, 7):
+        run.policy_path(number).unlink()
+    notice = Run.open(run.path).notice
+    assert "policies of 6 candidates are lost (1, 2, 3, 5, 6, ...): put the file back from a copy" in notice
+    assert notice in call("status", run.path)[2]
+    assert lost([candidate(1)], run.policy_path) is None, "a former version told nothing of it"
+
+
+def test_an_exchanged_policy_is_not_played(run):
+    run.append(replace(candidate(0), policy="00"))
+    with pytest.raises(RunError, match=r"no policy at .*000000\.safetensors: put the file back"):
+        require(run.candidates[0], run.policy_path(0))
+    write_whole(run.policy_path(0), b"another")
+    with pytest.raises(RunError, match="is not the policy with which candidate 0 was evaluated: put the file back"):
+        require(run.candidates[0], run.policy_path(0))
+    require(candidate(0), run.policy_path(0))
