@@ -111,7 +111,7 @@ class ClosedForm:
         fewest = reflected_components_of if light == lighting.BOUNCE else components_of
         self._components = fewest(atlas.texels, irradiance)
         self.basis = self._components.basis
-        self._faces = _face_rows(walls.uv, atlas, place)
+        self._faces = face_rows(walls.uv, atlas, place)
         self._n_faces = len(walls.geoms)
         self._one_dimensional = atlas.one_dimensional
         self._sphere_textures = [
@@ -242,7 +242,7 @@ def _check_tops(world: World, walls: Walls, static: StaticScene) -> None:
         raise NoClosedForm(f"light that is reflected twice sees the top of a wall {lowest:.2g} m high")
 
 
-def _face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
+def face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
     """Per face (face, ROW): column and row of the texel as affine functions of the point, place of the texture, 0."""
     rows = np.zeros((len(uv), ROW))
     for i, (affine, texture) in enumerate(zip(uv, place, strict=True)):

@@ -10,6 +10,7 @@ from optics.numerics.autodiff import Array
 from sim.scene import shapes
 from sim.scene.variant import MitsubaObject, variant
 from sim.tracing import lighting
+from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.mitsuba_tracer import Traced
 from sim.tracing.static_scene import StaticScene
@@ -59,6 +60,7 @@ class Tracers:
     def __init__(self, world: World, static: StaticScene, wavelengths: np.ndarray, name: str = "auto") -> None:
         self._world, self._static, self._wavelengths, self._name = world, static, wavelengths, name
         self._known: dict[str, Tracer] = {}
+        self._areas: AreaTracer | None = None
         self.of(lighting.DIRECT)
 
     def of(self, light: str) -> Tracer:
@@ -71,6 +73,20 @@ class Tracers:
             with variant(self._static.variant):
                 self._known[light] = tracer_of(self._world, self._static, self._wavelengths, self._name, light)
         return self._known[light]
+
+    def areas(self) -> AreaTracer:
+        """The one that sees by areas, in direct light.
+
+        Raises:
+            ValueError: a world that cannot be seen so.
+        """
+        if self._areas is None:
+            try:
+                with variant(self._static.variant):
+                    self._areas = AreaTracer(self._world, self._static, self._wavelengths)
+            except NoClosedForm as reason:
+                raise ValueError(f"samples = 'areas': this world has no closed form: {reason}") from reason
+        return self._areas
 
 
 def tracer_of(

@@ -1,0 +1,10 @@
+"""Light by areas: means over rectangles of the visual field in closed form, where rays would have to be many.
+
+area_tracer    AreaTracer: what an area sees
+patch          Area, and the Patch of a surface that is seen in it
+half_planes    shares that straight lines cut off
+columns        walls, floor and sky behind an area
+sphere_areas   spheres in front of them
+stripes        textures, averaged
+shadows        shares of a patch that a light reaches
+"""

@@ -1,0 +1,141 @@
+"""How much of an area a sphere fills, and which patch of the sphere that is.
+
+A sphere's outline on the tangent plane is a conic. A few lines across the area are cut with it exactly; between them
+it is taken as straight.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.tracing.areas.patch import Area, Patch
+from sim.tracing.areas.stripes import Texture
+
+LINES = 2  # chosen: cut with the outline
+# Cosine below which a surface does not slope further away from the eye: beyond, its patch would be longer than the
+# sphere.
+GRAZING = 0.15
+TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class SphereTexture:
+    """column = to_column @ (u, v, 1), of a texture along one axis · frame: from the sphere's axes to the world's."""
+
+    texture: Texture
+    to_column: np.ndarray
+    frame: np.ndarray
+
+
+@dataclass(frozen=True)
+class Disk:
+    """A sphere as an area sees it. share: of the area that it fills · distance: squared, of its centre [m²]."""
+
+    share: Array
+    distance: Array
+    patch: Patch
+
+
+@dataclass(frozen=True)
+class _Chord:
+    """Of the outline on one line across the area: its length and middle, in sides of the area."""
+
+    length: Array
+    middle: Array
+
+
+def disk_of(area: Area, centre: Array, radius: float) -> Disk:
+    """What an area sees of a sphere."""
+    way = centre - area.origin
+    distance = dr.squared_norm(way)
+    tangent = dr.maximum(distance - radius * radius, TINY)  # squared length of the lines that touch it
+    ahead = area.direction(0, 0)
+    right, up = mi.Vector3f(area.right.x, area.right.y, 0), mi.Vector3f(0, 0, area.height)
+
+    def slope(side: Array) -> Array:
+        return dr.abs(dr.dot(way, ahead) * dr.dot(way, side) - tangent * dr.dot(ahead, side))
+
+    upright = slope(right) <= slope(up)  # lines run towards the outline, so that they cut it steeply
+    along, across = dr.select(upright, up, right), dr.select(upright, right, up)
+    places = [(i + 0.5) / LINES - 0.5 for i in range(LINES)]
+    chords = [_chord(way, tangent, ahead + across * place, along) for place in places]
+    total, filled = sum(c.length for c in chords), sum(dr.select(c.length > 0, 1.0, 0.0) for c in chords)
+    per = dr.rcp(dr.maximum(total, TINY))
+    a = sum(place * c.length for place, c in zip(places, chords, strict=True)) * per
+    b = sum(c.middle * c.length for c in chords) * per
+    seen = ahead + across * a + along * b
+    width = total / dr.maximum(filled, 1)
+    patch = _patch(way, tangent, seen, along * width, across * (filled / LINES), area.origin, centre)
+    return Disk(total / LINES, distance, patch)
+
+
+def column_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Array, Array]:
+    """Where in the texture the middle of the patch is, and how many columns it spans."""
+    to_local = mi.Matrix3f(texture.frame.T.tolist())
+    n, along, across = (to_local @ mi.Vector3f(v) for v in (patch.normal, patch.along, patch.across))
+    per_u, per_v, at = map(float, texture.to_column)
+    sine = dr.maximum(dr.square(n.x) + dr.square(n.y), 1e-4)  # squared, of the polar angle
+    column, slopes = mi.Float(at), [mi.Float(0), mi.Float(0)]
+    if per_u:
+        u = dr.atan2(n.y, n.x) * dr.inv_two_pi
+        column += per_u * dr.select(u < 0, u + 1, u)
+        scale = per_u * dr.inv_two_pi / (radius * sine)
+        slopes = [s + (n.x * e.y - n.y * e.x) * scale for s, e in zip(slopes, (along, across), strict=True)]
+    if per_v:
+        column += per_v * dr.safe_acos(n.z) * dr.inv_pi
+        scale = -per_v * dr.inv_pi / radius * dr.rsqrt(sine)
+        slopes = [s + e.z * scale for s, e in zip(slopes, (along, across), strict=True)]
+    return column, dr.hypot(*slopes)
+
+
+def hidden_behind(disks: list[Disk]) -> tuple[list[Array], Array]:
+    """Share of the area in which each is seen before all others, and what is left for what stands behind them."""
+    visible = []
+    for k, disk in enumerate(disks):
+        share = disk.share
+        for other in (*disks[:k], *disks[k + 1 :]):
+            share *= dr.select(other.distance < disk.distance, 1 - other.share, 1)
+        visible.append(share)
+    return visible, 1 - sum(visible, mi.Float(0))
+
+
+def _chord(way: Array, tangent: Array, start: Array, side: Array) -> _Chord:
+    """Directions start + x side, |x| up to 1/2, meet the sphere where q2 x² + 2 q1 x + q0 > 0, ahead of the eye."""
+    a, b = dr.dot(way, start), dr.dot(way, side)
+    q2 = b * b - dr.squared_norm(side) * tangent
+    q1 = a * b - dr.dot(start, side) * tangent
+    q0 = a * a - dr.squared_norm(start) * tangent
+    under = q1 * q1 - q2 * q0
+    root, per = dr.sqrt(dr.maximum(under, 0)), dr.rcp(dr.select(dr.abs(q2) < TINY, TINY, q2))
+    one, other = (-q1 - root) * per, (-q1 + root) * per
+    low, high = dr.minimum(one, other), dr.maximum(one, other)
+    # Where the sphere reaches beside the eye, the outline is open: from one of its branches on.
+    open_, right = q2 > 0, b > 0
+    low, high = (
+        dr.select(open_, dr.select(right, high, -dr.inf), low),
+        dr.select(open_, dr.select(right, dr.inf, low), high),
+    )
+    low, high = dr.clip(low, -0.5, 0.5), dr.clip(high, -0.5, 0.5)
+    middle = (low + high) / 2
+    ahead = (under > 0) & (dr.fma(b, middle, a) > 0)
+    return _Chord(dr.select(ahead, high - low, 0), middle)
+
+
+def _patch(way: Array, tangent: Array, seen: Array, along: Array, across: Array, origin: Array, centre: Array) -> Patch:
+    """The patch around where a direction meets the sphere."""
+    length = dr.squared_norm(seen)
+    ahead = dr.dot(way, seen)
+    t = (ahead - dr.sqrt(dr.maximum(ahead * ahead - length * tangent, 0))) / length
+    point = mi.Point3f(origin + seen * t)
+    normal = mi.Normal3f(dr.normalize(point - centre))
+    facing = dr.minimum(dr.dot(normal, seen), -GRAZING * dr.sqrt(length))
+
+    def onto(side: Array) -> Array:
+        return t * (side - seen * (dr.dot(normal, side) / facing))
+
+    return Patch(point, normal, onto(along), onto(across))
