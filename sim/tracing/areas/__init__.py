@@ -1,6 +1,7 @@
 """Light by areas: means over rectangles of the visual field in closed form, where rays would have to be many.
 
 area_tracer    AreaTracer: what an area sees
+branches       what is left out where no area needs it
 patch          Area, and the Patch of a surface that is seen in it
 half_planes    shares that straight lines cut off
 columns        walls, floor and sky behind an area

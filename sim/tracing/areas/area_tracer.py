@@ -14,6 +14,7 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from sim.tracing import lighting
 from sim.tracing.areas import sphere_areas
+from sim.tracing.areas.branches import only_where
 from sim.tracing.areas.columns import RIM, Columns, Piece
 from sim.tracing.areas.patch import Area, Patch
 from sim.tracing.areas.shadows import WallShadows, lit_past_sphere
@@ -81,17 +82,28 @@ class AreaTracer:
     def radiance(self, area: Area, agent: Array, centres: list[Array], inputs: dict[str, Array]) -> list[Array]:
         """Mean of what comes out of each area, one array per component; agent, centres: of the spheres that move."""
         bodies = [*centres, agent]
+        n = len(self.basis)
+        nothing = [0.0] * n
         pieces = self._columns.pieces(area, inputs)
-        seen = [self._wall(area, piece, bodies, inputs) for piece in pieces]
-        seen.append(self._floor(area, pieces, bodies, inputs))
-        disks = [
-            sphere_areas.disk_of(area, centre, float(r))
-            for centre, r in zip(centres, self._bodies.radii, strict=False)
+        seen = [
+            only_where(piece.beside > 0, lambda piece=piece: self._wall(area, piece, bodies, inputs), nothing)
+            for piece in pieces
         ]
-        visible, behind = sphere_areas.hidden_behind(disks)
+        below = pieces[0].below + pieces[1].below
+        seen.append(only_where(below > 0, lambda: self._floor(area, pieces, bodies, inputs), nothing))
+        spheres = [
+            only_where(
+                sphere_areas.may_see(area, centre, float(radius)),
+                lambda k=k: self._sphere(area, k, bodies, inputs),
+                [0.0, *nothing],
+            )
+            for k, (centre, radius) in enumerate(zip(centres, self._bodies.radii, strict=False))
+        ]
+        distances = [dr.squared_norm(centre - area.origin) for centre in centres]
+        visible, behind = sphere_areas.hidden_behind([share for share, *_ in spheres], distances)
         total = [behind * sum(parts[1:], parts[0]) for parts in zip(*seen, strict=True)]
-        for k, (share, disk) in enumerate(zip(visible, disks, strict=True)):
-            total = [dr.fma(share, light, sum_) for light, sum_ in zip(self._sphere(k, disk.patch, bodies, inputs), total, strict=True)]
+        for share, (_, *light) in zip(visible, spheres, strict=True):
+            total = [dr.fma(share, own, rest) for own, rest in zip(light, total, strict=True)]
         return total
 
     def _wall(self, area: Area, piece: Piece, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
@@ -132,12 +144,15 @@ class AreaTracer:
         light = self._irradiance(patch, bodies, inputs)
         return [share * r * e for r, e in zip(reflectance, light, strict=True)]
 
-    def _sphere(self, k: int, patch: Patch, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
-        texture = self._sphere_textures[k]
-        column, spread = sphere_areas.column_of(texture, patch, float(self._bodies.radii[k]))
+    def _sphere(self, area: Area, k: int, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
+        """Its share of the area, and the light that comes from there per component."""
+        texture, radius = self._sphere_textures[k], float(self._bodies.radii[k])
+        disk = sphere_areas.disk_of(area, bodies[k], radius)
+        patch = disk.patch
+        column, spread = sphere_areas.column_of(texture, patch, radius)
         reflectance = self._stripes.mean(texture.texture, [column, column], spread, inputs)
         light = self._irradiance(patch, bodies, inputs, k)
-        return [r * e for r, e in zip(reflectance, light, strict=True)]
+        return [disk.share, *(r * e for r, e in zip(reflectance, light, strict=True))]
 
     def _irradiance(self, patch: Patch, bodies: list[Array], inputs: dict[str, Array], itself: int = -1) -> list[Array]:
         """Per component: sum over the lights of level · cos θ · share that is lit."""
@@ -145,11 +160,12 @@ class AreaTracer:
         directions = [list(map(float, source.direction)) for source in self._lights]
         lit = self._shadows.lit(patch, directions, inputs)
         total = [mi.Float(0) for _ in range(levels.shape[1])]
+        for k, (centre, radius) in enumerate(zip(bodies, self._bodies.radii, strict=True)):
+            if k != itself:
+                past = lit_past_sphere(patch, directions, centre, float(radius))
+                lit = [share * other for share, other in zip(lit, past, strict=True)]
         for direction, level, share in zip(directions, levels, lit, strict=True):
-            share = share * dr.maximum(dr.dot(patch.normal, mi.Vector3f(*direction)), 0)
-            for k, (centre, radius) in enumerate(zip(bodies, self._bodies.radii, strict=True)):
-                if k != itself:
-                    share *= lit_past_sphere(patch, direction, centre, float(radius))
+            share *= dr.maximum(dr.dot(patch.normal, mi.Vector3f(*direction)), 0)
             total = [dr.fma(share, float(factor), sum_) for factor, sum_ in zip(level, total, strict=True)]
         return total
 

@@ -34,10 +34,9 @@ class SphereTexture:
 
 @dataclass(frozen=True)
 class Disk:
-    """A sphere as an area sees it. share: of the area that it fills · distance: squared, of its centre [m²]."""
+    """A sphere as an area sees it. share: of the area that it fills · patch: what is seen of it."""
 
     share: Array
-    distance: Array
     patch: Patch
 
 
@@ -71,7 +70,19 @@ def disk_of(area: Area, centre: Array, radius: float) -> Disk:
     seen = ahead + across * a + along * b
     width = total / dr.maximum(filled, 1)
     patch = _patch(way, tangent, seen, along * width, across * (filled / LINES), area.origin, centre)
-    return Disk(total / LINES, distance, patch)
+    return Disk(total / LINES, patch)
+
+
+def may_see(area: Area, centre: Array, radius: float) -> Array:
+    """Whether an area might see a sphere: false where it surely does not."""
+    way = centre - area.origin
+    ahead = area.direction(0, 0)
+    beside = dr.cross(way, ahead)
+    along = dr.dot(way, ahead)
+    # Tangent of the sphere's radius as seen from the area's middle, plus half of the area's diagonal, on its plane.
+    half = dr.sqrt(dr.squared_norm(area.right) + dr.square(area.height)) / 2
+    reach = radius * dr.norm(ahead) + half * dr.norm(way)
+    return (dr.squared_norm(beside) < dr.square(reach)) & (along > -radius * dr.norm(ahead))
 
 
 def column_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Array, Array]:
@@ -93,13 +104,14 @@ def column_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Arra
     return column, dr.hypot(*slopes)
 
 
-def hidden_behind(disks: list[Disk]) -> tuple[list[Array], Array]:
+def hidden_behind(shares: list[Array], distances: list[Array]) -> tuple[list[Array], Array]:
     """Share of the area in which each is seen before all others, and what is left for what stands behind them."""
     visible = []
-    for k, disk in enumerate(disks):
-        share = disk.share
-        for other in (*disks[:k], *disks[k + 1 :]):
-            share *= dr.select(other.distance < disk.distance, 1 - other.share, 1)
+    for k, (own, distance) in enumerate(zip(shares, distances, strict=True)):
+        share = own
+        for j, other in enumerate(shares):
+            if j != k:
+                share *= dr.select(distances[j] < distance, 1 - other, 1)
         visible.append(share)
     return visible, 1 - sum(visible, mi.Float(0))
 
