@@ -146,11 +146,11 @@ class BoxSampling:
         rays = max(1, round(rays_per_receptor))
         return BoxSensor(*self._rays(rays, np.arange(np.prod(self.eye.resolution))), rays)
 
-    def areas(self, per_receptor: float) -> BoxSensor:
-        """The sensor whose samples are all of a receptor's square, cut into so many rectangles: as many rows of them as
-        columns, or fewer."""
+    def areas(self, per_receptor: float, *, in_rows: bool = True) -> BoxSensor:
+        """The sensor whose samples are all of a receptor's square, cut into so many rectangles: one row of them, or, in
+        rows, as many rows as columns or fewer."""
         count = max(1, round(per_receptor))
-        rows = max(n for n in range(1, math.isqrt(count) + 1) if count % n == 0)
+        rows = max(n for n in range(1, math.isqrt(count) + 1) if count % n == 0) if in_rows else 1
         columns = count // rows
         y, x = (index.ravel() for index in np.indices((rows, columns)))
         within = np.stack([(x + 0.5) / columns, (y + 0.5) / rows], axis=-1)

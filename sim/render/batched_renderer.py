@@ -18,6 +18,7 @@ import numpy as np
 import optics
 from optics.numerics.autodiff import Array
 from sim.eyes.eyes import Eyes, eye_positions, eye_rotations
+from sim.eyes.sensor import BoxSampling, Sensor
 from sim.render import memory_budget
 from sim.render.fidelity import AREAS, Fidelity, chosen_fidelity
 from sim.render.frozen_kernels import garbage_kept
@@ -79,12 +80,13 @@ class BatchedRenderer:
             white = lighting.white_radiance(self._static.scene, self.bands.wavelengths)
         self.fidelity, sampling = fidelity, scene.sampling(fidelity.depth)
         self.tracer: Tracer | AreaTracer
-        if by_areas := fidelity.samples == AREAS:
-            self.tracer = scene.areas()
-        else:
-            self.tracer = scene.tracers.of(fidelity.light)
+        self.tracer = scene.areas() if fidelity.samples == AREAS else scene.tracers.of(fidelity.light)
         self._check_memory(n_envs)
-        self.sensor = (sampling.areas if by_areas else sampling.sensor)(fidelity.rays_per_receptor)
+        if isinstance(sampling, BoxSampling) and fidelity.samples == AREAS:
+            # What is upright has closed forms along columns of any height; spheres' outlines want rows, too.
+            self.sensor: Sensor = sampling.areas(fidelity.rays_per_receptor, in_rows=len(self._static.spheres) > 0)
+        else:
+            self.sensor = sampling.sensor(fidelity.rays_per_receptor)
         if self.eye.pupil is None:  # a whole number of its own for every receptor
             self.fidelity = replace(fidelity, rays_per_receptor=float(self.sensor.rays_per_receptor))
         mixing = self.eye.throughput * self.bands.weights
