@@ -28,6 +28,7 @@ from sim.tracing.walls import ALIGNED, NoClosedForm, Walls, walls_of
 from sim.worlds.world import World
 
 LEAST_DIP = 1e-4  # of directions that meet the floor
+BANDS = 2
 STRETCHES = 2  # of a wall's texture, each averaged by itself: what is near fills more of an area than what is far
 
 
@@ -123,34 +124,39 @@ class AreaTracer:
     def _floor(
         self, area: Area, pieces: tuple[Piece, Piece], bodies: list[Array], inputs: dict[str, Array]
     ) -> list[Array]:
+        """In bands of the same height, which lie the further apart the nearer they are to the horizon."""
         share = pieces[0].below + pieces[1].below
         a = sum(piece.middle * piece.below for piece in pieces) / dr.maximum(share, LEAST_DIP)
-        level = area.level(a)
-        dip = dr.maximum(area.height * (1 - share) / 2 - area.up, LEAST_DIP)
+        total = [mi.Float(0) for _ in self.basis]
+        for band in range(BANDS):
+            below = area.height * (0.5 - share * ((band + 0.5) / BANDS))
+            dip = dr.maximum(below - area.up, LEAST_DIP)
+            patch = self._floor_patch(area, a, dip, area.height * share / BANDS)
+            light = zip(self._floor_reflectance(patch, inputs), self._irradiance(patch, bodies, inputs), strict=True)
+            total = [dr.fma(r, e, sum_) for (r, e), sum_ in zip(light, total, strict=True)]
+        return [sum_ * share / BANDS for sum_ in total]
+
+    def _floor_patch(self, area: Area, a: Array, dip: Array, height: Array) -> Patch:
+        """The floor in a band of the visual field of this height, its middle at column a and so far down."""
         t = (area.origin.z - self._walls.floor) / dip
+        level, across = area.level(a), area.level(a) * (t / dip * height)
         point = area.origin + mi.Vector3f(level.x, level.y, -dip) * t
-        across = level * (t / dip * area.height * share)
-        patch = Patch(
-            point,
-            mi.Normal3f(0, 0, 1),
-            mi.Vector3f(area.right.x, area.right.y, 0) * t,
-            mi.Vector3f(across.x, across.y, 0),
-        )
-        row = self._floor_row
-        column = float(row[0]) * point.x + float(row[1]) * point.y + float(row[3])
-        spread = dr.abs(float(row[0]) * patch.along.x + float(row[1]) * patch.along.y)
-        spread += dr.abs(float(row[0]) * patch.across.x + float(row[1]) * patch.across.y)
-        reflectance = self._stripes.mean(Texture(*map(float, row[4:6])), [column, column], spread, inputs)
-        light = self._irradiance(patch, bodies, inputs)
-        return [share * r * e for r, e in zip(reflectance, light, strict=True)]
+        along = mi.Vector3f(area.right.x, area.right.y, 0) * t
+        return Patch(point, mi.Normal3f(0, 0, 1), along, mi.Vector3f(across.x, across.y, 0))
+
+    def _floor_reflectance(self, patch: Patch, inputs: dict[str, Array]) -> list[Array]:
+        per_x, per_y, _, at, *texture = map(float, self._floor_row)
+        column = per_x * patch.point.x + per_y * patch.point.y + at
+        along, across = (per_x * side.x + per_y * side.y for side in (patch.along, patch.across))
+        return self._stripes.mean_over(Texture(*texture), column, (along, across), inputs)
 
     def _sphere(self, area: Area, k: int, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
         """Its share of the area, and the light that comes from there per component."""
         texture, radius = self._sphere_textures[k], float(self._bodies.radii[k])
         disk = sphere_areas.disk_of(area, bodies[k], radius)
         patch = disk.patch
-        column, spread = sphere_areas.column_of(texture, patch, radius)
-        reflectance = self._stripes.mean(texture.texture, [column, column], spread, inputs)
+        column, sides = sphere_areas.columns_of(texture, patch, radius)
+        reflectance = self._stripes.mean_over(texture.texture, column, sides, inputs)
         light = self._irradiance(patch, bodies, inputs, k)
         return [disk.share, *(r * e for r, e in zip(reflectance, light, strict=True))]
 

@@ -85,8 +85,8 @@ def may_see(area: Area, centre: Array, radius: float) -> Array:
     return (dr.squared_norm(beside) < dr.square(reach)) & (along > -radius * dr.norm(ahead))
 
 
-def column_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Array, Array]:
-    """Where in the texture the middle of the patch is, and how many columns it spans."""
+def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Array, tuple[Array, Array]]:
+    """Where in the texture the middle of the patch is, and how many columns its sides span."""
     to_local = mi.Matrix3f(texture.frame.T.tolist())
     n, along, across = (to_local @ mi.Vector3f(v) for v in (patch.normal, patch.along, patch.across))
     per_u, per_v, at = map(float, texture.to_column)
@@ -101,7 +101,7 @@ def column_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Arra
         column += per_v * dr.safe_acos(n.z) * dr.inv_pi
         scale = -per_v * dr.inv_pi / radius * dr.rsqrt(sine)
         slopes = [s + e.z * scale for s, e in zip(slopes, (along, across), strict=True)]
-    return column, dr.hypot(*slopes)
+    return column, (slopes[0], slopes[1])
 
 
 def hidden_behind(shares: list[Array], distances: list[Array]) -> tuple[list[Array], Array]:
