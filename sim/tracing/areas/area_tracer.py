@@ -153,12 +153,19 @@ class AreaTracer:
     def _sphere(self, area: Area, k: int, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
         """Its share of the area, and the light that comes from there per component."""
         texture, radius = self._sphere_textures[k], float(self._bodies.radii[k])
-        disk = sphere_areas.disk_of(area, bodies[k], radius)
-        patch = disk.patch
-        column, sides = sphere_areas.columns_of(texture, patch, radius)
-        reflectance = self._stripes.mean_over(texture.texture, column, sides, inputs)
-        light = self._irradiance(patch, bodies, inputs, k)
-        return [disk.share, *(r * e for r, e in zip(reflectance, light, strict=True))]
+        view = sphere_areas.SphereView(area, bodies[k], radius)
+
+        def add(index: Array, share: Array, total: list[Array]) -> tuple[Array, Array, list[Array]]:
+            part = view.part(index)
+            column, sides = sphere_areas.columns_of(texture, part.patch, radius)
+            reflectance = self._stripes.mean_over(texture.texture, column, sides, inputs)
+            light = zip(reflectance, self._irradiance(part.patch, bodies, inputs, k), strict=True)
+            total = [dr.fma(part.share, r * e, sum_) for (r, e), sum_ in zip(light, total, strict=True)]
+            return index + 1, share + part.share, total
+
+        start = mi.UInt32(0), mi.Float(0), [mi.Float(0) for _ in self.basis]
+        _, share, total = dr.while_loop(start, lambda index, share, total: index < view.count, add, label="parts")
+        return [share, *(sum_ / dr.maximum(share, LEAST_DIP) for sum_ in total)]
 
     def _irradiance(self, patch: Patch, bodies: list[Array], inputs: dict[str, Array], itself: int = -1) -> list[Array]:
         """Per component: sum over the lights of level · cos θ · share that is lit."""

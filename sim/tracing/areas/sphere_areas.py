@@ -16,7 +16,7 @@ from optics.numerics.autodiff import Array
 from sim.tracing.areas.patch import Area, Patch
 from sim.tracing.areas.stripes import Texture
 
-LINES = 2  # chosen: cut with the outline
+STRIPS, PARTS = 2, 2  # chosen: cut with the outline
 # Cosine below which a surface does not slope further away from the eye: beyond, its patch would be longer than the
 # sphere.
 GRAZING = 0.15
@@ -33,7 +33,7 @@ class SphereTexture:
 
 
 @dataclass(frozen=True)
-class Disk:
+class Part:
     """A sphere as an area sees it. share: of the area that it fills · patch: what is seen of it."""
 
     share: Array
@@ -48,29 +48,34 @@ class _Chord:
     middle: Array
 
 
-def disk_of(area: Area, centre: Array, radius: float) -> Disk:
-    """What an area sees of a sphere."""
-    way = centre - area.origin
-    distance = dr.squared_norm(way)
-    tangent = dr.maximum(distance - radius * radius, TINY)  # squared length of the lines that touch it
-    ahead = area.direction(0, 0)
-    right, up = mi.Vector3f(area.right.x, area.right.y, 0), mi.Vector3f(0, 0, area.height)
+class SphereView:
+    """What an area sees of a sphere, in parts: of STRIPS strips across it, cut to PARTS each."""
 
-    def slope(side: Array) -> Array:
-        return dr.abs(dr.dot(way, ahead) * dr.dot(way, side) - tangent * dr.dot(ahead, side))
+    count = STRIPS * PARTS
 
-    upright = slope(right) <= slope(up)  # lines run towards the outline, so that they cut it steeply
-    along, across = dr.select(upright, up, right), dr.select(upright, right, up)
-    places = [(i + 0.5) / LINES - 0.5 for i in range(LINES)]
-    chords = [_chord(way, tangent, ahead + across * place, along) for place in places]
-    total, filled = sum(c.length for c in chords), sum(dr.select(c.length > 0, 1.0, 0.0) for c in chords)
-    per = dr.rcp(dr.maximum(total, TINY))
-    a = sum(place * c.length for place, c in zip(places, chords, strict=True)) * per
-    b = sum(c.middle * c.length for c in chords) * per
-    seen = ahead + across * a + along * b
-    width = total / dr.maximum(filled, 1)
-    patch = _patch(way, tangent, seen, along * width, across * (filled / LINES), area.origin, centre)
-    return Disk(total / LINES, patch)
+    def __init__(self, area: Area, centre: Array, radius: float) -> None:
+        self._area, self._centre = area, centre
+        self._way = way = centre - area.origin
+        # Squared length of the lines that touch the sphere.
+        self._tangent = tangent = dr.maximum(dr.squared_norm(way) - radius * radius, TINY)
+        self._ahead = ahead = area.direction(0, 0)
+        right, up = mi.Vector3f(area.right.x, area.right.y, 0), mi.Vector3f(0, 0, area.height)
+
+        def slope(side: Array) -> Array:
+            return dr.abs(dr.dot(way, ahead) * dr.dot(way, side) - tangent * dr.dot(ahead, side))
+
+        upright = slope(right) <= slope(up)  # lines run towards the outline, so that they cut it steeply
+        self._along, self._across = dr.select(upright, up, right), dr.select(upright, right, up)
+
+    def part(self, index: Array) -> Part:
+        """One of them."""
+        strip = index // PARTS
+        start = self._ahead + self._across * ((mi.Float(strip) + 0.5) / STRIPS - 0.5)
+        chord = _chord(self._way, self._tangent, start, self._along)
+        seen = start + self._along * (chord.middle + chord.length * ((mi.Float(index - strip * PARTS) + 0.5) / PARTS - 0.5))
+        sides = self._along * (chord.length / PARTS), self._across / STRIPS
+        patch = _patch(self._way, self._tangent, seen, *sides, self._area.origin, self._centre)
+        return Part(chord.length / self.count, patch)
 
 
 def may_see(area: Area, centre: Array, radius: float) -> Array:
