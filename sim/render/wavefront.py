@@ -42,7 +42,9 @@ class PoseBuffer:
 class Wavefront:
     """The kernel's body. Everything here is traced once; only arrays passed as arguments may change."""
 
-    def __init__(self, n_envs: int, n_eyes: int, sensor: Sensor, tracer: Tracer | AreaTracer, poses: PoseBuffer) -> None:
+    def __init__(
+        self, n_envs: int, n_eyes: int, sensor: Sensor, tracer: Tracer | AreaTracer, poses: PoseBuffer
+    ) -> None:
         self.n_rays, self.n_eyes = len(sensor.directions), n_eyes
         self.lanes = n_envs * n_eyes * self.n_rays
         self.stride, self.n_spheres = poses.stride, poses.n_spheres

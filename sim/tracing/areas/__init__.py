@@ -2,6 +2,7 @@
 
 area_tracer    AreaTracer: what an area sees
 branches       what is left out where no area needs it
+illumination   the light that falls on a patch
 patch          Area, and the Patch of a surface that is seen in it
 half_planes    shares that straight lines cut off
 columns        walls, floor and sky behind an area

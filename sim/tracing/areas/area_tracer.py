@@ -7,6 +7,8 @@ and each light is shut off by the shares that lie in shadow. Colours and compone
 
 from __future__ import annotations
 
+from functools import partial
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -16,8 +18,8 @@ from sim.tracing import lighting
 from sim.tracing.areas import sphere_areas
 from sim.tracing.areas.branches import only_where
 from sim.tracing.areas.columns import RIM, Columns, Piece
+from sim.tracing.areas.illumination import Illumination, Moment
 from sim.tracing.areas.patch import Area, Patch
-from sim.tracing.areas.shadows import WallShadows, lit_past_sphere
 from sim.tracing.areas.sphere_areas import SphereTexture
 from sim.tracing.areas.stripes import Stripes, Texture
 from sim.tracing.closed_form_tracer import Components, components_of, face_rows
@@ -49,57 +51,39 @@ class AreaTracer:
 
     def __init__(self, world: World, static: StaticScene, wavelengths: np.ndarray) -> None:
         walls = walls_of(world.model, static.geoms)
-        if np.ptp(walls.top) > ALIGNED if len(walls) else False:
+        if len(walls) and np.ptp(walls.top) > ALIGNED:
             raise NoClosedForm("walls of several heights")
-        self._walls, self._bodies = walls, static.bodies
-        self._lights = lighting.directional_lights(static.scene, wavelengths)
-        if any(source.direction[2] <= 0 for source in self._lights):
-            raise NoClosedForm("a light shines from below")
-        footprints = footprints_of(walls)
-        self.why = f"{len(walls)} upright walls, {footprints.how}"
-        self._columns = Columns(walls, footprints)
-        self._shadows = WallShadows(walls, [source.direction for source in self._lights])
         geoms, place = np.unique(walls.geoms, return_inverse=True)
         bsdfs = [*(static.bsdfs[int(g)] for g in geoms), *static.spheres.bsdfs]
         atlas = bake(world.model, [*geoms, *static.spheres.geoms], bsdfs, wavelengths)
         if not atlas.one_dimensional:
             raise NoClosedForm("a texture that changes along two axes")
-        irradiance = np.array([source.irradiance for source in self._lights]).reshape(-1, len(wavelengths))
-        self._components: Components = components_of(atlas.texels, irradiance)
-        self.basis = self._components.basis
-        self._stripes = Stripes(self._components.reflectance, atlas.places[:, :2])
+        lights, footprints = lighting.directional_lights(static.scene, wavelengths), footprints_of(walls)
+        irradiance = np.array([light.irradiance for light in lights]).reshape(-1, len(wavelengths))
+        components: Components = components_of(atlas.texels, irradiance)
+        self.why = f"{len(walls)} upright walls, {footprints.how}"
+        self.basis = components.basis
+        self._walls, self._bodies = walls, static.bodies
+        self._columns = Columns(walls, footprints)
+        self._illumination = Illumination(walls, static.bodies.radii, lights, components.levels)
+        self._stripes = Stripes(components.reflectance, atlas.places[:, :2])
         self._sphere_textures = _sphere_textures(atlas, len(geoms), static)
-        floor = face_rows(walls.uv[-1:], atlas, place[-1:])[0]
-        self._floor_row = [*floor[:4], *floor[8:10]]
-        tables = {
-            "faces": _faces(walls, atlas, place),
-            **footprints.tables,
-            **self._columns.tables,
-            **self._shadows.tables,
-            **self._stripes.tables,
-        }
+        *self._floor_column, first, columns = _column_and_texture(face_rows(walls.uv[-1:], atlas, place[-1:]))[0]
+        self._floor_texture = Texture(mi.Float(first), mi.Float(columns))
+        parts = (footprints, self._columns, self._illumination, self._stripes)
+        tables = {"faces": _faces(walls, atlas, place)} | {k: v for part in parts for k, v in part.tables.items()}
         self.inputs = {name: mi.Float(np.ascontiguousarray(table, np.float32)) for name, table in tables.items()}
 
     def radiance(self, area: Area, agent: Array, centres: list[Array], inputs: dict[str, Array]) -> list[Array]:
         """Mean of what comes out of each area, one array per component; agent, centres: of the spheres that move."""
-        bodies = [*centres, agent]
-        n = len(self.basis)
-        nothing = [0.0] * n
+        now, nothing = Moment([*centres, agent], inputs), [0.0] * len(self.basis)
         pieces = self._columns.pieces(area, inputs)
-        seen = [
-            only_where(piece.beside > 0, lambda piece=piece: self._wall(area, piece, bodies, inputs), nothing)
-            for piece in pieces
-        ]
-        below = pieces[0].below + pieces[1].below
-        seen.append(only_where(below > 0, lambda: self._floor(area, pieces, bodies, inputs), nothing))
-        spheres = [
-            only_where(
-                sphere_areas.may_see(area, centre, float(radius)),
-                lambda k=k: self._sphere(area, k, bodies, inputs),
-                [0.0, *nothing],
-            )
-            for k, (centre, radius) in enumerate(zip(centres, self._bodies.radii, strict=False))
-        ]
+        seen = [only_where(piece.beside > 0, partial(self._wall, area, piece, now), nothing) for piece in pieces]
+        seen.append(only_where(pieces[0].below + pieces[1].below > 0, partial(self._floor, area, pieces, now), nothing))
+        spheres = []
+        for k, centre in enumerate(centres):
+            in_view = sphere_areas.may_see(area, centre, float(self._bodies.radii[k]))
+            spheres.append(only_where(in_view, partial(self._sphere, area, k, now), [0.0, *nothing]))
         distances = [dr.squared_norm(centre - area.origin) for centre in centres]
         visible, behind = sphere_areas.hidden_behind([share for share, *_ in spheres], distances)
         total = [behind * sum(parts[1:], parts[0]) for parts in zip(*seen, strict=True)]
@@ -107,23 +91,21 @@ class AreaTracer:
             total = [dr.fma(share, own, rest) for own, rest in zip(light, total, strict=True)]
         return total
 
-    def _wall(self, area: Area, piece: Piece, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
+    def _wall(self, area: Area, piece: Piece, now: Moment) -> list[Array]:
         patch = piece.patch(area, self._walls.floor, self._columns.top)
-        row = dr.gather(mi.Vector4f, inputs["faces"], 2 * piece.face)
-        place = dr.gather(mi.Vector2f, inputs["faces"], 4 * piece.face + 2)
+        row = dr.gather(mi.Vector4f, now.inputs["faces"], 2 * piece.face.index)
+        place = dr.gather(mi.Vector2f, now.inputs["faces"], 4 * piece.face.index + 2)
         steps = [piece.start + (piece.end - piece.start) * (i / STRETCHES) for i in range(STRETCHES + 1)]
         ends = []
         for step in steps:
             at = piece.place(area, step)
             ends.append(row.x * at.x + row.y * at.y + row.z * patch.point.z + row.w)
         spread = dr.abs(row.z * patch.across.z)
-        reflectance = self._stripes.mean(Texture(place.x, place.y), ends, spread, inputs)
-        light = self._irradiance(patch, bodies, inputs)
+        reflectance = self._stripes.mean(Texture(place.x, place.y), ends, spread, now.inputs)
+        light = self._illumination.irradiance(patch, now)
         return [piece.beside * r * e for r, e in zip(reflectance, light, strict=True)]
 
-    def _floor(
-        self, area: Area, pieces: tuple[Piece, Piece], bodies: list[Array], inputs: dict[str, Array]
-    ) -> list[Array]:
+    def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: Moment) -> list[Array]:
         """In bands of the same height, which lie the further apart the nearer they are to the horizon."""
         share = pieces[0].below + pieces[1].below
         a = sum(piece.middle * piece.below for piece in pieces) / dr.maximum(share, LEAST_DIP)
@@ -132,7 +114,7 @@ class AreaTracer:
             below = area.height * (0.5 - share * ((band + 0.5) / BANDS))
             dip = dr.maximum(below - area.up, LEAST_DIP)
             patch = self._floor_patch(area, a, dip, area.height * share / BANDS)
-            light = zip(self._floor_reflectance(patch, inputs), self._irradiance(patch, bodies, inputs), strict=True)
+            light = zip(self._floor_reflectance(patch, now), self._illumination.irradiance(patch, now), strict=True)
             total = [dr.fma(r, e, sum_) for (r, e), sum_ in zip(light, total, strict=True)]
         return [sum_ * share / BANDS for sum_ in total]
 
@@ -144,59 +126,52 @@ class AreaTracer:
         along = mi.Vector3f(area.right.x, area.right.y, 0) * t
         return Patch(point, mi.Normal3f(0, 0, 1), along, mi.Vector3f(across.x, across.y, 0))
 
-    def _floor_reflectance(self, patch: Patch, inputs: dict[str, Array]) -> list[Array]:
-        per_x, per_y, _, at, *texture = map(float, self._floor_row)
+    def _floor_reflectance(self, patch: Patch, now: Moment) -> list[Array]:
+        per_x, per_y, _, at = map(float, self._floor_column)
         column = per_x * patch.point.x + per_y * patch.point.y + at
         along, across = (per_x * side.x + per_y * side.y for side in (patch.along, patch.across))
-        return self._stripes.mean_over(Texture(*texture), column, (along, across), inputs)
+        return self._stripes.mean_over(self._floor_texture, column, (along, across), now.inputs)
 
-    def _sphere(self, area: Area, k: int, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
+    def _sphere(self, area: Area, k: int, now: Moment) -> list[Array]:
         """Its share of the area, and the light that comes from there per component."""
         texture, radius = self._sphere_textures[k], float(self._bodies.radii[k])
-        view = sphere_areas.SphereView(area, bodies[k], radius)
+        view = sphere_areas.SphereView(area, now.bodies[k], radius)
 
         def add(index: Array, share: Array, total: list[Array]) -> tuple[Array, Array, list[Array]]:
-            part = view.part(index)
-            column, sides = sphere_areas.columns_of(texture, part.patch, radius)
-            reflectance = self._stripes.mean_over(texture.texture, column, sides, inputs)
-            light = zip(reflectance, self._irradiance(part.patch, bodies, inputs, k), strict=True)
-            total = [dr.fma(part.share, r * e, sum_) for (r, e), sum_ in zip(light, total, strict=True)]
-            return index + 1, share + part.share, total
+            slice_ = view.slice(index)
+            column, sides = sphere_areas.columns_of(texture, slice_.patch, radius)
+            reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs)
+            light = zip(reflectance, self._illumination.irradiance(slice_.patch, now, k), strict=True)
+            total = [dr.fma(slice_.share, r * e, sum_) for (r, e), sum_ in zip(light, total, strict=True)]
+            return index + 1, share + slice_.share, total
 
         start = mi.UInt32(0), mi.Float(0), [mi.Float(0) for _ in self.basis]
-        _, share, total = dr.while_loop(start, lambda index, share, total: index < view.count, add, label="parts")
+        _, share, total = dr.while_loop(start, lambda index, share, total: index < view.count, add, label="slices")
         return [share, *(sum_ / dr.maximum(share, LEAST_DIP) for sum_ in total)]
-
-    def _irradiance(self, patch: Patch, bodies: list[Array], inputs: dict[str, Array], itself: int = -1) -> list[Array]:
-        """Per component: sum over the lights of level · cos θ · share that is lit."""
-        levels = self._components.levels
-        directions = [list(map(float, source.direction)) for source in self._lights]
-        lit = self._shadows.lit(patch, directions, inputs)
-        total = [mi.Float(0) for _ in range(levels.shape[1])]
-        for k, (centre, radius) in enumerate(zip(bodies, self._bodies.radii, strict=True)):
-            if k != itself:
-                past = lit_past_sphere(patch, directions, centre, float(radius))
-                lit = [share * other for share, other in zip(lit, past, strict=True)]
-        for direction, level, share in zip(directions, levels, lit, strict=True):
-            share *= dr.maximum(dr.dot(patch.normal, mi.Vector3f(*direction)), 0)
-            total = [dr.fma(share, float(factor), sum_) for factor, sum_ in zip(level, total, strict=True)]
-        return total
 
 
 def _faces(walls: Walls, atlas: Atlas, place: np.ndarray) -> np.ndarray:
     """Per face, in eights: column of the texel as an affine function of (x, y, z), first texel and columns of the
     texture; the floor's rim has any texture, since none of it is seen."""
-    rows = face_rows(walls.uv, atlas, place)
-    found = np.zeros((len(rows) - 1 + RIM, 8))
-    found[: len(rows) - 1, :4], found[: len(rows) - 1, 4:6] = rows[:-1, :4], rows[:-1, 8:10]
-    found[len(rows) - 1 :, 5] = 1
+    rows = _column_and_texture(face_rows(walls.uv[:-1], atlas, place[:-1]))
+    found = np.zeros((len(rows) + RIM, 8))
+    found[: len(rows), :6] = rows
+    found[len(rows) :, 5] = 1
     return found.ravel()
+
+
+def _column_and_texture(rows: np.ndarray) -> np.ndarray:
+    """What of face_rows textures along one axis need: (face, 6), the texel's column as an affine function of (x, y, z),
+    first texel and columns of the texture."""
+    return np.concatenate([rows[:, :4], rows[:, 8:10]], axis=1)
 
 
 def _sphere_textures(atlas: Atlas, first: int, static: StaticScene) -> list[SphereTexture]:
     return [
         SphereTexture(
-            Texture(*map(float, atlas.places[first + k, :2])), atlas.to_texels[first + k][0], static.spheres.frames[k]
+            Texture(*map(mi.Float, atlas.places[first + k, :2].astype(float))),
+            atlas.to_texels[first + k][0],
+            static.spheres.frames[k],
         )
         for k in range(len(static.spheres))
     ]

@@ -24,17 +24,23 @@ RIM = 4  # sides of the floor, at which worlds without a wall end
 
 
 @dataclass(frozen=True)
-class Piece:
-    """A wall in columns start <= a <= end of an area.
+class Face:
+    """index: which · left, right: its ends, as seen from in front (Point2f)."""
 
-    face: which · left, right: its ends, as seen from in front (Point2f)
+    index: Array
+    left: Array
+    right: Array
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A wall's face in columns start <= a <= end of an area.
+
     nearness: at a = 0, and its slope along a [1/m]
     below, beside, above: shares of the area in which floor, wall and sky are seen in these columns
     """
 
-    face: Array
-    left: Array
-    right: Array
+    face: Face
     start: Array
     end: Array
     nearness: tuple[Array, Array]
@@ -66,9 +72,12 @@ class Piece:
         point = area.origin + mi.Vector3f(level.x, level.y, (low + high) / 2) * far
         point.z = dr.clip(point.z, floor, top)
         along = self.place(area, self.end) - self.place(area, self.start)
-        side = dr.normalize(self.right - self.left)
+        side = dr.normalize(self.face.right - self.face.left)
         return Patch(
-            point, mi.Normal3f(side.y, -side.x, 0), mi.Vector3f(along.x, along.y, 0), mi.Vector3f(0, 0, (high - low) * far)
+            point,
+            mi.Normal3f(side.y, -side.x, 0),
+            mi.Vector3f(along.x, along.y, 0),
+            mi.Vector3f(0, 0, (high - low) * far),
         )
 
 
@@ -88,18 +97,18 @@ class Columns:
     def pieces(self, area: Area, inputs: dict[str, Array]) -> tuple[Piece, Piece]:
         """The left and the right one; where one wall fills all columns, the right one has none."""
         half = mi.Float(0.5)
-        (one, *left), (other, *right) = (self._met(area, sign * half, inputs) for sign in (-1, 1))
-        edge = dr.select(one == other, half, self._edge(area, *left, *right))
-        return self._piece(area, one, *left, -half, edge), self._piece(area, other, *right, edge, half)
+        left, right = (self._met(area, sign * half, inputs) for sign in (-1, 1))
+        edge = dr.select(left.index == right.index, half, self._edge(area, left, right))
+        return self._piece(area, left, -half, edge), self._piece(area, right, edge, half)
 
-    def _met(self, area: Area, a: Array, inputs: dict[str, Array]) -> tuple[Array, Array, Array]:
-        """Which face is met at a, and its left and right end."""
+    def _met(self, area: Area, a: Array, inputs: dict[str, Array]) -> Face:
+        """The one that is met at a."""
         level = area.level(a)
         ray = mi.Ray3f(area.origin, mi.Vector3f(level.x, level.y, 0))
         t, face, _ = self._footprints.hit(ray, inputs)
         face = dr.select(dr.isfinite(t), face, self._rim + self._side_of_floor(ray))
         ends = dr.gather(mi.Vector4f, inputs["face_ends"], face)
-        return face, mi.Point2f(ends.x, ends.y), mi.Point2f(ends.z, ends.w)
+        return Face(face, mi.Point2f(ends.x, ends.y), mi.Point2f(ends.z, ends.w))
 
     def _side_of_floor(self, ray: Array) -> Array:
         """Through which of the floor's sides a ray leaves it: -x, +x, -y, +y."""
@@ -110,12 +119,12 @@ class Columns:
         x, y = (dr.select(d > 0, mi.UInt32(1), mi.UInt32(0)) for d in (ray.d.x, ray.d.y))
         return dr.select(t[0] < t[1], x, y + 2)
 
-    def _edge(self, area: Area, l_left: Array, l_right: Array, r_left: Array, r_right: Array) -> Array:
+    def _edge(self, area: Area, left: Face, right: Face) -> Array:
         """Where the left wall gives way to the right one: at an end of the nearer one, or where they meet in a corner.
         What is seen between two walls that both end is not known: half of it goes to either."""
-        ends = dr.minimum(_column_of(area, l_right, 1.0), 0.5)
-        begins = dr.maximum(_column_of(area, r_left, -1.0), -0.5)
-        (l0, l1), (r0, r1) = _nearness(area, l_left, l_right), _nearness(area, r_left, r_right)
+        ends = dr.minimum(_column_of(area, left.right, 1.0), 0.5)
+        begins = dr.maximum(_column_of(area, right.left, -1.0), -0.5)
+        (l0, l1), (r0, r1) = _nearness(area, left), _nearness(area, right)
         middle = (ends + begins) / 2
         slope = l1 - r1
         corner = (r0 - l0) / dr.select(dr.abs(slope) < LEAST_NEARNESS, LEAST_NEARNESS, slope)
@@ -124,22 +133,22 @@ class Columns:
         edge = dr.select((corner > begins) & (corner < ends), corner, edge)
         return dr.clip(dr.select(begins >= ends, middle, edge), -0.5, 0.5)
 
-    def _piece(self, area: Area, face: Array, left: Array, right: Array, start: Array, end: Array) -> Piece:
-        value, slope = _nearness(area, left, right)
+    def _piece(self, area: Area, face: Face, start: Array, end: Array) -> Piece:
+        value, slope = _nearness(area, face)
         near = [dr.maximum(dr.fma(slope, a, value), LEAST_NEARNESS) for a in (start, end)]
         bottom, ceiling = (area.up + sign * area.height / 2 for sign in (-1, 1))
         depth, climb = self._floor - area.origin.z, self.top - area.origin.z
         width, per = end - start, dr.rcp(area.height)
         below = width * mean_clamped(*((depth * n - bottom) * per for n in near))
         above = width * mean_clamped(*((ceiling - climb * n) * per for n in near))
-        beside = dr.select(face < self._rim, dr.maximum(width - below - above, 0), 0)
-        return Piece(face, left, right, start, end, (value, slope), below, beside, above)
+        beside = dr.select(face.index < self._rim, dr.maximum(width - below - above, 0), 0)
+        return Piece(face, start, end, (value, slope), below, beside, above)
 
 
-def _nearness(area: Area, left: Array, right: Array) -> tuple[Array, Array]:
-    """At a = 0 and its slope, of the line through two points."""
-    side = right - left
-    scale = dr.rcp(_cross(left - area.origin.xy, side))
+def _nearness(area: Area, face: Face) -> tuple[Array, Array]:
+    """At a = 0 and its slope, of the line on which a face stands."""
+    side = face.right - face.left
+    scale = dr.rcp(_cross(face.left - area.origin.xy, side))
     return _cross(area.ahead, side) * scale, _cross(area.right, side) * scale
 
 

@@ -57,14 +57,14 @@ class WallShadows:
         NoClosedForm: walls on no grid, and shadows that reach further.
     """
 
-    def __init__(self, walls: Walls, directions: list[np.ndarray]) -> None:
+    def __init__(self, walls: Walls, directions: list[list[float]]) -> None:
         self._top = float(walls.top.max(initial=walls.floor))
         self._any = len(walls) > 0
         self.tables: dict[str, np.ndarray] = {}
         if not self._any:
             return
         self._side, origin, cells = cells_of(walls)
-        reach = max(np.abs(d[:2]).max() / d[2] for d in directions) * (self._top - walls.floor)
+        reach = max(max(abs(d[0]), abs(d[1])) / d[2] for d in directions) * (self._top - walls.floor)
         if reach > self._side:
             raise NoClosedForm(f"shadows of {reach:.2g} m on a grid of {self._side:.2g} m")
         filled = np.pad(cells >= 0, 2)

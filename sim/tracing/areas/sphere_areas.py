@@ -33,7 +33,7 @@ class SphereTexture:
 
 
 @dataclass(frozen=True)
-class Part:
+class Slice:
     """A sphere as an area sees it. share: of the area that it fills · patch: what is seen of it."""
 
     share: Array
@@ -49,7 +49,7 @@ class _Chord:
 
 
 class SphereView:
-    """What an area sees of a sphere, in parts: of STRIPS strips across it, cut to PARTS each."""
+    """What an area sees of a sphere, in slices: STRIPS across it, cut to PARTS each."""
 
     count = STRIPS * PARTS
 
@@ -67,15 +67,17 @@ class SphereView:
         upright = slope(right) <= slope(up)  # lines run towards the outline, so that they cut it steeply
         self._along, self._across = dr.select(upright, up, right), dr.select(upright, right, up)
 
-    def part(self, index: Array) -> Part:
+    def slice(self, index: Array) -> Slice:
         """One of them."""
         strip = index // PARTS
-        start = self._ahead + self._across * ((mi.Float(strip) + 0.5) / STRIPS - 0.5)
+        place: Array = (mi.Float(strip) + 0.5) / STRIPS - 0.5
+        start = self._ahead + self._across * place
         chord = _chord(self._way, self._tangent, start, self._along)
-        seen = start + self._along * (chord.middle + chord.length * ((mi.Float(index - strip * PARTS) + 0.5) / PARTS - 0.5))
+        place = (mi.Float(index - strip * PARTS) + 0.5) / PARTS - 0.5
+        seen = start + self._along * (chord.middle + chord.length * place)
         sides = self._along * (chord.length / PARTS), self._across / STRIPS
         patch = _patch(self._way, self._tangent, seen, *sides, self._area.origin, self._centre)
-        return Part(chord.length / self.count, patch)
+        return Slice(chord.length / self.count, patch)
 
 
 def may_see(area: Area, centre: Array, radius: float) -> Array:
@@ -116,7 +118,7 @@ def hidden_behind(shares: list[Array], distances: list[Array]) -> tuple[list[Arr
         share = own
         for j, other in enumerate(shares):
             if j != k:
-                share *= dr.select(distances[j] < distance, 1 - other, 1)
+                share = share * dr.select(distances[j] < distance, 1 - other, 1)
         visible.append(share)
     return visible, 1 - sum(visible, mi.Float(0))
 

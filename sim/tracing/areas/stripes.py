@@ -26,10 +26,10 @@ LEAST_SIDE = 1 / 256
 
 @dataclass(frozen=True)
 class Texture:
-    """Where the kernel finds one: first: of its texels · columns: of them · all per lane, or numbers."""
+    """Where the kernel finds one: first: of its texels · columns: of them."""
 
-    first: Array | float
-    columns: Array | float
+    first: Array
+    columns: Array
 
 
 class Stripes:
@@ -94,9 +94,7 @@ class Stripes:
     def _twice(self, texture: Texture, x: Array, inputs: dict[str, Array]) -> list[Array]:
         """Integral of that."""
         rows, past = self._rows(texture, x, inputs)
-        return [
-            dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows
-        ]
+        return [dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows]
 
     def _rows(self, texture: Texture, x: Array, inputs: dict[str, Array]) -> tuple[list[Array], Array]:
         """Of the texel below x, per component, and how far x is beyond its centre."""
