@@ -80,7 +80,7 @@ class BatchedRenderer:
             white = lighting.white_radiance(self._static.scene, self.bands.wavelengths)
         self.fidelity, sampling = fidelity, scene.sampling(fidelity.depth)
         self.tracer: Tracer | AreaTracer
-        self.tracer = scene.areas() if fidelity.samples == AREAS else scene.tracers.of(fidelity.light)
+        self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.of)(fidelity.light)
         self._check_memory(n_envs)
         if isinstance(sampling, BoxSampling) and fidelity.samples == AREAS:
             # What is upright has closed forms along columns of any height; spheres' outlines want rows, too.

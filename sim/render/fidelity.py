@@ -86,8 +86,6 @@ class Fidelity:
             raise ValueError(f"light = {self.light!r}: must be one of {', '.join(map(repr, LEVELS))}")
         if self.samples not in SAMPLES:
             raise ValueError(f"samples = {self.samples!r}: must be one of {', '.join(map(repr, SAMPLES))}")
-        if self.samples == AREAS and self.light != DIRECT:
-            raise ValueError(f"samples = 'areas': light = {self.light!r} is followed by rays only")
 
     @property
     def predicted_error(self) -> float | None:

@@ -35,7 +35,7 @@ class PreparedScene:
         """Of the eyes."""
         return self.eye.spectral_bands
 
-    def areas(self) -> AreaTracer:
+    def areas(self, light: str) -> AreaTracer:
         """What sees the world by areas.
 
         Raises:
@@ -43,7 +43,7 @@ class PreparedScene:
         """
         if self.eye.pupil is not None:
             raise ValueError("samples = 'areas': eyes behind a pupil are sampled by rays only")
-        return self.tracers.areas()
+        return self.tracers.areas(light)
 
     def sampling(self, depth: DepthLayers) -> EyeSampling:
         """How the eye is sampled with these depth layers; its PSFs are computed once, when first asked for.

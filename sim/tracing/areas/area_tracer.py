@@ -19,15 +19,13 @@ from sim.tracing.areas import sphere_areas
 from sim.tracing.areas.branches import only_where
 from sim.tracing.areas.columns import RIM, Columns, Piece
 from sim.tracing.areas.illumination import Illumination, Moment
+from sim.tracing.areas.light_table import LightTable, sum_of
 from sim.tracing.areas.patch import Area, Patch
 from sim.tracing.areas.sphere_areas import SphereTexture
 from sim.tracing.areas.stripes import Stripes, Texture
-from sim.tracing.closed_form_tracer import Components, components_of, face_rows
-from sim.tracing.reflectance_atlas import Atlas, bake
-from sim.tracing.static_scene import StaticScene
-from sim.tracing.wall_intersection import footprints_of
-from sim.tracing.walls import ALIGNED, NoClosedForm, Walls, walls_of
-from sim.worlds.world import World
+from sim.tracing.closed_form_tracer import ClosedForm
+from sim.tracing.spheres import Spheres
+from sim.tracing.walls import ALIGNED, NoClosedForm
 
 LEAST_DIP = 1e-4  # of directions that meet the floor
 BANDS = 2
@@ -37,41 +35,44 @@ STRETCHES = 2  # of a wall's texture, each averaged by itself: what is near fill
 class AreaTracer:
     """Sees by areas.
 
+    rays: the tracer of rays through the same world, for the same light
+    radii, heights: of the bodies that move, and of their centres above the floor [m], the agent's last
+    frames: of the spheres that are seen, from their axes to the world's
+
     name, why: of this way of tracing, for reports
     light: what of it is followed
     basis: (component, band): what each component is worth in each band
 
     Raises:
-        NoClosedForm: worlds that are not made of upright walls of one height on a grid, textures along two axes.
+        NoClosedForm: walls of several heights or on no grid, and textures along two axes.
     """
 
     name = "areas"
-    light = lighting.DIRECT
     scene = None
 
-    def __init__(self, world: World, static: StaticScene, wavelengths: np.ndarray) -> None:
-        walls = walls_of(world.model, static.geoms)
+    def __init__(self, rays: ClosedForm, bodies: Spheres, heights: np.ndarray, n_seen: int) -> None:
+        walls, self._radii = rays.walls, list(map(float, bodies.radii))
         if len(walls) and np.ptp(walls.top) > ALIGNED:
             raise NoClosedForm("walls of several heights")
-        geoms, place = np.unique(walls.geoms, return_inverse=True)
-        bsdfs = [*(static.bsdfs[int(g)] for g in geoms), *static.spheres.bsdfs]
-        atlas = bake(world.model, [*geoms, *static.spheres.geoms], bsdfs, wavelengths)
-        if not atlas.one_dimensional:
+        if not rays.one_dimensional:
             raise NoClosedForm("a texture that changes along two axes")
-        lights, footprints = lighting.directional_lights(static.scene, wavelengths), footprints_of(walls)
-        irradiance = np.array([light.irradiance for light in lights]).reshape(-1, len(wavelengths))
-        components: Components = components_of(atlas.texels, irradiance)
-        self.why = f"{len(walls)} upright walls, {footprints.how}"
-        self.basis = components.basis
-        self._walls, self._bodies = walls, static.bodies
-        self._columns = Columns(walls, footprints)
-        self._illumination = Illumination(walls, static.bodies.radii, lights, components.levels)
-        self._stripes = Stripes(components.reflectance, atlas.places[:, :2])
-        self._sphere_textures = _sphere_textures(atlas, len(geoms), static)
-        *self._floor_column, first, columns = _column_and_texture(face_rows(walls.uv[-1:], atlas, place[-1:]))[0]
+        self.why, self.light, self.basis = rays.why, rays.light, rays.basis
+        self._walls = walls
+        self._columns = Columns(walls, rays.footprints)
+        self._illumination = Illumination(rays, bodies.radii)
+        self._reflected = LightTable(rays, bodies.radii, heights) if rays.light == lighting.BOUNCE else None
+        rows = np.concatenate([rays.faces[:, :4], rays.faces[:, 8:10]], axis=1)
+        spheres = [place[:2] for _, place in rays.sphere_textures]
+        places = np.unique(np.concatenate([rows[:, 4:], np.reshape(spheres, (-1, 2))]), axis=0)
+        self._stripes = Stripes(rays.components.reflectance, places)
+        self._sphere_textures = [
+            SphereTexture(Texture(*map(mi.Float, place[:2].astype(float))), to_texels[0], frame)
+            for (to_texels, place), frame in zip(rays.sphere_textures[:n_seen], bodies.frames, strict=False)
+        ]
+        *self._floor_column, first, columns = map(float, rows[-1])
         self._floor_texture = Texture(mi.Float(first), mi.Float(columns))
-        parts = (footprints, self._columns, self._illumination, self._stripes)
-        tables = {"faces": _faces(walls, atlas, place)} | {k: v for part in parts for k, v in part.tables.items()}
+        parts = (rays.footprints, self._columns, self._illumination, self._stripes, self._reflected)
+        tables = {"faces": _in_eights(rows[:-1])} | {k: v for part in parts if part for k, v in part.tables.items()}
         self.inputs = {name: mi.Float(np.ascontiguousarray(table, np.float32)) for name, table in tables.items()}
 
     def radiance(self, area: Area, agent: Array, centres: list[Array], inputs: dict[str, Array]) -> list[Array]:
@@ -82,7 +83,7 @@ class AreaTracer:
         seen.append(only_where(pieces[0].below + pieces[1].below > 0, partial(self._floor, area, pieces, now), nothing))
         spheres = []
         for k, centre in enumerate(centres):
-            in_view = sphere_areas.may_see(area, centre, float(self._bodies.radii[k]))
+            in_view = sphere_areas.may_see(area, centre, self._radii[k])
             spheres.append(only_where(in_view, partial(self._sphere, area, k, now), [0.0, *nothing]))
         distances = [dr.squared_norm(centre - area.origin) for centre in centres]
         visible, behind = sphere_areas.hidden_behind([share for share, *_ in spheres], distances)
@@ -103,6 +104,8 @@ class AreaTracer:
         spread = dr.abs(row.z * patch.across.z)
         reflectance = self._stripes.mean(Texture(place.x, place.y), ends, spread, now.inputs)
         light = self._illumination.irradiance(patch, now)
+        if self._reflected:
+            light = _sum(light, self._reflected.on_wall(patch, now.inputs))
         return [piece.beside * r * e for r, e in zip(reflectance, light, strict=True)]
 
     def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: Moment) -> list[Array]:
@@ -114,8 +117,11 @@ class AreaTracer:
             below = area.height * (0.5 - share * ((band + 0.5) / BANDS))
             dip = dr.maximum(below - area.up, LEAST_DIP)
             patch = self._floor_patch(area, a, dip, area.height * share / BANDS)
-            light = zip(self._floor_reflectance(patch, now), self._illumination.irradiance(patch, now), strict=True)
-            total = [dr.fma(r, e, sum_) for (r, e), sum_ in zip(light, total, strict=True)]
+            light = self._illumination.irradiance(patch, now)
+            if self._reflected:
+                light = _sum(light, self._reflected.on_floor(patch, now.inputs))
+            sent_on = zip(self._floor_reflectance(patch, now), light, strict=True)
+            total = [dr.fma(r, e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
         return [sum_ * share / BANDS for sum_ in total]
 
     def _floor_patch(self, area: Area, a: Array, dip: Array, height: Array) -> Patch:
@@ -127,22 +133,26 @@ class AreaTracer:
         return Patch(point, mi.Normal3f(0, 0, 1), along, mi.Vector3f(across.x, across.y, 0))
 
     def _floor_reflectance(self, patch: Patch, now: Moment) -> list[Array]:
-        per_x, per_y, _, at = map(float, self._floor_column)
+        per_x, per_y, _, at = self._floor_column
         column = per_x * patch.point.x + per_y * patch.point.y + at
         along, across = (per_x * side.x + per_y * side.y for side in (patch.along, patch.across))
         return self._stripes.mean_over(self._floor_texture, column, (along, across), now.inputs)
 
     def _sphere(self, area: Area, k: int, now: Moment) -> list[Array]:
         """Its share of the area, and the light that comes from there per component."""
-        texture, radius = self._sphere_textures[k], float(self._bodies.radii[k])
+        texture, radius = self._sphere_textures[k], self._radii[k]
+        around = self._reflected.on_body(k, now.bodies[k], now.inputs) if self._reflected else None
         view = sphere_areas.SphereView(area, now.bodies[k], radius)
 
         def add(index: Array, share: Array, total: list[Array]) -> tuple[Array, Array, list[Array]]:
             slice_ = view.slice(index)
             column, sides = sphere_areas.columns_of(texture, slice_.patch, radius)
             reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs)
-            light = zip(reflectance, self._illumination.irradiance(slice_.patch, now, k), strict=True)
-            total = [dr.fma(slice_.share, r * e, sum_) for (r, e), sum_ in zip(light, total, strict=True)]
+            light = self._illumination.irradiance(slice_.patch, now, k)
+            if around:
+                light = _sum(light, [sum_of(fours, slice_.patch.normal) for fours in around])
+            sent_on = zip(reflectance, light, strict=True)
+            total = [dr.fma(slice_.share, r * e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
             return index + 1, share + slice_.share, total
 
         start = mi.UInt32(0), mi.Float(0), [mi.Float(0) for _ in self.basis]
@@ -150,28 +160,14 @@ class AreaTracer:
         return [share, *(sum_ / dr.maximum(share, LEAST_DIP) for sum_ in total)]
 
 
-def _faces(walls: Walls, atlas: Atlas, place: np.ndarray) -> np.ndarray:
+def _in_eights(rows: np.ndarray) -> np.ndarray:
     """Per face, in eights: column of the texel as an affine function of (x, y, z), first texel and columns of the
     texture; the floor's rim has any texture, since none of it is seen."""
-    rows = _column_and_texture(face_rows(walls.uv[:-1], atlas, place[:-1]))
     found = np.zeros((len(rows) + RIM, 8))
     found[: len(rows), :6] = rows
     found[len(rows) :, 5] = 1
     return found.ravel()
 
 
-def _column_and_texture(rows: np.ndarray) -> np.ndarray:
-    """What of face_rows textures along one axis need: (face, 6), the texel's column as an affine function of (x, y, z),
-    first texel and columns of the texture."""
-    return np.concatenate([rows[:, :4], rows[:, 8:10]], axis=1)
-
-
-def _sphere_textures(atlas: Atlas, first: int, static: StaticScene) -> list[SphereTexture]:
-    return [
-        SphereTexture(
-            Texture(*map(mi.Float, atlas.places[first + k, :2].astype(float))),
-            atlas.to_texels[first + k][0],
-            static.spheres.frames[k],
-        )
-        for k in range(len(static.spheres))
-    ]
+def _sum(one: list[Array], other: list[Array]) -> list[Array]:
+    return [a + b for a, b in zip(one, other, strict=True)]

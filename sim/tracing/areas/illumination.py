@@ -11,8 +11,7 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from sim.tracing.areas.patch import Patch
 from sim.tracing.areas.shadows import WallShadows, lit_past_sphere
-from sim.tracing.lighting import DirectionalLight
-from sim.tracing.walls import NoClosedForm, Walls
+from sim.tracing.closed_form_tracer import ClosedForm
 
 ITSELF_NONE = -1  # a patch that is on none of the bodies
 
@@ -31,17 +30,13 @@ class Illumination:
     tables: float32 arrays for the kernel
 
     Raises:
-        NoClosedForm: lights from below, and what WallShadows does not know.
+        NoClosedForm: what WallShadows does not know.
     """
 
-    def __init__(
-        self, walls: Walls, radii: np.ndarray, lights: tuple[DirectionalLight, ...], levels: np.ndarray
-    ) -> None:
-        if any(light.direction[2] <= 0 for light in lights):
-            raise NoClosedForm("a light shines from below")
-        self._radii, self._levels = list(map(float, radii)), levels
-        self._directions = [list(map(float, light.direction)) for light in lights]
-        self._shadows = WallShadows(walls, self._directions)
+    def __init__(self, rays: ClosedForm, radii: np.ndarray) -> None:
+        self._radii, self._levels = list(map(float, radii)), rays.components.levels
+        self._directions = [list(map(float, light.direction)) for light in rays.lights]
+        self._shadows = WallShadows(rays.walls, self._directions)
         self.tables = self._shadows.tables
 
     def irradiance(self, patch: Patch, now: Moment, itself: int = ITSELF_NONE) -> list[Array]:
