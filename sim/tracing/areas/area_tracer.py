@@ -105,7 +105,8 @@ class AreaTracer:
         reflectance = self._stripes.mean(Texture(place.x, place.y), ends, spread, now.inputs)
         light = self._illumination.irradiance(patch, now)
         if self._reflected:
-            light = _sum(light, self._reflected.on_wall(patch, now.inputs))
+            arriving = self._reflected.on_wall(patch, now.inputs)
+            light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
         return [piece.beside * r * e for r, e in zip(reflectance, light, strict=True)]
 
     def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: Moment) -> list[Array]:
@@ -119,7 +120,8 @@ class AreaTracer:
             patch = self._floor_patch(area, a, dip, area.height * share / BANDS)
             light = self._illumination.irradiance(patch, now)
             if self._reflected:
-                light = _sum(light, self._reflected.on_floor(patch, now.inputs))
+                arriving = self._reflected.on_floor(patch, now.inputs)
+                light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
             sent_on = zip(self._floor_reflectance(patch, now), light, strict=True)
             total = [dr.fma(r, e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
         return [sum_ * share / BANDS for sum_ in total]
@@ -150,7 +152,8 @@ class AreaTracer:
             reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs)
             light = self._illumination.irradiance(slice_.patch, now, k)
             if around:
-                light = _sum(light, [sum_of(fours, slice_.patch.normal) for fours in around])
+                arriving = [sum_of(fours, slice_.patch.normal) for fours in around]
+                light = _sum(light, self._illumination.past_bodies(slice_.patch, arriving, now, k))
             sent_on = zip(reflectance, light, strict=True)
             total = [dr.fma(slice_.share, r * e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
             return index + 1, share + slice_.share, total

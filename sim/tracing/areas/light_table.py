@@ -25,10 +25,10 @@ SPACING = 0.25  # [m] of nodes on floor and walls, at most
 BODY_SPACING = 0.5  # [m] of the places of bodies, at most
 MARGIN = 0.02  # [m] from a cell's borders, at least: nodes lie on one side of each edge
 RAYS = 1024  # from a node
-NORMALS = 48  # of a body's surface, to which nine harmonics are fitted
+NORMALS = 96  # of a body's surface, to which sixteen harmonics are fitted
 LANES = 2**21  # rays traced at once
 SIDES = np.array([[-1, 0], [1, 0], [0, -1], [0, 1]])  # on which side of its cell a wall stands
-FOURS = 3  # of floats: nine harmonics
+FOURS = 4  # of floats: sixteen harmonics
 
 
 class LightTable:
@@ -175,8 +175,11 @@ def _spread(fours: list[Array], values: list[Array]) -> Iterator[tuple[Array, in
 
 
 def harmonics(x: Array, y: Array, z: Array) -> list[Array]:
-    """Spherical harmonics of degree 0 to 2, not normalised."""
-    return [x * 0 + 1, x, y, z, x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1]
+    """Spherical harmonics of degree 0 to 3 in the direction (x, y, z), not normalised."""
+    xx, yy, zz = x * x, y * y, z * z
+    flat = [x * 0 + 1, x, y, z, x * y, y * z, z * x, xx - yy, 3 * zz - 1]
+    cubic = [y * (3 * xx - yy), x * y * z, y * (5 * zz - 1), z * (5 * zz - 3), x * (5 * zz - 1), z * (xx - yy)]
+    return [*flat, *cubic, x * (xx - 3 * yy)]
 
 
 def _corners(first: Array, *axes: tuple[Array, int]) -> Iterator[tuple[Array, Array]]:
