@@ -7,6 +7,10 @@ patch          Area, and the Patch of a surface that is seen in it
 half_planes    shares that straight lines cut off
 columns        walls, floor and sky behind an area
 sphere_areas   spheres in front of them
+light_table    light that walls and floor send on to each other
+light_baking   how that is found
+light_store    and kept on disk
+cell_grid      the cells that it is kept for
 stripes        textures, averaged
 shadows        shares of a patch that a light reaches
 """

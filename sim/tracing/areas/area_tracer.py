@@ -60,7 +60,10 @@ class AreaTracer:
         self._walls = walls
         self._columns = Columns(walls, rays.footprints)
         self._illumination = Illumination(rays, bodies.radii)
-        self._reflected = LightTable(rays, bodies.radii, heights) if rays.light == lighting.BOUNCE else None
+        seen = slice(n_seen)
+        self._reflected = None
+        if rays.light == lighting.BOUNCE:
+            self._reflected = LightTable(rays, bodies.radii[seen], heights[seen])
         rows = np.concatenate([rays.faces[:, :4], rays.faces[:, 8:10]], axis=1)
         spheres = [place[:2] for _, place in rays.sphere_textures]
         places = np.unique(np.concatenate([rows[:, 4:], np.reshape(spheres, (-1, 2))]), axis=0)
