@@ -80,7 +80,8 @@ class AreaTracer:
 
     def radiance(self, area: Area, agent: Array, centres: list[Array], inputs: dict[str, Array]) -> list[Array]:
         """Mean of what comes out of each area, one array per component; agent, centres: of the spheres that move."""
-        now, nothing = Moment([*centres, agent], inputs), [0.0] * len(self.basis)
+        bodies, nothing = [*centres, agent], [0.0] * len(self.basis)
+        now = self._illumination.moment(bodies, inputs) if self._reflected else Moment(bodies, inputs)
         pieces = self._columns.pieces(area, inputs)
         seen = [only_where(piece.beside > 0, partial(self._wall, area, piece, now), nothing) for piece in pieces]
         seen.append(only_where(pieces[0].below + pieces[1].below > 0, partial(self._floor, area, pieces, now), nothing))
@@ -116,9 +117,9 @@ class AreaTracer:
         """In bands of the same height, which lie the further apart the nearer they are to the horizon."""
         share = pieces[0].below + pieces[1].below
         a = sum(piece.middle * piece.below for piece in pieces) / dr.maximum(share, LEAST_DIP)
-        total = [mi.Float(0) for _ in self.basis]
-        for band in range(BANDS):
-            below = area.height * (0.5 - share * ((band + 0.5) / BANDS))
+
+        def add(index: Array, total: list[Array]) -> tuple[Array, list[Array]]:
+            below = area.height * (0.5 - share * ((mi.Float(index) + 0.5) / BANDS))
             dip = dr.maximum(below - area.up, LEAST_DIP)
             patch = self._floor_patch(area, a, dip, area.height * share / BANDS)
             light = self._illumination.irradiance(patch, now)
@@ -126,7 +127,10 @@ class AreaTracer:
                 arriving = self._reflected.on_floor(patch, now.inputs)
                 light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
             sent_on = zip(self._floor_reflectance(patch, now), light, strict=True)
-            total = [dr.fma(r, e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
+            return index + 1, [dr.fma(r, e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
+
+        start = mi.UInt32(0), [mi.Float(0) for _ in self.basis]
+        _, total = dr.while_loop(start, lambda index, total: index < BANDS, add, label="bands")
         return [sum_ * share / BANDS for sum_ in total]
 
     def _floor_patch(self, area: Area, a: Array, dip: Array, height: Array) -> Patch:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from functools import partial
 
 import drjit as dr
@@ -21,10 +22,12 @@ ITSELF_NONE = -1  # a patch that is on none of the bodies
 
 @dataclass(frozen=True)
 class Moment:
-    """What changes from call to call. bodies: centres of the spheres that move, the agent's last · inputs: arrays."""
+    """What changes from call to call. bodies: centres of the spheres that move, the agent's last · inputs: arrays
+    lit: which share of each body each light reaches past walls, where light that they reflect is followed."""
 
     bodies: list[Array]
     inputs: dict[str, Array]
+    lit: list[list[Array]] = field(default_factory=list)
 
 
 class Illumination:
@@ -57,6 +60,15 @@ class Illumination:
             total = [dr.fma(arrives, float(factor), sum_) for factor, sum_ in zip(level, total, strict=True)]
         return total
 
+    def moment(self, bodies: list[Array], inputs: dict[str, Array]) -> Moment:
+        """With what light reaches the bodies."""
+        lit = []
+        for centre, radius in zip(bodies, self._radii, strict=True):
+            side = math.sqrt(math.pi) * radius
+            disk = Patch(centre, mi.Normal3f(0, 0, 1), mi.Vector3f(side, 0, 0), mi.Vector3f(0, side, 0))
+            lit.append(self._shadows.lit(disk, self._directions, inputs))
+        return Moment(bodies, inputs, lit)
+
     def past_bodies(self, patch: Patch, arriving: list[Array], now: Moment, itself: int = ITSELF_NONE) -> list[Array]:
         """What is left of reflected light on its way to a patch, per component, where bodies stand in it, with what
         they reflect themselves; they are taken as far away, and what they hide as average."""
@@ -81,11 +93,8 @@ class Illumination:
 
     def _sent(self, k: int, towards: Array, now: Moment) -> list[Array]:
         """Radiosity of a body as seen from far away, per component: Lambert's phase function, with its mean colour."""
-        side = float(np.sqrt(np.pi)) * self._radii[k]
-        disk = Patch(now.bodies[k], mi.Normal3f(0, 0, 1), mi.Vector3f(side, 0, 0), mi.Vector3f(0, side, 0))
-        lit = self._shadows.lit(disk, self._directions, now.inputs)
         total = [mi.Float(0) for _ in range(self._levels.shape[1])]
-        for direction, level, share in zip(self._directions, self._levels, lit, strict=True):
+        for direction, level, share in zip(self._directions, self._levels, now.lit[k], strict=True):
             cosine = dr.clip(dr.dot(towards, mi.Vector3f(*direction)), -1, 1)
             phase = dr.sqrt(1 - cosine * cosine) + (dr.pi - dr.acos(cosine)) * cosine
             arrives = share * phase * (2 / (3 * np.pi))
