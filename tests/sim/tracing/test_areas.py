@@ -314,8 +314,6 @@ def test_what_has_no_closed_form_is_refused():
     pupil = optics.Pupil(aperture_radius=30e-6, thin_lens_focal_length=240e-6)
     with pytest.raises(ValueError, match="samples = 'areas': eyes behind a pupil"):
         sim.BatchedRenderer(build_world("detection"), sim.Eyes(optics=pupil), 1, AREAS)
-    with pytest.raises(ValueError, match="samples = 'areas': light = 'bounce'"):
-        sim.Fidelity(1, 4, light="bounce", samples="areas")
     with pytest.raises(ValueError, match="samples = 'squares': must be one of 'rays', 'areas'"):
         sim.Fidelity(1, 4, samples="squares")
 
