@@ -167,9 +167,10 @@ class ClosedForm:
         on_floor, t_floor = self._floor_hit(ray)
         floor_first = on_floor & (t_floor < t)
         t = dr.select(floor_first, t_floor, t)
-        face = dr.select(floor_first, self._n_faces - 1, face)
-        normal = dr.select(floor_first, mi.Normal3f(0, 0, 1), normal)
         seen = dr.isfinite(t)
+        # The floor's where nothing is met: a face that there is, in worlds without walls, too.
+        face = dr.select(floor_first | ~seen, self._n_faces - 1, face)
+        normal = dr.select(floor_first, mi.Normal3f(0, 0, 1), normal)
         t, which = spheres.nearest(self._bodies, centres, ray, t)
         on_sphere = which < len(centres)
         point = ray(dr.select(seen | on_sphere, t, 0))

@@ -62,7 +62,8 @@ def cases():
 
 
 # Largest errors, in noise: a quarter more than measured with these views. In all, what is reflected twice is 0.98,
-# 0.77, 3.4 and 7.1 of it. What is left is what bodies do to the light, close to walls and before a bright floor most of all.
+# 0.77, 3.4 and 7.1 of it. What is left is what bodies do to the light, most of all close to walls and
+# before a bright floor.
 TOLERANCE = {"detection": 0.095, "foraging": 0.055, "navigation": 0.40, "stairs": 0.52}
 
 
