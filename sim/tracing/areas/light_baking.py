@@ -33,7 +33,7 @@ SIDES = np.array([[-1, 0], [1, 0], [0, -1], [0, 1]])  # on which side of its cel
 
 
 @dataclass(frozen=True)
-class Nodes:
+class LightNodes:
     """Where light is known. floor, top: heights of the floor and of the walls' tops [m] · across, up, places: nodes
     along a cell, up a wall, and places of bodies along a cell."""
 
@@ -45,7 +45,7 @@ class Nodes:
     places: int
 
     @classmethod
-    def of(cls, walls: Walls) -> Nodes:
+    def of(cls, walls: Walls) -> LightNodes:
         """Of a world of walls of one height.
 
         Raises:
@@ -64,7 +64,7 @@ class Nodes:
 class Baking:
     """What has yet to be baked: for bodies of these kinds, radius and height of the centre [m]."""
 
-    def __init__(self, tracer: ClosedForm, nodes: Nodes, kinds: list[tuple[float, float]]) -> None:
+    def __init__(self, tracer: ClosedForm, nodes: LightNodes, kinds: list[tuple[float, float]]) -> None:
         self._tracer, self._nodes, self._kinds = tracer, nodes, kinds
 
     @property
@@ -128,7 +128,7 @@ class Baking:
         points = (centres[:, None] + radius * normals).reshape(-1, 3)
         turned, owners = np.tile(normals, (len(centres), 1)), np.repeat(centres, NORMALS, axis=0)
         light = self._gathered(points, turned, (radius, owners)).reshape(len(centres), NORMALS, -1)
-        fit = np.linalg.pinv(np.stack(harmonics(*normals.T), axis=-1))
+        fit = np.linalg.pinv(np.stack(spherical_harmonics(*normals.T), axis=-1))
         fours = np.zeros((len(centres), 4 * FOURS, light.shape[-1]), np.float32)
         fours[:, : len(fit)] = np.einsum("hn,cnk->chk", fit, light)
         return fours
@@ -159,7 +159,7 @@ class Baking:
         return np.concatenate(found) if found else np.zeros((0, len(self._tracer.basis)))
 
 
-def harmonics(x: Array, y: Array, z: Array) -> list[Array]:
+def spherical_harmonics(x: Array, y: Array, z: Array) -> list[Array]:
     """Spherical harmonics of degree 0 to 3 in the direction (x, y, z), not normalised."""
     xx, yy, zz = x * x, y * y, z * z
     flat = [x * 0 + 1, x, y, z, x * y, y * z, z * x, xx - yy, 3 * zz - 1]

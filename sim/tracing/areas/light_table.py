@@ -14,7 +14,7 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.tracing.areas import light_store
-from sim.tracing.areas.light_baking import FOURS, MARGIN, SIDES, Baking, Nodes, harmonics
+from sim.tracing.areas.light_baking import FOURS, MARGIN, SIDES, Baking, LightNodes, spherical_harmonics
 from sim.tracing.areas.patch import Patch
 from sim.tracing.closed_form_tracer import ClosedForm
 
@@ -34,7 +34,7 @@ class LightTable:
         known = sorted(set(kinds))
         self._kinds = [known.index(kind) for kind in kinds]
         self._components = len(tracer.basis)
-        self._nodes = Nodes.of(tracer.walls)
+        self._nodes = LightNodes.of(tracer.walls)
         self.tables = light_store.stored(Baking(tracer, self._nodes, known))
         self.tables["cells"] = self._nodes.grid.numbers.astype(np.float32).ravel()
 
@@ -82,7 +82,7 @@ class LightTable:
 
 def sum_of(fours: list[Array], normal: Array) -> Array:
     """What harmonics, in fours, say of a direction."""
-    values = harmonics(normal.x, normal.y, normal.z)
+    values = spherical_harmonics(normal.x, normal.y, normal.z)
     return sum((four[i] * v for four, i, v in _spread(fours, values)), mi.Float(0))
 
 

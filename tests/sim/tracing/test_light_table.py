@@ -201,7 +201,7 @@ def test_worlds_without_walls_reflect_nothing_twice():
 def test_harmonics_hold_any_smooth_light():
     """Those of degree 3 and below are fitted exactly, from the normals that are baked."""
     normals = light_baking._evenly(light_baking.NORMALS)
-    fit = np.linalg.pinv(np.stack(light_baking.harmonics(*normals.T), axis=-1))
+    fit = np.linalg.pinv(np.stack(light_baking.spherical_harmonics(*normals.T), axis=-1))
     x, y, z = np.random.default_rng(0).normal(size=(3, 50))
     x, y, z = np.stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)
 
