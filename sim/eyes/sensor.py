@@ -7,6 +7,7 @@ optical axis; receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -39,12 +40,15 @@ class BoxSensor:
     bounce_samples: of each ray, on the unit square: which way light that bounces goes on, (ray, 2) float32
     rays_per_receptor: samples of one receptor; the renderer sums them in its kernel
     depth: nothing is blurred, whatever its distance
+    extent: where samples are rectangles of the tangent plane at distance 1, their width and height; directions are then
+        those of their middles, up to that plane. None: samples are rays
     """
 
     directions: np.ndarray
     bounce_samples: np.ndarray
     rays_per_receptor: int
     depth: DepthLayers = ONE_PSF
+    extent: tuple[float, float] | None = None
 
     def receptor_radiance(self, sums: np.ndarray) -> np.ndarray:
         """Mean radiance of each receptor from the sums over its rays: (band, view, receptor), both ways."""
@@ -83,6 +87,7 @@ class ReceptiveFieldSensor:
     resolution: tuple[int, int]
     depth: DepthLayers = ONE_PSF
     rays_per_receptor: int = 1  # summed in the kernel: none
+    extent: None = None  # samples are rays
 
     def receptor_radiance(self, radiance: np.ndarray) -> np.ndarray:
         """(layer * band, view, ray) -> (band, view, receptor)."""
@@ -141,6 +146,19 @@ class BoxSampling:
         rays = max(1, round(rays_per_receptor))
         return BoxSensor(*self._rays(rays, np.arange(np.prod(self.eye.resolution))), rays)
 
+    def areas(self, per_receptor: float, *, in_rows: bool = True) -> BoxSensor:
+        """The sensor whose samples are all of a receptor's square, cut into so many rectangles: one row of them, or, in
+        rows, as many rows as columns or fewer."""
+        count = max(1, round(per_receptor))
+        rows = max(n for n in range(1, math.isqrt(count) + 1) if count % n == 0) if in_rows else 1
+        columns = count // rows
+        y, x = (index.ravel() for index in np.indices((rows, columns)))
+        within = np.stack([(x + 0.5) / columns, (y + 0.5) / rows], axis=-1)
+        plane = on_tangent_plane(self.eye, (within + self._corners()).reshape(-1, 2)).astype(np.float32)
+        side = self.eye.receptor_pitch / self.eye.sensor_distance
+        unused = np.zeros((len(plane), 2), np.float32)
+        return BoxSensor(plane, unused, count, extent=(side / columns, side / rows))
+
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
         """What that sensor has for these receptors (numbered row by row)."""
         rays = max(1, round(rays_per_receptor))
@@ -151,10 +169,15 @@ class BoxSampling:
         """Directions and places."""
         height, width = self.eye.resolution
         shifts, turns = (np.random.default_rng(seed).random((height * width, 1, 2))[receptors] for seed in (0, 1))
-        row, column = np.divmod(receptors, width)
-        corners = np.stack([column - width / 2, row - height / 2], axis=-1)[:, None]
+        corners = self._corners()[receptors]
         directions = directions_of(self.eye, ((low_discrepancy(rays) + shifts) % 1.0 + corners).reshape(-1, 2))
         return directions, ((bounce_samples(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
+
+    def _corners(self) -> np.ndarray:
+        """Of every receptor's square, upper left, (receptor, 1, 2)."""
+        height, width = self.eye.resolution
+        row, column = (index.ravel() for index in np.indices((height, width)))
+        return np.stack([column - width / 2, row - height / 2], axis=-1)[:, None]
 
 
 @dataclass(frozen=True)
@@ -228,9 +251,14 @@ def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers =
 
 def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
     """Unit vectors (ray, 3) in the eye's frame of points (x right, y down) [receptor pitches] on the tangent plane."""
-    pitch = eye.receptor_pitch
-    v = np.stack([plane[:, 0] * pitch, -plane[:, 1] * pitch, np.full(len(plane), eye.sensor_distance)], axis=-1)
+    v = on_tangent_plane(eye, plane)
     return (v / np.linalg.norm(v, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def on_tangent_plane(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
+    """The same points in the eye's frame, on the plane at distance 1, (ray, 3)."""
+    side = eye.receptor_pitch / eye.sensor_distance
+    return np.stack([plane[:, 0] * side, -plane[:, 1] * side, np.ones(len(plane))], axis=-1)
 
 
 def negligible_share(eye: optics.Eye) -> float:

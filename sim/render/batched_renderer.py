@@ -18,14 +18,16 @@ import numpy as np
 import optics
 from optics.numerics.autodiff import Array
 from sim.eyes.eyes import Eyes, eye_positions, eye_rotations
+from sim.eyes.sensor import BoxSampling, Sensor
 from sim.render import memory_budget
-from sim.render.fidelity import Fidelity, chosen_fidelity
+from sim.render.fidelity import AREAS, Fidelity, chosen_fidelity
 from sim.render.frozen_kernels import garbage_kept
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.render.prepared_scene import PreparedScene
 from sim.render.wavefront import PoseBuffer, Wavefront
 from sim.scene.variant import variant
 from sim.tracing import lighting
+from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.tracer import Tracer
 from sim.worlds.state import WorldState
 from sim.worlds.world import World
@@ -77,9 +79,14 @@ class BatchedRenderer:
         with variant(self._static.variant):
             white = lighting.white_radiance(self._static.scene, self.bands.wavelengths)
         self.fidelity, sampling = fidelity, scene.sampling(fidelity.depth)
-        self.tracer: Tracer = scene.tracers.of(fidelity.light)
+        self.tracer: Tracer | AreaTracer
+        self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.of)(fidelity.light)
         self._check_memory(n_envs)
-        self.sensor = sampling.sensor(fidelity.rays_per_receptor)
+        if isinstance(sampling, BoxSampling) and fidelity.samples == AREAS:
+            # What is upright has closed forms along columns of any height; spheres' outlines want rows, too.
+            self.sensor: Sensor = sampling.areas(fidelity.rays_per_receptor, in_rows=len(self._static.spheres) > 0)
+        else:
+            self.sensor = sampling.sensor(fidelity.rays_per_receptor)
         if self.eye.pupil is None:  # a whole number of its own for every receptor
             self.fidelity = replace(fidelity, rays_per_receptor=float(self.sensor.rays_per_receptor))
         mixing = self.eye.throughput * self.bands.weights

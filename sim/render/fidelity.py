@@ -37,6 +37,7 @@ PUPIL_RAYS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)
 SHARE_OF_DEPTH = SHARE_OF_BANDS = 0.35
 SHARE_OF_LIGHT = 0.5
 LAYERS = (1, 3, 5, 9)  # nodes of each are among those of the next
+RAYS, AREAS = SAMPLES = ("rays", "areas")
 NEAREST = 0.005  # chosen: quantile of the distances that counts as the nearest
 
 
@@ -59,6 +60,8 @@ class Fidelity:
     bands: spectral bands
     depth: distances for which the eye has a PSF
     light: what of it is followed: "direct", or "bounce", which adds light that is reflected twice
+    samples: what eyes look along: "rays", or "areas", which cut each receptor's square into rays_per_receptor
+        rectangles and find the mean of each in closed form; direct light, perfect lenses and upright worlds only
     tolerance: error allowed to a receptor's signal (root mean square); None where nothing was chosen
     levels: what was chosen for each stage, and why
 
@@ -72,6 +75,7 @@ class Fidelity:
     tolerance: float | None = None
     levels: tuple[Level, ...] = ()
     light: str = DIRECT
+    samples: str = RAYS
 
     def __post_init__(self) -> None:
         if not 0 < self.rays_per_receptor < math.inf:
@@ -80,6 +84,8 @@ class Fidelity:
             raise ValueError(f"bands = {self.bands!r}: must be at least 1")
         if self.light not in LEVELS:
             raise ValueError(f"light = {self.light!r}: must be one of {', '.join(map(repr, LEVELS))}")
+        if self.samples not in SAMPLES:
+            raise ValueError(f"samples = {self.samples!r}: must be one of {', '.join(map(repr, SAMPLES))}")
 
     @property
     def predicted_error(self) -> float | None:
@@ -97,7 +103,7 @@ class Fidelity:
             Level("bands", f"{self.bands}", None, "as asked"),
             Level("depth", f"{self.depth}", None, "as asked"),
             Level("light", self.light, None, "as asked"),
-            Level("rays", f"{self.rays_per_receptor:g} per receptor", None, "as asked"),
+            Level(self.samples, f"{self.rays_per_receptor:g} per receptor", None, "as asked"),
         )
         rows = [("stage", "level", "error", "why")]
         for level in levels:

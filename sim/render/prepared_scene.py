@@ -7,6 +7,7 @@ from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.eyes.sensor import EyeSampling, eye_sampling
 from sim.render.band_error import with_band_averaged_lights
+from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.static_scene import StaticScene, build_static_scene
 from sim.tracing.tracer import Tracers
 from sim.worlds.world import World
@@ -33,6 +34,16 @@ class PreparedScene:
     def bands(self) -> optics.SpectralBands:
         """Of the eyes."""
         return self.eye.spectral_bands
+
+    def areas(self, light: str) -> AreaTracer:
+        """What sees the world by areas.
+
+        Raises:
+            ValueError: eyes behind a pupil, and worlds that have no closed form.
+        """
+        if self.eye.pupil is not None:
+            raise ValueError("samples = 'areas': eyes behind a pupil are sampled by rays only")
+        return self.tracers.areas(light)
 
     def sampling(self, depth: DepthLayers) -> EyeSampling:
         """How the eye is sampled with these depth layers; its PSFs are computed once, when first asked for.

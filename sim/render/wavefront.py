@@ -7,11 +7,13 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.eyes.eyes import EYE_HEIGHT
+from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT
 from sim.eyes.sensor import Sensor
 from sim.render.frozen_kernels import aligned
 from sim.scene.variant import MitsubaObject
 from sim.tracing import lighting
+from sim.tracing.areas.area_tracer import AreaTracer
+from sim.tracing.areas.patch import Area
 from sim.tracing.static_scene import StaticScene
 from sim.tracing.tracer import Tracer
 from sim.worlds.state import WorldState
@@ -40,24 +42,24 @@ class PoseBuffer:
 class Wavefront:
     """The kernel's body. Everything here is traced once; only arrays passed as arguments may change."""
 
-    def __init__(self, n_envs: int, n_eyes: int, sensor: Sensor, tracer: Tracer, poses: PoseBuffer) -> None:
+    def __init__(
+        self, n_envs: int, n_eyes: int, sensor: Sensor, tracer: Tracer | AreaTracer, poses: PoseBuffer
+    ) -> None:
         self.n_rays, self.n_eyes = len(sensor.directions), n_eyes
         self.lanes = n_envs * n_eyes * self.n_rays
         self.stride, self.n_spheres = poses.stride, poses.n_spheres
-        self.tracer, self.depth = tracer, sensor.depth
+        self.tracer, self.depth, self.extent = tracer, sensor.depth, sensor.extent
 
     def __call__(self, scene: MitsubaObject, poses: Array, inputs: dict[str, Array], reduced: int) -> Array:
         lane = inputs["lanes"]
         view = lane // self.n_rays
         world = view // self.n_eyes
         sample = lane - view * self.n_rays
-        ray, cosine, agent, centres = self._ray(poses, inputs, world, view - world * self.n_eyes, sample)
-        bounces = self.tracer.light == lighting.BOUNCE
-        bounce_sample = dr.gather(mi.Point2f, inputs["bounce_samples"], sample) if bounces else None
-        components, distance = self.tracer.radiance(scene, ray, agent, centres, inputs, bounce_sample)
-        if self.depth.count > 1:
-            shares = self.depth.shares(dr.rcp(distance * cosine))
-            components = [component * share for share in shares for component in components]
+        eye = view - world * self.n_eyes
+        if isinstance(self.tracer, AreaTracer):
+            components = self.tracer.radiance(*self._area(poses, inputs, world, eye, sample), inputs)
+        else:
+            components = self._along_rays(self.tracer, scene, poses, inputs, (world, eye, sample))
         if len(components) == 1:
             out = components[0]
         else:
@@ -66,6 +68,35 @@ class Wavefront:
                 dr.scatter(out, value, lane + k * self.lanes, mode=dr.ReduceMode.Permute)
         # One reduction of one array: a reduction per component would trace the rays once per component.
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
+
+    def _along_rays(
+        self,
+        tracer: Tracer,
+        scene: MitsubaObject,
+        poses: Array,
+        inputs: dict[str, Array],
+        place: tuple[Array, Array, Array],
+    ) -> list[Array]:
+        """Components of the light that comes along the ray at this place (world, eye, sample), per depth layer."""
+        ray, cosine, agent, centres = self._ray(poses, inputs, *place)
+        bounces = tracer.light == lighting.BOUNCE
+        bounce_sample = dr.gather(mi.Point2f, inputs["bounce_samples"], place[2]) if bounces else None
+        components, distance = tracer.radiance(scene, ray, agent, centres, inputs, bounce_sample)
+        if self.depth.count == 1:
+            return components
+        shares = self.depth.shares(dr.rcp(distance * cosine))
+        return [component * share for share in shares for component in components]
+
+    def _area(
+        self, poses: Array, inputs: dict[str, Array], world: Array, eye: Array, sample: Array
+    ) -> tuple[Area, Array, list[Array]]:
+        """The lane's area, and the centres as for a ray. Eyes are level: their x is level and their y upright."""
+        ray, _, agent, centres = self._ray(poses, inputs, world, eye, sample)
+        assert self.extent is not None
+        width, height = self.extent
+        axis = mi.Vector2f((ray.o - agent).xy) * (1 / BODY_RADIUS)
+        right = mi.Vector2f(axis.y, -axis.x) * width
+        return Area(ray.o, ray.d.xy, right, ray.d.z, mi.Float(height)), agent, centres
 
     def _ray(
         self, poses: Array, inputs: dict[str, Array], world: Array, eye: Array, ray: Array

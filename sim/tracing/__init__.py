@@ -8,5 +8,6 @@ spheres              what moves
 walls                a world as upright walls
 wall_intersection    where rays meet them
 reflectance_atlas    all reflectances in one table
+areas                means over rectangles of the visual field, without rays
 lighting             direct light and one bounce
 """

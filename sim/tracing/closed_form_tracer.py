@@ -82,6 +82,8 @@ class ClosedForm:
     name, why: of this way of tracing, for reports
     light: what of it is followed, one of `lighting.LEVELS`
     basis: (component, band): what each component is worth in each band
+    walls, footprints, lights, components: what the world is made of
+    faces: textures of walls and floor, see `face_rows` · sphere_textures: the way to their texels, and where they are
 
     Raises:
         NoClosedForm: worlds that are not made of upright walls, and, where light that is reflected twice is followed,
@@ -97,24 +99,24 @@ class ClosedForm:
         self.light = light
         if light == lighting.BOUNCE:
             _check_tops(world, walls, static)
-        self._footprints: Footprints = footprints_of(walls)
-        self.why = f"{len(walls)} upright walls, {self._footprints.how}"
-        self._bodies, self._walls = static.bodies, walls
-        self._lights = lighting.directional_lights(static.scene, wavelengths)
-        if any(source.direction[2] <= 0 for source in self._lights):
+        self.footprints: Footprints = footprints_of(walls)
+        self.why = f"{len(walls)} upright walls, {self.footprints.how}"
+        self._bodies, self.walls = static.bodies, walls
+        self.lights = lighting.directional_lights(static.scene, wavelengths)
+        if any(source.direction[2] <= 0 for source in self.lights):
             raise NoClosedForm("a light shines from below")
         geoms, place = np.unique(walls.geoms, return_inverse=True)
         visible = static.bodies if light == lighting.BOUNCE else static.spheres
         bsdfs = [*(static.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
         atlas = bake(world.model, [*geoms, *visible.geoms], bsdfs, wavelengths)
-        irradiance = np.array([source.irradiance for source in self._lights]).reshape(-1, len(wavelengths))
+        irradiance = np.array([source.irradiance for source in self.lights]).reshape(-1, len(wavelengths))
         fewest = reflected_components_of if light == lighting.BOUNCE else components_of
-        self._components = fewest(atlas.texels, irradiance)
-        self.basis = self._components.basis
-        self._faces = _face_rows(walls.uv, atlas, place)
+        self.components = fewest(atlas.texels, irradiance)
+        self.basis = self.components.basis
+        self.faces = face_rows(walls.uv, atlas, place)
         self._n_faces = len(walls.geoms)
-        self._one_dimensional = atlas.one_dimensional
-        self._sphere_textures = [
+        self.one_dimensional = atlas.one_dimensional
+        self.sphere_textures = [
             (atlas.to_texels[len(geoms) + k], atlas.places[len(geoms) + k]) for k in range(len(visible))
         ]
         self._static = self._inputs()
@@ -129,9 +131,9 @@ class ClosedForm:
         return self._static
 
     def _inputs(self) -> dict[str, Array]:
-        texels = self._components.reflectance.astype(np.float32)
+        texels = self.components.reflectance.astype(np.float32)
         tables = {f"texels_{k}": np.ascontiguousarray(column) for k, column in enumerate(texels.T)}
-        tables |= {"faces": self._faces.astype(np.float32).ravel(), **self._footprints.tables}
+        tables |= {"faces": self.faces.astype(np.float32).ravel(), **self.footprints.tables}
         return {name: mi.Float(table) for name, table in tables.items()}
 
     def radiance(
@@ -153,15 +155,22 @@ class ClosedForm:
             light = [dr.select(hit.lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
         return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
 
+    def returned(self, ray: Array, shade: Array, radius: float) -> list[Array]:
+        """Direct light that walls and floor send back along each ray, per component, in the shade of one sphere."""
+        hit = self._hit(ray, [], self._static)
+        light = self._irradiance(hit, [shade], self._static, [radius])
+        return [dr.select(hit.lit, r * e, 0) for r, e in zip(hit.reflectance, light, strict=True)]
+
     def _hit(self, ray: Array, centres: list[Array], inputs: dict[str, Array]) -> _Hit:
         """Where rays meet walls, floor or bodies first; those without a centre are not there."""
-        t, face, normal = self._footprints.hit(ray, inputs)
+        t, face, normal = self.footprints.hit(ray, inputs)
         on_floor, t_floor = self._floor_hit(ray)
         floor_first = on_floor & (t_floor < t)
         t = dr.select(floor_first, t_floor, t)
-        face = dr.select(floor_first, self._n_faces - 1, face)
-        normal = dr.select(floor_first, mi.Normal3f(0, 0, 1), normal)
         seen = dr.isfinite(t)
+        # The floor's where nothing is met: a face that there is, in worlds without walls, too.
+        face = dr.select(floor_first | ~seen, self._n_faces - 1, face)
+        normal = dr.select(floor_first, mi.Normal3f(0, 0, 1), normal)
         t, which = spheres.nearest(self._bodies, centres, ray, t)
         on_sphere = which < len(centres)
         point = ray(dr.select(seen | on_sphere, t, 0))
@@ -179,24 +188,27 @@ class ClosedForm:
 
     def _floor_hit(self, ray: Array) -> tuple[Array, Array]:
         """Whether and where a ray from above meets the floor."""
-        t = (self._walls.floor - ray.o.z) / ray.d.z
-        lower, upper = self._walls.floor_lower, self._walls.floor_upper
+        t = (self.walls.floor - ray.o.z) / ray.d.z
+        lower, upper = self.walls.floor_lower, self.walls.floor_upper
         x, y = ray.o.x + t * ray.d.x, ray.o.y + t * ray.d.y
         inside = (x >= float(lower[0])) & (x <= float(upper[0])) & (y >= float(lower[1])) & (y <= float(upper[1]))
         return inside & (ray.d.z < 0) & (t > 0), t
 
-    def _irradiance(self, hit: _Hit, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
-        """Per component: sum over the lights of level · cos θ, where nothing is in the way."""
-        levels = self._components.levels
+    def _irradiance(
+        self, hit: _Hit, bodies: list[Array], inputs: dict[str, Array], radii: list[float] | None = None
+    ) -> list[Array]:
+        """Per component: sum over the lights of level · cos θ, where nothing is in the way; radii: of the bodies, None:
+        their own."""
+        levels = self.components.levels
         start = lighting.clear_of(hit.point, hit.normal)
-        radii = list(map(float, self._bodies.radii))
+        radii = list(map(float, self._bodies.radii)) if radii is None else radii
         total = [mi.Float(0) for _ in range(levels.shape[1])]
-        for light, level in zip(self._lights, levels, strict=True):
+        for light, level in zip(self.lights, levels, strict=True):
             towards = mi.Vector3f(*map(float, light.direction))
             shadow = mi.Ray3f(start, towards)
             cosine = dr.dot(hit.normal, towards)
             shines = hit.lit & (cosine > 0) & ~spheres.blocks(radii, bodies, shadow)
-            shines &= ~self._footprints.blocks(start, light.direction, inputs)
+            shines &= ~self.footprints.blocks(start, light.direction, inputs)
             cosine = dr.select(shines, cosine, 0)
             total = [dr.fma(cosine, float(factor), sum_so_far) for factor, sum_so_far in zip(level, total, strict=True)]
         return total
@@ -207,13 +219,13 @@ class ClosedForm:
         place = dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 2)
         x = _affine(columns, point)
         y = mi.Float(0)
-        if not self._one_dimensional:
+        if not self.one_dimensional:
             y = _affine(dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 1), point)
         return place.x, place.y, place.z, x, y
 
     def _sphere_texel(self, which: Array, uv: Array) -> tuple[Array, ...]:
         found: tuple[Array, ...] = tuple(mi.Float(0) for _ in range(5))
-        for k, (to_texels, place) in enumerate(self._sphere_textures):
+        for k, (to_texels, place) in enumerate(self.sphere_textures):
             column, row = (float(a) * uv.x + float(b) * uv.y + float(c) for a, b, c in to_texels)
             mine = (*(mi.Float(float(p)) for p in place), column, row)
             found = tuple(dr.select(which == k, a, b) for a, b in zip(mine, found, strict=True))
@@ -224,9 +236,9 @@ class ClosedForm:
     ) -> list[Array]:
         """Reflectance per component, interpolated bilinearly in a texture that repeats."""
         x0, x1, fx = _neighbours(x, columns)
-        n = self._components.reflectance.shape[1]
+        n = self.components.reflectance.shape[1]
         taps = [(offset, x0, 1 - fx), (offset, x1, fx)]
-        if not self._one_dimensional:
+        if not self.one_dimensional:
             y0, y1, fy = _neighbours(y, rows)
             taps = [(first + r * columns, c, wx * wy) for first, c, wx in taps for r, wy in ((y0, 1 - fy), (y1, fy))]
         index = [(mi.UInt32(first + column), weight) for first, column, weight in taps]
@@ -242,7 +254,7 @@ def _check_tops(world: World, walls: Walls, static: StaticScene) -> None:
         raise NoClosedForm(f"light that is reflected twice sees the top of a wall {lowest:.2g} m high")
 
 
-def _face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
+def face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
     """Per face (face, ROW): column and row of the texel as affine functions of the point, place of the texture, 0."""
     rows = np.zeros((len(uv), ROW))
     for i, (affine, texture) in enumerate(zip(uv, place, strict=True)):

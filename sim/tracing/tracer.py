@@ -7,9 +7,11 @@ from typing import Protocol
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from sim.eyes.eyes import EYE_HEIGHT
 from sim.scene import shapes
 from sim.scene.variant import MitsubaObject, variant
 from sim.tracing import lighting
+from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.mitsuba_tracer import Traced
 from sim.tracing.static_scene import StaticScene
@@ -59,6 +61,7 @@ class Tracers:
     def __init__(self, world: World, static: StaticScene, wavelengths: np.ndarray, name: str = "auto") -> None:
         self._world, self._static, self._wavelengths, self._name = world, static, wavelengths, name
         self._known: dict[str, Tracer] = {}
+        self._areas: dict[str, AreaTracer] = {}
         self.of(lighting.DIRECT)
 
     def of(self, light: str) -> Tracer:
@@ -71,6 +74,27 @@ class Tracers:
             with variant(self._static.variant):
                 self._known[light] = tracer_of(self._world, self._static, self._wavelengths, self._name, light)
         return self._known[light]
+
+    def areas(self, light: str) -> AreaTracer:
+        """The one that sees by areas.
+
+        Raises:
+            ValueError: a world that cannot be seen so.
+        """
+        if light not in self._areas:
+            try:
+                self._areas[light] = self._by_areas(light)
+            except NoClosedForm as reason:
+                raise ValueError(f"samples = 'areas': this world has no closed form: {reason}") from reason
+        return self._areas[light]
+
+    def _by_areas(self, light: str) -> AreaTracer:
+        static, world = self._static, self._world
+        above = [world.model.body(name).pos[2] for name in world.objects]
+        heights = np.add([*above, EYE_HEIGHT], static.bodies.offsets[:, 2])
+        with variant(static.variant):
+            rays = ClosedForm(world, static, self._wavelengths, light)
+            return AreaTracer(rays, static.bodies, heights, len(static.spheres))
 
 
 def tracer_of(

@@ -85,13 +85,8 @@ class Cells:
     """A grid whose cells are filled by one wall each, or empty. Around it lie cells in which rays end."""
 
     def __init__(self, walls: Walls) -> None:
-        self._side, origin, shape = _grid(walls)
-        cells = np.full(shape, -1)
-        for i, (low, high) in enumerate(zip(walls.lower, walls.upper, strict=True)):
-            first, last = (np.rint((c - origin) / self._side).astype(int) for c in (low, high))
-            if (cells[first[1] : last[1], first[0] : last[0]] >= 0).any():
-                raise NoClosedForm("walls overlap")
-            cells[first[1] : last[1], first[0] : last[0]] = i
+        self._side, origin, cells = cells_of(walls)
+        shape = cells.shape
         self._climb, self._ceiling = float(walls.top.max() - walls.floor), float(walls.top.max())
         self.how = f"found in a grid of {shape[1]} x {shape[0]} cells"
         padded = np.pad(cells, 1, constant_values=-1)
@@ -171,6 +166,23 @@ class Cells:
     def _place(self, point: Array) -> tuple[Array, Array]:
         """Coordinates in cells."""
         return tuple((point[i] - float(self._corner[i])) * (1 / self._side) for i in range(2))
+
+
+def cells_of(walls: Walls) -> tuple[float, np.ndarray, np.ndarray]:
+    """The walls on the coarsest grid: side of its cells [m], its lower corner (2,), and which wall fills each cell
+    (row, column), -1 for none.
+
+    Raises:
+        NoClosedForm: walls that lie on no grid, or overlap.
+    """
+    side, origin, shape = _grid(walls)
+    cells = np.full(shape, -1)
+    for i, (low, high) in enumerate(zip(walls.lower, walls.upper, strict=True)):
+        first, last = (np.rint((c - origin) / side).astype(int) for c in (low, high))
+        if (cells[first[1] : last[1], first[0] : last[0]] >= 0).any():
+            raise NoClosedForm("walls overlap")
+        cells[first[1] : last[1], first[0] : last[0]] = i
+    return side, origin, cells
 
 
 def _finished(t: Array, face: Array, through_x: Array, dx: Array, dy: Array) -> tuple[Array, Array, Array]:

@@ -8,5 +8,18 @@ spheres: render/test_batched_renderer.py
 walls: test_closed_form_tracer.py
 wall_intersection: test_closed_form_tracer.py
 reflectance_atlas: test_closed_form_tracer.py
+areas.area_tracer: test_areas.py
+areas.light_table: test_light_table.py
+areas.light_baking: test_light_table.py
+areas.light_store: test_light_table.py
+areas.cell_grid: test_light_table.py
+areas.branches: test_areas.py
+areas.columns: test_areas.py
+areas.half_planes: test_areas.py
+areas.illumination: test_areas.py
+areas.patch: test_areas.py
+areas.shadows: test_areas.py
+areas.sphere_areas: test_areas.py
+areas.stripes: test_areas.py
 lighting: test_lighting.py, render/test_batched_renderer.py, render/test_reference_renderer.py
 """

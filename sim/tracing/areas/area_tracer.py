@@ -1,0 +1,183 @@
+"""Worlds of upright walls, a floor and spheres, seen by whole areas instead of rays: in closed form, no noise.
+
+What an area sees is shared out among floor, walls, sky and spheres; each surface's texture is averaged over its patch,
+and each light is shut off by the shares that lie in shadow. Colours and components are those of
+`sim.tracing.closed_form_tracer`, which follows rays through the same worlds.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.tracing import lighting
+from sim.tracing.areas import sphere_areas
+from sim.tracing.areas.branches import only_where
+from sim.tracing.areas.columns import RIM, Columns, Piece
+from sim.tracing.areas.illumination import Illumination, Moment
+from sim.tracing.areas.light_table import LightTable, sum_of
+from sim.tracing.areas.patch import Area, Patch
+from sim.tracing.areas.sphere_areas import SphereTexture
+from sim.tracing.areas.stripes import Stripes, Texture
+from sim.tracing.closed_form_tracer import ClosedForm
+from sim.tracing.spheres import Spheres
+from sim.tracing.walls import ALIGNED, NoClosedForm
+
+LEAST_DIP = 1e-4  # of directions that meet the floor
+BANDS = 2
+STRETCHES = 2  # of a wall's texture, each averaged by itself: what is near fills more of an area than what is far
+
+
+class AreaTracer:
+    """Sees by areas.
+
+    rays: the tracer of rays through the same world, for the same light
+    radii, heights: of the bodies that move, and of their centres above the floor [m], the agent's last
+    frames: of the spheres that are seen, from their axes to the world's
+
+    name, why: of this way of tracing, for reports
+    light: what of it is followed
+    basis: (component, band): what each component is worth in each band
+
+    Raises:
+        NoClosedForm: walls of several heights or on no grid, and textures along two axes.
+    """
+
+    name = "areas"
+    scene = None
+
+    def __init__(self, rays: ClosedForm, bodies: Spheres, heights: np.ndarray, n_seen: int) -> None:
+        walls, self._radii = rays.walls, list(map(float, bodies.radii))
+        if len(walls) and np.ptp(walls.top) > ALIGNED:
+            raise NoClosedForm("walls of several heights")
+        if not rays.one_dimensional:
+            raise NoClosedForm("a texture that changes along two axes")
+        self.why, self.light, self.basis = rays.why, rays.light, rays.basis
+        self._walls = walls
+        self._columns = Columns(walls, rays.footprints)
+        self._illumination = Illumination(rays, bodies.radii)
+        seen = slice(n_seen)
+        self._reflected = None
+        if rays.light == lighting.BOUNCE:
+            self._reflected = LightTable(rays, bodies.radii[seen], heights[seen])
+        rows = np.concatenate([rays.faces[:, :4], rays.faces[:, 8:10]], axis=1)
+        spheres = [place[:2] for _, place in rays.sphere_textures]
+        places = np.unique(np.concatenate([rows[:, 4:], np.reshape(spheres, (-1, 2))]), axis=0)
+        self._stripes = Stripes(rays.components.reflectance, places)
+        self._sphere_textures = [
+            SphereTexture(Texture(*map(mi.Float, place[:2].astype(float))), to_texels[0], frame)
+            for (to_texels, place), frame in zip(rays.sphere_textures[:n_seen], bodies.frames, strict=False)
+        ]
+        *self._floor_column, first, columns = map(float, rows[-1])
+        self._floor_texture = Texture(mi.Float(first), mi.Float(columns))
+        parts = (rays.footprints, self._columns, self._illumination, self._stripes, self._reflected)
+        tables = {"faces": _in_eights(rows[:-1])} | {k: v for part in parts if part for k, v in part.tables.items()}
+        self.inputs = {name: mi.Float(np.ascontiguousarray(table, np.float32)) for name, table in tables.items()}
+
+    def radiance(self, area: Area, agent: Array, centres: list[Array], inputs: dict[str, Array]) -> list[Array]:
+        """Mean of what comes out of each area, one array per component; agent, centres: of the spheres that move."""
+        bodies, nothing = [*centres, agent], [0.0] * len(self.basis)
+        now = self._illumination.moment(bodies, inputs) if self._reflected else Moment(bodies, inputs)
+        pieces = self._columns.pieces(area, inputs)
+        seen = [only_where(piece.beside > 0, partial(self._wall, area, piece, now), nothing) for piece in pieces]
+        seen.append(only_where(pieces[0].below + pieces[1].below > 0, partial(self._floor, area, pieces, now), nothing))
+        spheres = []
+        for k, centre in enumerate(centres):
+            in_view = sphere_areas.may_see(area, centre, self._radii[k])
+            spheres.append(only_where(in_view, partial(self._sphere, area, k, now), [0.0, *nothing]))
+        distances = [dr.squared_norm(centre - area.origin) for centre in centres]
+        visible, behind = sphere_areas.hidden_behind([share for share, *_ in spheres], distances)
+        total = [behind * sum(parts[1:], parts[0]) for parts in zip(*seen, strict=True)]
+        for share, (_, *light) in zip(visible, spheres, strict=True):
+            total = [dr.fma(share, own, rest) for own, rest in zip(light, total, strict=True)]
+        return total
+
+    def _wall(self, area: Area, piece: Piece, now: Moment) -> list[Array]:
+        patch = piece.patch(area, self._walls.floor, self._columns.top)
+        row = dr.gather(mi.Vector4f, now.inputs["faces"], 2 * piece.face.index)
+        place = dr.gather(mi.Vector2f, now.inputs["faces"], 4 * piece.face.index + 2)
+        steps = [piece.start + (piece.end - piece.start) * (i / STRETCHES) for i in range(STRETCHES + 1)]
+        ends = []
+        for step in steps:
+            at = piece.place(area, step)
+            ends.append(row.x * at.x + row.y * at.y + row.z * patch.point.z + row.w)
+        spread = dr.abs(row.z * patch.across.z)
+        reflectance = self._stripes.mean(Texture(place.x, place.y), ends, spread, now.inputs)
+        light = self._illumination.irradiance(patch, now)
+        if self._reflected:
+            arriving = self._reflected.on_wall(patch, now.inputs)
+            light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
+        return [piece.beside * r * e for r, e in zip(reflectance, light, strict=True)]
+
+    def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: Moment) -> list[Array]:
+        """In bands of the same height, which lie the further apart the nearer they are to the horizon."""
+        share = pieces[0].below + pieces[1].below
+        a = sum(piece.middle * piece.below for piece in pieces) / dr.maximum(share, LEAST_DIP)
+
+        def add(index: Array, total: list[Array]) -> tuple[Array, list[Array]]:
+            below = area.height * (0.5 - share * ((mi.Float(index) + 0.5) / BANDS))
+            dip = dr.maximum(below - area.up, LEAST_DIP)
+            patch = self._floor_patch(area, a, dip, area.height * share / BANDS)
+            light = self._illumination.irradiance(patch, now)
+            if self._reflected:
+                arriving = self._reflected.on_floor(patch, now.inputs)
+                light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
+            sent_on = zip(self._floor_reflectance(patch, now), light, strict=True)
+            return index + 1, [dr.fma(r, e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
+
+        start = mi.UInt32(0), [mi.Float(0) for _ in self.basis]
+        _, total = dr.while_loop(start, lambda index, total: index < BANDS, add, label="bands")
+        return [sum_ * share / BANDS for sum_ in total]
+
+    def _floor_patch(self, area: Area, a: Array, dip: Array, height: Array) -> Patch:
+        """The floor in a band of the visual field of this height, its middle at column a and so far down."""
+        t = (area.origin.z - self._walls.floor) / dip
+        level, across = area.level(a), area.level(a) * (t / dip * height)
+        point = area.origin + mi.Vector3f(level.x, level.y, -dip) * t
+        along = mi.Vector3f(area.right.x, area.right.y, 0) * t
+        return Patch(point, mi.Normal3f(0, 0, 1), along, mi.Vector3f(across.x, across.y, 0))
+
+    def _floor_reflectance(self, patch: Patch, now: Moment) -> list[Array]:
+        per_x, per_y, _, at = self._floor_column
+        column = per_x * patch.point.x + per_y * patch.point.y + at
+        along, across = (per_x * side.x + per_y * side.y for side in (patch.along, patch.across))
+        return self._stripes.mean_over(self._floor_texture, column, (along, across), now.inputs)
+
+    def _sphere(self, area: Area, k: int, now: Moment) -> list[Array]:
+        """Its share of the area, and the light that comes from there per component."""
+        texture, radius = self._sphere_textures[k], self._radii[k]
+        around = self._reflected.on_body(k, now.bodies[k], now.inputs) if self._reflected else None
+        view = sphere_areas.SphereView(area, now.bodies[k], radius)
+
+        def add(index: Array, share: Array, total: list[Array]) -> tuple[Array, Array, list[Array]]:
+            slice_ = view.slice(index)
+            column, sides = sphere_areas.columns_of(texture, slice_.patch, radius)
+            reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs)
+            light = self._illumination.irradiance(slice_.patch, now, k)
+            if around:
+                arriving = [sum_of(fours, slice_.patch.normal) for fours in around]
+                light = _sum(light, self._illumination.past_bodies(slice_.patch, arriving, now, k))
+            sent_on = zip(reflectance, light, strict=True)
+            total = [dr.fma(slice_.share, r * e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
+            return index + 1, share + slice_.share, total
+
+        start = mi.UInt32(0), mi.Float(0), [mi.Float(0) for _ in self.basis]
+        _, share, total = dr.while_loop(start, lambda index, share, total: index < view.count, add, label="slices")
+        return [share, *(sum_ / dr.maximum(share, LEAST_DIP) for sum_ in total)]
+
+
+def _in_eights(rows: np.ndarray) -> np.ndarray:
+    """Per face, in eights: column of the texel as an affine function of (x, y, z), first texel and columns of the
+    texture; the floor's rim has any texture, since none of it is seen."""
+    found = np.zeros((len(rows) + RIM, 8))
+    found[: len(rows), :6] = rows
+    found[len(rows) :, 5] = 1
+    return found.ravel()
+
+
+def _sum(one: list[Array], other: list[Array]) -> list[Array]:
+    return [a + b for a, b in zip(one, other, strict=True)]

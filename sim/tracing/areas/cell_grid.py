@@ -1,0 +1,55 @@
+"""The free cells of a world of walls: where patches are, and where in their cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.tracing.wall_intersection import cells_of
+from sim.tracing.walls import Walls
+
+
+@dataclass(frozen=True)
+class CellGrid:
+    """side: of a cell [m] · corner: the grid's lower one [m], (2,) · free: which cells hold no wall, (row, column)
+
+    Two rings of cells without a wall lie around those with one; the outermost are never free."""
+
+    side: float
+    corner: np.ndarray
+    free: np.ndarray
+
+    @classmethod
+    def of(cls, walls: Walls) -> CellGrid:
+        """The coarsest on which the walls lie.
+
+        Raises:
+            NoClosedForm: there is none.
+        """
+        side, origin, cells = cells_of(walls)
+        return cls(side, origin, cells < 0)
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """Of the free cells, row by row; 0 where there is a wall."""
+        return np.where(self.free, np.cumsum(self.free).reshape(self.free.shape) - 1, 0)
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Lower corners of the free cells [m], (cell, 2)."""
+        row, column = np.nonzero(self.free)
+        found: np.ndarray = self.corner + self.side * np.stack([column, row], axis=-1)
+        return found
+
+    def locate(self, point: Array, table: Array) -> tuple[Array, Array, Array]:
+        """What a table of all cells, row by row, has for the cell of a point, and where in it the point is, in [0, 1].
+        Points beyond the grid are at its border."""
+        rows, columns = self.free.shape
+        x, y = ((point[i] - float(self.corner[i])) * (1 / self.side) for i in range(2))
+        column, row = dr.clip(dr.floor(x), 0, columns - 1), dr.clip(dr.floor(y), 0, rows - 1)
+        value = dr.gather(mi.Float, table, mi.UInt32(row * columns + column))
+        return value, dr.clip(x - column, 0, 1), dr.clip(y - row, 0, 1)

@@ -1,0 +1,175 @@
+"""The upright world behind an area: which walls stand at its left and right ends, and where one gives way to the other.
+
+Seen from a level eye, a wall that is met at the distance t (in lengths of the level direction) ends below at
+-z/t and on top at (top - z)/t: 1/t, its nearness, runs evenly along a, so the shares of floor, wall and sky have closed
+forms. Where the ends of the area see two walls, a corner or an edge lies between, found from the walls' ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.tracing.areas.half_planes import mean_clamped
+from sim.tracing.areas.patch import Area, Patch
+from sim.tracing.wall_intersection import Footprints
+from sim.tracing.walls import SIDES, Walls
+
+LEAST_NEARNESS = 1e-6  # [1/m] of what is seen in a stretch of no width
+RIM = 4  # sides of the floor, at which worlds without a wall end
+
+
+@dataclass(frozen=True)
+class Face:
+    """index: which · left, right: its ends, as seen from in front (Point2f)."""
+
+    index: Array
+    left: Array
+    right: Array
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A wall's face in columns start <= a <= end of an area.
+
+    nearness: at a = 0, and its slope along a [1/m]
+    below, beside, above: shares of the area in which floor, wall and sky are seen in these columns
+    """
+
+    face: Face
+    start: Array
+    end: Array
+    nearness: tuple[Array, Array]
+    below: Array
+    beside: Array
+    above: Array
+
+    @property
+    def middle(self) -> Array:
+        """Of its columns."""
+        return (self.start + self.end) / 2
+
+    def nearness_at(self, a: Array) -> Array:
+        """1/t at a [1/m]."""
+        return dr.maximum(dr.fma(self.nearness[1], a, self.nearness[0]), LEAST_NEARNESS)
+
+    def place(self, area: Area, a: Array) -> Array:
+        """Where the wall is met at a (Point2f)."""
+        return area.origin.xy + area.level(a) / self.nearness_at(a)
+
+    def patch(self, area: Area, floor: float, top: float) -> Patch:
+        """What is seen of the wall."""
+        near = self.nearness_at(self.middle)
+        bottom, ceiling = (area.up + sign * area.height / 2 for sign in (-1, 1))
+        low = dr.maximum((floor - area.origin.z) * near, bottom)
+        high = dr.maximum(dr.minimum((top - area.origin.z) * near, ceiling), low)
+        far = dr.rcp(near)
+        level = area.level(self.middle)
+        point = area.origin + mi.Vector3f(level.x, level.y, (low + high) / 2) * far
+        point.z = dr.clip(point.z, floor, top)
+        along = self.place(area, self.end) - self.place(area, self.start)
+        side = dr.normalize(self.face.right - self.face.left)
+        return Patch(
+            point,
+            mi.Normal3f(side.y, -side.x, 0),
+            mi.Vector3f(along.x, along.y, 0),
+            mi.Vector3f(0, 0, (high - low) * far),
+        )
+
+
+class Columns:
+    """Finds the pieces of a world of walls, all of one height.
+
+    top: height of the walls' tops [m] · tables: float32 arrays for the kernel
+    """
+
+    def __init__(self, walls: Walls, footprints: Footprints) -> None:
+        self._footprints, self._floor = footprints, walls.floor
+        self.top = float(walls.top.max(initial=walls.floor))
+        self._lower, self._upper = (list(map(float, corner)) for corner in (walls.floor_lower, walls.floor_upper))
+        self._rim = SIDES * len(walls)
+        self.tables = {"face_ends": _face_ends(walls).astype(np.float32).ravel()}
+
+    def pieces(self, area: Area, inputs: dict[str, Array]) -> tuple[Piece, Piece]:
+        """The left and the right one; where one wall fills all columns, the right one has none."""
+        half = mi.Float(0.5)
+        left, right = (self._met(area, sign * half, inputs) for sign in (-1, 1))
+        edge = dr.select(left.index == right.index, half, self._edge(area, left, right))
+        return self._piece(area, left, -half, edge), self._piece(area, right, edge, half)
+
+    def _met(self, area: Area, a: Array, inputs: dict[str, Array]) -> Face:
+        """The one that is met at a."""
+        level = area.level(a)
+        ray = mi.Ray3f(area.origin, mi.Vector3f(level.x, level.y, 0))
+        t, face, _ = self._footprints.hit(ray, inputs)
+        face = dr.select(dr.isfinite(t), face, self._rim + self._side_of_floor(ray))
+        ends = dr.gather(mi.Vector4f, inputs["face_ends"], face)
+        return Face(face, mi.Point2f(ends.x, ends.y), mi.Point2f(ends.z, ends.w))
+
+    def _side_of_floor(self, ray: Array) -> Array:
+        """Through which of the floor's sides a ray leaves it: -x, +x, -y, +y."""
+        t = [
+            (dr.select(d > 0, upper, lower) - o) / dr.select(dr.abs(d) < LEAST_NEARNESS, LEAST_NEARNESS, d)
+            for o, d, lower, upper in zip(ray.o, ray.d, self._lower, self._upper, strict=False)
+        ]
+        x, y = (dr.select(d > 0, mi.UInt32(1), mi.UInt32(0)) for d in (ray.d.x, ray.d.y))
+        return dr.select(t[0] < t[1], x, y + 2)
+
+    def _edge(self, area: Area, left: Face, right: Face) -> Array:
+        """Where the left wall gives way to the right one: at an end of the nearer one, or where they meet in a corner.
+        What is seen between two walls that both end is not known: half of it goes to either."""
+        ends = dr.minimum(_column_of(area, left.right, 1.0), 0.5)
+        begins = dr.maximum(_column_of(area, right.left, -1.0), -0.5)
+        (l0, l1), (r0, r1) = _nearness(area, left), _nearness(area, right)
+        middle = (ends + begins) / 2
+        slope = l1 - r1
+        corner = (r0 - l0) / dr.select(dr.abs(slope) < LEAST_NEARNESS, LEAST_NEARNESS, slope)
+        left_nearer = dr.fma(slope, middle, l0 - r0) > 0
+        edge = dr.select(left_nearer, ends, begins)
+        edge = dr.select((corner > begins) & (corner < ends), corner, edge)
+        return dr.clip(dr.select(begins >= ends, middle, edge), -0.5, 0.5)
+
+    def _piece(self, area: Area, face: Face, start: Array, end: Array) -> Piece:
+        value, slope = _nearness(area, face)
+        near = [dr.maximum(dr.fma(slope, a, value), LEAST_NEARNESS) for a in (start, end)]
+        bottom, ceiling = (area.up + sign * area.height / 2 for sign in (-1, 1))
+        depth, climb = self._floor - area.origin.z, self.top - area.origin.z
+        width, per = end - start, dr.rcp(area.height)
+        below = width * mean_clamped(*((depth * n - bottom) * per for n in near))
+        above = width * mean_clamped(*((ceiling - climb * n) * per for n in near))
+        beside = dr.select(face.index < self._rim, dr.maximum(width - below - above, 0), 0)
+        return Piece(face, start, end, (value, slope), below, beside, above)
+
+
+def _nearness(area: Area, face: Face) -> tuple[Array, Array]:
+    """At a = 0 and its slope, of the line on which a face stands."""
+    side = face.right - face.left
+    scale = dr.rcp(_cross(face.left - area.origin.xy, side))
+    return _cross(area.ahead, side) * scale, _cross(area.right, side) * scale
+
+
+def _column_of(area: Area, point: Array, beyond: float) -> Array:
+    """Column a in which a point is seen; for points behind the eye, beyond all others on that side (±1)."""
+    way = point - area.origin.xy
+    across = _cross(area.right, way)
+    return dr.select(across > 0, -_cross(area.ahead, way) / dr.select(across > 0, across, 1), beyond)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return dr.fma(a.x, b.y, -a.y * b.x)
+
+
+def _face_ends(walls: Walls) -> np.ndarray:
+    """Left and right end of each face as seen from in front, (face, 4): of the walls', then of the floor's rim, which
+    is seen from within."""
+    found = []
+    for (x0, y0), (x1, y1) in zip(walls.lower, walls.upper, strict=True):
+        # Those that face -x, +x, -y, +y.
+        found += [(x0, y1, x0, y0), (x1, y0, x1, y1), (x0, y0, x1, y0), (x1, y1, x0, y1)]
+    (x0, y0), (x1, y1) = walls.floor_lower, walls.floor_upper
+    found += [(x0, y0, x0, y1), (x1, y1, x1, y0), (x1, y0, x0, y0), (x0, y1, x1, y1)]
+    return np.array(found)

@@ -1,0 +1,184 @@
+"""How the tables of reflected light are found: by brute force, with many rays from every node.
+
+Nothing that moves is in the tables, but the shadow that a body casts on the floor from which light reaches it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.eyes.receptive_fields import low_discrepancy
+from sim.tracing import lighting
+from sim.tracing.areas.cell_grid import CellGrid
+from sim.tracing.closed_form_tracer import ClosedForm
+from sim.tracing.walls import NoClosedForm, Walls
+
+# Chosen. In navigation, nodes half as dense make the error twice as large; four times as many rays, or bodies' places
+# twice as dense, change it by a fiftieth.
+SPACING = 0.25  # [m] of nodes on floor and walls, at most
+BODY_SPACING = 1.0  # [m] of the places of bodies, at most
+RAYS = 256  # from a node
+NORMALS = 96  # of a body's surface, to which sixteen harmonics are fitted
+MARGIN = 0.02  # [m] from a cell's borders, at least: nodes lie on one side of each edge
+MOST_NODES = 2**22
+LANES = 2**21  # rays traced at once
+FOURS = 4  # of floats: sixteen harmonics
+SIDES = np.array([[-1, 0], [1, 0], [0, -1], [0, 1]])  # on which side of its cell a wall stands
+
+
+@dataclass(frozen=True)
+class LightNodes:
+    """Where light is known. floor, top: heights of the floor and of the walls' tops [m] · across, up, places: nodes
+    along a cell, up a wall, and places of bodies along a cell."""
+
+    grid: CellGrid
+    floor: float
+    top: float
+    across: int
+    up: int
+    places: int
+
+    @classmethod
+    def of(cls, walls: Walls) -> LightNodes:
+        """Of a world of walls of one height.
+
+        Raises:
+            NoClosedForm: no walls, or too many nodes.
+        """
+        if not len(walls):
+            raise NoClosedForm("no walls, between which light would be reflected")
+        grid, floor, top = CellGrid.of(walls), walls.floor, float(walls.top.max())
+        across, up = _count(grid.side, SPACING), _count(top - floor, SPACING)
+        total = grid.free.sum() * across * (across + len(SIDES) * up)
+        if total > MOST_NODES:
+            raise NoClosedForm(f"{total} nodes for reflected light")
+        return cls(grid, floor, top, across, up, _count(grid.side, BODY_SPACING))
+
+
+class Baking:
+    """What has yet to be baked: for bodies of these kinds, radius and height of the centre [m]."""
+
+    def __init__(self, tracer: ClosedForm, nodes: LightNodes, kinds: list[tuple[float, float]]) -> None:
+        self._tracer, self._nodes, self._kinds = tracer, nodes, kinds
+
+    @property
+    def ingredients(self) -> list[np.ndarray]:
+        """All that the tables depend on."""
+        walls, components = self._tracer.walls, self._tracer.components
+        settings = [SPACING, BODY_SPACING, RAYS, NORMALS, MARGIN]
+        lights = [light.direction for light in self._tracer.lights]
+        surfaces = [walls.lower, walls.upper, walls.top, walls.floor_lower, walls.floor_upper, self._tracer.faces]
+        light = [components.reflectance, components.levels, *lights]
+        return [np.asarray(a, np.float64) for a in (*surfaces, walls.floor, *light, self._kinds, settings)]
+
+    def tables(self) -> dict[str, np.ndarray]:
+        """All of them, float32, flat, by name: one for each component."""
+        found: dict[str, np.ndarray] = {}
+        for name, light in (("floor", self._on_floor()), ("walls", self._on_walls())):
+            found |= {f"bounced_{name}_{k}": column for k, column in enumerate(light.T.astype(np.float32))}
+        for i, kind in enumerate(self._kinds):
+            light = self._on_body(*kind)
+            found |= {f"bounced_body_{i}_{k}": light[..., k].ravel() for k in range(light.shape[-1])}
+        return {name: np.ascontiguousarray(table) for name, table in found.items()}
+
+    def _on_floor(self) -> np.ndarray:
+        """(node, component), in order of cell, y and x."""
+        places = _within(self._nodes.grid.side, self._nodes.across)
+        y, x = (a.ravel() for a in np.meshgrid(places, places, indexing="ij"))
+        points = self._nodes.grid.corners[:, None] + np.stack([x, y], axis=-1)
+        points = np.dstack([points, np.full(points.shape[:2], self._nodes.floor)]).reshape(-1, 3)
+        return self._gathered(points, np.tile([0.0, 0, 1], (len(points), 1)))
+
+    def _on_walls(self) -> np.ndarray:
+        """(node, component), in order of cell, side, z and place along the wall; 0 where there is no wall."""
+        n, grid = self._nodes.across * self._nodes.up, self._nodes.grid
+        light = np.zeros((len(grid.corners), len(SIDES), n, len(self._tracer.basis)))
+        free = np.pad(grid.free, 1, constant_values=True)
+        row, column = np.nonzero(grid.free)
+        places, ups = (
+            _within(grid.side, self._nodes.across),
+            self._nodes.floor + _within(self._nodes.top - self._nodes.floor, self._nodes.up),
+        )
+        z, along = (a.ravel() for a in np.meshgrid(ups, places, indexing="ij"))
+        for s, side in enumerate(SIDES):
+            mine = ~free[row + 1 + side[1], column + 1 + side[0]]
+            axis = int(np.argmax(np.abs(side)))
+            points = np.empty((mine.sum(), n, 3))
+            points[..., axis] = grid.corners[mine, axis, None] + (grid.side if side[axis] > 0 else 0)
+            points[..., 1 - axis] = grid.corners[mine, 1 - axis, None] + along
+            points[..., 2] = z
+            normal = np.array([-side[0], -side[1], 0.0])
+            found = self._gathered(points.reshape(-1, 3), np.tile(normal, (mine.sum() * n, 1)))
+            light[mine, s] = found.reshape(mine.sum(), n, -1)
+        return light.reshape(-1, light.shape[-1])
+
+    def _on_body(self, radius: float, height: float) -> np.ndarray:
+        """Harmonics (place, FOURS * 4, component) of the light on a body's surface, in order of cell, y and x."""
+        offsets = np.linspace(0, self._nodes.grid.side, self._nodes.places)
+        y, x = (a.ravel() for a in np.meshgrid(offsets, offsets, indexing="ij"))
+        centres = (self._nodes.grid.corners[:, None] + np.stack([x, y], axis=-1)).reshape(-1, 2)
+        centres = np.column_stack([centres, np.full(len(centres), height)])
+        normals = _evenly(NORMALS)
+        points = (centres[:, None] + radius * normals).reshape(-1, 3)
+        turned, owners = np.tile(normals, (len(centres), 1)), np.repeat(centres, NORMALS, axis=0)
+        light = self._gathered(points, turned, (radius, owners)).reshape(len(centres), NORMALS, -1)
+        fit = np.linalg.pinv(np.stack(spherical_harmonics(*normals.T), axis=-1))
+        fours = np.zeros((len(centres), 4 * FOURS, light.shape[-1]), np.float32)
+        fours[:, : len(fit)] = np.einsum("hn,cnk->chk", fit, light)
+        return fours
+
+    def _gathered(
+        self, points: np.ndarray, normals: np.ndarray, shade: tuple[float, np.ndarray] | None = None
+    ) -> np.ndarray:
+        """Irradiance of what walls and floor reflect onto points (n, 3), per component, (n, component); shade: radius
+        and centre of a body at each point that casts its shadow."""
+        rays = RAYS
+        samples = mi.Point2f(
+            *(mi.Float(np.tile(c, max(LANES // rays, 1)).astype(np.float32)) for c in low_discrepancy(rays).T)
+        )
+        dr.eval(samples)
+        step, found = max(LANES // rays, 1), []
+        for first in range(0, len(points), step):
+            part = slice(first, first + step)
+            # As many lanes every time, so that one kernel serves all.
+            point, normal, body = (
+                mi.Point3f(*(mi.Float(np.repeat(np.resize(c, step), rays).astype(np.float32)) for c in a[part].T))
+                for a in (points, normals, shade[1] if shade else points)
+            )
+            ray = lighting.onwards(point, mi.Normal3f(normal), samples)
+            light = self._tracer.returned(ray, body, shade[0] if shade else 0.0)
+            means = [dr.block_reduce(dr.ReduceOp.Add, c, rays) for c in light]
+            dr.eval(means)
+            found.append(np.stack([np.array(m) / rays for m in means], axis=-1)[: len(points[part])])
+        return np.concatenate(found) if found else np.zeros((0, len(self._tracer.basis)))
+
+
+def spherical_harmonics(x: Array, y: Array, z: Array) -> list[Array]:
+    """Spherical harmonics of degree 0 to 3 in the direction (x, y, z), not normalised."""
+    xx, yy, zz = x * x, y * y, z * z
+    flat = [x * 0 + 1, x, y, z, x * y, y * z, z * x, xx - yy, 3 * zz - 1]
+    cubic = [y * (3 * xx - yy), x * y * z, y * (5 * zz - 1), z * (5 * zz - 3), x * (5 * zz - 1), z * (xx - yy)]
+    return [*flat, *cubic, x * (xx - 3 * yy)]
+
+
+def _count(length: float, spacing: float) -> int:
+    return max(math.ceil(length / spacing - 1e-6), 1) + 1
+
+
+def _within(length: float, nodes: int) -> np.ndarray:
+    """Their places, off the ends."""
+    return np.clip(np.linspace(0, length, nodes), MARGIN, length - MARGIN)
+
+
+def _evenly(n: int) -> np.ndarray:
+    """n directions (n, 3): Fibonacci's spiral."""
+    i = np.arange(n) + 0.5
+    z, azimuth = 1 - 2 * i / n, np.pi * (1 + np.sqrt(5)) * i
+    r = np.sqrt(1 - z * z)
+    return np.stack([r * np.cos(azimuth), r * np.sin(azimuth), z], axis=-1)

@@ -1,0 +1,53 @@
+"""Tables of reflected light are kept on disk: they take seconds to bake and are the same for the same world."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import tempfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from sim.tracing.areas.light_baking import Baking
+
+VERSION = 1  # of what is baked: another one if the same ingredients give other tables
+KEPT = 200  # files, at most; the oldest go first
+
+
+def folder() -> Path:
+    """Where they are kept."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rhabdom" / "light"
+
+
+def stored(baking: Baking) -> dict[str, np.ndarray]:
+    """The tables, from disk where they are there. Without a disk to write to they are baked every time."""
+    path = folder() / f"{_digest(baking.ingredients)}.npz"
+    # A file that is missing, cut off or someone else's is baked anew.
+    with contextlib.suppress(OSError, ValueError, zipfile.BadZipFile, EOFError), np.load(path) as file:
+        return {name: file[name] for name in file.files}
+    tables = baking.tables()
+    with contextlib.suppress(OSError):
+        _write(path, tables)
+    return tables
+
+
+def _digest(ingredients: list[np.ndarray]) -> str:
+    digest = hashlib.sha256(str(VERSION).encode())
+    for array in ingredients:
+        digest.update(str(array.shape).encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def _write(path: Path, tables: dict[str, np.ndarray]) -> None:
+    """Whole or not at all, whoever else writes it at the same time."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    for old in sorted(path.parent.glob("*.npz"), key=lambda p: p.stat().st_mtime)[: -(KEPT - 1)]:
+        old.unlink(missing_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    with os.fdopen(handle, "wb") as file:
+        np.savez(file, **tables)  # type: ignore[arg-type]
+    os.replace(name, path)

@@ -1,0 +1,130 @@
+"""Which share of a patch a light reaches: edges of shadows are straight lines across it."""
+
+from __future__ import annotations
+
+import math
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.tracing.areas.branches import only_where
+from sim.tracing.areas.half_planes import share_above
+from sim.tracing.areas.patch import Patch
+from sim.tracing.wall_intersection import NEVER_ZERO, cells_of
+from sim.tracing.walls import NoClosedForm, Walls
+
+BESIDE = 1e-3  # [m] in front of a wall: in the cell from which it is seen
+NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1))
+
+
+def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, radius: float) -> list[Array]:
+    """Share of a patch on which a sphere casts no shadow, for each light."""
+    way = centre - patch.point
+    slope = max(math.hypot(*d[:2]) / d[2] for d in directions)
+    patch_reach = (dr.norm(patch.along) + dr.norm(patch.across)) / 2
+    reach = slope * dr.maximum(way.z + radius, 0) + (radius + patch_reach)
+    near = dr.squared_norm(way.xy) < reach * reach
+    lit = lambda: [_lit_past_sphere(patch, direction, way, radius) for direction in directions]  # noqa: E731
+    return only_where(near, lit, [1.0] * len(directions))
+
+
+def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: float) -> Array:
+    """Near the patch the shadow's rim is a straight line, or two; on larger patches it is a disk that lies within."""
+    towards = mi.Vector3f(*direction)
+    ahead = dr.dot(way, towards)
+    beside = way - ahead * towards
+    distance = dr.norm(beside)
+    across = beside / dr.maximum(distance, NEVER_ZERO)
+    p, q = dr.dot(across, patch.along), dr.dot(across, patch.across)
+    strip = share_above(radius - distance, p, q) - share_above(-radius - distance, p, q)
+    seen = dr.abs(dr.dot(towards, dr.cross(patch.along, patch.across)))  # from the light
+    disk = math.pi * radius**2 / dr.maximum(seen, NEVER_ZERO)
+    return 1 - dr.select(ahead > 0, dr.minimum(strip, disk), 0)
+
+
+class WallShadows:
+    """Shadows that walls of one height cast, no further than into the next cell of the grid that they stand on.
+
+    Seen from a point in a cell without a wall, light comes over the cell beside it, the cell before it and the one
+    across the corner. Which of them are walls is known per cell; on which the ray meets first, and whether it is above
+    their tops by then, is decided by three straight lines.
+
+    tables: float32 arrays for the kernel
+
+    Raises:
+        NoClosedForm: walls on no grid, and shadows that reach further.
+    """
+
+    def __init__(self, walls: Walls, directions: list[list[float]]) -> None:
+        self._top = float(walls.top.max(initial=walls.floor))
+        self._any = len(walls) > 0
+        self.tables: dict[str, np.ndarray] = {}
+        if not self._any:
+            return
+        self._side, origin, cells = cells_of(walls)
+        reach = max(max(abs(d[0]), abs(d[1])) / d[2] for d in directions) * (self._top - walls.floor)
+        if reach > self._side:
+            raise NoClosedForm(f"shadows of {reach:.2g} m on a grid of {self._side:.2g} m")
+        filled = np.pad(cells >= 0, 2)
+        around = sum(
+            2**bit * filled[1 + row : filled.shape[0] - 1 + row, 1 + column : filled.shape[1] - 1 + column]
+            for bit, (row, column) in enumerate(NEIGHBOURS)
+        )
+        self._corner, (self._rows, self._columns) = origin - self._side, around.shape
+        self.tables = {"walls_around": np.asarray(around, np.float32).ravel()}
+
+    def lit(self, patch: Patch, directions: list[list[float]], inputs: dict[str, Array]) -> list[Array]:
+        """Share of the patch that each light reaches."""
+        if not self._any:
+            return [mi.Float(1) for _ in directions]
+        clear = patch.point + patch.normal * BESIDE
+        x, y = ((clear[i] - float(self._corner[i])) * (1 / self._side) for i in range(2))
+        column, row = dr.clip(dr.floor(x), 0, self._columns - 1), dr.clip(dr.floor(y), 0, self._rows - 1)
+        around = mi.UInt32(dr.gather(mi.Float, inputs["walls_around"], mi.UInt32(row * self._columns + column)))
+        concerns = mi.Bool(False)
+        for direction in directions:
+            facing = dr.dot(patch.normal, mi.Vector3f(*direction)) > 0
+            bits = sum(1 << NEIGHBOURS.index(cell) for cell in _behind(direction))
+            concerns |= facing & ((around & bits) != 0)
+
+        def lit() -> list[Array]:
+            return [self._lit_from(patch, direction, row, column, around) for direction in directions]
+
+        return only_where(concerns, lit, [1.0] * len(directions))
+
+    def _lit_from(self, patch: Patch, direction: list[float], row: Array, column: Array, around: Array) -> Array:
+        """1 - share of what lies behind the cells that the ray crosses into along x, along y, or through the corner."""
+        dx, dy = (math.copysign(max(abs(d), NEVER_ZERO), d) for d in direction[:2])
+        dz = direction[2]
+        crosses_x, crosses_y = (
+            (float(self._corner[i]) + (cell + (d > 0)) * self._side - patch.point[i]) / d
+            for i, (cell, d) in enumerate(((column, dx), (row, dy)))
+        )
+        climbs = (self._top - patch.point.z) / dz
+        behind_x = _share(climbs - crosses_x, patch, (1 / dx, 0, -1 / dz))
+        behind_y = _share(climbs - crosses_y, patch, (0, 1 / dy, -1 / dz))
+        x_first = _share(crosses_y - crosses_x, patch, (1 / dx, -1 / dy, 0))
+        in_x, in_y, in_corner = (_has(around, cell) for cell in _behind(direction))
+        corner = behind_x * behind_y
+        dark = dr.select(in_corner, corner, 0)
+        dark = dr.select(in_x, dr.select(in_corner, behind_x, behind_x * x_first), dark)
+        alone_y = dr.select(in_corner, behind_y, behind_y * (1 - x_first))
+        dark = dr.select(in_y, dr.select(in_x, behind_x + behind_y - corner, alone_y), dark)
+        return 1 - dark
+
+
+def _share(value: Array, patch: Patch, gradient: tuple[float, float, float]) -> Array:
+    g = mi.Vector3f(*gradient)
+    return share_above(value, dr.dot(g, patch.along), dr.dot(g, patch.across))
+
+
+def _behind(direction: list[float]) -> tuple[tuple[int, int], ...]:
+    """Neighbours (row, column) that light from there crosses: along x, along y, through the corner."""
+    x, y = (1 if d > 0 else -1 for d in direction[:2])
+    return (0, x), (y, 0), (y, x)
+
+
+def _has(around: Array, cell: tuple[int, int]) -> Array:
+    return (around & (1 << NEIGHBOURS.index(cell))) != 0
