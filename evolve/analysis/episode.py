@@ -19,7 +19,7 @@ from evolve.genome.plain_values import parsed
 from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run, RunError
-from evolve.store.policies import require
+from evolve.store.policies import require_policy
 from sim.worlds.state import WorldState, concatenate
 
 __all__ = ["Episode", "record"]
@@ -119,7 +119,7 @@ def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_ev
         RunError: there is no such candidate, or its policy is missing or no policy.
     """
     candidate = run.candidate(candidate_id)
-    require(candidate, run.policy_path(candidate.id))
+    require_policy(candidate, run.policy_path(candidate.id))
     try:
         policy = load_policy(run.policy_path(candidate.id))
     except ValueError as error:

@@ -11,7 +11,7 @@ from typing import Any
 
 from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RELIEF_POINTS
 from evolve.genome.interval import Interval
-from evolve.genome.plain_values import listed, real, whole
+from evolve.genome.plain_values import listed, real, whole_number
 
 __all__ = ["checked_fields"]
 
@@ -60,5 +60,5 @@ def _of_gene(gene: str, key: str, value: Any) -> float | int:
     """A gene's value; where there is no such gene, a count of something."""
     valid = ALL_GENES[gene].range if gene in ALL_GENES else Interval(1, LARGEST_COUNT)
     if gene not in ALL_GENES or ALL_GENES[gene].kind == "integer":
-        return whole(value, key, int(valid.low), int(valid.high))
+        return whole_number(value, key, int(valid.low), int(valid.high))
     return real(value, key, valid)

@@ -7,7 +7,7 @@ from typing import Any
 
 from evolve.genome.interval import Interval
 
-__all__ = ["listed", "parsed", "real", "whole"]
+__all__ = ["listed", "parsed", "real", "whole_number"]
 
 SHOWN = 40  # letters of a value that a message quotes
 ROUNDING = 1e-9  # of a range's width, by which a number computed from its ends may lie outside
@@ -25,7 +25,7 @@ def parsed(text: str | bytes) -> Any:
         raise ValueError("too many brackets within brackets") from None
 
 
-def whole(value: Any, name: str, low: int, high: int) -> int:
+def whole_number(value: Any, name: str, low: int, high: int) -> int:
     """An integer.
 
     Raises:

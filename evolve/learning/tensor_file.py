@@ -24,7 +24,8 @@ def read_tensors(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
     Raises:
         StrangeFileError: it is no regular file.
         OSError: it cannot be read.
-        SafetensorError, ValueError: it holds something else.
+        SafetensorError: it holds something else.
+        ValueError: its header is no JSON.
     """
     content = read(path)
     tensors = safetensors.torch.load(content)  # checks the header, so that what follows can rely on it

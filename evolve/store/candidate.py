@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from evolve.config.numbering import Place
 from evolve.genome.interval import Interval
 from evolve.genome.phenotype import Phenotype
-from evolve.genome.plain_values import listed, parsed, real, whole
+from evolve.genome.plain_values import listed, parsed, real, whole_number
 from evolve.store.evaluation import Evaluation
 
 __all__ = ["Candidate"]
@@ -91,7 +91,7 @@ class Candidate:
             raise ValueError(f"wrong fields: must hold exactly {', '.join(names)}")
         try:
             candidate = cls(
-                **{name: whole(record[name], name, 0, most) for name, most in _COUNTS.items()},
+                **{name: whole_number(record[name], name, 0, most) for name, most in _COUNTS.items()},
                 genome=_reals(record, "genome"),
                 phenotype=Phenotype.from_json(record["phenotype"]),
                 fitness=-math.inf if record["fitness"] is None else real(record["fitness"], "fitness", _ANY),
@@ -102,7 +102,8 @@ class Candidate:
                 failure=_text(record["failure"], "failure"),
                 policy=_text(record["policy"], "policy"),
                 parents=tuple(
-                    whole(one, "parents", 0, _COUNTS["id"]) for one in listed(record["parents"], "parents", 0, _LONGEST)
+                    whole_number(one, "parents", 0, _COUNTS["id"])
+                    for one in listed(record["parents"], "parents", 0, _LONGEST)
                 ),
             )
         except TypeError as error:
@@ -137,7 +138,7 @@ def _real_or_none(value: Any, name: str, valid: Interval) -> float:
 
 def _point(entry: Any) -> tuple[int, float]:
     steps, value = listed(entry, "curve", 2, 2)
-    return whole(steps, "curve", 0, _COUNTS["steps"]), _real_or_none(value, "curve", _ANY)
+    return whole_number(steps, "curve", 0, _COUNTS["steps"]), _real_or_none(value, "curve", _ANY)
 
 
 def _text(value: Any, name: str) -> str | None:

@@ -10,7 +10,7 @@ from evolve.store.candidate import Candidate
 from evolve.store.record import RunError
 from evolve.store.regular_files import read
 
-__all__ = ["digest", "lost", "require"]
+__all__ = ["digest", "lost", "require_policy"]
 
 SHOWN = 5  # ids in a line, at most
 REMEDY = "put the file back from a copy of the run; nothing else needs it but replay, report and export"
@@ -37,7 +37,7 @@ def lost(candidates: Iterable[Candidate], where: Callable[[int], Path]) -> str |
     return f"{where(gone[0]).parent}: policies of {len(gone)} candidates are lost ({names}): {REMEDY}"
 
 
-def require(candidate: Candidate, path: Path) -> None:
+def require_policy(candidate: Candidate, path: Path) -> None:
     """The policy with which a candidate was evaluated, and no other.
 
     Raises:

@@ -4,12 +4,12 @@ import pytest
 
 from validation import hostile, hostile_files, hostile_runs
 
-CHEAP = [promise for promise in hostile.PROMISES if promise.share > 0.01]  # within this process
-
 
 def test_promises_hold(capsys):
     assert hostile.main(["--trials", "120", "--seed", "7"]) == 0
-    assert capsys.readouterr().out.splitlines()[-1].split()[-2:] == ["121", "0"]
+    trials, failed = map(int, capsys.readouterr().out.splitlines()[-1].split()[-2:])
+    assert trials > 100
+    assert failed == 0
 
 
 def test_trials_repeat_by_their_seed(tmp_path):

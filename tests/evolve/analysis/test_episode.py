@@ -166,17 +166,17 @@ def test_replay_sums_up_and_writes_a_page(run, episode, capsys):
 def test_a_maze_is_that_which_was_walked_through(episode, tmp_path):
     """In the file, and in the ground plan; files from before there was a choice are of the first maze."""
     world = WorldConfig(mazes=2, unseen=True)
-    walked = dataclasses.replace(episode, task="navigation", world=world)
+    walked = dataclasses.replace(episode, task="maze", world=world)
     walked.save(tmp_path / "walked.npz")
     again = Episode.load(tmp_path / "walked.npz")
     assert again.world == world
-    model = sim.build_world("navigation", seed=1, mazes=2).model
+    model = sim.build_world("maze", seed=1, mazes=2).model
     walls = [i for i in range(model.ngeom) if model.geom(i).name.startswith("wall")]
     shown, y = GroundPlan.of(again), model.geom_pos[walls, 1]
     north = y[y > 0] if again.position[0, 1] > 0 else y[y < 0]
     np.testing.assert_array_equal(shown.walls[:, 1], north)
     assert shown.bounds[3] - shown.bounds[1] == pytest.approx(26.0)
-    (x_min, low, _, high), alone = shown.goal_region, sim.build_world("navigation").goal_region
+    (x_min, low, _, high), alone = shown.goal_region, sim.build_world("maze").goal_region
     assert (x_min, high - low) == pytest.approx((alone[0], alone[3] - alone[1]))
     with np.load(tmp_path / "walked.npz") as file:
         columns = dict(file)

@@ -10,7 +10,7 @@ from evolve.genome.genes import ALL_GENES
 from evolve.genome.genotype import Genotype
 from evolve.genome.interval import Interval
 from evolve.genome.phenotype import Phenotype, develop
-from evolve.genome.plain_values import listed, parsed, real, whole
+from evolve.genome.plain_values import listed, parsed, real, whole_number
 from tests.evolve.closed_form import tiny
 
 NAMES = [f.name for f in fields(Phenotype)]
@@ -47,13 +47,13 @@ def test_ends_of_a_genes_range_are_the_last_values_allowed(name):
 def test_values_are_of_their_type_and_quoted_in_short():
     for wrong in (True, 1.0, "1", None, [1]):
         with pytest.raises(ValueError, match=r"count = .*: must be a whole number from 0 to 5"):
-            whole(wrong, "count", 0, 5)
+            whole_number(wrong, "count", 0, 5)
     for wrong in (True, "1", None, float("nan"), float("inf"), 10**400):
         with pytest.raises(ValueError, match=r"share = .*: must be a number in \[0, 1\]"):
             real(wrong, "share", Interval(0, 1))
     assert real(1 + 1e-12, "share", Interval(0, 1)) == 1 + 1e-12, "rounding"
     with pytest.raises(ValueError, match=r"^count = '9{39}\.\.\.: must be") as long:
-        whole("9" * 10_000, "count", 0, 5)
+        whole_number("9" * 10_000, "count", 0, 5)
     assert len(str(long.value)) < 120
     for wrong, reason in (({}, "must be a list"), ([], "has 0 entries"), ([1] * 4, "has 4 entries")):
         with pytest.raises(ValueError, match=reason):

@@ -8,7 +8,7 @@ from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run, RunError
-from evolve.store.policies import digest, lost, require
+from evolve.store.policies import digest, lost, require_policy
 from tests.evolve.closed_form import leaves_a_policy, tiny
 from tests.evolve.conftest import Silent
 from tests.evolve.store.records import candidate
@@ -27,7 +27,7 @@ def test_checksums_are_on_record_and_policies_that_are_there_are_not_lost(traine
     assert run.notice is None
     for one in run.candidates:
         assert one.policy == digest(run.policy_path(one.id))
-        require(one, run.policy_path(one.id))
+        require_policy(one, run.policy_path(one.id))
     assert len({one.policy for one in run.candidates}) == 4
 
 
@@ -47,8 +47,8 @@ def test_lost_policies_are_noticed_at_once(run, call):
 def test_an_exchanged_policy_is_not_played(run):
     run.append(replace(candidate(0), policy="00"))
     with pytest.raises(RunError, match=r"no policy at .*000000\.safetensors: put the file back"):
-        require(run.candidates[0], run.policy_path(0))
+        require_policy(run.candidates[0], run.policy_path(0))
     write_whole(run.policy_path(0), b"another")
     with pytest.raises(RunError, match="is not the policy with which candidate 0 was evaluated: put the file back"):
-        require(run.candidates[0], run.policy_path(0))
-    require(candidate(0), run.policy_path(0))
+        require_policy(run.candidates[0], run.policy_path(0))
+    require_policy(candidate(0), run.policy_path(0))

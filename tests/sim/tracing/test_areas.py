@@ -16,6 +16,7 @@ from sim.eyes.sensor import eye_sampling
 from sim.scene.variant import variant
 from sim.tracing.areas import columns, half_planes, illumination, shadows, sphere_areas, stripes
 from sim.worlds import layout, materials
+from sim.worlds.layout import Starts
 from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
 
@@ -52,7 +53,7 @@ def stairs(change=None) -> sim.World:
     if change:
         change(spec.geom("wall_0"))
     spots = layout.cell_centers(column[free], row[free], (n, n))
-    return sim.World("navigation", spec.compile(), (), spots, np.empty((0, 2)), None)
+    return sim.World("navigation", spec.compile(), (), Starts(spots), np.empty((0, 2)), None)
 
 
 def views(world, n=VIEWS, seed=0) -> WorldState:

@@ -14,6 +14,7 @@ from sim.scene.variant import variant
 from sim.tracing.closed_form_tracer import components_of
 from sim.tracing.reflectance_atlas import bake
 from sim.tracing.static_scene import build_static_scene
+from sim.worlds.layout import Starts
 from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=3, resolution=(9, 12), fov_deg=70, placement_range_deg=240, bands=5, noise_sigma=0)
@@ -91,7 +92,9 @@ def furnished(n_boxes, *, grid, floor="t", extra="", seed=0):
         )
     model = mujoco.MjModel.from_xml_string(BOXES.format(boxes="".join(boxes) + extra, floor=floor))
     spots = np.array([[0.0, 0.0], [1.0, -1.0], [-1.5, 0.5]])
-    return sim.World("detection", model, ("goal",), spots, np.array([[2.0, 2.0], [-2.0, -2.0], [2.0, -2.0]]), None)
+    return sim.World(
+        "detection", model, ("goal",), Starts(spots), np.array([[2.0, 2.0], [-2.0, -2.0], [2.0, -2.0]]), None
+    )
 
 
 def around(world, n, seed):

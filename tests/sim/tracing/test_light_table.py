@@ -14,6 +14,7 @@ from sim.render.prepared_scene import PreparedScene
 from sim.scene.variant import variant
 from sim.tracing import lighting
 from sim.tracing.areas import illumination, light_baking, light_store, light_table
+from sim.worlds.layout import Starts
 from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
 from tests.sim.tracing.test_areas import BEE, EYES, ROW, SIGMA, stairs, views
@@ -189,7 +190,7 @@ def test_worlds_without_walls_reflect_nothing_twice():
         '<joint name="agent_y" type="slide" axis="0 1 0"/><joint name="agent_heading" axis="0 0 1"/>'
         '<geom size=".2"/></body></worldbody></mujoco>'
     )
-    world = sim.World("navigation", spec.compile(), (), np.zeros((1, 2)), np.empty((0, 2)), None)
+    world = sim.World("navigation", spec.compile(), (), Starts(np.zeros((1, 2))), np.empty((0, 2)), None)
     with pytest.raises(ValueError, match="samples = 'areas': this world has no closed form: no walls"):
         sim.BatchedRenderer(world, EYES, 1, sim.Fidelity(1, 4, light="bounce", samples="areas"))
     state = views(world, 4)
