@@ -39,6 +39,7 @@ def write_rows(rows: Iterable[Any], path: Path) -> None:
     table = csv.writer(text, lineterminator="\n")
     table.writerow(lines[0])
     table.writerows([f"{v:.6g}" if isinstance(v, float) else v for v in line.values()] for line in lines)
+    path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, text.getvalue().encode())
 
 

@@ -109,3 +109,13 @@ def test_rows_survive_the_file(tmp_path):
     back = read_rows(Trained, tmp_path / "rows.csv")
     assert [row.design for row in back] == [row.design for row in some]
     assert [row.fitness for row in back] == pytest.approx([row.fitness for row in some], rel=1e-5)
+
+
+def test_the_published_page_says_what_its_store_says():
+    from pathlib import Path
+
+    results = Path(__file__).parents[2] / "docs/results"
+    data = results / "data/eyes_for_tasks.csv"
+    answer = data.with_suffix(".txt").read_text(encoding="utf-8").strip()
+    made = page(read_rows(Trained, data), Origin.read(data.with_suffix(".json")), answer)
+    assert made.markdown == (results / "eyes_for_tasks.md").read_text(encoding="utf-8")

@@ -17,14 +17,14 @@ VERSION = 1  # of what is baked: another one if the same ingredients give other 
 KEPT = 200  # files, at most; the oldest go first
 
 
-def folder() -> Path:
+def cache_folder() -> Path:
     """Where they are kept."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rhabdom" / "light"
 
 
 def stored(baking: Baking) -> dict[str, np.ndarray]:
     """The tables, from disk where they are there. Without a disk to write to they are baked every time."""
-    path = folder() / f"{_digest(baking.ingredients)}.npz"
+    path = cache_folder() / f"{_digest(baking.ingredients)}.npz"
     # A file that is missing, cut off or someone else's is baked anew.
     with contextlib.suppress(OSError, ValueError, zipfile.BadZipFile, EOFError), np.load(path) as file:
         return {name: file[name] for name in file.files}

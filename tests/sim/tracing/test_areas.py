@@ -124,6 +124,7 @@ def cases():
     worlds = {
         "detection": (build_world("detection"), EYES),
         "foraging": (build_world("foraging"), BEE),
+        "maze": (build_world("maze"), ROW),
         "navigation": (build_world("navigation"), ROW),
         "stairs": (stairs(), ROW),
         "stairs in detail": (stairs(), EYES),
@@ -137,14 +138,16 @@ def cases():
 
 # Largest errors over all receptors and over those that see an object, in noise: a quarter more than measured with these
 # views. For comparison: 32 and 64 rays err by .29 and .16 in detection, by .73 and .39 on objects; by .81 and .42 in
-# navigation.
+# the maze.
 TOLERANCE = {
     ("detection", 1): (0.21, 0.60),
     ("detection", 4): (0.10, 0.28),
     ("foraging", 1): (0.16, 0.45),
     ("foraging", 4): (0.062, 0.17),
-    ("navigation", 2): (0.30, 0.0),
-    ("navigation", 8): (0.09, 0.0),
+    ("maze", 2): (0.30, 0.0),
+    ("maze", 8): (0.09, 0.0),
+    ("navigation", 2): (0.75, 0.0),
+    ("navigation", 8): (0.15, 0.0),
     ("stairs", 4): (0.38, 0.0),
     ("stairs in detail", 2): (0.32, 0.0),
 }
@@ -224,14 +227,14 @@ def objects_in_any_order(monkeypatch):
 @pytest.mark.parametrize(
     ("mutant", "name", "areas"),
     [
-        (no_edges, "navigation", 2),
+        (no_edges, "maze", 2),
         (no_edges, "stairs", 4),
         (no_wall_shadows, "stairs", 4),
-        (no_wall_shadows, "navigation", 8),
+        (no_wall_shadows, "maze", 8),
         (no_body_shadows, "detection", 4),
         (sums_off_by_a_stripe, "detection", 4),
         (sums_off_by_a_stripe, "foraging", 4),
-        (sums_off_by_a_stripe, "navigation", 8),
+        (sums_off_by_a_stripe, "maze", 8),
         (no_filter, "detection", 1),
         (all_or_nothing, "detection", 4),
         (objects_in_any_order, "detection", 4),

@@ -162,7 +162,7 @@ def flat(level):
 def test_a_broken_file_is_baked_anew():
     world = build_world("detection")
     first = tables(world)
-    (path,) = light_store.folder().glob("*.npz")
+    (path,) = light_store.cache_folder().glob("*.npz")
     path.write_bytes(path.read_bytes()[:1000])
     np.testing.assert_array_equal(tables(world)["bounced_floor_0"].numpy(), first["bounced_floor_0"].numpy())
 
