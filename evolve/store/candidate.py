@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -100,7 +101,7 @@ class Candidate:
                 seconds=real(record["seconds"], "seconds", Interval(0, 1e300)),
                 curve=tuple(_point(entry) for entry in listed(record["curve"], "curve", 0, _LONGEST)),
                 failure=_text(record["failure"], "failure"),
-                policy=_text(record["policy"], "policy"),
+                policy=_checksum(record["policy"]),
                 parents=tuple(
                     whole_number(one, "parents", 0, _COUNTS["id"])
                     for one in listed(record["parents"], "parents", 0, _LONGEST)
@@ -146,6 +147,13 @@ def _text(value: Any, name: str) -> str | None:
     if value is not None and not isinstance(value, str):
         raise ValueError(f"{name}: must be text or null")
     return value if value is None else value.encode(errors="backslashreplace").decode()
+
+
+def _checksum(value: Any) -> str | None:
+    """Of a policy's file, as `evolve.store.policies.digest` writes it."""
+    if value is not None and (not isinstance(value, str) or re.fullmatch("[0-9a-f]{64}", value) is None):
+        raise ValueError("policy: must be a SHA-256 in 64 lower-case hexadecimal digits, or null")
+    return value
 
 
 def _finite(value: Any) -> Any:

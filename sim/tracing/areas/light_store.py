@@ -8,6 +8,7 @@ import os
 import tempfile
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -42,12 +43,12 @@ def _digest(ingredients: list[np.ndarray]) -> str:
     return digest.hexdigest()
 
 
-def _write(path: Path, tables: dict[str, np.ndarray]) -> None:
+def _write(path: Path, tables: dict[str, Any]) -> None:
     """Whole or not at all, whoever else writes it at the same time."""
     path.parent.mkdir(parents=True, exist_ok=True)
     for old in sorted(path.parent.glob("*.npz"), key=lambda p: p.stat().st_mtime)[: -(KEPT - 1)]:
         old.unlink(missing_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
     with os.fdopen(handle, "wb") as file:
-        np.savez(file, **tables)  # type: ignore[arg-type]
+        np.savez(file, **tables)
     os.replace(name, path)

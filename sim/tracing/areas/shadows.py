@@ -26,7 +26,10 @@ def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, 
     patch_reach = (dr.norm(patch.along) + dr.norm(patch.across)) / 2
     reach = slope * dr.maximum(way.z + radius, 0) + (radius + patch_reach)
     near = dr.squared_norm(way.xy) < reach * reach
-    lit = lambda: [_lit_past_sphere(patch, direction, way, radius) for direction in directions]  # noqa: E731
+
+    def lit() -> list[Array]:
+        return [_lit_past_sphere(patch, direction, way, radius) for direction in directions]
+
     return only_where(near, lit, [1.0] * len(directions))
 
 

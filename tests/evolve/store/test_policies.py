@@ -33,7 +33,7 @@ def test_checksums_are_on_record_and_policies_that_are_there_are_not_lost(traine
 
 def test_lost_policies_are_noticed_at_once(run, call):
     for number in range(8):
-        run.append(replace(candidate(number), policy="00"))
+        run.append(replace(candidate(number), policy="00" * 32))
         write_whole(run.policy_path(number), b"policy")
     assert Run.open(run.path).notice is None
     for number in (1, 2, 3, 5, 6, 7):
@@ -45,7 +45,7 @@ def test_lost_policies_are_noticed_at_once(run, call):
 
 
 def test_an_exchanged_policy_is_not_played(run):
-    run.append(replace(candidate(0), policy="00"))
+    run.append(replace(candidate(0), policy="00" * 32))
     with pytest.raises(RunError, match=r"no policy at .*000000\.safetensors: put the file back"):
         require_policy(run.candidates[0], run.policy_path(0))
     write_whole(run.policy_path(0), b"another")

@@ -17,7 +17,7 @@ from sim.tracing.areas import illumination, light_baking, light_store, light_tab
 from sim.worlds.layout import Starts
 from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
-from tests.sim.tracing.test_areas import BEE, EYES, ROW, SIGMA, stairs, views
+from tests.sim.tracing.area_views import BEE, EYES, ROW, SIGMA, stairs, views
 
 VIEWS = 12
 RAYS = {EYES: 1024, BEE: 1024, ROW: 8192}  # their own error: 0.04 of the noise
