@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+import rhabdom  # noqa: F401 (finds rhabdom's own optics and sim, whoever else has installed packages of these names)
+
 _HOME = {
     "RunConfig": "evolve.config.run_config",
     "EyeConfig": "evolve.config.run_config",

@@ -45,6 +45,8 @@ def _outcome(arguments: Sequence[str]) -> int:
     """The exit code of a command; what is the user's to mend is said in one line."""
     try:
         parsed = _parser().parse_args(arguments)
+        if parsed.module != "checks":
+            _require_system()
         # Numerical libraries read this as they load. More threads than one sum in another order, and a run must repeat.
         os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
         command = import_module(f"evolve.cli.commands.{parsed.module}")
@@ -59,6 +61,15 @@ def _outcome(arguments: Sequence[str]) -> int:
             raise
         print(f"evolve: error: {_one_line(error)}", file=sys.stderr)
         return 2
+
+
+def _require_system() -> None:
+    """What the commands need, every system but Windows has."""
+    if os.name == "nt":
+        from evolve.cli.doctor import unsupported
+
+        print(f"evolve: error: {unsupported()}", file=sys.stderr)
+        raise SystemExit(2)
 
 
 def _one_line(error: Exception) -> str:
