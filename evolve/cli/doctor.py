@@ -31,6 +31,7 @@ PACKAGES = (
     "rich",
     "scikit-image",
     "tomli-w",
+    "pandas",
 )
 # One child process loads Mitsuba (its import alone can fail on a broken installation) and renders in each variant.
 RENDER = """

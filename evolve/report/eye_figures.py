@@ -22,7 +22,7 @@ from optics.eye.summary import noise_of
 from optics.numerics.precision import precision
 from optics.spectra.bands import daylight
 
-__all__ = ["eye_figures", "relief_heights"]
+__all__ = ["DECADES", "WhiteLight", "eye_figures", "middle_of_psf", "relief_heights"]
 
 SIZE = (370, 310)
 PIXELS = 161  # of a picture, at most: fine enough for its size on the page
@@ -108,7 +108,7 @@ def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
 
 def _psf(light: WhiteLight) -> Html:
     """The polychromatic PSF, logarithmic, with a receptor's outline."""
-    picture, half = _shown(light)
+    picture, half = middle_of_psf(light)
     edge, pitch = 1e6 * half, 1e6 * light.eye.receptor_pitch
     peak = picture.max()
     with drawing(*SIZE) as drawn:
@@ -135,7 +135,7 @@ def _psf(light: WhiteLight) -> Html:
     return figure(svg, caption)
 
 
-def _shown(light: WhiteLight) -> tuple[np.ndarray, float]:
+def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
     """The middle of the PSF that holds most of the light, averaged to at most PIXELS, and its half width [m]."""
     image, dx = light.white.psf[0], light.white.dx
     middle = image.shape[0] // 2
@@ -154,7 +154,7 @@ def _shown(light: WhiteLight) -> tuple[np.ndarray, float]:
 def _cuts(light: WhiteLight) -> Html:
     """Each band's PSF along x through the axis."""
     psf = light.psf
-    _, half = _shown(light)
+    _, half = middle_of_psf(light)
     inside = np.abs(psf.x) <= half
     row = psf.psf.shape[1] // 2
     cuts = psf.psf[:, row][:, inside] / 1e12
