@@ -29,6 +29,7 @@ PACKAGES = (
     "OpenEXR",
     "matplotlib",
     "rich",
+    "shtab",
     "scikit-image",
     "tomli-w",
     "pandas",

@@ -60,7 +60,7 @@ def test_systems_are_named(monkeypatch, platform, supported):
 
 
 def test_windows_is_refused_in_one_line(monkeypatch, capsys):
-    monkeypatch.setattr("os.name", "nt")
+    monkeypatch.setattr("sys.platform", "win32")
     monkeypatch.setattr(doctor, "unsupported", lambda: "win32: is not supported")
     with pytest.raises(SystemExit) as stop:
         main(["genes"])
