@@ -136,6 +136,11 @@ def _add_runs(commands: Commands) -> None:
             "--scheduler", metavar="ADDRESS", help="address of the Dask scheduler, such as tcp://host:8786"
         )
         command.add_argument(
+            "--device",
+            choices=("auto", "cpu", "cuda"),
+            help="where PSFs, eyes and rays are computed (default: RHABDOM_DEVICE, else cpu)",
+        )
+        command.add_argument(
             "--tensorboard", action="store_true", help="also write TensorBoard files to DIR/tensorboard"
         )
 

@@ -10,6 +10,7 @@ import sys
 from importlib import metadata
 
 from optics.numerics import backend
+from optics.numerics.device import device
 from rhabdom.importing import namesakes
 
 __all__ = ["examine", "print_findings", "unsupported"]
@@ -58,7 +59,8 @@ def unsupported(platform_name: str = sys.platform) -> str | None:
 
 
 def examine() -> dict[str, object]:
-    """Findings as a dictionary: python, machine, packages, llvm (every library tried), variants, gpu, notes, good."""
+    """Findings as a dictionary: python, machine, packages, llvm (every library tried), variants, gpu, device, notes,
+    good."""
     chosen, tried = backend.find(cached=False)
     environment = {**os.environ, backend.VARIABLE: chosen.path} if chosen else dict(os.environ)
     wanted = ["scalar_spectral"] + (["llvm_ad_spectral"] if chosen else [])
@@ -75,11 +77,15 @@ def examine() -> dict[str, object]:
         if hasattr(os, "sched_getaffinity")
         else f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "gpu": gpu or "none",
+        "device": _device(),
         "packages": packages,
         "llvm": [vars(llvm) for llvm in tried],
         "variants": variants,
         "notes": [*([refused] if refused else []), *namesakes()],
-        "good": works and refused is None and "not installed" not in packages.values(),
+        "good": works
+        and refused is None
+        and not _device().startswith("refused")
+        and "not installed" not in packages.values(),
     }
 
 
@@ -88,6 +94,14 @@ def _version(name: str) -> str:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return "not installed"
+
+
+def _device() -> str:
+    """Where PSFs, eyes and rays are computed."""
+    try:
+        return device()
+    except backend.BackendError as error:
+        return f"refused: {error}"
 
 
 def _gpu() -> str:
@@ -129,6 +143,7 @@ def _lines(findings: dict[str, object]) -> list[str]:
         f"{'python':<20}{findings['python']}",
         f"{'machine':<20}{findings['machine']}",
         f"{'gpu':<20}{findings['gpu']}",
+        f"{'device':<20}{findings['device']} for PSFs, eyes and rays; cpu for physics and learning",
     ]
     lines += [f"{name:<20}{version}" for name, version in packages.items()]
     for llvm in tried:

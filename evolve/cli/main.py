@@ -37,6 +37,8 @@ def _outcome(arguments: Sequence[str]) -> int:
             _require_system()
         # Numerical libraries read this as they load. More threads than one sum in another order, and a run must repeat.
         os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
+        if getattr(parsed, "device", None):
+            os.environ["RHABDOM_DEVICE"] = parsed.device  # workers inherit it
         command = import_module(f"evolve.cli.commands.{parsed.module}")
         with ExitStack() as silence:
             if getattr(parsed, "quiet", False):

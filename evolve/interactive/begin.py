@@ -13,7 +13,7 @@ from evolve.interactive.carry_on import Callback, carry_on
 from evolve.interactive.opened_run import OpenedRun
 from evolve.search.search import Search
 from evolve.store.directory import next_directory
-from optics.numerics import backend
+from optics.numerics import device
 
 __all__ = ["run"]
 
@@ -53,7 +53,7 @@ def run(
     assignments = [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
     chosen = assemble(task, preset, None if config is None else Path(config), assignments, starts, scale)
     Search(chosen)  # an unknown optimizer, say, is refused before anything is written
-    backend.require()
+    device.make_ready()
     directory = Path(out) if out is not None else next_directory(chosen.task, preset.removesuffix(f"-{chosen.task}"))
     begun = OpenedRun.create(directory, chosen, starts.name.removeprefix("--from ") if starts else None)
     with begun.lock():

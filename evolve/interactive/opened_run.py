@@ -16,7 +16,7 @@ from evolve.search.successive_halving import finished
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.versions import record_start
-from optics.numerics import backend
+from optics.numerics import device
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,7 +76,7 @@ class OpenedRun(Run):
             LockedError: another process works on it.
             RunError: its format is a former one.
         """
-        backend.require()
+        device.make_ready()
         with self.lock():
             self.repair()
             if finished(self):

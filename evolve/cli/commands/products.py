@@ -10,7 +10,7 @@ from pathlib import Path
 from evolve.cli.waiting import Waiting
 from evolve.report.write import FILE as REPORT
 from evolve.store.directory import Run
-from optics.numerics import backend
+from optics.numerics import device
 
 __all__ = ["REPORT", "export", "open_page", "replay", "report"]
 
@@ -73,5 +73,5 @@ def _waiting(arguments: Namespace, text: str) -> Waiting:
 def _open(arguments: Namespace) -> Run:
     """The run, on a machine that can see."""
     run = Run.open(arguments.directory)
-    backend.require()
+    device.make_ready()
     return run

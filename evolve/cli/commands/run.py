@@ -29,7 +29,7 @@ from evolve.search.worker import evaluate_candidate, prepare_device
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, next_directory
 from evolve.store.versions import altered, present, record_start, recorded
-from optics.numerics import backend
+from optics.numerics import device
 
 __all__ = ["resume", "start"]
 
@@ -43,7 +43,7 @@ def start(arguments: Namespace) -> int:
         arguments.task, arguments.preset, arguments.config, [*arguments.set, *flags], starts, arguments.scale
     )
     Search(config)  # an unknown optimizer, say, is refused before anything is written
-    backend.require()
+    device.make_ready()
     directory = arguments.out or next_directory(config.task, arguments.preset.removesuffix(f"-{config.task}"))
     if arguments.dry_run:
         return _show(RunPlan.of(config, directory), arguments.json)
@@ -63,7 +63,7 @@ def resume(arguments: Namespace) -> int:
     """Carry an interrupted run to its end."""
     _require_scheduler(arguments)
     run = Run.open(arguments.directory)
-    backend.require()
+    device.make_ready()
     with run.lock():
         run.repair()
         if run.notice and not arguments.quiet:
