@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Circle, Rectangle
@@ -17,7 +16,7 @@ from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.report.markup import Html, figure, html, joined, key, rounded
 from evolve.report.svg import drawing, inline
-from evolve.report.theme import ACCENT, INK, MUTED, VERMILLION
+from evolve.report.theme import ACCENT, INK, LINES, MUTED, VERMILLION
 from optics.eye.summary import noise_of
 from optics.numerics.precision import precision
 from optics.spectra.bands import daylight
@@ -161,8 +160,7 @@ def _cuts(light: WhiteLight) -> Html:
     with drawing(*SIZE) as drawn:
         axes = drawn.subplots()
         chosen = np.unique(np.linspace(0, len(cuts) - 1, min(len(cuts), 6)).astype(int))
-        for band in chosen:
-            colour = colormaps["viridis"](0.1 + 0.75 * band / max(len(cuts) - 1, 1))
+        for band, colour in zip(chosen, LINES, strict=False):
             label = f"{1e9 * psf.wavelengths[band]:.0f} nm"
             axes.semilogy(1e6 * psf.x[inside], cuts[band], color=colour, lw=1.2, label=label)
         axes.set(xlim=(-1e6 * half, 1e6 * half), ylim=(cuts.max() * 10.0**-DECADES, 2 * cuts.max()))
