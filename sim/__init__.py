@@ -18,6 +18,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import rhabdom  # noqa: F401 (finds rhabdom's own optics, whoever else has installed a package of that name)
 from sim.envs.registration import register as register_environments
 from sim.worlds import catalog
 
