@@ -50,6 +50,7 @@ def test_all_that_arrives_is_what_a_small_window_measures_contrast_by():
     assert np.abs(by_all - expected).max() < 0.02
     np.testing.assert_allclose(by_window, by_all / result.power[0], rtol=1e-4)
     assert optics.mtf(result, 1.0).mtf[0, 6, 6] == 1
+    np.testing.assert_allclose(optics.mtf(result, 0.95).profile(f)[0], by_all / 0.95, rtol=1e-4)
     with pytest.raises(ValueError, match=r"arriving = 0\.5: must be in"):
         optics.mtf(result, 0.5)
     with pytest.raises(ValueError, match=r"arriving has shape \(2,\): must be a number, or one per wavelength \(1,\)"):
