@@ -5,8 +5,9 @@ Table of contents; everything loads on first use.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # Ctrl-C while this loads is not looked after yet, and `typing` takes milliseconds
+    from typing import Any
 
 _HOME = {
     "RunConfig": "evolve.config.run_config",
@@ -33,6 +34,8 @@ __all__ = sorted(_HOME)
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'evolve' has no attribute {name!r}")
+    from importlib import import_module
+
     return getattr(import_module(_HOME[name]), name)
 
 

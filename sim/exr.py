@@ -12,6 +12,7 @@ Files are written whole or not at all, and each part carries a SHA-256 of what i
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -100,7 +101,9 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
         attributes[_HASH] = _digest(name, channels, attributes)
         # OpenEXR writes arrays that are not contiguous wrong, without a word: _part makes them so.
         parts.append(OpenEXR.Part({**header, **attributes}, channels, name))
-    _write_whole(Path(path), lambda name: OpenEXR.File(parts).write(name))
+    encoded = io.BytesIO()  # OpenEXR opens no file whose name is not UTF-8
+    OpenEXR.File(parts).write(encoded)
+    _write_whole(Path(path), encoded.getbuffer())
 
 
 def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list[View]:
@@ -117,11 +120,12 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     if not Path(path).is_file():
         raise FileNotFoundError(f"no such file: {path}")
     try:
-        headers = OpenEXR.File(str(path), header_only=True).parts
+        content = Path(path).read_bytes()
+        headers = OpenEXR.File(io.BytesIO(content), header_only=True).parts
         expected = len(headers)
         if (unpacked := sum(_pixel_bytes(part.header) for part in headers)) > most_bytes:
             raise ExrError(f"unpacks to {unpacked:,} bytes: must be at most most_bytes = {most_bytes:,}")
-        parts = OpenEXR.File(str(path), separate_channels=True).parts
+        parts = OpenEXR.File(io.BytesIO(content), separate_channels=True).parts
         held = [_checked(part, expected) for part in parts]
     except ExrError as error:
         raise ExrError(f"{path}: {error}") from None
@@ -218,14 +222,14 @@ def _views(parts: list[tuple[str, dict[str, np.ndarray], dict[str, Any]]]) -> li
     return [View(**view) for view in fields.values()]
 
 
-def _write_whole(path: Path, write: Any) -> None:
+def _write_whole(path: Path, content: memoryview) -> None:
     """Write to a neighbouring temporary file, flush it to the disk, and give it its name."""
     temporary = str(path.with_name(f".{path.name}.{os.getpid()}.tmp"))  # not tempfile's, which none but we may read
     try:
         Path(temporary).unlink(missing_ok=True)  # a link, maybe, that leads elsewhere
-        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-        write(temporary)
-        with open(temporary, "rb+") as file:
+        with os.fdopen(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
+            file.write(content)
+            file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
     except BaseException:

@@ -284,3 +284,13 @@ def test_a_disk_that_is_full_leaves_the_old_picture_and_nothing_else(tmp_path, m
         write_exr(tmp_path / "a.exr", views(seed=1))
     assert [path.name for path in tmp_path.iterdir()] == ["a.exr"]
     assert (tmp_path / "a.exr").read_bytes() == before
+
+
+def test_names_need_not_be_text(tmp_path):
+    """On Linux a file's name is bytes, and OpenEXR takes UTF-8 alone."""
+    path = tmp_path / os.fsdecode(b"bad\xffname.exr")
+    write_exr(path, views())
+    assert [view.name for view in read_exr(path)] == ["left", "right", "signals"]
+    path.write_bytes(path.read_bytes()[:-50])
+    with pytest.raises(ExrError, match=r"truncated|no readable|damaged"):
+        read_exr(path)
