@@ -296,3 +296,12 @@ def test_windows_remember_no_frame_from_before_the_episode(memory):
                 back = min(memory - 1 - slot, int(age[segment, step]))
                 expected = codes[:, :, segment, memory - 1 + step - back]
                 assert torch.equal(windows[:, :, slot, segment, step], expected)
+
+
+def test_one_number_that_is_none_spoils_a_policy(policy, tmp_path):
+    save_policy(policy, tmp_path / "0.safetensors")
+    stored = (tmp_path / "0.safetensors").read_bytes()
+    spoilt = stored[:-4] + np.float32(np.nan).tobytes()
+    (tmp_path / "0.safetensors").write_bytes(spoilt)
+    with pytest.raises(ValueError, match="numbers that are not finite"):
+        load_policy(tmp_path / "0.safetensors")

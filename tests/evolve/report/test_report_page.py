@@ -181,6 +181,8 @@ def test_a_population_is_drawn_as_its_median_between_its_tenth_and_its_ninetieth
 
     axes = Figure().subplots()
     figures._spread(axes, [0, 1, 2], [1.0, 2.0, 3.0], [2.0, 3.0, 5.0], [4.0, 5.0, 6.0])
+    figures._generation_axis(axes, [0, 1, 2])
+    assert axes.get_xlim() == (-0.5, 2.5)
     (line,) = axes.lines
     assert line.get_xydata().tolist() == [[0, 2], [1, 3], [2, 5]]
     (band,) = axes.collections
