@@ -58,13 +58,15 @@ class View:
 
     def __post_init__(self) -> None:
         where = f"View {self.name!r}"
-        if not self.name or not self.name.isprintable():
-            raise ValueError(f"{where}: name must be printable and not empty")
+        if not isinstance(self.name, str) or not self.name or not self.name.isprintable():
+            raise ValueError(f"{where}: its name must be printable text, and not empty")
         if self.radiance is None and self.receptors is None:
             raise ValueError(f"{where}: has neither radiance nor receptors")
         for label, image in (("radiance", self.radiance), ("receptors", self.receptors)):
             if image is not None and (image.ndim != 3 or 0 in image.shape):
                 raise ValueError(f"{where}: {label} has shape {image.shape}: must be (band, y, x)")
+        if np.ndim(self.wavelengths_nm) != 1 or not np.all(np.isfinite(self.wavelengths_nm)):
+            raise ValueError(f"{where}: wavelengths_nm = {self.wavelengths_nm!s:.60}: must be finite numbers (band,)")
         if self.radiance is not None:
             names = {_channel(nm) for nm in self.wavelengths_nm}
             if len(self.radiance) != len(self.wavelengths_nm) or len(names) != len(self.radiance):

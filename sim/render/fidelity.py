@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
 import optics
+from optics.numerics.arguments import whole
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.eyes.receptive_fields import NoRaysError
@@ -39,6 +41,8 @@ SHARE_OF_LIGHT = 0.5
 LAYERS = (1, 3, 5, 9)  # nodes of each are among those of the next
 RAYS, AREAS = SAMPLES = ("rays", "areas")
 NEAREST = 0.005  # chosen: quantile of the distances that counts as the nearest
+MOST_RAYS = 1e7  # per receptor: what is more was a slip, and its arithmetic overflows
+MOST_BANDS = 4096
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,7 @@ class Fidelity:
     levels: what was chosen for each stage, and why
 
     Raises:
-        ValueError: less than one band, rays_per_receptor that are not positive, or unknown light.
+        ValueError: bands or rays_per_receptor that are no numbers or out of range, or unknown light.
     """
 
     rays_per_receptor: float
@@ -78,10 +82,10 @@ class Fidelity:
     samples: str = RAYS
 
     def __post_init__(self) -> None:
-        if not 0 < self.rays_per_receptor < math.inf:
-            raise ValueError(f"rays_per_receptor = {self.rays_per_receptor!r}: must be positive, or 'auto'")
-        if self.bands < 1:
-            raise ValueError(f"bands = {self.bands!r}: must be at least 1")
+        rays = self.rays_per_receptor
+        if not (isinstance(rays, Real) and 0 < rays <= MOST_RAYS):
+            raise ValueError(f"rays_per_receptor = {rays!s:.40}: must be positive and at most {MOST_RAYS:g}, or 'auto'")
+        whole("bands", self.bands, 1, MOST_BANDS)
         if self.light not in LEVELS:
             raise ValueError(f"light = {self.light!r}: must be one of {', '.join(map(repr, LEVELS))}")
         if self.samples not in SAMPLES:
