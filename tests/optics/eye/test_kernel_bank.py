@@ -299,3 +299,9 @@ def test_a_signal_too_dark_is_as_wrong_as_one_too_bright():
     there, back = worst_difference([(1, kernel), (-1, moved)], S), worst_difference([(-1, kernel), (1, moved)], S)
     assert there == pytest.approx(back)
     assert 0.1 < there < 1
+
+
+@pytest.mark.parametrize("z", [[-1e-3, 1e-3], [0.0, 1.0], -1.0])
+def test_one_distance_that_is_none_is_named_among_others(z):
+    with pytest.raises(ValueError, match=r"^z = .*: must be"):
+        LENS.sight(S, z)

@@ -12,7 +12,7 @@ import pytest
 import sim
 from sim.envs.simulation import Simulation
 from sim.scene.variant import variant
-from sim.tracing.closed_form_tracer import components_of
+from sim.tracing.closed_form_tracer import components_of, reflected_components_of
 from sim.tracing.reflectance_atlas import bake
 from sim.tracing.static_scene import build_static_scene
 from sim.tracing.wall_intersection import Cells
@@ -190,3 +190,13 @@ def test_a_cell_beyond_any_side_of_the_grid_is_outside():
         column, row = mi.Int32([0, 2, -1, 3, 0, 0]), mi.Int32([0, 1, 0, 0, -1, 2])
         inside = Cells._inside(grid, column, row).numpy()
     assert inside.tolist() == [True, True, False, False, False, False]
+
+
+def test_components_of_greys_are_their_reflectances():
+    """What a grey texel sends on is its own reflectance times what arrives: radiance / irradiance = reflectance / π."""
+    texels, light = np.repeat([[0.2], [0.5], [0.9]], 4, axis=1), np.array([[1.0, 2.0, 3.0, 1.5]])
+    few = reflected_components_of(texels, light)
+    assert few.basis.shape == (1, 4)
+    np.testing.assert_allclose(few.reflectance, texels[:, :1], rtol=1e-6)
+    radiance = few.reflectance @ np.diag(few.levels[0]) @ few.basis
+    np.testing.assert_allclose(radiance, texels * light / np.pi, rtol=1e-6)
