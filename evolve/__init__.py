@@ -5,10 +5,11 @@ Table of contents; everything loads on first use.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
-
 import rhabdom  # noqa: F401 (finds rhabdom's own optics and sim, whoever else has installed packages of these names)
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # Ctrl-C while this loads is not looked after yet, and `typing` takes milliseconds
+    from typing import Any
 
 _HOME = {
     "RunConfig": "evolve.config.run_config",
@@ -36,6 +37,8 @@ __all__ = sorted(_HOME)
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'evolve' has no attribute {name!r}")
+    from importlib import import_module
+
     module, _, own_name = _HOME[name].partition(":")
     return getattr(import_module(module), own_name or name)
 

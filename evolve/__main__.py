@@ -1,13 +1,18 @@
-"""python -m evolve"""
+"""`evolve`, and python -m evolve. Nothing else is loaded before Ctrl-C is looked after."""
 
 import sys
 
-if __name__ == "__main__":
-    try:
-        from evolve.cli.main import main
 
-        code = main()
+def main() -> int:
+    """Load the command and run it; returns the exit code."""
+    try:
+        from evolve.cli.main import main as command
+
+        return command()
     except KeyboardInterrupt:  # while it was being loaded
         print("evolve: interrupted", file=sys.stderr)
-        code = 130
-    sys.exit(code)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

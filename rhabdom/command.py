@@ -10,7 +10,7 @@ __all__ = ["run_command"]
 def run_command() -> int:
     """Run one command; returns the exit code."""
     try:
-        return int(import_module("evolve.cli.main").main())
+        return int(import_module("evolve.__main__").main())
     except KeyboardInterrupt:  # while it was being loaded
         print("\nevolve: interrupted")
         return 130

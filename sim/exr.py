@@ -12,6 +12,7 @@ Files are written whole or not at all, and each part carries a SHA-256 of what i
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -57,13 +58,15 @@ class View:
 
     def __post_init__(self) -> None:
         where = f"View {self.name!r}"
-        if not self.name or not self.name.isprintable():
-            raise ValueError(f"{where}: name must be printable and not empty")
+        if not isinstance(self.name, str) or not self.name or not self.name.isprintable():
+            raise ValueError(f"{where}: its name must be printable text, and not empty")
         if self.radiance is None and self.receptors is None:
             raise ValueError(f"{where}: has neither radiance nor receptors")
         for label, image in (("radiance", self.radiance), ("receptors", self.receptors)):
             if image is not None and (image.ndim != 3 or 0 in image.shape):
                 raise ValueError(f"{where}: {label} has shape {image.shape}: must be (band, y, x)")
+        if np.ndim(self.wavelengths_nm) != 1 or not np.all(np.isfinite(self.wavelengths_nm)):
+            raise ValueError(f"{where}: wavelengths_nm = {self.wavelengths_nm!s:.60}: must be finite numbers (band,)")
         if self.radiance is not None:
             names = {_channel(nm) for nm in self.wavelengths_nm}
             if len(self.radiance) != len(self.wavelengths_nm) or len(names) != len(self.radiance):
@@ -100,7 +103,9 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
         attributes[_HASH] = _digest(name, channels, attributes)
         # OpenEXR writes arrays that are not contiguous wrong, without a word: _part makes them so.
         parts.append(OpenEXR.Part({**header, **attributes}, channels, name))
-    _write_whole(Path(path), lambda name: OpenEXR.File(parts).write(name))
+    encoded = io.BytesIO()  # OpenEXR opens no file whose name is not UTF-8
+    OpenEXR.File(parts).write(encoded)
+    _write_whole(Path(path), encoded.getbuffer())
 
 
 def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list[View]:
@@ -117,11 +122,12 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     if not Path(path).is_file():
         raise FileNotFoundError(f"no such file: {path}")
     try:
-        headers = OpenEXR.File(str(path), header_only=True).parts
+        content = Path(path).read_bytes()
+        headers = OpenEXR.File(io.BytesIO(content), header_only=True).parts
         expected = len(headers)
         if (unpacked := sum(_pixel_bytes(part.header) for part in headers)) > most_bytes:
             raise ExrError(f"unpacks to {unpacked:,} bytes: must be at most most_bytes = {most_bytes:,}")
-        parts = OpenEXR.File(str(path), separate_channels=True).parts
+        parts = OpenEXR.File(io.BytesIO(content), separate_channels=True).parts
         held = [_checked(part, expected) for part in parts]
     except ExrError as error:
         raise ExrError(f"{path}: {error}") from None
@@ -218,14 +224,14 @@ def _views(parts: list[tuple[str, dict[str, np.ndarray], dict[str, Any]]]) -> li
     return [View(**view) for view in fields.values()]
 
 
-def _write_whole(path: Path, write: Any) -> None:
+def _write_whole(path: Path, content: memoryview) -> None:
     """Write to a neighbouring temporary file, flush it to the disk, and give it its name."""
     temporary = str(path.with_name(f".{path.name}.{os.getpid()}.tmp"))  # not tempfile's, which none but we may read
     try:
         Path(temporary).unlink(missing_ok=True)  # a link, maybe, that leads elsewhere
-        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-        write(temporary)
-        with open(temporary, "rb+") as file:
+        with os.fdopen(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
+            file.write(content)
+            file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
     except BaseException:

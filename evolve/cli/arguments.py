@@ -133,8 +133,14 @@ def _add_runs(commands: Commands) -> None:
             help="where candidates are evaluated (default: local)",
         )
         command.add_argument(
-            "--scheduler", metavar="ADDRESS", help="address of the Dask scheduler, such as tcp://host:8786"
+            "--scheduler", metavar="ADDRESS", help="address of the Dask scheduler, such as tls://host:8786"
         )
+        for name, whose in (
+            ("ca-file", "the authority's certificate"),
+            ("cert", "our certificate"),
+            ("key", "its key"),
+        ):
+            command.add_argument(f"--tls-{name}", type=Path, metavar="FILE", help=f"for a tls:// scheduler: {whose}")
         command.add_argument(
             "--device",
             choices=("auto", "cpu", "cuda"),

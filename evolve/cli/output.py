@@ -14,10 +14,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO, cast
 
-__all__ = ["Voice", "as_it_is", "printable", "voices"]
+__all__ = ["Voice", "as_it_is", "printable", "spelled", "voices"]
 
 _UNSEEN = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")  # controls, marks that turn a line around, no letters, line ends
 _LAYOUT = "\n\t"
+_SPELLINGS = {"σ": "sigma", "λ": "lambda", "±": "+-", "×": "x", "°": " deg", "µ": "u", "²": "^2", "·": "*", "–": "-"}
 
 
 def printable(text: str) -> str:
@@ -28,6 +29,24 @@ def printable(text: str) -> str:
         letter if letter in _LAYOUT or unicodedata.category(letter) not in _UNSEEN else _named(letter)
         for letter in text
     )
+
+
+def spelled(text: str, stream: TextIO) -> str:
+    """The text in letters that a stream's encoding has: "sigma", where there is no σ."""
+    encoding = stream.encoding or "utf-8"
+    try:
+        text.encode(encoding)
+        return text
+    except UnicodeEncodeError:
+        known = "".join(letter if _has(encoding, letter) else _SPELLINGS.get(letter, letter) for letter in text)
+        return known.encode(encoding, "backslashreplace").decode(encoding)
+
+
+def _has(encoding: str, letter: str) -> bool:
+    try:
+        return bool(letter.encode(encoding))
+    except UnicodeEncodeError:
+        return False
 
 
 def _named(letter: str) -> str:
@@ -45,9 +64,7 @@ class Voice:
         self.stream, self.patient, self.obeyed = stream, patient, obeyed
 
     def write(self, text: str) -> int:
-        shown = text if self.obeyed else printable(text)
-        encoding = self.stream.encoding or "utf-8"
-        shown = shown.encode(encoding, "backslashreplace").decode(encoding)
+        shown = spelled(text if self.obeyed else printable(text), self.stream)
         self._heard(lambda: self.stream.write(shown))
         return len(text)
 

@@ -10,5 +10,6 @@ job                 what executors are given
 local_executor      processes on this machine
 worker              what such a process does
 dask_executor       many machines
+scheduler           where they are asked for, and by which certificates
 dask_worker         what one of them does
 """

@@ -15,12 +15,13 @@ from typing import Any
 from evolve.config.assemble import to_toml
 from evolve.search import dask_worker
 from evolve.search.job import ATTEMPTS, ExecutorError, Job, Progress
+from evolve.search.scheduler import Scheduler
 from evolve.store.atomic_files import write_whole
 from evolve.store.evaluation import Evaluation
 
 __all__ = ["DaskExecutor"]
 
-CONNECT_S = 30.0
+CONNECT_S = 8.0
 LISTEN_S = 0.5  # between looks at progress
 REPLY_S = 10.0  # for a worker to send what it has
 
@@ -38,7 +39,7 @@ class _Trial:
 class DaskExecutor:
     """Workers of a Dask scheduler, one candidate each at a time; a context manager that takes back what it asked for.
 
-    scheduler: address, "tcp://host:8786"
+    scheduler: where it is; an address alone will do
     function: "module:name" of what evaluates, with the arguments of `evolve.learning.fitness.evaluate`
     patience_s: how long to wait for workers, and for a scheduler that is gone to come back
 
@@ -49,7 +50,7 @@ class DaskExecutor:
         ExecutorError: Dask is not installed, nobody answers, or no worker can do the work.
     """
 
-    scheduler: str
+    scheduler: Scheduler | str
     function: str = "evolve.search.worker:evaluate_candidate"
     patience_s: float = 600.0
     count: int = 0
@@ -57,13 +58,18 @@ class DaskExecutor:
     _client: Any = None
     _told: SimpleQueue[list[int]] = field(default_factory=SimpleQueue)
 
+    def __post_init__(self) -> None:
+        if isinstance(self.scheduler, str):
+            self.scheduler = Scheduler(self.scheduler)
+        self._scheduler, self._address = self.scheduler, self.scheduler.address
+
     def __enter__(self) -> DaskExecutor:
         self._client = self._connected(min(CONNECT_S, self.patience_s))
         try:
             self._client.wait_for_workers(1, timeout=self.patience_s)
         except TimeoutError:
             self._client.close()
-            raise ExecutorError(f"{self.scheduler}: no worker has come within {self.patience_s:g} s") from None
+            raise ExecutorError(f"{self._address}: no worker has come within {self.patience_s:g} s") from None
         self.count = len(self._client.scheduler_info(n_workers=-1)["workers"])
         return self
 
@@ -142,7 +148,7 @@ class DaskExecutor:
             if isinstance(error, KilledWorker):
                 return Evaluation.failed(f"its worker process died {ATTEMPTS} times")
             if isinstance(error, dask_worker.UnfitWorker):
-                raise ExecutorError(f"{self.scheduler}: {error}")
+                raise ExecutorError(f"{self._address}: {error}")
             return Evaluation.failed(f"{type(error).__name__}: {error}")
         try:
             outcome, policy, checkpoint = dask_worker.decode(future.result(timeout=REPLY_S))
@@ -164,15 +170,14 @@ class DaskExecutor:
                     progress(*report)
 
     def _connected(self, timeout: float) -> Any:
+        security = self._scheduler.security()
+        from distributed import Client
+
         try:
-            from distributed import Client
-        except ImportError:
-            raise ExecutorError("--executor dask needs Dask: pip install 'rhabdom[dask]'") from None
-        try:
-            client = Client(self.scheduler, timeout=timeout, set_as_default=False)
+            client = Client(self._address, timeout=timeout, security=security, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
-            reason = str(error).splitlines()[0]
-            raise ExecutorError(f"no Dask scheduler answers at {self.scheduler}: {reason}") from None
+            reason = (str(error) or type(error).__name__).splitlines()[0]
+            raise ExecutorError(f"no Dask scheduler answers at {self._address}: {reason}") from None
         client.subscribe_topic(self._name, lambda event: self._told.put(event[1]))
         return client
 
@@ -188,7 +193,7 @@ class DaskExecutor:
                 except ExecutorError:
                     time.sleep(LISTEN_S)
             if time.monotonic() > deadline:
-                raise ExecutorError(f"{self.scheduler}: the scheduler has been gone for {self.patience_s:g} s")
+                raise ExecutorError(f"{self._address}: the scheduler has been gone for {self.patience_s:g} s")
 
     def _withdraw(self, under_way: dict[Any, _Trial]) -> None:
         """Nobody will ask for these any more; workers stop at the next progress report."""

@@ -16,6 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 import optics
+from optics.numerics.arguments import whole
 from optics.numerics.autodiff import Array
 from sim.eyes.eyes import Eyes, eye_positions, eye_rotations
 from sim.eyes.sensor import BoxSampling, Sensor
@@ -33,6 +34,8 @@ from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.tracer import Tracer
 from sim.worlds.state import WorldState
 from sim.worlds.world import World
+
+MOST_ENVS = 2**31 - 1
 
 
 class BatchedRenderer:
@@ -103,8 +106,7 @@ class BatchedRenderer:
         return other
 
     def _check_memory(self, n_envs: int) -> None:
-        if n_envs < 1:
-            raise ValueError(f"n_envs = {n_envs!r}: must be at least 1")
+        whole("n_envs", n_envs, 1, MOST_ENVS)
         fidelity, layers = self.fidelity, self.fidelity.depth.count
         planes, weights = layers * len(self.tracer.basis), layers * len(self.bands.wavelengths)
         memory_budget.check_memory(
@@ -119,7 +121,7 @@ class BatchedRenderer:
         )
 
     def _set_width(self, n_envs: int) -> None:
-        self.n_envs = n_envs
+        self.n_envs = n_envs = int(n_envs)
         self._poses, self._slot = PoseBuffer(n_envs, len(self._static.spheres)), FrameSlot()
         with variant(self._static.variant):
             self._inputs = {

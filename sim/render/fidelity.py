@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 
+from optics.numerics.arguments import whole
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.tracing.lighting import ALL, DIRECT, LEVELS
 
 RAYS, AREAS = SAMPLES = ("rays", "areas")
+MOST_RAYS = 1e7  # per receptor: what is more was a slip, and its arithmetic overflows
+MOST_BANDS = 4096
 
 
 @dataclass(frozen=True)
@@ -37,8 +41,8 @@ class Fidelity:
     levels: what was chosen for each stage, and why
 
     Raises:
-        ValueError: less than one band, rays_per_receptor that are not positive, unknown light or samples, and rays that
-            would follow all light.
+        ValueError: bands or rays_per_receptor that are no numbers or out of range, unknown light or samples, and rays
+            that would follow all light.
     """
 
     rays_per_receptor: float
@@ -50,10 +54,10 @@ class Fidelity:
     samples: str = RAYS
 
     def __post_init__(self) -> None:
-        if not 0 < self.rays_per_receptor < math.inf:
-            raise ValueError(f"rays_per_receptor = {self.rays_per_receptor!r}: must be positive, or 'auto'")
-        if self.bands < 1:
-            raise ValueError(f"bands = {self.bands!r}: must be at least 1")
+        rays = self.rays_per_receptor
+        if not (isinstance(rays, Real) and 0 < rays <= MOST_RAYS):
+            raise ValueError(f"rays_per_receptor = {rays!s:.40}: must be positive and at most {MOST_RAYS:g}, or 'auto'")
+        whole("bands", self.bands, 1, MOST_BANDS)
         if self.light not in LEVELS:
             raise ValueError(f"light = {self.light!r}: must be one of {', '.join(map(repr, LEVELS))}")
         if self.light == ALL and self.samples != AREAS:

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+ELSEWHERE = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
 PYTHON = f"python{sys.version_info.major}.{sys.version_info.minor}"
 
 
@@ -35,15 +36,15 @@ def bare(built, tmp_path_factory):
     packages = folder / "lib" / PYTHON / "site-packages"
     [wheel] = built.glob("*.whl")
     pip = [sys.executable, "-m", "pip", "--python", folder / "bin" / "python", "install", "--quiet"]
-    subprocess.run([*pip, "--no-deps", "--no-index", wheel], check=True)
+    # Not with PYTHONPATH: a checkout there that is installed for editing would pass for the wheel.
+    subprocess.run([*pip, "--no-deps", "--no-index", wheel], check=True, env=ELSEWHERE)
     (packages / "zz_borrowed.pth").write_text("\n".join(site.getsitepackages()))
     return folder
 
 
 def call(bare: Path, *command: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     command = (str(bare / "bin" / command[0]), *command[1:])
-    return subprocess.run(command, cwd=cwd or bare.parent, env=environment, capture_output=True, text=True, check=False)
+    return subprocess.run(command, cwd=cwd or bare.parent, env=ELSEWHERE, capture_output=True, text=True, check=False)
 
 
 def test_the_sdist_holds_what_the_repository_holds(built):
@@ -99,7 +100,7 @@ def test_missing_llvm_is_one_line(bare, tmp_path):
     environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(tmp_path / "libLLVM.so")}
     environment.pop("PYTHONPATH", None)
     child = subprocess.run(
-        [bare / "bin" / "python", "-c", code], env=environment, capture_output=True, text=True, check=False
+        [bare / "bin" / "python", "-c", code], env=ELSEWHERE, capture_output=True, text=True, check=False
     )
     last = child.stderr.strip().splitlines()[-1]
     assert "BackendError: Dr.Jit has no usable LLVM library" in last

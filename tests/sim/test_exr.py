@@ -243,3 +243,54 @@ def test_a_name_twice_is_refused(tmp_path):
     view = views()[1]
     with pytest.raises(ValueError, match="no name twice"):
         write_exr(tmp_path / "a.exr", [view, view])
+
+
+def test_a_file_whose_last_parts_were_taken_away_is_not_whole(tmp_path):
+    """Each part that is left is as it was written; only their number says that there were more."""
+    import OpenEXR
+
+    write_exr(tmp_path / "a.exr", views())
+    parts = OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True).parts
+    kept = [
+        OpenEXR.Part(dict(part.header), {name: channel.pixels for name, channel in part.channels.items()}, part.name())
+        for part in parts[:-1]
+    ]
+    OpenEXR.File(kept).write(str(tmp_path / "fewer.exr"))
+    with pytest.raises(ExrError, match=r"fewer\.exr: parts are missing \(3 of 4\)"):
+        read_exr(tmp_path / "fewer.exr")
+
+
+def test_a_picture_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
+    """Else a machine that dies leaves a name with half a picture, or none, behind it."""
+    steps, sync, replace = [], os.fsync, os.replace
+    monkeypatch.setattr(os, "fsync", lambda file: (steps.append(("sync", os.fstat(file).st_size)), sync(file)))
+    monkeypatch.setattr(
+        os, "replace", lambda old, new: (steps.append(("name", os.stat(old).st_size)), replace(old, new))
+    )
+    write_exr(tmp_path / "a.exr", views())
+    size = (tmp_path / "a.exr").stat().st_size
+    assert steps == [("sync", size), ("name", size)]
+
+
+def test_a_disk_that_is_full_leaves_the_old_picture_and_nothing_else(tmp_path, monkeypatch):
+    write_exr(tmp_path / "a.exr", views())
+    before = (tmp_path / "a.exr").read_bytes()
+
+    def full(file):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_exr(tmp_path / "a.exr", views(seed=1))
+    assert [path.name for path in tmp_path.iterdir()] == ["a.exr"]
+    assert (tmp_path / "a.exr").read_bytes() == before
+
+
+def test_names_need_not_be_text(tmp_path):
+    """On Linux a file's name is bytes, and OpenEXR takes UTF-8 alone."""
+    path = tmp_path / os.fsdecode(b"bad\xffname.exr")
+    write_exr(path, views())
+    assert [view.name for view in read_exr(path)] == ["left", "right", "signals"]
+    path.write_bytes(path.read_bytes()[:-50])
+    with pytest.raises(ExrError, match=r"truncated|no readable|damaged"):
+        read_exr(path)

@@ -23,6 +23,7 @@ from evolve.genome.phenotype import repaired
 from evolve.search.dask_executor import DaskExecutor
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
+from evolve.search.scheduler import Scheduler
 from evolve.search.search import Search
 from evolve.search.successive_halving import finished
 from evolve.search.worker import evaluate_candidate, prepare_device
@@ -36,7 +37,7 @@ __all__ = ["resume", "start"]
 
 def start(arguments: Namespace) -> int:
     """Begin a run and carry it to its end."""
-    _require_scheduler(arguments)
+    scheduler = _scheduler(arguments)
     flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
     starts = starts_from(arguments.start_from) if arguments.start_from else None
     config = assemble(
@@ -56,12 +57,12 @@ def start(arguments: Namespace) -> int:
             print(f"note: {note}", file=sys.stderr)
         print(f"{run.path}: {_plan(config)}", flush=True)
     with run.lock():
-        return _carry(run, arguments)
+        return _carry(run, arguments, scheduler)
 
 
 def resume(arguments: Namespace) -> int:
     """Carry an interrupted run to its end."""
-    _require_scheduler(arguments)
+    scheduler = _scheduler(arguments)
     run = Run.open(arguments.directory)
     device.make_ready()
     with run.lock():
@@ -81,7 +82,7 @@ def resume(arguments: Namespace) -> int:
                 f"{run.path}: {len(run.candidates)} of {run.config.candidates} candidates are on record",
                 flush=True,
             )
-        return _carry(run, arguments)
+        return _carry(run, arguments, scheduler)
 
 
 def _show(plan: RunPlan, as_json: bool) -> int:
@@ -93,11 +94,11 @@ def _show(plan: RunPlan, as_json: bool) -> int:
     return 0
 
 
-def _carry(run: Run, arguments: Namespace) -> int:
+def _carry(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> int:
     """Carry a run whose lock is held to its end; on Ctrl-C say how to go on. Nothing needs saving: it is on record."""
     try:
         with (
-            _executor(run, arguments) as executor,
+            _executor(run, scheduler) as executor,
             _watcher(run, executor.count, arguments) as watch,
             TensorBoardWriter(run) if arguments.tensorboard else nullcontext() as tensorboard,
         ):
@@ -133,16 +134,24 @@ def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lin
     return watcher(run, sys.stdout if arguments.json else sys.stderr, workers, arguments.json)
 
 
-def _executor(run: Run, arguments: Namespace) -> DaskExecutor | LocalExecutor:
-    if arguments.executor == "dask":
-        return DaskExecutor(arguments.scheduler)
+def _executor(run: Run, scheduler: Scheduler | None) -> DaskExecutor | LocalExecutor:
+    if scheduler is not None:
+        return DaskExecutor(scheduler)
     return LocalExecutor(evaluate_candidate, run.config.workers, prepare_device)
 
 
-def _require_scheduler(arguments: Namespace) -> None:
-    """Only Dask has one, and needs one."""
-    if (arguments.executor == "dask") != (arguments.scheduler is not None):
+def _scheduler(arguments: Namespace) -> Scheduler | None:
+    """Only Dask has one, and needs one: it must be there before anything is begun."""
+    files = arguments.tls_ca_file, arguments.tls_cert, arguments.tls_key
+    wanted = arguments.scheduler is not None
+    if (arguments.executor == "dask") != wanted or (any(files) and not wanted):
         raise ConfigError("--executor dask needs --scheduler ADDRESS, and no other executor takes one")
+    if not wanted:
+        return None
+    scheduler = Scheduler(arguments.scheduler, *files)
+    if not getattr(arguments, "dry_run", False):
+        scheduler.require_answer()
+    return scheduler
 
 
 def _finish(run: Run, arguments: Namespace) -> int:

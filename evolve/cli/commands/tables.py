@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import sys
 from argparse import Namespace
 
+from evolve.cli.output import spelled
 from evolve.config.run_config import TASKS, SearchConfig
 from evolve.config.sources import preset_about, preset_names
 from evolve.genome.genes import CLUSTERS, GENES, Gene
@@ -40,6 +42,7 @@ def genes(arguments: Namespace) -> int:
         return 0
     header = ("gene", "cluster", "kind", "range", "unit", "open", "searched", "start", "mutation", "what it does")
     rows = [header, *(_row(gene) for gene in ordered)]
+    rows = [tuple(spelled(cell, sys.stdout) for cell in row) for row in rows]
     widths = [max(len(row[column]) for row in rows) for column in range(len(header))]
     for row in rows:
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())

@@ -127,11 +127,12 @@ def test_policies_of_another_animal_or_damaged_are_named(run):
 
 
 def test_perfect_eyes_are_shown_the_same_light():
-    """In a maze a tenth of the light has been reflected twice: a dusk eye's rays follow it, and so do its pictures'."""
+    """On the course a tenth of the light has been reflected more than once: a dusk eye sees it, and so do its
+    pictures."""
     eyes = sim.Eyes(n_eyes=2, resolution=(4, 6), fov_deg=60, noise_sigma=0.02)
     worlds = sim.make_vec_env("navigation", eyes, 1, seed=0)
     worlds.reset()
-    assert worlds.renderer.fidelity.light == "bounce"
+    assert worlds.renderer.fidelity.light == "all"
     views = _perfect_views(worlds, eyes, worlds.state, 1)
     exact = worlds.renderer.signals(worlds.state)
     assert views["perfect_signals"].mean() == pytest.approx(exact.mean(), rel=0.04)

@@ -131,3 +131,11 @@ def _all_of(terminal):
         pass
     os.close(terminal)
     return written.decode()
+
+
+def test_utilisation_is_the_workers_time_spent_on_what_is_done(run, clock):
+    tally = Tally(run, 2)
+    done = replace(add(run, 1, 5.0), seconds=3.0)
+    tally.evaluated(done)
+    clock.now = 4.0
+    assert tally.utilisation == pytest.approx(3.0 / (2 * 4.0))

@@ -17,6 +17,9 @@ def test_numbers_are_the_records(finished, tmp_path):
     for name in ("candidates", "generations"):
         events = accumulator.EventAccumulator(str(run.path / "tensorboard" / name))
         events.Reload()
+        for tag in events.Tags()["scalars"]:
+            steps = [event.step for event in events.Scalars(tag)]
+            assert len(steps) == len(set(steps)), f"{tag} is written more than once"
         shown[name] = {tag: {e.step: e.value for e in events.Scalars(tag)} for tag in events.Tags()["scalars"]}
     assert shown["candidates"]["fitness"] == pytest.approx({c.id: c.fitness for c in run.candidates}, rel=1e-6)
     assert shown["candidates"]["genes/fov_deg"] == pytest.approx({c.id: c.phenotype.fov_deg for c in run.candidates})

@@ -5,7 +5,7 @@ import tomllib
 import pytest
 
 from evolve.config.assemble import assemble
-from evolve.config.provenance import _line_of
+from evolve.config.provenance import _line_of, _spellings
 from evolve.config.run_config import ConfigError
 
 LINES = {
@@ -95,3 +95,10 @@ def test_line_is_the_same_as_by_trying_each(spread):
         assert _line_of(text, path) == tried(path)
     many = "1,\n" * 300
     assert _line_of(f"x = [\n{many}]\ny = 1\nz = 1\n", ["z"]) in (None, 304)
+
+
+def test_only_genes_are_set_by_their_groups():
+    assert list(_spellings("eye.optics")) == [["eye", "optics"]]
+    assert list(_spellings("genome")) == [["genome"]]
+    assert list(_spellings("eye.doe_00")) == [["eye", "doe_00"]]
+    assert ["genome", "optical", "open"] in _spellings("genome.doe_00.open")

@@ -1,7 +1,7 @@
 """Which test covers which module of evolve/learning.
 
 fitness: test_fitness.py
-ppo: test_ppo.py, test_learning.py
+ppo: test_ppo.py, test_learning.py, search/test_successive_halving.py
 policy: test_policy.py
 eye_features: test_policy.py, test_learning.py
 training_rewards: test_ppo.py

@@ -8,9 +8,11 @@ import pytest
 
 import sim
 from evolve.config.run_config import WorldConfig
+from evolve.learning import fitness
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.learning.ppo import play
+from evolve.learning.training_stage import TrainingStage
 from evolve.search.successive_halving import trained_steps
 from sim.envs.assembly import vec_env_in
 from tests.evolve.small_run import LEARNING, PHENOTYPE, small_config
@@ -130,3 +132,20 @@ def test_unseen_mazes_are_seen_by_the_evaluation_alone(tmp_path):
     assert taught == taught_as_well
     assert seen != unseen
     assert of_two != taught
+
+
+def test_every_stage_has_chance_of_its_own(tmp_path, monkeypatch):
+    """A training that went on in the worlds of its first stage would learn them by heart."""
+    seeds, make = [], fitness._worlds
+
+    def recorded(phenotype, config, *two):
+        seeds.append(two)
+        return make(phenotype, config, *two)
+
+    monkeypatch.setattr(fitness, "_worlds", recorded)
+    kept = tuple(tmp_path / str(number) for number in range(3))
+    evaluate(PHENOTYPE, small_config(), 5, tmp_path / "policy", stage=TrainingStage((256, 512, 768), kept))
+    assert len(seeds) == 3
+    assert len({seed for two in seeds for seed in two}) == 6
+    evaluate(PHENOTYPE, small_config(), 5, tmp_path / "whole")
+    assert seeds[3] == seeds[0], "the first stage begins as a whole training does"

@@ -1,5 +1,6 @@
 """The learner on a world that takes seconds: it learns, repeats itself exactly, stops in time and fails by name."""
 
+import tempfile
 from dataclasses import replace
 
 import numpy as np
@@ -183,3 +184,10 @@ class Blinding(BrightSpot):
 def test_signals_that_are_no_numbers_end_the_training():
     with pytest.raises(TrainingDiverged, match="not finite"):
         learn(worlds=Blinding(16))
+
+
+def test_a_training_leaves_nothing_behind_in_the_temporary_folder(tmp_path, monkeypatch):
+    """SB3's own logger makes a folder there for each training: a long run would leave thousands."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    learn(LearningConfig(total_steps=512, n_envs=16, n_steps=32, batch_size=128))
+    assert list(tmp_path.iterdir()) == []

@@ -7,7 +7,9 @@ import pytest
 
 import optics
 from evolve.analysis.episode import record
+from evolve.report import eye_figures
 from evolve.report.eye_figures import WhiteLight, diffraction_limit, relief_heights
+from evolve.report.markup import html
 from evolve.report.views import through
 from optics.spectra.bands import daylight
 
@@ -69,3 +71,18 @@ def test_height_map_lies_the_right_way_up():
     points[3] = 1e-6  # row index and y grow together
     heights, _ = relief_heights(optics.Pupil(30e-6, optics.BSplineRelief(points)))
     assert heights[-1].mean() > 100 * max(heights[0].mean(), 1e-12)
+
+
+def test_the_mtf_is_drawn_beside_its_limit_up_to_the_cutoff(run, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(eye_figures, "inline", lambda figure, *_: drawn.append(figure.axes[0]) or html("picture"))
+    light = WhiteLight.through(
+        optics.Eye(optics.Pupil(20e-6, thin_lens_focal_length=optics.Eye().sensor_distance), (5, 5))
+    )
+    eye_figures._mtf(light)
+    limit, contrast, nyquist = (line.get_xydata() for line in drawn[0].lines)
+    np.testing.assert_allclose(contrast[:, 0], limit[:, 0])
+    np.testing.assert_allclose(limit[-1, 0], optics.mtf(light.psf).cutoff.max() * light.per_degree)
+    assert contrast[0, 1] > 0.9 > contrast[-1, 1]
+    assert (contrast[:, 1] <= limit[:, 1] + 0.03).all()
+    np.testing.assert_allclose(nyquist[:, 0], light.per_degree / (2 * light.eye.receptor_pitch))

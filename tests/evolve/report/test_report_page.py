@@ -11,6 +11,7 @@ from evolve.config.numbering import Place
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
+from evolve.report import figures
 from evolve.report.markup import exact, rounded
 from evolve.report.page import genes_section, render
 from evolve.report.tables import best_genes
@@ -173,3 +174,16 @@ def test_symmetric_reliefs_are_reported_by_the_genes_that_they_have(tmp_path):
     assert [name for name in genes if name.startswith("doe_")] == ["doe_00 … doe_01", "doe_11"]
     text = Page(genes_section(run).markup).texts["all"]
     assert "Frozen genes, and genes that mirror others, are left out." in text
+
+
+def test_a_population_is_drawn_as_its_median_between_its_tenth_and_its_ninetieth_part():
+    from matplotlib.figure import Figure
+
+    axes = Figure().subplots()
+    figures._spread(axes, [0, 1, 2], [1.0, 2.0, 3.0], [2.0, 3.0, 5.0], [4.0, 5.0, 6.0])
+    figures._generation_axis(axes, [0, 1, 2])
+    assert axes.get_xlim() == (-0.5, 2.5)
+    (line,) = axes.lines
+    assert line.get_xydata().tolist() == [[0, 2], [1, 3], [2, 5]]
+    (band,) = axes.collections
+    assert {tuple(corner) for corner in band.get_paths()[0].vertices} >= {(0, 1), (2, 3), (0, 4), (2, 6)}

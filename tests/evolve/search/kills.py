@@ -65,7 +65,7 @@ def carry(path, config):
         evolve(run, Here(path.parent / f"{path.name}.log"), Nobody())
 
 
-def child_killed_after(seconds, path, config):
+def child_killed_after(seconds, path, config, carry=carry):
     """Whether the run was killed before its end."""
     pid = os.fork()
     if pid == 0:

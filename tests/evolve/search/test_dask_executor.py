@@ -15,6 +15,7 @@ from evolve.search import dask_worker
 from evolve.search.dask_executor import DaskExecutor
 from evolve.search.local_executor import ExecutorError, LocalExecutor
 from evolve.search.loop import evolve
+from evolve.search.scheduler import Scheduler
 from evolve.search.successive_halving import finished
 from evolve.store.directory import Run
 from evolve.store.versions import present
@@ -22,30 +23,36 @@ from tests.evolve.closed_form import tiny
 from tests.evolve.remote_form import bowl, in_stages
 from tests.evolve.search.test_local_executor import jobs
 from tests.evolve.search.test_loop import SilentWatcher, history
+from tests.evolve.search.test_scheduler import certificates
 
 pytest.importorskip("distributed")
 ROOT = Path(__file__).parents[3]
 
 
 class Cluster:
-    """Processes of a scheduler and its workers."""
+    """Processes of a scheduler and its workers; with `tls`, a certificate and its key, they speak to nobody else."""
 
-    def __init__(self, folder):
-        self.folder = folder
+    def __init__(self, folder, tls=()):
+        self.folder, self.protocol = folder, "tls" if tls else "tcp"
+        self.files = (tls[0], *tls) if tls else ()
+        self.flags = [
+            x for pair in zip(("--tls-ca-file", "--tls-cert", "--tls-key"), self.files, strict=False) for x in pair
+        ]
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
-            self.address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+            self.address = f"{self.protocol}://127.0.0.1:{free.getsockname()[1]}"
         self.processes = []
         self.environment = {**os.environ, "PYTHONPATH": str(ROOT), "RHABDOM_TEST": str(folder)}
 
     def start(self, workers=2):
         port = self.address.rpartition(":")[2]
-        self._run("scheduler", "--host", "127.0.0.1", "--port", port, "--dashboard-address", ":0")
+        own = ("--protocol", self.protocol, "--host", "127.0.0.1", "--port", port, "--dashboard-address", ":0")
+        self._run("scheduler", *own)
         for _ in range(workers):
             self._run("worker", self.address, "--nthreads", "1", "--dashboard-address", ":0", "--death-timeout", "60")
 
     def _run(self, *arguments):
-        command = [sys.executable, "-m", "dask", *arguments]
+        command = [sys.executable, "-m", "dask", *arguments, *self.flags]
         log = (self.folder / f"{arguments[0]}.log").open("a")
         self.processes.append(
             subprocess.Popen(
@@ -62,7 +69,7 @@ class Cluster:
         self.processes = []
 
     def executor(self, function):
-        return DaskExecutor(self.address, f"tests.evolve.remote_form:{function}", patience_s=60)
+        return DaskExecutor(Scheduler(self.address, *self.files), f"tests.evolve.remote_form:{function}", patience_s=60)
 
     def calls(self):
         """How often each candidate has been begun, since asked last."""
@@ -225,3 +232,26 @@ def test_scheduler_that_comes_back_is_asked_again(tmp_path):
         cluster.kill()
     local, _ = carried(tmp_path / "local", config, LocalExecutor(bowl, 1))
     assert history(Run.open(run.path)) == history(local)
+
+
+def test_behind_certificates_the_history_is_the_same_and_strangers_stay_outside(tmp_path):
+    """Whoever holds no certificate that the scheduler knows gets no answer: no encryption, or another's."""
+    own, another = certificates(tmp_path), certificates(tmp_path, "another")
+    cluster = Cluster(tmp_path, own)
+    cluster.start(workers=1)
+    try:
+        config = tiny("search.generations=1")
+        far, _ = carried(tmp_path / "dask", config, cluster.executor("bowl"))
+        strangers = (
+            Scheduler(cluster.address, another[0], *another),
+            Scheduler(cluster.address, own[0], *another),
+            Scheduler(cluster.address.replace("tls", "tcp")),
+        )
+        for stranger in strangers:
+            with pytest.raises(ExecutorError, match="no Dask scheduler answers at") as caught:
+                DaskExecutor(stranger, patience_s=3).__enter__()
+            assert "\n" not in str(caught.value)
+    finally:
+        cluster.kill()
+    local, _ = carried(tmp_path / "local", config, LocalExecutor(bowl, 1))
+    assert history(far) == history(local)

@@ -8,8 +8,11 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[3]
 KILLS = int(os.environ.get("RHABDOM_KILLS", "50"))
+TRAINING_KILLS = int(os.environ.get("RHABDOM_TRAINING_KILLS", "3"))
 SMALL = """
 seed = 11
 workers = 1
@@ -83,10 +86,13 @@ def test_killed_run_resumes_to_the_history_of_an_uninterrupted_one(tmp_path):
         assert tensors(policy) == tensors(tmp_path / "killed" / "policies" / policy.name)
 
 
-def test_fifty_kills_at_random_moments_change_nothing(tmp_path):
+@pytest.mark.parametrize(
+    ("script", "kills"), [("kills.py", KILLS), ("training_kills.py", TRAINING_KILLS)], ids=["search", "training"]
+)
+def test_kills_at_random_moments_change_nothing(tmp_path, script, kills):
     """In a process of its own, because it forks; its seed is printed, for those who want to see a failure again."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path)}
-    command = [sys.executable, Path(__file__).with_name("kills.py"), str(KILLS)]
+    command = [sys.executable, Path(__file__).with_name(script), str(kills)]
     child = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert child.returncode == 0, child.stdout + child.stderr
     assert "finished as if nothing had happened" in child.stdout

@@ -1,12 +1,14 @@
 """The search proposes by seed alone, spreads as asked, improves, opens genes in time, and takes failures as worst."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
 
 from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
+from evolve.search.optimizers import _quiet
 from evolve.search.search import Search, training_seed
 from tests.evolve.closed_form import tiny
 
@@ -188,3 +190,13 @@ def test_training_seeds_are_fresh_for_every_candidate_and_run():
     # 16,000 draws from 2^32: 0.03 collisions expected.
     assert len(seeds) >= 16_000 - 2
     assert training_seed(3, 5) == training_seed(3, 5)
+
+
+def test_what_pycma_warns_of_is_not_told():
+    """It is expected here, generation after generation; other warnings pass."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        with _quiet():
+            warnings.warn("orphanated injected solution array([0.5])", stacklevel=1)
+            warnings.warn("something else", stacklevel=1)
+    assert [str(warning.message) for warning in told] == ["something else"]

@@ -1,6 +1,8 @@
 """Files are written whole or not at all, and what a killed writer left is swept up."""
 
 import os
+import stat
+from pathlib import Path
 
 import pytest
 
@@ -27,3 +29,18 @@ def test_what_killed_writers_left_is_swept_up(tmp_path):
     (tmp_path / f".file.77{UNFINISHED}").touch()
     sweep(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_content_is_on_the_disk_before_the_name_and_the_name_before_anybody_is_told(tmp_path, monkeypatch):
+    """A machine that dies between any two of these steps keeps the old file, or all of the new one."""
+    steps, sync, named = [], os.fsync, Path.replace
+
+    def synced(descriptor):
+        found = os.fstat(descriptor)
+        steps.append("folder" if stat.S_ISDIR(found.st_mode) else f"{found.st_size} bytes")
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", synced)
+    monkeypatch.setattr(Path, "replace", lambda path, target: (steps.append("name"), named(path, target)))
+    write_whole(tmp_path / "file", b"whole")
+    assert steps == ["5 bytes", "name", "folder"]

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -130,3 +131,20 @@ def test_read_only_directory_is_named_and_can_still_be_read(tmp_path):
     assert len(lines) == 4
     assert all("cannot be written: Permission denied" in line for line in lines[1:]), lines
     assert (run.path / "candidates.jsonl").read_bytes() == kept
+
+
+def test_steps_are_those_of_the_candidate_and_its_furthest_stage(run):
+    run.append(replace(candidate(0), steps=100))
+    run.append(replace(candidate(1), steps=900))
+    run.append(replace(candidate(0), rung=1, steps=300))
+    assert [run.steps_of(identity) for identity in (0, 1, 2)] == [300, 900, 0]
+
+
+@pytest.mark.parametrize("name", ["policies", "trainings", "exr"])
+def test_a_file_in_a_folders_place_is_named_before_anything_is_read(run, name):
+    if (run.path / name).exists():
+        (run.path / name).rmdir()
+    (run.path / name).write_text("no folder")
+    with pytest.raises((RunError, OSError), match="must be a directory") as caught:
+        Run.open(run.path)
+    assert name in str(caught.value)

@@ -147,3 +147,18 @@ def test_one_line_more_looks_at_few_others(run, monkeypatch):
     monkeypatch.undo()
     assert run.candidates == _furthest(run.record.lines)
     assert [c.rung for c in run.candidates] == [2, 0, 0, 1, 0, 0]
+
+
+def test_a_line_is_on_the_disk_when_it_is_on_record_and_what_is_cut_off_is_gone_from_it(run, monkeypatch):
+    sizes, sync = [], os.fsync
+    monkeypatch.setattr(os, "fsync", lambda file: (sizes.append(os.fstat(file).st_size), sync(file)))
+    record = run.path / "candidates.jsonl"
+    run.append(candidate(0))
+    whole = record.stat().st_size
+    assert sizes == [whole]
+    with record.open("ab") as file:
+        file.write(b'{"half')
+    again = Run.open(run.path)
+    again.record.cut_off_unfinished()
+    assert record.stat().st_size == whole
+    assert sizes == [whole, whole]

@@ -5,7 +5,7 @@ import pytest
 
 from optics.apertures.circular import Annulus, Circle
 from optics.apertures.polygonal import Polygon, Slit
-from optics.apertures.triangulation import triangles
+from optics.apertures.triangulation import _meet, triangles
 from optics.numerics.precision import precision
 
 TYPES = precision("float64")
@@ -107,3 +107,11 @@ def test_triangles_cover_any_simple_polygon(seed):
 def test_bad_input_names_itself(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_segments_that_only_touch_share_a_point():
+    """The end of one on the middle or the end of the other, to rounding; a gap of a millionth is one."""
+    a, along = np.array([0.0, 0.0]), np.array([2.0, 0.0])
+    starts = np.array([[1.0, 0.0], [2.0, 0.0], [1.0, 1e-6], [1.0, -1.0], [2.000001, -1.0]])
+    ends = np.array([[1.0, 1.0], [3.0, 1.0], [1.0, 1.0], [1.0, 0.0], [2.000001, 1.0]])
+    assert _meet(a, along, starts, ends - starts).tolist() == [True, True, False, True, False]

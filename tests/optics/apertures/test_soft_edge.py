@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 from scipy.special import j0
 
 from optics.apertures.soft_edge import SoftEdge, kaiser_beta
@@ -47,3 +48,10 @@ def test_transition_is_the_cheapest(half_widths):
 def test_reach_has_a_limit():
     assert SoftEdge.cheapest(0.5, 1e-6, 0.25).reach == pytest.approx(0.25)
     assert SoftEdge.cheapest(0.5, 1e-6, 0.1).reach == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("attenuation", [30.0, 45.0, 49.9, 50.1, 80.0])
+def test_kaisers_rule_is_his(attenuation):
+    """Below an attenuation of about 25 dB ours stays at 1."""
+    assert kaiser_beta(10 ** (-attenuation / 20)) == pytest.approx(signal.kaiser_beta(attenuation), rel=1e-9)
+    assert kaiser_beta(0.1) == 1.0

@@ -1,5 +1,6 @@
 """Reliefs of pixels: gratings and lenses of steps against closed forms, both methods against each other."""
 
+import drjit as dr
 import numpy as np
 import pytest
 
@@ -280,3 +281,13 @@ def test_a_message_takes_one_line_whatever_it_is_about():
         with pytest.raises(ValueError, match=named) as caught:
             Pupil(wrong)
         assert "\n" not in str(caught.value)
+
+
+def test_a_flat_relief_is_known_to_be_flat_unless_it_may_change():
+    """A flat one is a plate, rotationally symmetric; one with derivatives is not, as its pixels may part."""
+    assert PixelRelief(np.full((3, 3), 1e-7)).rotationally_symmetric
+    assert not PixelRelief(np.diag([1e-7, 0.0, 0.0])).rotationally_symmetric
+    types = precision("float64")
+    samples = types.Tensor64(types.Float64(np.full(9, 1e-7)), (3, 3))
+    dr.enable_grad(samples)
+    assert not PixelRelief(samples).rotationally_symmetric

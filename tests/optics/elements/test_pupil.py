@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from optics import BSplineRelief, HeightMap, PointSource, Pupil, RefractiveIndex
+from optics.apertures.aperture import EDGE_REACH
+from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 
 TYPES = precision("float64")
@@ -80,3 +82,14 @@ def test_slopes_and_rays_of_a_prism():
 def test_bad_pupils(arguments, message):
     with pytest.raises(ValueError, match=message):
         Pupil(**arguments)
+
+
+def test_path_and_pupil_turn_together_most_at_the_rim():
+    """Without a relief the path's slope to a point on the axis is n sin of the angle to the rim, R / √(R² + D²)."""
+    radius, distance = 30e-6, 200e-6
+    slopes = Pupil(radius, medium_n=1.33).slopes(550e-9, PointSource())
+    soft, disk = slopes.turning(distance, Grid((1, 1), 1e-6), 1.33)
+    rim = 1.33 * radius / math.hypot(radius, distance)
+    assert rim <= disk <= 1.1 * rim
+    reach = (1 + EDGE_REACH) * radius
+    assert soft == pytest.approx(1.33 * reach / math.hypot(reach, distance), rel=0.02)

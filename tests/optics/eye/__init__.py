@@ -5,7 +5,7 @@ eye: test_eye.py, test_eye_derivatives.py, test_eye_robustness.py
 kernel_bank: test_kernel_bank.py
 kernel_interpolation: test_kernel_bank.py
 photoreceptor: test_photoreceptor.py
-receptive_field: test_eye.py
+receptive_field: test_eye.py, test_eye_robustness.py
 retinal_image: test_retinal_image.py
 summary: test_summary.py
 """

@@ -127,3 +127,12 @@ def test_a_plain_eye_gives_arrays():
     assert isinstance(eye.see(np.zeros((1, 6, 10)), S), np.ndarray)
     assert isinstance(eye.throughput, float)
     assert math.isclose(eye.throughput, 0.15**2)
+
+
+def test_off_the_axis_the_field_of_view_carries_no_derivatives():
+    import drjit as dr
+
+    fov = types().Float64(40.0)
+    dr.enable_grad(fov)
+    with pytest.raises(ValueError, match=r"fov_deg is a Dr\.Jit array: must be a number off the axis"):
+        Eye(Pupil(20e-6), (5, 5), fov_deg=fov).kernel(S, direction_deg=(5.0, 0.0))

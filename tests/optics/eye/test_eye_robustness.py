@@ -1,13 +1,15 @@
 """Whatever is asked of an eye: a finite answer, or one line that says what is wrong. Nothing else."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from optics import Eye, PhotonBudget, Pupil
+from optics import AccuracyError, Eye, PhotonBudget, Pupil
+from optics.eye import receptive_field
 from optics.eye.band_choice import choose_bands
 
 QUIETLY = settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
@@ -117,3 +119,23 @@ def test_what_is_of_another_kind_is_named():
         Eye(bands=1).see(np.zeros((1, 15, 15)), 1, rng=0)
     with pytest.raises(ValueError, match="radiance: must be real numbers, not complex"):
         Eye(bands=1).see(np.zeros((1, 15, 15)) * 1j, 1)
+
+
+def test_as_many_cells_as_a_spot_may_have_and_no_more(monkeypatch):
+    """The limit itself is allowed."""
+    eye = Eye(Pupil(25e-6, thin_lens_focal_length=Eye().sensor_distance), (7, 9), bands=1)
+    counted, count = [], receptive_field._cells_within
+
+    def noted(*arguments):
+        counted.append(count(*arguments))
+        return counted[-1]
+
+    monkeypatch.setattr(receptive_field, "_cells_within", noted)
+    eye.kernel(2)
+    most = counted[0]
+    assert most > 1
+    monkeypatch.setattr(receptive_field, "MOST_CELLS", most)
+    replace(eye, fov_deg=eye.fov_deg).kernel(2)
+    monkeypatch.setattr(receptive_field, "MOST_CELLS", most - 1)
+    with pytest.raises(AccuracyError, match=rf"at most {most - 1}; widen"):
+        replace(eye, fov_deg=eye.fov_deg).kernel(2)

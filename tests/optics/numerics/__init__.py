@@ -1,7 +1,7 @@
 """Which test fails when a module of optics/numerics is broken.
 
 accuracy: point_spread/test_psf.py
-arguments: test_any_input.py
+arguments: test_arguments.py, test_any_input.py
 autodiff: point_spread/test_derivatives.py
 backend: test_backend.py
 device: test_device.py

@@ -108,3 +108,21 @@ def test_require_points_drjit_at_the_library():
         "print(dr.maximum(Float(1), 2))"
     )
     assert child.returncode == 0, child.stderr
+
+
+@pytest.mark.parametrize("verdict", ["broken", "too old", "missing"])
+def test_what_may_be_mended_under_the_same_path_is_proved_again(verdict, tmp_path, monkeypatch):
+    """libatomic is installed, say: the library is the same file as before, and works now."""
+    library = tmp_path / "libLLVM.so"
+    library.write_bytes(b"one")
+    verdicts = iter([verdict, "good"])
+    monkeypatch.setattr(backend, "prove", lambda path: backend.Llvm(path, next(verdicts)))
+    assert backend.find([str(library)])[0] is None
+    assert backend.find([str(library)])[0].good
+
+
+def test_an_abort_is_not_tried_twice(monkeypatch):
+    verdicts = iter(["aborts"])
+    monkeypatch.setattr(backend, "prove", lambda path: backend.Llvm(path, next(verdicts)))
+    for _ in range(2):
+        assert backend.find(["/x/libLLVM.so"])[1][0].verdict == "aborts"

@@ -40,3 +40,11 @@ def test_planes_nearer_than_the_pupil_is_wide(radius, distance):
     exact = circular_aperture_on_axis(radius, distance, 550e-9) / (math.pi * radius**2)
     assert result.psf[0, 4, 4] == pytest.approx(exact, rel=1e-7)
     assert result.plan.predicted_error <= 1e-8
+
+
+def test_a_profile_costs_no_more_than_its_wave_turns():
+    """Of a wave that turns 2πbR = 63 radians over its radius, and an obliquity that adds a tenth: some fifty points
+    and a table twice as fine. A rim a hundred times as far away adds nothing."""
+    near, far = (RadialProfile.resolving(1e-4, 1e5, distance, 1e-4) for distance in (2e-3, 2e-1))
+    assert 30 < far.points <= near.points < 150
+    assert 60 < far.table <= near.table < 1.05 * far.table

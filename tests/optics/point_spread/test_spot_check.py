@@ -1,5 +1,7 @@
 """The spot check sees the errors that a focus or a small window could hide from it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from optics import Grid, PointSource, Pupil
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import cached_nodes
+from optics.point_spread import spot_check as spot_check_module
 from optics.point_spread.planner import choose
 from optics.point_spread.spot_check import CAUTION, spot_check
 
@@ -56,3 +59,19 @@ def test_half_the_nodes_sum_what_is_even_in_y(aperture, cycles):
     for even in (lambda x, y: 1 + 0 * x, lambda x, y: np.cos(3 * x) * y**2, lambda x, y: np.exp(x) * np.cos(2 * y)):
         sums = [float(np.sum(nodes.weight * even(nodes.x, nodes.y))) for nodes in (whole, half)]
         assert sums[1] == pytest.approx(sums[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("spare", [1.0, 2.0])
+def test_the_check_owns_up_to_what_its_own_sum_is_good_to(spare, monkeypatch):
+    """A picture made of the very sum that it is held against differs from it in nothing. What is left to say is how
+    far the sum itself may be off: in a dark window by more than in a bright one, unless it is given digits for that."""
+    effort = replace(spot_check_module.EFFORT, spare_digits=(spare,))
+    monkeypatch.setattr(spot_check_module, "EFFORT", effort)
+    beam, task, image = picture((61, 61), 4e-6)
+    mean = np.sqrt(np.mean(np.square(image)))
+    darkness = spot_check_module._darkness(beam, task, mean)
+    assert darkness > 0.5
+    reference = spot_check_module._affordable(task, darkness, 1.0, image.size)
+    assert reference.digits == pytest.approx(spare - np.log10(task.tolerance) + darkness)
+    same = spot_check_module._exact(beam, task, reference, np.arange(image.size))
+    assert spot_check(beam, task, same, 1.0) == pytest.approx(2 * task.tolerance * 10**-spare, rel=1e-3)

@@ -1,10 +1,12 @@
 """Bands, daylight, pigments: the frozen tables against colour-science, the weights against fine quadrature."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from optics import Eye, illuminant, reflectance
-from optics.eye.band_choice import choose_bands
+from optics.eye.band_choice import _reflectance_error, choose_bands
 from optics.spectra.bands import SpectralBands, cie_1931, daylight, pigment_absorptance
 from optics.spectra.receptors import receptors_of
 
@@ -171,3 +173,15 @@ class TestLightInBands:
         caught, seen = self.caught("rgb", light.at), bands.weights @ bands.of(light, "rgb")
         assert np.ptp(seen) < 1e-9, "one band: white in FL2 looks grey"
         assert caught.min() < seen[0] < caught.max()
+
+
+def test_an_error_of_reflectances_is_the_worst_channels():
+    """Two channels, of which one is right: the other's error is told."""
+    wavelengths = np.linspace(410e-9, 690e-9, 8)
+    weights = np.vstack([np.full(8, 0.1), np.linspace(0.0, 0.2, 8)])
+    exact = SimpleNamespace(wavelengths=wavelengths, weights=weights)
+    wrong = SimpleNamespace(wavelengths=wavelengths, weights=weights * np.array([[1.0], [1.5]]))
+    found = _reflectance_error(wrong, exact, (400.0, 700.0))
+    phase = np.exp(2j * np.pi * wavelengths / 300e-9)
+    assert found == pytest.approx(0.25 * abs(weights[1] @ (daylight(wavelengths) * phase)))
+    assert found > 0.01

@@ -15,9 +15,10 @@ from stable_baselines3.common.env_checker import check_env as sb3_check
 
 import optics
 import sim
+from sim.envs.field_of_view_overlay import _receptor_rays
 from sim.envs.follow_camera import FollowCamera, _follow
 from sim.envs.registration import IDS
-from sim.envs.retina_images import GAP
+from sim.envs.retina_images import GAP, _shares
 from sim.eyes.eyes import EYE_HEIGHT
 from sim.scene.color import encode_srgb
 
@@ -259,3 +260,18 @@ def test_a_fidelity_by_either_name_is_the_same():
         renderer = sim.make_vec_env("detection", EYES, 1, **named).renderer
         assert renderer.fidelity == fidelity
         assert renderer.eyes.bands == 3
+
+
+def test_an_eyes_columns_of_receptors_are_drawn_where_they_look():
+    """Receptors are equally wide on the retina: behind 90°, five columns look to the arcs of tan = 0, 0.4 and 0.8."""
+    eyes = sim.Eyes(n_eyes=1, resolution=(1, 5), fov_deg=90)
+    np.testing.assert_allclose(_receptor_rays(eyes), np.arctan([0.8, 0.4, 0.0, -0.4, -0.8]), atol=1e-12)
+    narrow = sim.Eyes(n_eyes=1, resolution=(1, 2), fov_deg=40)
+    np.testing.assert_allclose(np.tan(_receptor_rays(narrow)), np.tan(np.radians(20)) * np.array([0.5, -0.5]))
+    assert 1 < len(_receptor_rays(sim.Eyes(n_eyes=1, resolution=(1, 500), fov_deg=90))) < 100
+
+
+def test_pictures_of_signals_are_white_where_all_receptors_see_white():
+    """Each primary's shares add up to one; one that no type has gets a bit of all."""
+    shares = _shares(np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]))
+    np.testing.assert_allclose(shares, [[0.5, 0.0, 0.5], [0.5, 1.0, 0.5]])

@@ -56,6 +56,7 @@ def test_cameras_of_a_world_are_the_eyes():
         ("fov_deg", 180.0),
         ("fov_deg", math.nan),
         ("placement_range_deg", 361.0),
+        ("placement_range_deg", -1e-9),
         ("sensor_width", 0.0),
         ("noise_sigma", -1.0),
         ("bands", 0),
@@ -135,3 +136,8 @@ def test_unknown_receptors_come_with_the_nearest_name():
         sim.Eyes(receptors="hunnybee")
     with pytest.raises(ValueError, match="there is no type; an eye needs at least one"):
         sim.Eyes(receptors=())
+
+
+@pytest.mark.parametrize("placement", [0.0, 0.5, 360.0])
+def test_placement_may_be_none_at_all_and_the_whole_way_round(placement):
+    assert sim.Eyes(placement_range_deg=placement).placement_range_deg == placement

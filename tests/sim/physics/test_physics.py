@@ -163,3 +163,25 @@ def test_objects_that_collide_are_refused(world):
     )
     with pytest.raises(ValueError, match="'goal' collides"):
         Physics(dataclasses.replace(world, model=spec.compile(), objects=("goal",)), 1)
+
+
+@pytest.mark.parametrize(("speed", "broken"), [(50.0, False), (400.0, True)])
+def test_what_no_actuator_can_do_is_a_breakdown(world, speed, broken):
+    """Agents are driven at 10 m/s at most. One that is ten times as fast, and rising, was thrown by something."""
+    state = dataclasses.replace(begun(world, 1), position=np.zeros((1, 2)), velocity=np.array([[0.0, speed]]))
+    command = np.array([[0.0, 10.0]])
+    motion = Physics(world, 1, closed_form=False).step(state, command)
+    assert motion.unstable.tolist() == [broken]
+    assert (np.abs(motion.velocity) < 100).all()
+
+
+def test_a_world_that_broke_down_touches_nothing(world):
+    """Whatever its sensors say: its agent is where it was before, and pays for no contact."""
+    physics = Physics(world, 1, closed_form=False)
+    state = dataclasses.replace(begun(world, 2), position=np.zeros((2, 2)))
+    states, sensors = physics._step_batch([physics._model] * 2, *physics._start_of(state, np.full((2, 2), 3.0)))
+    sensors[:] = 1.0
+    states[1, -1, physics._columns.velocity] = 1e4
+    motion = physics._motion(state.position, states, sensors)
+    assert motion.unstable.tolist() == [False, True]
+    assert motion.contact.tolist() == [True, False]

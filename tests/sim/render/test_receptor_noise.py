@@ -103,3 +103,13 @@ def test_dim_light_is_noisy_light():
 def test_photon_budgets_are_checked():
     with pytest.raises(ValueError, match=r"photon_budget = 3: must be an optics\.PhotonBudget or None"):
         sim.Eyes(photon_budget=3)
+
+
+def test_the_largest_noise_is_that_of_the_receptors_with_fewest_photons_in_the_brightest_light():
+    """Shot noise has the variance signal / photons: here of a signal of 2 * 0.5."""
+    photons = np.array([20.0, 300.0], np.float32).reshape(2, 1, 1)
+    assert NoiseModel(0.1, photons).largest(0.5) == pytest.approx(np.sqrt(0.01 + 1.0 / 20))
+    assert NoiseModel(0.1).largest(0.5) == pytest.approx(0.1)
+    z = np.random.default_rng(0).standard_normal((2, 1, 100_000)).astype(np.float32)
+    drawn = NoiseModel(0.1, photons)(np.full_like(z, 1.0), z.copy())
+    assert drawn.std(axis=-1).max() == pytest.approx(NoiseModel(0.1, photons).largest(0.5), rel=0.02)

@@ -207,3 +207,14 @@ def test_unknown_mode_and_task_are_refused(field):
         Simulation(field, 1, 0, "testing", 1)
     with pytest.raises(ValueError, match="task"):
         task_of(dataclasses.replace(field, task="chess"))
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_a_step_in_which_everybody_arrives_is_a_step_like_others(field, n):
+    """With goals alone: nothing is left that nobody has reached."""
+    goals = dataclasses.replace(field, objects=("goal",))
+    simulation = Simulation(goals, n, 0, "training", 1)
+    simulation._state = facing(simulation, np.zeros(n, int), 2.5)
+    step = simulation.step(np.tile(AHEAD, (n, 1)))
+    assert step.success.all()
+    assert step.terminated.all()

@@ -1,6 +1,7 @@
 """Areas in closed form against what very many rays see of the same worlds, and its integrals against sums."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import drjit as dr
 import mitsuba as mi
@@ -13,6 +14,7 @@ import sim
 from sim.eyes.sensor import eye_sampling
 from sim.scene.variant import variant
 from sim.tracing.areas import columns, half_planes, illumination, shadows, sphere_areas, stripes
+from sim.tracing.areas.illumination import Illumination
 from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
 from tests.sim.tracing.area_views import BEE, EYES, ROW, SIGMA, sees_object, stairs, views
@@ -265,3 +267,14 @@ def test_the_kernel_is_recorded_once(cases):
     assert renderer.recordings == 1
     assert np.abs(first - other).max() > 0.1
     np.testing.assert_array_equal(renderer.signals(case.state), first)
+
+
+def test_a_body_shines_as_lamberts_sphere():
+    """Its disk seen from where the light comes from is 2/3 as bright as a matt disk, from behind it is dark, and from
+    the side 2/(3π) (its phase function is sin α + (π - α) cos α, over π)."""
+    straight = SimpleNamespace(_levels=np.array([[0.8]]), _directions=[[0.0, 0.0, 1.0]], _colours=[[0.5]])
+    with variant():
+        now = SimpleNamespace(lit=[[mi.Float(1.0)]])
+        for towards, expected in (((0, 0, 1), 2 / 3), ((1, 0, 0), 2 / (3 * np.pi)), ((0, 0, -1), 0.0)):
+            (sent,) = Illumination._sent(straight, 0, mi.Vector3f(*towards), now)
+            assert sent.numpy() == pytest.approx(0.8 * 0.5 * expected, abs=1e-6)

@@ -1,6 +1,7 @@
 """Walls in closed form against Mitsuba's ray tracing of the same stage, ray by ray."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import drjit as dr
 import mitsuba as mi
@@ -11,9 +12,10 @@ import pytest
 import sim
 from sim.envs.simulation import Simulation
 from sim.scene.variant import variant
-from sim.tracing.closed_form_tracer import components_of
+from sim.tracing.closed_form_tracer import components_of, reflected_components_of
 from sim.tracing.reflectance_atlas import bake
 from sim.tracing.static_scene import build_static_scene
+from sim.tracing.wall_intersection import Cells
 from sim.worlds.layout import Starts
 from sim.worlds.world import build_world
 
@@ -179,3 +181,22 @@ def test_as_many_components_as_independent_spectra():
         assert len(c.basis) == rank
         found = np.einsum("tk,lk,kb->tlb", c.reflectance, c.levels, c.basis)
         np.testing.assert_allclose(found, texels[:, None] * lights / np.pi, rtol=1e-5, atol=1e-6)
+
+
+def test_a_cell_beyond_any_side_of_the_grid_is_outside():
+    """Else a ray that leaves the field would read the height of a wall that is none."""
+    grid = SimpleNamespace(_columns=3, _rows=2)
+    with variant():
+        column, row = mi.Int32([0, 2, -1, 3, 0, 0]), mi.Int32([0, 1, 0, 0, -1, 2])
+        inside = Cells._inside(grid, column, row).numpy()
+    assert inside.tolist() == [True, True, False, False, False, False]
+
+
+def test_components_of_greys_are_their_reflectances():
+    """What a grey texel sends on is its own reflectance times what arrives: radiance / irradiance = reflectance / π."""
+    texels, light = np.repeat([[0.2], [0.5], [0.9]], 4, axis=1), np.array([[1.0, 2.0, 3.0, 1.5]])
+    few = reflected_components_of(texels, light)
+    assert few.basis.shape == (1, 4)
+    np.testing.assert_allclose(few.reflectance, texels[:, :1], rtol=1e-6)
+    radiance = few.reflectance @ np.diag(few.levels[0]) @ few.basis
+    np.testing.assert_allclose(radiance, texels * light / np.pi, rtol=1e-6)

@@ -213,3 +213,17 @@ def test_bad_input_is_named():
 
 def test_tracking_is_the_field_of_detection():
     assert sim.build_world("tracking").objects == detection.OBJECTS
+
+
+def test_a_seeds_maze_stays_the_same():
+    """Another version's maze of the same seed would be another task. One row of walls and passages per line."""
+    drawn = maze.draw_maze((7, 9), np.random.default_rng(0))
+    assert ["".join(".#"[int(wall)] for wall in row) for row in drawn] == [
+        "#########",
+        "#.......#",
+        "#.#####.#",
+        "#.#.....#",
+        "#.#.###.#",
+        "#.......#",
+        "#########",
+    ]

@@ -1,0 +1,113 @@
+"""Where a Dask scheduler is, and by which certificates it and we know each other."""
+
+from __future__ import annotations
+
+import re
+import socket
+import ssl
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from evolve.config.checks import ConfigError
+from evolve.search.job import ExecutorError
+
+__all__ = ["Scheduler"]
+
+ADDRESS = re.compile(r"(?:(?P<protocol>tcp|tls)://)?(?P<host>\[[0-9A-Fa-f:.%\w]+\]|[^\s:/\[\]]+):(?P<port>\d{1,5})")
+ANSWER_S = 5.0  # for one that is just being started, too
+RETRY_S = 0.25
+
+
+@dataclass(frozen=True)
+class Scheduler:
+    """A scheduler's address, "tls://host:8786", or "tcp://host:8786" in a network where everybody is trusted.
+
+    ca_file: certificates of those who vouch for scheduler and workers; certificate, key: ours. PEM files, all or none;
+    without them Dask's own settings (distributed.comm.tls) say where they are.
+
+    Raises:
+        ConfigError: no such address, or certificates that are missing, of no use, or not used.
+    """
+
+    address: str
+    ca_file: Path | None = None
+    certificate: Path | None = None
+    key: Path | None = None
+
+    def __post_init__(self) -> None:
+        found = ADDRESS.fullmatch(self.address)
+        if found is None or not 0 < int(found["port"]) < 65536:
+            raise ConfigError(f"--scheduler {self.address}: must be an address with a port, such as tls://host:8786")
+        given = [file for file in (self.ca_file, self.certificate, self.key) if file is not None]
+        if len(given) not in (0, 3):
+            raise ConfigError("--tls-ca-file, --tls-cert and --tls-key: must be given together, or not at all")
+        if given and not self.encrypted:
+            raise ConfigError(f"--scheduler {self.address}: must begin with tls:// where certificates are given")
+        if given:
+            self._require_certificates()
+
+    @property
+    def encrypted(self) -> bool:
+        return self.address.startswith("tls://")
+
+    def _require_certificates(self) -> None:
+        """What Dask would complain about only later, and at length."""
+        for file in (self.ca_file, self.certificate, self.key):
+            if not Path(str(file)).is_file():
+                raise ConfigError(f"{file}: no such file: must be a PEM file")
+        try:
+            context = ssl.create_default_context(cafile=str(self.ca_file))
+            context.load_cert_chain(str(self.certificate), str(self.key))
+        except (ssl.SSLError, OSError) as error:
+            reason = getattr(error, "reason", None) or error.strerror or error
+            raise ConfigError(
+                f"{self.ca_file}, {self.certificate}, {self.key}: must be PEM files of certificates, and of the key "
+                f"that belongs to the second ({reason})"
+            ) from None
+
+    def require_answer(self) -> None:
+        """Make sure that somebody listens there, before anything is begun.
+
+        Raises:
+            ConfigError: as `security`.
+            ExecutorError: nobody does, within seconds, or Dask is not installed.
+        """
+        self.security()
+        found = ADDRESS.fullmatch(self.address)
+        assert found is not None
+        host, port = found["host"].strip("[]"), int(found["port"])
+        deadline = time.monotonic() + ANSWER_S
+        while True:
+            try:
+                socket.create_connection((host, port), timeout=max(RETRY_S, deadline - time.monotonic())).close()
+                return
+            except (OSError, UnicodeError) as error:
+                unknown = isinstance(error, socket.gaierror | UnicodeError)
+                if unknown or time.monotonic() + RETRY_S > deadline:
+                    reason = "there is no such host" if unknown else error
+                    raise ExecutorError(f"no Dask scheduler answers at {self.address}: {reason}") from None
+            time.sleep(RETRY_S)
+
+    def security(self) -> Any:
+        """Dask's `Security`; None for its own settings.
+
+        Raises:
+            ConfigError: the address asks for certificates, and there are none.
+            ExecutorError: Dask is not installed.
+        """
+        try:
+            import dask
+            from distributed.security import Security
+        except ImportError:
+            raise ExecutorError("--executor dask needs Dask: pip install 'rhabdom[dask]'") from None
+
+        if self.ca_file is not None:
+            client = {"tls_client_cert": str(self.certificate), "tls_client_key": str(self.key)}
+            return Security(tls_ca_file=str(self.ca_file), require_encryption=True, **client)
+        if self.encrypted and not dask.config.get("distributed.comm.tls.ca-file", None):
+            raise ConfigError(
+                f"--scheduler {self.address}: needs certificates: --tls-ca-file, --tls-cert and --tls-key"
+            )
+        return None

@@ -1,0 +1,109 @@
+"""kill -9 at random moments of real PPO trainings, in stages and whole, against the same runs, killed by nobody.
+
+    RHABDOM_TRAINING_KILLS=100 python -m pytest tests/evolve/search/test_kill.py -k training
+
+As `kills`, but each candidate learns: children are forked from a process that has loaded the libraries, and has not yet
+started a thread of theirs.
+"""
+
+import os
+import random
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import drjit  # noqa: F401 (loaded before any fork)
+import mitsuba  # noqa: F401
+import torch
+
+from evolve.config.assemble import assemble
+from evolve.learning import fitness
+from evolve.search.loop import evolve
+from evolve.search.search import Search
+from evolve.search.successive_halving import finished
+from evolve.search.worker import prepare_device
+from evolve.store.directory import Run
+from tests.evolve.search.kills import Nobody, child_killed_after, history
+from tests.evolve.search.test_kill import tensors
+
+SMALL = (
+    "workers=1",
+    "search.population=2",
+    "search.generations=2",
+    "learning.total_steps=256",
+    "learning.n_envs=8",
+    "learning.n_steps=16",
+    "learning.batch_size=64",
+    "learning.n_epochs=2",
+    "learning.eval_interval=128",
+    "evaluation.episodes=2",
+    "eye.optics=false",
+    "eye.rays_per_receptor=1",
+    "genome.morphological.open=false",
+    "genome.optical.open=false",
+)
+KINDS = ((), ("search.rungs=2",))
+
+
+class Learning:
+    """Evaluates in this process, as a worker would."""
+
+    def run(self, jobs, progress):
+        while jobs:
+            job = jobs.popleft()
+            yield job, fitness.evaluate(*job.arguments[:4], None, *job.arguments[4:])
+
+
+def carry(path, config):
+    """Begin a run, or go on with it, and bring it to its end."""
+    torch.set_num_threads(1)
+    prepare_device()
+    run = Run.open(path) if (path / "config.toml").exists() else Run.create(path, config)
+    with run.lock():
+        run.repair()
+        evolve(run, Learning(), Nobody())
+
+
+def policies(run):
+    """Numbers of all policies that are left, by name."""
+    return {path.name: tensors(path) for path in (run.path / "policies").iterdir()}
+
+
+def endure(kills, seed, folder):
+    """Runs that are killed `kills` times in all, and end as if nobody had touched them; returns moments of death."""
+    chance, moments, number = random.Random(seed), [], 0
+    while len(moments) < kills:
+        config = assemble("detection", "quick", assignments=[*SMALL, f"seed={number}", *KINDS[number % len(KINDS)]])
+        whole, path = folder / f"whole-{number}", folder / f"run-{number}"
+        began = time.monotonic()
+        assert not child_killed_after(300.0, whole, config, carry)
+        longest = 1.2 * (time.monotonic() - began)
+        kept = b""
+        while child_killed_after(moment := chance.uniform(0, longest), path, config, carry):
+            moments.append(moment)
+            record = path / "candidates.jsonl"
+            now = record.read_bytes() if record.exists() else b""
+            assert now.startswith(kept), "something written was lost"
+            kept = now[: now.rfind(b"\n") + 1]
+        undisturbed, run = Run.open(whole), Run.open(path)
+        assert finished(run)
+        assert all(candidate.failure is None for candidate in run.candidates)
+        assert history(run) == history(undisturbed), "another history than that of a run that nobody killed"
+        assert policies(run) == policies(undisturbed)
+        number += 1
+    return moments
+
+
+def main(kills, seed=None):
+    Search(assemble("detection", "quick", assignments=SMALL))  # loads what children would each load again
+    seed = random.randrange(2**32) if seed is None else seed
+    print(f"seed {seed}", flush=True)
+    with TemporaryDirectory() as folder:
+        moments = endure(kills, seed, Path(folder))
+    print(f"{len(moments)} trainings killed, and finished as if nothing had happened")
+
+
+if __name__ == "__main__":
+    os.environ["OMP_NUM_THREADS"] = "1"
+    main(*map(int, sys.argv[1:]))

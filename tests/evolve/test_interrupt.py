@@ -1,0 +1,58 @@
+"""Ctrl-C at any moment from the first line on: one line, code 130, no traceback."""
+
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+# As pip writes the script `evolve`, told apart by a line when the interpreter has started.
+SCRIPT = """
+import sys
+print("started", flush=True)
+from evolve.__main__ import main
+sys.exit(main())
+"""
+
+
+def interrupted_after(seconds, arguments):
+    child = subprocess.Popen(
+        [sys.executable, "-c", SCRIPT, *arguments],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    assert child.stdout.readline() == "started\n"
+    time.sleep(seconds)
+    child.send_signal(signal.SIGINT)
+    _, told = child.communicate(timeout=60)
+    return child.returncode, told
+
+
+def test_ctrl_c_while_it_loads(tmp_path):
+    """While its own modules are loaded, arguments are read, and the heavy libraries are loaded: the latter some of the
+    time only, as everything else is done within milliseconds."""
+    chance = random.Random(0)
+    found = []
+    for number in range(14):
+        arguments = ["run", "detection", "--dry-run"] if number % 2 else ["genes"]
+        seconds = 0.002 + chance.random() * (0.3 if number % 2 else 0.03)
+        found.append(interrupted_after(seconds, arguments))
+    for code, told in found:
+        assert code in (0, 130), told
+        assert "Traceback" not in told
+        assert told.count("evolve: interrupted\n") == (code == 130)
+    assert [code for code, _ in found].count(130) >= 5, "or nothing was shown"
+
+
+def test_nothing_is_loaded_before_ctrl_c_is_looked_after():
+    """`typing` alone takes five milliseconds."""
+    code = "import sys; before = set(sys.modules); import evolve.__main__; print(*sorted(set(sys.modules) - before))"
+    child = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded = set(child.stdout.split())
+    assert {"evolve", "evolve.__main__"} <= loaded
+    assert not loaded & {"typing", "argparse", "numpy", "evolve.cli.main", "importlib.metadata"}

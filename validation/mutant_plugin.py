@@ -1,0 +1,78 @@
+"""A plugin of pytest for `validation.mutants`: quick tests come first, dear ones are left out, what fails is noted.
+
+MUTANTS names a file of JSON: {"times": {test: seconds} or null, "seconds": budget, "report": file}. Without times all
+tests run, until the budget is spent. The report holds what each test took and which failed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+FEWEST = 2  # tests of a file that run however dear they are
+
+
+class Nearest:
+    """What one run of pytest is asked for, and what came of it."""
+
+    def __init__(self, asked: dict[str, Any]) -> None:
+        self.known: dict[str, float] | None = asked["times"]
+        self.budget: float = asked["seconds"]
+        self.report = Path(asked["report"])
+        self.took: dict[str, float] = defaultdict(float)
+        self.failed: list[str] = []
+        self.began = time.monotonic()
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
+        if self.known is None:
+            return
+        files: dict[str, list[pytest.Item]] = defaultdict(list)
+        for item in items:
+            if item.nodeid in self.known:
+                files[item.nodeid.split("::")[0]].append(item)
+        kept = [item for of_file in sorted(files.values(), key=self._dear) for item in self._quick(of_file)]
+        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+        items[:] = kept
+
+    def _dear(self, items: list[pytest.Item]) -> float:
+        return sum(self.known[item.nodeid] for item in items)
+
+    def _quick(self, items: list[pytest.Item]) -> list[pytest.Item]:
+        """The quickest of a file, as many as the budget allows."""
+        kept: list[pytest.Item] = []
+        spent = 0.0
+        for item in sorted(items, key=lambda item: self.known[item.nodeid]):
+            spent += self.known[item.nodeid]
+            if spent <= self.budget or len(kept) < FEWEST:
+                kept.append(item)
+        return kept
+
+    def pytest_runtest_logfinish(self) -> None:
+        if self.known is None and time.monotonic() - self.began > self.budget:
+            self.session.shouldstop = "the tests of this file are dear"
+
+    def pytest_sessionstart(self, session: pytest.Session) -> None:
+        self.session = session
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        self.took[report.nodeid] += report.duration
+        if report.failed and report.nodeid not in self.failed:
+            self.failed.append(report.nodeid)
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        if report.failed:
+            self.failed.append(report.nodeid)
+
+    def pytest_sessionfinish(self) -> None:
+        self.report.write_text(json.dumps({"took": self.took, "failed": self.failed}))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(Nearest(json.loads(Path(os.environ["MUTANTS"]).read_text())))
