@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 
 __all__ = ["run_command"]
@@ -10,7 +11,7 @@ __all__ = ["run_command"]
 def run_command() -> int:
     """Run one command; returns the exit code."""
     try:
-        return int(import_module("evolve.__main__").main())
+        return int(import_module("evolve.cli.main").main())
     except KeyboardInterrupt:  # while it was being loaded
-        print("\nevolve: interrupted")
+        print("evolve: interrupted", file=sys.stderr)
         return 130

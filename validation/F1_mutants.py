@@ -93,12 +93,12 @@ def go_on(root: Path, store: Path, options: argparse.Namespace) -> None:
     """Try the mutants that are asked for and not in the store yet; the store is written after each."""
     before = {row.key: row for row in stored(store)}
     again = {key for key, row in before.items() if options.again and row.verdict != "killed"}
+    wanted = chosen(root, options.trials, options.seed)
+    still_there = {(site.path, site.change) for site in wanted}  # code changes
+    before = {key: row for key, row in before.items() if key in still_there}
+    again &= still_there
     rows = [row for key, row in before.items() if key not in again]
-    sites = [
-        site
-        for site in chosen(root, options.trials, options.seed)
-        if (site.path, site.change) not in before or (site.path, site.change) in again
-    ]
+    sites = [site for site in wanted if (site.path, site.change) not in before or (site.path, site.change) in again]
     for row in trials(root, sites, options.work):
         old = before.get(row.key)
         alike = row.verdict == "survived" and old is not None

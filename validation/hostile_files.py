@@ -75,6 +75,8 @@ def forged_policy(chance: random.Random, stage: Stage) -> str | None:
     """A shape that its tensors do not have, or bytes that are broken."""
     path = stage.folder / "policy.safetensors"
     policy = build_policy(PolicyConfig((2, 2, 3, 2, 2), 8))
+    save_policy(policy, path)
+    load_policy(path)  # PyTorch loads a second's worth of itself with the first
     forged = chance.random() < 0.5
     if forged:
         shape = {"eyes": [2, 2, 3, 2, 2], "neurons": 8, "layers": 2}
@@ -84,7 +86,6 @@ def forged_policy(chance: random.Random, stage: Stage) -> str | None:
         metadata = {"config": json.dumps({**shape, "units": "LeakyReLU"})}
         path.write_bytes(save({name: tensor.detach().clone() for name, tensor in learnt(policy).items()}, metadata))
     else:
-        save_policy(policy, path)
         content = bytearray(path.read_bytes())
         for _ in range(chance.randint(1, 4)):
             content[chance.randrange(min(2000, len(content)))] = chance.randrange(256)

@@ -200,4 +200,5 @@ def steering_text(chance: random.Random, stage: Stage) -> str | None:
     record |= {"failure": f"ValueError: {name}", "fitness": None}
     (run / "candidates.jsonl").write_text("".join(stage.lines[:-1]) + json.dumps(record) + "\n")
     code, out, err = call(chance.choice(("status", "compare")), run)
-    return None if code == 0 and (out + err).replace("\n", "").isprintable() else f"code {code}, said {out + err!r}"
+    plain = (out + err).translate(dict.fromkeys(map(ord, "\n\t"))).isprintable()  # layout steers nothing
+    return None if code == 0 and plain else f"code {code}, said {out + err!r}"

@@ -1,7 +1,9 @@
 """A plugin of pytest for `validation.mutants`: quick tests come first, dear ones are left out, what fails is noted.
 
-MUTANTS names a file of JSON: {"times": {test: seconds} or null, "seconds": budget, "report": file}. Without times all
-tests run, until the budget is spent. The report holds what each test took and which failed.
+MUTANTS names a file of JSON: {"times": {test: seconds} or null, "measured": [tests], "seconds": budget, "report":
+file}.
+Without times all tests run but those measured already, until the budget is spent. The report holds what each test took
+and which failed.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ class Nearest:
 
     def __init__(self, asked: dict[str, Any]) -> None:
         self.known: dict[str, float] | None = asked["times"]
+        self.measured = set(asked["measured"])
         self.budget: float = asked["seconds"]
         self.report = Path(asked["report"])
         self.took: dict[str, float] = defaultdict(float)
@@ -32,6 +35,7 @@ class Nearest:
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
         if self.known is None:
+            items[:] = [item for item in items if item.nodeid not in self.measured]
             return
         files: dict[str, list[pytest.Item]] = defaultdict(list)
         for item in items:

@@ -135,11 +135,7 @@ def _add_runs(commands: Commands) -> None:
         command.add_argument(
             "--scheduler", metavar="ADDRESS", help="address of the Dask scheduler, such as tls://host:8786"
         )
-        for name, whose in (
-            ("ca-file", "the authority's certificate"),
-            ("cert", "our certificate"),
-            ("key", "its key"),
-        ):
+        for name, whose in (("ca-file", "certificates to trust"), ("cert", "our certificate"), ("key", "its key")):
             command.add_argument(f"--tls-{name}", type=Path, metavar="FILE", help=f"for a tls:// scheduler: {whose}")
         command.add_argument(
             "--device",

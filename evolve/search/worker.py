@@ -6,6 +6,7 @@ import ctypes
 import gc
 import multiprocessing
 import os
+import sys
 import threading
 import time
 import traceback
@@ -117,8 +118,12 @@ def refusal(error: OSError | MemoryError) -> str:
 
 def _give_back_memory() -> None:
     """To the system, what the last candidate's arrays have left free between what is still in use: glibc keeps it, some
-    10 MB a candidate, and arrays of other sizes do not fill it."""
-    gc.collect()
+    10 MB a candidate, and arrays of other sizes do not fill it. Dr.Jit keeps its kernels, those of every shape of eye
+    that has been; what is needed again it finds on the disk."""
+    gc.collect()  # frozen functions first, which hold kernels
+    if (drjit := sys.modules.get("drjit")) is not None and multiprocessing.parent_process() is not None:
+        drjit.flush_kernel_cache()
+        drjit.flush_malloc_cache()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
     if trim is not None:
         trim(0)

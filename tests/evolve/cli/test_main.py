@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from evolve.cli.arguments import EXAMPLES, FIRST, parse
+from evolve.cli.main import main
 from evolve.config.assemble import assemble, from_toml
 from evolve.config.run_config import TASKS
 from evolve.config.sources import preset_names
@@ -91,6 +92,26 @@ def test_help_comes_at_once_and_names_the_commands():
         "config",
     ):
         assert f"\n    {command} " in child.stdout
+
+
+FLAGS = {
+    "run": ("--preset", "--config", "--set", "--out", "--dry-run", "--executor", "--scheduler", "--tls-key", "--json"),
+    "resume": ("--executor", "--scheduler", "--tls-ca-file", "--tls-cert", "--json", "--tensorboard"),
+    "status": ("--json", "--watch"),
+    "compare": ("--json", "--html"),
+    "replay": ("--candidate", "--seed", "--rrd"),
+    "export": ("--candidate", "--seed"),
+    "doctor": ("--json",),
+    "genes": ("--json",),
+}
+
+
+@pytest.mark.parametrize("command", FLAGS)
+def test_help_names_every_flag(command, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    told = capsys.readouterr().out
+    assert [flag for flag in FLAGS[command] if flag not in told] == []
 
 
 def test_bare_command_shows_its_help(call):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from evolve.cli.pace import measure_pace
+from evolve.cli.pace import Pace, _slowest, measure_pace
 from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
@@ -32,3 +32,8 @@ def test_pace_is_measured_with_the_real_thing(tmp_path, short_episodes):
     assert pace.policy_bytes == (tmp_path / "policy").stat().st_size
     assert pace.steps_per_s > 0
     assert pace.start_s > 0
+
+
+def test_the_slowest_of_many_lives_counts():
+    lives = [Pace(start_s=1.0, steps_per_s=90.0, play_s=3.0, policy_bytes=7), Pace(2.0, 50.0, 2.0, 7)]
+    assert _slowest(lives) == Pace(start_s=2.0, steps_per_s=50.0, play_s=3.0, policy_bytes=7)

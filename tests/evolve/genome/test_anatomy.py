@@ -164,3 +164,14 @@ def test_animals_that_never_fit_are_refused_before_work_starts(settings_, messag
     with pytest.raises(ConfigError, match=message) as caught:
         assemble("detection", assignments=settings_)
     assert "--set" in str(caught.value)
+
+
+def test_receptors_of_no_width_are_not_taken_away_to_make_room():
+    """Where eyes are as wide whatever they hold, fewer receptors would make no room: there are fewer eyes."""
+    config = assemble("detection", assignments=["eye.head_radius=0.4e-3", "genome.placement_range_deg.high=150"])
+    assert config.eye.receptor_pitch == 0
+    genotype = Genotype(config.genome)
+    values = genotype.decode(np.ones(genotype.dimension))
+    fits = fitted(values, config.genome, config.eye)
+    assert fits["n_eyes"] < values["n_eyes"]
+    assert fits["resolution_width"] == values["resolution_width"]

@@ -27,6 +27,9 @@ def columns(run, episode, tmp_path_factory):
             if ":" in name or name == "time":
                 found = rows.setdefault((chunk.entity_path, name), [])
                 found += zip(actions, batch.column(name).to_pylist(), strict=True)
+    for (_, component), values in rows.items():
+        if component == "Transform3D:translation" and len(values) > 1:
+            assert sorted(action for action, _ in values) == list(range(len(episode))), "each has a time of its own"
     return {key: [value for _, value in sorted(values, key=lambda row: row[0])] for key, values in rows.items()}
 
 
@@ -100,3 +103,11 @@ def test_without_the_extra_one_line_says_so(run, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "rerun", None)
     assert main(["replay", str(run.path), "--rrd"]) == 2
     assert capsys.readouterr().err == "evolve: error: --rrd needs rerun: pip install 'rhabdom[rerun]'\n"
+
+
+def test_agent_and_objects_are_balls_of_their_size(columns, episode):
+    stage = GroundPlan.of(episode)
+    sizes = {"agent/body": stage.body_radius, **dict(zip(stage.object_names, stage.object_radius, strict=True))}
+    for name, radius in sizes.items():
+        (half,) = columns[f"/world/{name}", "Ellipsoids3D:half_sizes"]
+        np.testing.assert_allclose(half, [[radius] * 3], rtol=1e-6)

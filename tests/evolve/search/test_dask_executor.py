@@ -8,6 +8,7 @@ import sys
 import time
 from collections import deque
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -255,3 +256,11 @@ def test_behind_certificates_the_history_is_the_same_and_strangers_stay_outside(
         cluster.kill()
     local, _ = carried(tmp_path / "local", config, LocalExecutor(bowl, 1))
     assert history(far) == history(local)
+
+
+def test_a_scheduler_that_is_gone_for_good_ends_the_run(tmp_path):
+    """A closed connection is made anew, for as long as patience lasts."""
+    executor = DaskExecutor("tcp://127.0.0.1:9", patience_s=0.5)
+    executor._client = SimpleNamespace(status="closed")
+    with pytest.raises(ExecutorError, match=r"the scheduler has been gone for 0\.5 s"):
+        list(executor.run(jobs(tmp_path, 1)))

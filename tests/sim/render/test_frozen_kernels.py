@@ -3,6 +3,10 @@
 import subprocess
 import sys
 
+import numpy as np
+
+from sim.render.frozen_kernels import ALIGNMENT, PACKET, aligned
+
 # A first environment becomes garbage; collection falls due in the middle of the second one's recording.
 PROGRAM = """
 import gc
@@ -38,3 +42,14 @@ print("survived")
 def test_collection_waits_until_the_kernel_is_recorded():
     child = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=False)
     assert child.stdout.strip() == "survived", child.stderr[-500:]
+
+
+def test_aligned_arrays_are_whole_and_a_packet_may_be_read_beyond_their_end():
+    for n in range(1, 200):
+        array = aligned(n, np.float32)
+        whole = array
+        while whole.base is not None:
+            whole = whole.base
+        assert array.shape == (n,)
+        assert array.ctypes.data % ALIGNMENT == 0
+        assert whole.ctypes.data + whole.nbytes >= array.ctypes.data + array.nbytes + PACKET

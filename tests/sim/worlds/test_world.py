@@ -1,5 +1,7 @@
 """Worlds: what stands where, how the agent moves, and what it can touch."""
 
+import hashlib
+
 import mujoco
 import numpy as np
 import pytest
@@ -227,3 +229,10 @@ def test_a_seeds_maze_stays_the_same():
         "#.......#",
         "#########",
     ]
+
+
+def test_so_do_those_of_other_seeds():
+    drawn = (maze.draw_maze((9, 13), np.random.default_rng(seed)) for seed in range(20))
+    assert (
+        hashlib.sha256(b"".join(np.packbits(walls).tobytes() for walls in drawn)).hexdigest()[:16] == "74e8c90da89a0d15"
+    )
