@@ -14,9 +14,9 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum
-from sim.render.frozen_kernels import aligned
 from sim.scene import lights, shapes, surfaces, tessellation
 from sim.scene.cameras import Viewpoint
+from sim.scene.device_arrays import aligned
 from sim.scene.mirror import VISIBLE_GROUPS, Mirror
 from sim.scene.shapes import Part
 from sim.scene.tessellation import Triangles
