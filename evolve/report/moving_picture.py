@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,10 @@ __all__ = ["write_gif"]
 HEIGHT, ASIDE, GAP = 320, 150, 10  # pixels: of the picture, of the eyes' column, between
 SMOOTH = 2  # drawn so many times as large, then reduced
 SPEED = 2.0  # times as fast as it was
-LONGEST = 400  # frames
-COLOURS = 64  # of the palette that all frames share
+LONGEST = 150  # frames: noise hardly compresses
+FIELD = "#c9e0ef"  # of view
+OWN = (INK, MUTED, PAPER, PANEL, ACCENT, VERMILLION, GREEN, FIELD)
+LEVELS = (0, 51, 102, 153, 204, 255)  # of red, green and blue that eyes' pictures are shown with
 
 
 def write_gif(episode: Episode, path: Path) -> Path:
@@ -31,13 +34,22 @@ def write_gif(episode: Episode, path: Path) -> Path:
     kept = range(0, len(episode), stride)
     eyes = display(episode.signals, plan.gain)
     pictures = [_frame(episode, plan, eyes, time) for time in kept]
-    palette = pictures[len(pictures) // 2].quantize(COLOURS)
+    palette = _palette()
     first, *rest = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
     content = io.BytesIO()
     pause = round(1000 * stride * plan.seconds / SPEED)
     first.save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
     write_whole(path, content.getvalue())
     return path
+
+
+def _palette() -> Image.Image:
+    """What all frames are painted with: the drawing's own colours, and a cube of others."""
+    own = [int(name[i : i + 2], 16) for name in OWN for i in (1, 3, 5)]
+    cube = [level for colour in product(LEVELS, repeat=3) for level in colour]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(own + cube)
+    return palette
 
 
 def _frame(episode: Episode, plan: GroundPlan, eyes: np.ndarray, time: int) -> Image.Image:
@@ -75,7 +87,7 @@ def _draw_world(draw: ImageDraw.ImageDraw, episode: Episode, plan: GroundPlan, t
         towards = math.degrees(float(episode.heading[time]) + float(azimuth))
         half, reach = plan.eyes.fov_deg / 2, 0.22 * HEIGHT * SMOOTH
         box = (here[0] - reach, here[1] - reach, here[0] + reach, here[1] + reach)
-        draw.pieslice(box, -towards - half, -towards + half, fill="#c9e0ef", outline=ACCENT)
+        draw.pieslice(box, -towards - half, -towards + half, fill=FIELD, outline=ACCENT)
     draw.line([place(*at) for at in episode.position[: time + 1]] or [here], fill=INK, width=SMOOTH)
     for name, radius, (x, y) in zip(plan.object_names, plan.object_radius, episode.objects[time][:, :2], strict=True):
         _disk(draw, place(x, y), radius * scale, GREEN if name.startswith("goal") else VERMILLION)

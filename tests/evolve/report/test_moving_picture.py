@@ -32,7 +32,7 @@ def frames(short, tmp_path_factory):
 def test_it_lasts_as_long_as_the_episode(short, frames):
     seconds = GroundPlan.of(short).seconds
     assert sum(pause for _, pause in frames) == pytest.approx(1000 * len(short) * seconds / SPEED, rel=0.01)
-    assert LONGEST >= 256
+    assert len(frames) == 24 < LONGEST
 
 
 def test_the_agent_is_where_it_was(short, frames):
