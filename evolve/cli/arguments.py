@@ -197,6 +197,7 @@ def _add_products(commands: Commands) -> None:
             product.add_argument("--seed", type=_seed, default=0, help="seed of the episode (default: 0)")
         if name == "replay":
             product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
+            product.add_argument("--gif", action="store_true", help="also write a moving picture, for slides and pages")
         if name != "export":
             product.add_argument("--open", action="store_true", help="open the page in a browser")
         product.add_argument("--out", type=Path, metavar=out, help="where to write (default: in the run directory)")

@@ -29,6 +29,7 @@ PACKAGES = (
     "nevergrad",
     "OpenEXR",
     "matplotlib",
+    "pillow",
     "rich",
     "shtab",
     "scikit-image",

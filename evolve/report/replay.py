@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis.episode import Episode, record
+from evolve.report.moving_picture import write_gif
 from evolve.report.player import write_player
 from evolve.report.rerun_recording import require_rerun, write_recording
 from evolve.store.directory import Run
@@ -14,10 +15,15 @@ __all__ = ["episode_facts", "episode_table", "write_replay"]
 
 
 def write_replay(
-    run: Run, candidate_id: int | None = None, seed: int = 0, rrd: bool = False, out: Path | None = None
+    run: Run,
+    candidate_id: int | None = None,
+    seed: int = 0,
+    rrd: bool = False,
+    gif: bool = False,
+    out: Path | None = None,
 ) -> tuple[Episode, list[Path]]:
     """Record an episode (default: of the best candidate) and write a page that plays it; with `rrd` a recording for
-    rerun as well.
+    rerun as well, with `gif` a moving picture.
 
     out: the page's file; in the run directory if None
     Returns the episode, and the paths.
@@ -32,7 +38,10 @@ def write_replay(
     path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{seed}.html"
     path.parent.mkdir(parents=True, exist_ok=True)
     page = write_player(episode, path)
-    return episode, [page, write_recording(episode, path.with_suffix(".rrd"))] if rrd else [page]
+    paths = [page]
+    paths += [write_recording(episode, path.with_suffix(".rrd"))] if rrd else []
+    paths += [write_gif(episode, path.with_suffix(".gif"))] if gif else []
+    return episode, paths
 
 
 def episode_facts(episode: Episode) -> dict[str, Any]:

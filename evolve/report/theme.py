@@ -7,7 +7,20 @@ so that the page's theme reaches into them.
 
 from __future__ import annotations
 
-__all__ = ["ACCENT", "CSS", "GREEN", "INK", "LINE", "LINES", "MUTED", "PAPER", "PURPLE", "VARIABLES", "VERMILLION"]
+__all__ = [
+    "ACCENT",
+    "CSS",
+    "GREEN",
+    "INK",
+    "LINE",
+    "LINES",
+    "MUTED",
+    "PANEL",
+    "PAPER",
+    "PURPLE",
+    "VARIABLES",
+    "VERMILLION",
+]
 
 INK, MUTED, LINE, PAPER, PANEL = "#1d2329", "#5c6670", "#d8dde2", "#fefefe", "#f5f6f8"
 ACCENT, VERMILLION, GREEN, PURPLE = "#0072b2", "#b34f00", "#007a59", "#a8467f"

@@ -21,7 +21,7 @@ def replay(arguments: Namespace) -> int:
     with _waiting(arguments, "an episode is played and written"):
         from evolve.report.replay import episode_facts, episode_table, write_replay
 
-        chosen = (arguments.candidate, arguments.seed, arguments.rrd, arguments.out)
+        chosen = (arguments.candidate, arguments.seed, arguments.rrd, arguments.gif, arguments.out)
         episode, paths = write_replay(run, *chosen)
     if arguments.json:
         print(json.dumps({**episode_facts(episode), "files": [str(path) for path in paths]}, indent=1))

@@ -14,6 +14,7 @@ views: test_eye_figures.py
 picture: test_picture.py
 player: test_player.py
 ground_plan: test_player.py, analysis/test_episode.py
+moving_picture: test_moving_picture.py
 replay: analysis/test_episode.py, test_rerun_recording.py
 rerun_recording: test_rerun_recording.py
 exr_export: analysis/test_episode.py

@@ -1,0 +1,98 @@
+"""An episode as a GIF: the world from above with the agent's path, and beside it what its eyes report."""
+
+from __future__ import annotations
+
+import io
+import math
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from evolve.analysis.episode import Episode
+from evolve.report.ground_plan import GroundPlan
+from evolve.report.picture import display
+from evolve.report.theme import ACCENT, GREEN, INK, MUTED, PANEL, PAPER, VERMILLION
+from evolve.store.atomic_files import write_whole
+
+__all__ = ["write_gif"]
+
+HEIGHT, ASIDE, GAP = 320, 150, 10  # pixels: of the picture, of the eyes' column, between
+SMOOTH = 2  # drawn so many times as large, then reduced
+SPEED = 2.0  # times as fast as it was
+LONGEST = 150  # frames: noise hardly compresses
+FIELD = "#c9e0ef"  # of view
+OWN = (INK, MUTED, PAPER, PANEL, ACCENT, VERMILLION, GREEN, FIELD)
+LEVELS = (0, 51, 102, 153, 204, 255)  # of red, green and blue that eyes' pictures are shown with
+
+
+def write_gif(episode: Episode, path: Path) -> Path:
+    """Write an episode as an animated GIF that repeats, whole or not at all; returns its path."""
+    plan = GroundPlan.of(episode)
+    stride = max(1, -(-len(episode) // LONGEST))
+    kept = range(0, len(episode), stride)
+    eyes = display(episode.signals, plan.gain)
+    pictures = [_frame(episode, plan, eyes, time) for time in kept]
+    palette = _palette()
+    first, *rest = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
+    content = io.BytesIO()
+    pause = round(1000 * stride * plan.seconds / SPEED)
+    first.save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
+    write_whole(path, content.getvalue())
+    return path
+
+
+def _palette() -> Image.Image:
+    """What all frames are painted with: the drawing's own colours, and a cube of others."""
+    own = [int(name[i : i + 2], 16) for name in OWN for i in (1, 3, 5)]
+    cube = [level for colour in product(LEVELS, repeat=3) for level in colour]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(own + cube)
+    return palette
+
+
+def _frame(episode: Episode, plan: GroundPlan, eyes: np.ndarray, time: int) -> Image.Image:
+    """One moment: the world on the left, an eye below the other on the right."""
+    x0, y0, x1, y1 = plan.bounds
+    scale = SMOOTH * HEIGHT / (y1 - y0)
+    width = round((x1 - x0) * scale / SMOOTH)
+    world = Image.new("RGB", (SMOOTH * width, SMOOTH * HEIGHT), PANEL)
+    _draw_world(ImageDraw.Draw(world), episode, plan, time, scale)
+    picture = Image.new("RGB", (width + GAP + ASIDE, HEIGHT), PAPER)
+    picture.paste(world.resize((width, HEIGHT), Image.Resampling.LANCZOS), (0, 0))
+    seen = eyes[time]
+    room = (HEIGHT - GAP * (len(seen) - 1)) / len(seen)
+    size = min(ASIDE / seen.shape[2], room / seen.shape[1])
+    for number, one in enumerate(seen):
+        shape = max(1, round(one.shape[1] * size)), max(1, round(one.shape[0] * size))
+        grown = Image.fromarray(np.ascontiguousarray(one)).resize(shape, Image.Resampling.NEAREST)
+        picture.paste(grown, (width + GAP, round(number * (room + GAP))))
+    return picture
+
+
+def _draw_world(draw: ImageDraw.ImageDraw, episode: Episode, plan: GroundPlan, time: int, scale: float) -> None:
+    """Walls, objects, path so far, fields of view and the agent, in pixels of the large drawing."""
+
+    def place(x: float, y: float) -> tuple[float, float]:
+        return (x - plan.bounds[0]) * scale, (plan.bounds[3] - y) * scale
+
+    for x, y, half_x, half_y in plan.walls:
+        draw.rectangle((*place(x - half_x, y + half_y), *place(x + half_x, y - half_y)), fill=MUTED)
+    if plan.goal_region is not None:
+        low_x, low_y, high_x, high_y = plan.goal_region
+        draw.rectangle((*place(low_x, high_y), *place(high_x, low_y)), outline=GREEN, width=3 * SMOOTH)
+    here = place(*episode.position[time])
+    for azimuth in plan.eyes.azimuths():
+        towards = math.degrees(float(episode.heading[time]) + float(azimuth))
+        half, reach = plan.eyes.fov_deg / 2, 0.22 * HEIGHT * SMOOTH
+        box = (here[0] - reach, here[1] - reach, here[0] + reach, here[1] + reach)
+        draw.pieslice(box, -towards - half, -towards + half, fill=FIELD, outline=ACCENT)
+    draw.line([place(*at) for at in episode.position[: time + 1]] or [here], fill=INK, width=SMOOTH)
+    for name, radius, (x, y) in zip(plan.object_names, plan.object_radius, episode.objects[time][:, :2], strict=True):
+        _disk(draw, place(x, y), radius * scale, GREEN if name.startswith("goal") else VERMILLION)
+    _disk(draw, here, max(plan.body_radius * scale, 5 * SMOOTH), INK)
+
+
+def _disk(draw: ImageDraw.ImageDraw, at: tuple[float, float], radius: float, colour: str) -> None:
+    draw.ellipse((at[0] - radius, at[1] - radius, at[0] + radius, at[1] + radius), fill=colour)

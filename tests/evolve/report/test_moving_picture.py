@@ -1,0 +1,54 @@
+"""A moving picture shows the episode: where the agent was, what its eyes reported, for as long as it took."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+
+from evolve.report.ground_plan import GroundPlan
+from evolve.report.moving_picture import ASIDE, HEIGHT, LONGEST, SPEED, write_gif
+from evolve.report.theme import INK
+
+
+@pytest.fixture(scope="module")
+def short(episode):
+    """Its first 24 actions."""
+    cut = {
+        name: value[:24] for name, value in vars(episode).items() if isinstance(value, np.ndarray) and len(value) == 256
+    }
+    terms = {name: term[:24] for name, term in episode.reward_terms.items()}
+    return dataclasses.replace(episode, **cut, reward_terms=terms)
+
+
+@pytest.fixture(scope="module")
+def frames(short, tmp_path_factory):
+    path = write_gif(short, tmp_path_factory.mktemp("gif") / "episode.gif")
+    with Image.open(path) as picture:
+        assert picture.info["loop"] == 0
+        return [(f.convert("RGB"), f.info["duration"]) for f in ImageSequence.Iterator(picture)]
+
+
+def test_it_lasts_as_long_as_the_episode(short, frames):
+    seconds = GroundPlan.of(short).seconds
+    assert sum(pause for _, pause in frames) == pytest.approx(1000 * len(short) * seconds / SPEED, rel=0.01)
+    assert len(frames) == 24 < LONGEST
+
+
+def test_the_agent_is_where_it_was(short, frames):
+    """The darkest spot of the world is its body."""
+    x0, _, _, y1 = (plan := GroundPlan.of(short)).bounds
+    scale = HEIGHT / (y1 - plan.bounds[1])
+    dark = tuple(int(INK[i : i + 2], 16) for i in (1, 3, 5))
+    assert len(frames) == len(short)
+    for time in (0, 12, 23):
+        x, y = (short.position[time, 0] - x0) * scale, (y1 - short.position[time, 1]) * scale
+        assert np.abs(np.subtract(frames[time][0].getpixel((round(x), round(y))), dark)).max() < 40
+    assert np.hypot(*(short.position[23] - short.position[0])) * scale > 10, "it has moved"
+
+
+def test_the_eyes_are_beside_it(short, frames):
+    picture = np.asarray(frames[12][0])[:, -ASIDE:]
+    left, right = picture[: HEIGHT // 2 - 10], picture[HEIGHT // 2 + 10 :]
+    assert np.abs(left.astype(float).mean() - right.astype(float).mean()) > 1 or (left != right[: len(left)]).any()
+    assert picture.std() > 5
