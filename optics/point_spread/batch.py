@@ -13,7 +13,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import Plan
 from optics.numerics.arguments import shown, vacuum_wavelength
-from optics.numerics.autodiff import Array, Scalar
+from optics.numerics.autodiff import Array, Scalar, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.point_spread.pictures import pictures
@@ -46,7 +46,7 @@ class PSFBatch:
 def psf_batch(
     pupils: Sequence[Pupil],
     wavelengths: Sequence[float] = (550e-9,),
-    sensor_distance: Scalar = 240e-6,
+    sensor_distance: Scalar | None = None,
     source_distances: Sequence[Scalar] = (math.inf,),
     *,
     dx: float = 0.25e-6,
@@ -56,6 +56,8 @@ def psf_batch(
     dtype: str = "float32",
 ) -> PSFBatch:
     """`optics.psf` of every pupil, source on the axis at every distance [m] and vacuum wavelength [m], over one window.
+
+    sensor_distance: None: where each pupil's ideal lens images the first source; see `optics.psf`.
 
     Nothing is computed before everything is planned, and each picture is being computed while the next is prepared.
 
@@ -69,15 +71,13 @@ def psf_batch(
         if not isinstance(values, Sized) or len(values) == 0:
             raise ValueError(f"{name} = {shown(values)}: must be a sequence of at least one")
     window = Grid(shape, dx)
-    setups = [
-        Setup(sensor_distance, PointSource(depth), window, tolerance, method, dtype) for depth in source_distances
-    ]
-    requests = [
-        setup.request(pupil, vacuum_wavelength(wavelength))
-        for pupil in pupils
-        for setup in setups
-        for wavelength in wavelengths
-    ]
+    sources = [PointSource(depth) for depth in source_distances]
+    requests = []
+    for pupil in pupils:
+        first = number(sources[0].distance)
+        at = pupil.image_distance(first) if sensor_distance is None else sensor_distance
+        setups = [Setup(at, source, window, tolerance, method, dtype) for source in sources]
+        requests += [setup.request(pupil, vacuum_wavelength(each)) for setup in setups for each in wavelengths]
     flat, plans = zip(*pictures(requests), strict=True)
     whole = flat[0] if len(flat) == 1 else dr.concat(flat)
     sizes = len(pupils), len(source_distances), len(wavelengths), *window.shape
