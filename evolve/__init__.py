@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+import rhabdom  # noqa: F401 (finds rhabdom's own optics and sim, whoever else has installed packages of these names)
+
 _HOME = {
     "RunConfig": "evolve.config.run_config",
     "EyeConfig": "evolve.config.run_config",
@@ -21,7 +23,8 @@ _HOME = {
     "Genotype": "evolve.genome.genotype",
     "Phenotype": "evolve.genome.phenotype",
     "develop": "evolve.genome.phenotype",
-    "Run": "evolve.store.directory",
+    "Run": "evolve.interactive.opened_run:OpenedRun",
+    "run": "evolve.interactive.begin",
     "RunError": "evolve.store.directory",
     "Candidate": "evolve.store.candidate",
     "load_policy": "evolve.learning.policy",
@@ -33,7 +36,8 @@ __all__ = sorted(_HOME)
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'evolve' has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+    module, _, own_name = _HOME[name].partition(":")
+    return getattr(import_module(module), own_name or name)
 
 
 def __dir__() -> list[str]:

@@ -6,6 +6,7 @@ TASKS                               names of the tasks
 mirror, Mirror                      any MuJoCo model as a Mitsuba scene
 BatchedRenderer                     all eyes of all worlds as one wavefront
 choose_fidelity, Fidelity           how finely: as the receptors' noise allows
+FidelityWarning                     where nothing is fine enough
 ReferenceRenderer                   the same, slowly: Mitsuba's integrators and optics' convolution
 make_vec_env, make_env              the environments, natively batched or single
                                     (also gymnasium.make("rhabdom/Detection-v0"), Foraging, Maze ...)
@@ -17,6 +18,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import rhabdom  # noqa: F401 (finds rhabdom's own optics, whoever else has installed a package of that name)
 from sim.envs.registration import register as register_environments
 from sim.worlds import catalog
 
@@ -26,7 +28,8 @@ if TYPE_CHECKING:
     from sim.exr import View, read_exr, write_exr
     from sim.eyes.eyes import Eyes
     from sim.render.batched_renderer import BatchedRenderer
-    from sim.render.fidelity import Fidelity, choose_fidelity
+    from sim.render.fidelity import Fidelity
+    from sim.render.fidelity_choice import FidelityWarning, choose_fidelity
     from sim.render.reference_renderer import ReferenceRenderer
     from sim.scene.mirror import Mirror, MirrorWarning, mirror
     from sim.worlds.course import Course
@@ -43,7 +46,8 @@ _HOME = {
     "BatchedRenderer": "sim.render.batched_renderer",
     "ReferenceRenderer": "sim.render.reference_renderer",
     "Fidelity": "sim.render.fidelity",
-    "choose_fidelity": "sim.render.fidelity",
+    "FidelityWarning": "sim.render.fidelity_choice",
+    "choose_fidelity": "sim.render.fidelity_choice",
     "make_env": "sim.envs.env",
     "make_vec_env": "sim.envs.assembly",
     "View": "sim.exr",
@@ -57,6 +61,7 @@ __all__ = [
     "Course",
     "Eyes",
     "Fidelity",
+    "FidelityWarning",
     "Mirror",
     "MirrorWarning",
     "ReferenceRenderer",

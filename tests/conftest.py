@@ -1,6 +1,16 @@
 """What tests of several packages share."""
 
+import os
+
 import pytest
+
+
+def pytest_configure() -> None:
+    """Workers beside each other have a thread each: Dr.Jit's second one spins while it waits, at the others' cost."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        import drjit
+
+        drjit.set_thread_count(1)
 
 
 @pytest.fixture(scope="module")

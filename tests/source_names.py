@@ -26,7 +26,7 @@ PACKAGES = ("optics", "sim", "evolve", "validation", "experiments", "tests")
 FOLDERS = (*PACKAGES, "docs", "examples")
 GENERATED = ("validation/figures",)
 TABLES = ("_CONTENTS", "_HOME")  # of contents, of packages that load lazily
-LIBRARIES = {"dr", "drjit", "gymnasium", "mi", "mitsuba", "mujoco", "np", "numpy", "torch"}
+LIBRARIES = {"dr", "drjit", "gymnasium", "mi", "mitsuba", "mujoco", "np", "numpy", "rhabdom", "torch"}
 
 SHELL_AND_CODE = re.compile(r"```(?:sh|python|toml)\n.*?```", re.DOTALL)
 LINK_TARGET = re.compile(r"\]\([^)\s]*\)")

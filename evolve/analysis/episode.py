@@ -25,7 +25,7 @@ from sim.worlds.state import WorldState, concatenate
 __all__ = ["Episode", "record"]
 
 FINE_PIXELS = 60  # least pixels along the longer side of the radiance pictures
-FINE_RAYS = 16  # rays per pixel of them
+FINE = {"rays": 16, "areas": 4}  # samples per pixel of them
 
 
 @dataclass(frozen=True)
@@ -189,11 +189,11 @@ def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any]]:
 def _perfect_views(worlds: Any, eyes: sim.Eyes, states: WorldState, every: int) -> dict[str, Any]:
     """The same scenes in the same light through a perfect lens: by the same receptors, and as radiance on a finer
     grid."""
-    world, light = worlds.simulation.world, worlds.renderer.fidelity.light
+    world, seen = worlds.simulation.world, worlds.renderer.fidelity
     perfect = replace(eyes, optics=None)
     factor = max(1, -(-FINE_PIXELS // max(eyes.resolution)))
     fine = replace(perfect, resolution=(factor * eyes.resolution[0], factor * eyes.resolution[1]))
-    fidelity = sim.Fidelity(FINE_RAYS, eyes.bands, light=light)
+    fidelity = sim.Fidelity(FINE[seen.samples], eyes.bands, light=seen.light, samples=seen.samples)
     receptors, pictures = (sim.BatchedRenderer(world, e, 1, fidelity) for e in (perfect, fine))
     scenes = [states.take(np.array([t])) for t in range(states.n)]
     frames = np.arange(0, states.n, every)

@@ -1,8 +1,10 @@
 """The command `evolve`.
 
-main         arguments, exit codes
+main         exit codes
+arguments    arguments of all commands, and suggestions for what was mistyped
 commands     what each command does
 output       the one door to the terminal
+waiting      a bar for every other wait
 progress     how a run is going
 run_plan     what a run is going to do
 pace         how fast this machine is

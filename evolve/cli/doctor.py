@@ -10,8 +10,10 @@ import sys
 from importlib import metadata
 
 from optics.numerics import backend
+from optics.numerics.device import device
+from rhabdom.importing import namesakes
 
-__all__ = ["examine", "print_findings"]
+__all__ = ["examine", "print_findings", "unsupported"]
 
 PACKAGES = (
     "rhabdom",
@@ -23,10 +25,15 @@ PACKAGES = (
     "torch",
     "gymnasium",
     "stable-baselines3",
-    "nevergrad",
-    "colour-science",
-    "OpenEXR",
     "safetensors",
+    "nevergrad",
+    "OpenEXR",
+    "matplotlib",
+    "rich",
+    "shtab",
+    "scikit-image",
+    "tomli-w",
+    "pandas",
 )
 # One child process loads Mitsuba (its import alone can fail on a broken installation) and renders in each variant.
 RENDER = """
@@ -44,8 +51,16 @@ for name in sys.argv[1:]:
 """
 
 
+def unsupported(platform_name: str = sys.platform) -> str | None:
+    """One line where the system cannot run evolutions: processes and locks are those of Linux and macOS."""
+    if platform_name in ("linux", "darwin"):
+        return None
+    return f"{platform_name}: is not supported; must be Linux or macOS (on Windows: in WSL 2, which is Linux)"
+
+
 def examine() -> dict[str, object]:
-    """Findings as a dictionary: python, machine, packages, llvm (every library tried), variants, gpu, good."""
+    """Findings as a dictionary: python, machine, packages, llvm (every library tried), variants, gpu, device, notes,
+    good."""
     chosen, tried = backend.find(cached=False)
     environment = {**os.environ, backend.VARIABLE: chosen.path} if chosen else dict(os.environ)
     wanted = ["scalar_spectral"] + (["llvm_ad_spectral"] if chosen else [])
@@ -55,16 +70,22 @@ def examine() -> dict[str, object]:
     variants = _render(wanted, environment)
     packages = {name: _version(name) for name in PACKAGES}
     works = variants.get("scalar_spectral") == variants.get("llvm_ad_spectral") == "works"
+    refused = unsupported()
     return {
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}, {len(os.sched_getaffinity(0))} cores"
         if hasattr(os, "sched_getaffinity")
         else f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "gpu": gpu or "none",
+        "device": _device(),
         "packages": packages,
         "llvm": [vars(llvm) for llvm in tried],
         "variants": variants,
-        "good": works and "not installed" not in packages.values(),
+        "notes": [*([refused] if refused else []), *namesakes()],
+        "good": works
+        and refused is None
+        and not _device().startswith("refused")
+        and "not installed" not in packages.values(),
     }
 
 
@@ -73,6 +94,14 @@ def _version(name: str) -> str:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return "not installed"
+
+
+def _device() -> str:
+    """Where PSFs, eyes and rays are computed."""
+    try:
+        return device()
+    except backend.BackendError as error:
+        return f"refused: {error}"
 
 
 def _gpu() -> str:
@@ -105,13 +134,16 @@ def print_findings(as_json: bool = False) -> int:
 
 def _lines(findings: dict[str, object]) -> list[str]:
     packages, variants, tried = findings["packages"], findings["variants"], findings["llvm"]
+    notes = findings["notes"]
     assert isinstance(packages, dict)
+    assert isinstance(notes, list)
     assert isinstance(variants, dict)
     assert isinstance(tried, list)
     lines = [
         f"{'python':<20}{findings['python']}",
         f"{'machine':<20}{findings['machine']}",
         f"{'gpu':<20}{findings['gpu']}",
+        f"{'device':<20}{findings['device']} for PSFs, eyes and rays; cpu for physics and learning",
     ]
     lines += [f"{name:<20}{version}" for name, version in packages.items()]
     for llvm in tried:
@@ -122,6 +154,7 @@ def _lines(findings: dict[str, object]) -> list[str]:
         )
         lines.append(f"{'llvm':<20}{llvm['path']}: {note}")
     lines += [f"{'variant':<20}{name}: {state}" for name, state in variants.items()]
+    lines += [f"{'note':<20}{note}" for note in notes]
     if not any(llvm["verdict"] == "good" for llvm in tried):
         lines.append(f"remedy: {backend.REMEDY}")
     lines.append("all good" if findings["good"] else "not good: see the lines above")

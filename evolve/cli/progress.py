@@ -16,7 +16,7 @@ from evolve.search.successive_halving import evaluations
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 
-__all__ = ["Bar", "Events", "Lines", "Tally", "Watchers", "clock", "watcher"]
+__all__ = ["Bar", "Events", "Lines", "Silent", "Tally", "Watchers", "clock", "watcher"]
 
 EVENT_S = 1.0  # least time between two events of one candidate's training
 
@@ -126,6 +126,10 @@ class _Watcher:
 
     def evaluated(self, candidate: Candidate) -> None:
         self.tally.evaluated(candidate)
+
+
+class Silent(_Watcher):
+    """Watcher that says nothing."""
 
 
 class Lines(_Watcher):

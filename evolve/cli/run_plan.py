@@ -17,12 +17,12 @@ from evolve.genome.genes import CLUSTERS
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import Phenotype, develop
 from evolve.search.local_executor import cores
-from evolve.search.successive_halving import budgets, evaluations, sizes, stage_steps
+from evolve.search.successive_halving import budgets, evaluations, sizes, stage_steps, trained_steps
 from evolve.search.successive_halving import steps as total_steps
 from evolve.store.candidate import Candidate
 from evolve.store.evaluation import Evaluation
 
-__all__ = ["RunPlan"]
+__all__ = ["RunPlan", "steps_each"]
 
 REPORT_BYTES = 5_000_000  # chosen: an allowance for pages; the report of eight candidates has 0.6 MB (`evolve report`)
 # The exported episode as evolve.analysis.episode records it, which would load torch; tests hold these to it.
@@ -104,7 +104,7 @@ class RunPlan:
 
     def lines(self) -> list[str]:
         """The plan as text."""
-        config, learning = self.config, self.config.learning
+        config = self.config
         search, genotype = config.search, Genotype(config.genome)
         order = "steady state" if search.steady_state else "generation by generation"
         lines = [
@@ -112,7 +112,7 @@ class RunPlan:
             f"search         {search.optimizer}, {order}, on {self.workers} workers",
             f"evaluations    {search.generations} generations x {search.population} candidates = {config.candidates:,}",
             *self._budget_stages(),
-            f"steps          up to {learning.total_steps:,} each, {total_steps(config):,} in all",
+            f"steps          up to {steps_each(config)} each, {total_steps(config):,} in all",
             f"genes open     {genotype.dimension} of {len(config.genome)}",
             *_gene_lines(config),
         ]
@@ -148,6 +148,14 @@ class RunPlan:
             "free_bytes": self.free_bytes,
             "notes": self.notes(),
         }
+
+
+def steps_each(config: RunConfig) -> str:
+    """Steps of one training, with what was asked for where that is not whole rollouts."""
+    learning = config.learning
+    trained = trained_steps(learning, 0, learning.total_steps)
+    rounded = f" ({learning.total_steps:,} rounded up to rollouts of {learning.n_envs * learning.n_steps:,})"
+    return f"{trained:,}{rounded if trained != learning.total_steps else ''}"
 
 
 def _gene_lines(config: RunConfig) -> list[str]:

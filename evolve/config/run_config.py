@@ -167,6 +167,12 @@ class RunConfig:
                 *(f"genome.{name}.opens_at" for name in opening),
             )
 
+    def __repr__(self) -> str:
+        """Short: there are some 150 settings."""
+        search, steps = self.search, self.learning.total_steps
+        plan = f"{search.generations} generations x {search.population} candidates x {steps:,} steps"
+        return f"<RunConfig {self.task}, seed {self.seed}, {plan}>"
+
     @property
     def candidates(self) -> int:
         """Evaluations in the whole run."""

@@ -57,7 +57,9 @@ class EyeConfig:
         False, None, "reliefs stay the same when mirrored or turned by 90 degrees, so an eighth of the genes is enough"
     )
     rays_per_receptor: float | str = setting(
-        AUTO, Interval(0, 4096, open_low=True), "rays traced per receptor and frame; auto: as few as the noise allows"
+        AUTO,
+        Interval(0, 4096, open_low=True),
+        "rays traced per receptor and frame; auto: as few as the noise allows, or areas",
     )
     square: bool = setting(
         False, None, "eyes are square: the gene resolution in place of resolution_height and resolution_width"
@@ -154,7 +156,9 @@ class LearningConfig:
         "steps until contact costs its full price: a tenth of it for a third of them, then rising exponentially",
     )
     rays_per_receptor: float = setting(
-        8.0, Interval(0, 4096, open_low=True), "most rays per receptor and frame in training and in its checkpoints"
+        8.0,
+        Interval(0, 4096, open_low=True),
+        "most rays, or areas, per receptor and frame in training and in its checkpoints",
     )
     least_return: float = setting(
         0.0, Interval(-1e6, 0), "a training episode whose rewards add up to no more is truncated; 0: none is"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from functools import reduce
 from importlib import resources
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from evolve.config.run_config import TASKS
 __all__ = [
     "SCALES",
     "parsed_toml",
+    "preset_about",
     "preset_names",
     "preset_sources",
     "read_assignment",
@@ -30,6 +33,16 @@ def preset_names() -> list[str]:
     """Names that `preset` takes."""
     folder = resources.files("evolve") / "presets"
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def preset_about(name: str) -> dict[str, Any]:
+    """A preset's name, its task (None: any), its scales, and what it is for: the first sentence of its file."""
+    text = (resources.files("evolve") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    tree = tomllib.loads(text)
+    remarks = " ".join(line.removeprefix("# ") for line in takewhile(lambda line: line[:1] == "#", text.split("\n")))
+    about = re.match(r".*?[.?](?= |$)", remarks)
+    scales = list(tree.get("scales", {}))
+    return {"name": name, "task": tree.get("task"), "scales": scales, "about": about[0] if about else remarks}
 
 
 def preset_sources(name: str | None, scale: str | None) -> list[Source]:

@@ -18,7 +18,7 @@ from evolve.learning.training_stage import TrainingStage
 from evolve.store.evaluation import Evaluation
 from sim.envs.assembly import prepared_scene, vec_env_in
 from sim.envs.vec_env import EyesVecEnv
-from sim.render.fidelity import fidelity_for
+from sim.render.fidelity_choice import fidelity_for
 
 __all__ = ["evaluate"]
 

@@ -3,6 +3,8 @@
 write            the report of a run: one HTML file
 page             its sections
 tables           its numbers
+lineup           first and best animal, and those between
+agent_figure     an animal's head and eyes
 figures          figures of a whole run
 eye_figures      figures of one eye's optics
 ground_plan      where an episode plays

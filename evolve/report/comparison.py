@@ -10,7 +10,7 @@ from typing import Any
 
 from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, generation_statistics
 from evolve.report.figures import comparison_figure
-from evolve.report.markup import document, figure, html, section, table
+from evolve.report.markup import document, duration, figure, html, section, table
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run
 
@@ -85,7 +85,7 @@ def _column(one: Mapping[str, Any]) -> dict[str, str]:
         "task": one["task"],
         "evaluated": f"{one['evaluated']} of {one['planned']}" + (f", {one['failed']} failed" * bool(one["failed"])),
         "steps trained": f"{one['steps']:,}",
-        "hours, all workers": f"{one['hours']:.2f}",
+        "time, all workers": duration(3600 * one["hours"]),
     }
     if one["best"] is None:
         return column | dict.fromkeys(OF_THE_BEST, "-")

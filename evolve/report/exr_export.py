@@ -15,13 +15,16 @@ from evolve.store.regular_files import folder, require_regular
 __all__ = ["export_episode", "export_run"]
 
 
-def export_run(run: Run, candidate_id: int | None = None, seed: int = 0) -> list[Path]:
-    """Record an episode (default: of the best candidate) and write it under the run's `exr/`; returns the files.
+def export_run(run: Run, candidate_id: int | None = None, seed: int = 0, out: Path | None = None) -> list[Path]:
+    """Record an episode (default: of the best candidate) and write it to the folder `out`, the run's `exr/` if None;
+    returns the files.
 
     Raises:
         RunError: there is no such candidate, or no policy of it.
     """
-    return export_episode(record(run, candidate_id, seed), run.path / "exr")
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
+    return export_episode(record(run, candidate_id, seed), out or run.path / "exr")
 
 
 def export_episode(episode: Episode, directory: Path) -> list[Path]:

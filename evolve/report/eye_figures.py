@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Circle, Rectangle
@@ -17,12 +16,12 @@ from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.report.markup import Html, figure, html, joined, key, rounded
 from evolve.report.svg import drawing, inline
-from evolve.report.theme import ACCENT, INK, MUTED, VERMILLION
+from evolve.report.theme import ACCENT, INK, LINES, MUTED, VERMILLION
 from optics.eye.summary import noise_of
 from optics.numerics.precision import precision
 from optics.spectra.bands import daylight
 
-__all__ = ["eye_figures", "relief_heights"]
+__all__ = ["DECADES", "WhiteLight", "eye_figures", "middle_of_psf", "relief_heights"]
 
 SIZE = (370, 310)
 PIXELS = 161  # of a picture, at most: fine enough for its size on the page
@@ -108,7 +107,7 @@ def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
 
 def _psf(light: WhiteLight) -> Html:
     """The polychromatic PSF, logarithmic, with a receptor's outline."""
-    picture, half = _shown(light)
+    picture, half = middle_of_psf(light)
     edge, pitch = 1e6 * half, 1e6 * light.eye.receptor_pitch
     peak = picture.max()
     with drawing(*SIZE) as drawn:
@@ -135,7 +134,7 @@ def _psf(light: WhiteLight) -> Html:
     return figure(svg, caption)
 
 
-def _shown(light: WhiteLight) -> tuple[np.ndarray, float]:
+def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
     """The middle of the PSF that holds most of the light, averaged to at most PIXELS, and its half width [m]."""
     image, dx = light.white.psf[0], light.white.dx
     middle = image.shape[0] // 2
@@ -154,15 +153,14 @@ def _shown(light: WhiteLight) -> tuple[np.ndarray, float]:
 def _cuts(light: WhiteLight) -> Html:
     """Each band's PSF along x through the axis."""
     psf = light.psf
-    _, half = _shown(light)
+    _, half = middle_of_psf(light)
     inside = np.abs(psf.x) <= half
     row = psf.psf.shape[1] // 2
     cuts = psf.psf[:, row][:, inside] / 1e12
     with drawing(*SIZE) as drawn:
         axes = drawn.subplots()
         chosen = np.unique(np.linspace(0, len(cuts) - 1, min(len(cuts), 6)).astype(int))
-        for band in chosen:
-            colour = colormaps["viridis"](0.1 + 0.75 * band / max(len(cuts) - 1, 1))
+        for band, colour in zip(chosen, LINES, strict=False):
             label = f"{1e9 * psf.wavelengths[band]:.0f} nm"
             axes.semilogy(1e6 * psf.x[inside], cuts[band], color=colour, lw=1.2, label=label)
         axes.set(xlim=(-1e6 * half, 1e6 * half), ylim=(cuts.max() * 10.0**-DECADES, 2 * cuts.max()))

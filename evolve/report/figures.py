@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +13,7 @@ from evolve.analysis.genealogy import descent, nearest_parent
 from evolve.analysis.statistics import GenerationStatistics, Trajectory, bootstrap_interval, champions, succeeded
 from evolve.report.markup import Html
 from evolve.report.svg import drawing, inline, label
-from evolve.report.theme import ACCENT, LINE, MUTED, VERMILLION
+from evolve.report.theme import ACCENT, LINE, LINES, MUTED, VERMILLION
 from evolve.store.candidate import Candidate
 
 __all__ = [
@@ -29,6 +28,7 @@ __all__ = [
 ]
 
 SIZE = (370, 260)
+DASHES = ("-", "--", ":", "-.")  # of more lines than there are colours
 Generations = Sequence[int] | NDArray[np.int64]
 
 
@@ -53,9 +53,9 @@ def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> H
     with drawing(740, 320) as figure:
         axes = figure.subplots()
         for place, (name, rows) in enumerate(curves.items()):
-            colour = colormaps["viridis"](0.05 + 0.8 * place / max(len(curves) - 1, 1))
+            colour, dashes = LINES[place % len(LINES)], DASHES[place // len(LINES) % len(DASHES)]
             generations, best = [row.generation for row in rows], [row.best_so_far for row in rows]
-            axes.plot(generations, best, color=colour, lw=2, marker="o", ms=4, label=label(name))
+            axes.plot(generations, best, color=colour, ls=dashes, lw=2, marker="o", ms=4, label=label(name))
         longest = max((len(rows) for rows in curves.values()), default=1)
         _generation_axis(axes, range(longest))
         axes.set_ylabel("best fitness so far")
@@ -81,11 +81,20 @@ def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
             if parent is not None and succeeded(parent):
                 axes.plot(*zip(place(parent), place(candidate), strict=True), color=MUTED, alpha=0.25, lw=0.7)
         _candidates(axes, candidates, [c.fitness for c in candidates])
+        _links(axes, candidates, place)
         line = [candidate for candidate in descent(best, candidates) if succeeded(candidate)]
         axes.plot(*zip(*map(place, line), strict=True), color=ACCENT, lw=2, marker="o", ms=4)
         _generation_axis(axes, sorted({candidate.generation for candidate in candidates}))
         axes.set_ylabel("fitness (mean return)")
         return inline(figure, "genealogy", f"Descent of candidate {best.id} over {len(line)} generations of its line.")
+
+
+def _links(axes: Axes, candidates: Sequence[Candidate], place: Callable[[Candidate], tuple[float, float]]) -> None:
+    """A place to click over each candidate's dot, which leads to its row of the table."""
+    good = [candidate for candidate in candidates if succeeded(candidate)]
+    x, y = np.transpose([place(candidate) for candidate in good])
+    dots = axes.scatter(x, y, s=90, color=ACCENT, alpha=0.0)
+    dots.set_urls([f"#candidate-{candidate.id}" for candidate in good])
 
 
 def vision_figure(name: str, label: str, generations: Sequence[int], values: Sequence[float]) -> Html:

@@ -20,7 +20,9 @@ from typing import Any
 __all__ = [
     "Html",
     "asset",
+    "contents",
     "document",
+    "duration",
     "exact",
     "figure",
     "html",
@@ -103,20 +105,33 @@ def rounded(value: float, digits: int = 3) -> str:
     return f"{value:,.{decimals}f}".replace(",", " ").replace("-", "−")
 
 
+def duration(seconds: float) -> str:
+    """Seconds below two minutes, minutes below two hours, hours below two days, then days."""
+    for unit, name in ((86400, "days"), (3600, "h"), (60, "min")):
+        if seconds >= 2 * unit:
+            return f"{rounded(seconds / unit, 2)} {name}"
+    return f"{rounded(seconds, 2)} s"
+
+
 def exact(value: float) -> str:
     """A setting or a whole number, with no more digits than it has."""
     return f"{value:g}".replace("-", "−")
 
 
 def table(
-    header: Sequence[str | Html], rows: Iterable[Sequence[str | Html]], name: str, highlight: int | None = None
+    header: Sequence[str | Html],
+    rows: Iterable[Sequence[str | Html]],
+    name: str,
+    highlight: int | None = None,
+    ids: Sequence[str] = (),
 ) -> Html:
-    """A table that scrolls sideways where it must; row `highlight` stands out."""
+    """A table that scrolls sideways where it must; row `highlight` stands out, and `ids` name its rows."""
     head = joined(html('<th scope="col">{}</th>', cell) for cell in header)
     body = joined(
         html(
-            "<tr{}>{}</tr>\n",
+            "<tr{}{}>{}</tr>\n",
             html(" class=best") if i == highlight else Html(),
+            html(' id="{}"', ids[i]) if ids else Html(),
             joined(html("<td>{}</td>", cell) for cell in row),
         )
         for i, row in enumerate(rows)
@@ -135,6 +150,13 @@ def figure(content: Html, caption: Html, kind: str = "") -> Html:
 
 def section(name: str, title: str, content: Html) -> Html:
     return html('<section id="{}"><h2>{}</h2>\n{}</section>\n', name, title, content)
+
+
+def contents(page: Html) -> Html:
+    """Links to a page's sections."""
+    found = re.findall(r'<section id="([^"]+)"><h2>([^<]*)</h2>', page.markup)
+    links = joined(html('<a href="#{}">{}</a> ', Html(name), Html(title)) for name, title in found)
+    return html('<nav class="contents" aria-label="Contents">{}</nav>\n', links)
 
 
 def json_script(value: Any, kind: str) -> Html:

@@ -22,7 +22,8 @@ from evolve.report.figures import (
     vision_figure,
 )
 from evolve.report.ground_plan import GroundPlan
-from evolve.report.markup import Html, document, figure, html, joined, key, rounded, section
+from evolve.report.lineup import lineup
+from evolve.report.markup import Html, contents, document, figure, html, joined, key, rounded, section
 from evolve.report.player import episode_sentence, player
 from evolve.report.views import what_it_sees
 from evolve.store.candidate import Candidate
@@ -44,9 +45,34 @@ def header(run: Run) -> Html:
     task = run.config.task
     return html(
         '<header><p class="kicker">rhabdom · evolution report · {}</p>\n<h1>{}</h1>\n'
-        "<p>Eyes and brains evolved to {}.</p>\n{}</header>\n",
-        *(run.path.resolve().name, task.capitalize(), TASKS[task], tables.headline(run)),
+        "<p>Eyes and brains evolved to {}. {}</p>\n</header>\n",
+        *(run.path.resolve().name, task.capitalize(), TASKS[task], _best_in_a_sentence(run)),
     )
+
+
+def _best_in_a_sentence(run: Run) -> Html:
+    """Who is the best, and how well it does."""
+    if (best := run.best) is None:
+        return Html()
+    animal = best.phenotype
+    eyes = (
+        f"{animal.n_eyes} eye{'s' * (animal.n_eyes > 1)} of {animal.resolution[0]} × {animal.resolution[1]} receptors"
+    )
+    return html(
+        '<a href="#candidate-{}">Candidate {}</a>, the best of {}, has {}, and solved {} of its {} evaluation '
+        "episodes.",
+        *(best.id, best.id, len(run.candidates), eyes, round(best.success_rate * len(best.returns)), len(best.returns)),
+    )
+
+
+def animals_section(run: Run) -> Html:
+    """First and best, side by side."""
+    shown = lineup(run)
+    return section("animals", "First and best", shown) if shown else Html()
+
+
+def numbers_section(run: Run) -> Html:
+    return section("numbers", "The run in numbers", tables.headline(run))
 
 
 def fitness_section(run: Run) -> Html:
@@ -75,7 +101,8 @@ def fitness_section(run: Run) -> Html:
         )
         figures += figure(learning_figure(run.candidates, best), caption)
         caption = html(
-            "<b>Genealogy.</b> Each candidate and the nearest of its parents; {} the line of candidate {}: {}.",
+            "<b>Genealogy.</b> Each candidate and the nearest of its parents (click one for its row in the table); "
+            "{} the line of candidate {}: {}.",
             *(key("accent"), best.id, ", ".join(str(c.id) for c in descent(best, run.candidates))),
         )
         figures += figure(genealogy_figure(run.candidates, best), caption)
@@ -182,15 +209,17 @@ def best_section(run: Run, best: Candidate, episode: Episode) -> Html:
 
 def episode_section(run: Run, episode: Episode) -> Html:
     content = html("<p>{}</p>\n{}", episode_sentence(episode), player(episode, GroundPlan.of(episode)))
-    return section("episode", "An episode", content)
+    return section("episode", "The best animal at its task", content)
 
 
 def render(run: Run, episode: Episode | None) -> bytes:
     """The whole page; without an episode where no candidate has succeeded."""
-    parts = [header(run), fitness_section(run), genes_section(run), vision_section(run)]
     if (best := run.best) is not None and episode is not None:
-        parts += [best_section(run, best, episode), episode_section(run, episode)]
+        parts = [episode_section(run, episode), animals_section(run), best_section(run, best, episode)]
     else:
-        parts += [section("best", "The best eye", html("<p>No candidate has been evaluated successfully.</p>\n"))]
+        parts = [section("best", "The best eye", html("<p>No candidate has been evaluated successfully.</p>\n"))]
+    parts += [numbers_section(run), fitness_section(run), genes_section(run), vision_section(run)]
     parts += [candidates_section(run), facts_section(run)]
-    return document(f"{run.config.task} · {run.path.resolve().name}", joined(parts), ["player.js"])
+    body = joined(parts)
+    title = f"{run.config.task} · {run.path.resolve().name}"
+    return document(title, joined([header(run), contents(body), body]), ["player.js", "lineup.js"])

@@ -273,12 +273,12 @@
       const inside = root.contains(event.target);
       if (event.altKey || event.ctrlKey || event.metaKey || event.target === speed) return;
       const step = event.shiftKey ? 10 : 1;
-      const moves = { ArrowLeft: frame - step, ArrowRight: frame + step };
-      if (inside) Object.assign(moves, { Home: 0, End: last });
+      if (!inside) return;  // the page scrolls, as readers expect
+      const moves = { ArrowLeft: frame - step, ArrowRight: frame + step, Home: 0, End: last };
       if (event.key in moves) {
         play(false);
         show(moves[event.key]);
-      } else if (event.key === " " && inside && event.target !== button) play(!playing);
+      } else if (event.key === " " && event.target !== button) play(!playing);
       else return;
       event.preventDefault();
     }

@@ -43,7 +43,12 @@ def player(episode: Episode, stage: GroundPlan) -> Html:
     """The player's element; the page that holds it needs player.js."""
     film = json_script(_film(episode, stage), "film")
     left, right = _world(stage) + _controls(episode), _sights(stage) + _score(episode)
-    return html('<div class="player"><div>{}</div><div>{}</div>{}</div>\n', left, right, film)
+    return html(
+        '<div class="player" tabindex="0" role="group" aria-label="Replay"><div>{}</div><div>{}</div>{}</div>\n',
+        left,
+        right,
+        film,
+    )
 
 
 def _world(stage: GroundPlan) -> Html:
@@ -122,7 +127,7 @@ def _score(episode: Episode) -> Html:
     return html(
         '<figure class="score"><canvas class="rewards" role="img" aria-label="Cumulated reward terms over time">'
         "</canvas><dl>{}</dl><figcaption><b>Reward so far</b> (dimensionless), by term, weighted as in fitness; "
-        "the action at this instant counted in. Arrow keys step (with shift: ten steps), space plays."
+        "the action at this instant counted in. In the player, arrow keys step (with shift: ten steps) and space plays."
         "</figcaption></figure>\n",
         cells,
     )

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from evolve.analysis.episode import Episode, record
 from evolve.report.player import write_player
 from evolve.report.rerun_recording import require_rerun, write_recording
 from evolve.store.directory import Run
 
-__all__ = ["episode_table", "write_replay"]
+__all__ = ["episode_facts", "episode_table", "write_replay"]
 
 
-def write_replay(run: Run, candidate_id: int | None = None, seed: int = 0, rrd: bool = False) -> list[Path]:
-    """Record an episode (default: of the best candidate), print how it went, and write a page that plays it; with `rrd`
-    a recording for rerun as well.
+def write_replay(
+    run: Run, candidate_id: int | None = None, seed: int = 0, rrd: bool = False, out: Path | None = None
+) -> tuple[Episode, list[Path]]:
+    """Record an episode (default: of the best candidate) and write a page that plays it; with `rrd` a recording for
+    rerun as well.
 
-    Returns the paths, in the run directory.
+    out: the page's file; in the run directory if None
+    Returns the episode, and the paths.
 
     Raises:
         RunError: there is no such candidate, or no policy of it.
@@ -25,28 +29,39 @@ def write_replay(run: Run, candidate_id: int | None = None, seed: int = 0, rrd: 
     if rrd:
         require_rerun()
     episode = record(run, candidate_id, seed)
-    print(episode_table(episode))
-    path = run.path / f"replay_candidate{episode.candidate_id:06d}_seed{seed}.html"
+    path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{seed}.html"
+    path.parent.mkdir(parents=True, exist_ok=True)
     page = write_player(episode, path)
-    return [page, write_recording(episode, path.with_suffix(".rrd"))] if rrd else [page]
+    return episode, [page, write_recording(episode, path.with_suffix(".rrd"))] if rrd else [page]
+
+
+def episode_facts(episode: Episode) -> dict[str, Any]:
+    """How an episode went: return, what it is made of, and what was reached."""
+    terms = episode.reward_terms
+    return {
+        "task": episode.task,
+        "candidate": episode.candidate_id,
+        "episode seed": episode.seed,
+        "actions": len(episode),
+        "return": float(episode.reward.sum()),
+        "terms": {name: float(term.sum()) for name, term in terms.items()},
+        "goals reached": int((terms["goal"] != 0).sum()),
+        "adversaries reached": int((terms["adversary"] != 0).sum()),
+        "actions in contact": int(episode.contact.sum()),
+        "solved": solved(episode),
+    }
 
 
 def episode_table(episode: Episode) -> str:
-    """How an episode went: return, what it is made of, and what was reached, one line each."""
-    terms = {name: float(term.sum()) for name, term in episode.reward_terms.items()}
-    events = {name: int((episode.reward_terms[name] != 0).sum()) for name in ("goal", "adversary")}
-    rows = [
-        ("task", episode.task),
-        ("candidate", str(episode.candidate_id)),
-        ("episode seed", str(episode.seed)),
-        ("actions", str(len(episode))),
-        ("return", f"{episode.reward.sum():.2f}"),
-        *((f"  {name}", f"{value:.2f}") for name, value in terms.items()),
-        ("goals reached", str(events["goal"])),
-        ("adversaries reached", str(events["adversary"])),
-        ("actions in contact", str(int(episode.contact.sum()))),
-        ("solved", "yes" if solved(episode) else "no"),
-    ]
+    """The same, one line each."""
+    rows: list[tuple[str, str]] = []
+    for name, value in episode_facts(episode).items():
+        if isinstance(value, dict):
+            rows += [(f"  {term}", f"{total:.2f}") for term, total in value.items()]
+        elif isinstance(value, bool):
+            rows.append((name, "yes" if value else "no"))
+        else:
+            rows.append((name, f"{value:.2f}" if isinstance(value, float) else str(value)))
     width = max(len(name) for name, _ in rows)
     return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
 

@@ -85,7 +85,9 @@ def _with_looks(text: str) -> Html:
 
 
 def _with_own_ids(text: str, name: str) -> str:
-    """Only the ids that something refers to, marked with the figure's name."""
-    used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', text))
+    """Only the ids that something refers to, marked with the figure's name; links to other places stay as they are."""
+    used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', text)) & set(re.findall(r' id="([^"]+)"', text))
     text = re.sub(r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", text)
-    return re.sub(r'(url\(#|href="#)', rf"\1{name}-", text)
+    return re.sub(
+        r'(url\(#|href="#)([^")]+)', lambda m: f"{m[1]}{name}-{m[2]}" if m[2] in used else f"{m[1]}{m[2]}", text
+    )

@@ -6,7 +6,7 @@ from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, gene_valu
 from evolve.config.assemble import to_toml
 from evolve.genome.genes import ALL_GENES
 from evolve.genome.phenotype import Phenotype
-from evolve.report.markup import Html, exact, html, joined, rounded, table
+from evolve.report.markup import Html, duration, exact, html, joined, rounded, table
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.versions import recorded
@@ -18,7 +18,7 @@ def headline(run: Run) -> Html:
     """The numbers one asks for first."""
     failed = sum(not succeeded(c) for c in run.candidates)
     generations = len({c.generation for c in run.candidates})
-    hours = sum(c.seconds for c in run.candidates) / 3600
+    seconds = sum(c.seconds for c in run.candidates)
     steps = sum(c.steps for c in run.candidates)
     tiles = [
         (
@@ -28,7 +28,7 @@ def headline(run: Run) -> Html:
         ),
         ("Generations", f"{generations}", f"of {run.config.search.generations} planned"),
         ("Training", f"{rounded(steps / 1e6)} M", "agent steps, all candidates"),
-        ("Evaluation time", f"{rounded(hours)} h", "training and evaluation, summed over workers"),
+        ("Evaluation time", duration(seconds), "training and evaluation, summed over workers"),
     ]
     if (best := run.best) is not None:
         tiles = [*_best_tiles(best), *tiles]
@@ -80,7 +80,8 @@ def all_candidates(run: Run) -> Html:
     ]
     best = run.best
     place = next((i for i, c in enumerate(run.candidates) if best is not None and c.id == best.id), None)
-    return table(header, [_candidate_row(c) for c in run.candidates], "all-candidates", place)
+    ids = [f"candidate-{c.id}" for c in run.candidates]
+    return table(header, [_candidate_row(c) for c in run.candidates], "all-candidates", place, ids)
 
 
 def _candidate_row(candidate: Candidate) -> list[str]:

@@ -9,13 +9,15 @@ if TYPE_CHECKING:
     from evolve.analysis.episode import Episode
     from evolve.store.directory import Run
 
-__all__ = ["write"]
+__all__ = ["FILE", "write"]
 
 FILE = "report.html"
 
 
-def write(run: Run, episode: Episode | None = None) -> Path:
+def write(run: Run, episode: Episode | None = None, out: Path | None = None) -> Path:
     """Write `report.html` of a run, whole or not at all, with an episode of the best candidate (default: played now).
+
+    out: another file to write to
 
     The same run gives the same bytes with the same versions of the libraries.
 
@@ -28,6 +30,7 @@ def write(run: Run, episode: Episode | None = None) -> Path:
 
     if episode is None and run.best is not None:
         episode = record(run)
-    path = run.path / FILE
+    path = out or run.path / FILE
+    path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, render(run, episode))
     return path

@@ -19,7 +19,18 @@ from evolve.config.numbering import generation_ids
 from evolve.config.run_config import LearningConfig, RunConfig, SearchConfig
 from evolve.store.directory import Run
 
-__all__ = ["budgets", "complete", "evaluations", "finished", "promoted", "reaching", "sizes", "stage_steps", "steps"]
+__all__ = [
+    "budgets",
+    "complete",
+    "evaluations",
+    "finished",
+    "promoted",
+    "reaching",
+    "sizes",
+    "stage_steps",
+    "steps",
+    "trained_steps",
+]
 
 
 def budgets(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
@@ -39,9 +50,20 @@ def sizes(search: SearchConfig) -> tuple[int, ...]:
 
 def steps(config: RunConfig) -> int:
     """Agent steps of the whole run, if all trainings take what they may."""
-    search = config.search
-    stages = zip(sizes(search), stage_steps(search, config.learning), strict=True)
-    return search.generations * sum(candidates * each for candidates, each in stages)
+    search, reached, total = config.search, 0, 0
+    for candidates, end in zip(sizes(search), budgets(search, config.learning), strict=True):
+        before, reached = reached, trained_steps(config.learning, reached, end)
+        total += candidates * (reached - before)
+    return search.generations * total
+
+
+def trained_steps(learning: LearningConfig, begin: int, end: int) -> int:
+    """Steps that a training from `begin` has come to when it stops at `end`: it goes on by whole rollouts of
+    n_envs x n_steps, evaluated every `eval_interval`."""
+    rollout, trained = learning.n_envs * learning.n_steps, begin
+    while trained < end:
+        trained += rollout * math.ceil(min(learning.eval_interval, end - trained) / rollout)
+    return trained
 
 
 def evaluations(search: SearchConfig) -> int:

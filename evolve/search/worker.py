@@ -56,14 +56,14 @@ def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: C
 
 
 def prepare_device() -> None:
-    """Make Dr.Jit ready for work beside other workers: a proven LLVM library, one thread.
+    """Make Dr.Jit ready for work beside other workers: a proven LLVM library, or a GPU; one thread.
 
     Raises:
         BackendError: Dr.Jit cannot work here.
     """
-    from optics.numerics import backend
+    from optics.numerics import device
 
-    backend.require()
+    device.make_ready()
     import drjit
 
     drjit.set_thread_count(1)

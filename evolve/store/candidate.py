@@ -46,6 +46,11 @@ class Candidate:
     rung: int = 0
     policy: str | None = None
 
+    def __repr__(self) -> str:
+        """Short: a record holds thousands."""
+        outcome = f"failed: {self.failure}" if self.failure is not None else f"fitness {self.fitness:.4g}"
+        return f"<Candidate {self.id}, generation {self.generation}, {outcome}>"
+
     @property
     def place(self) -> Place:
         """Where it stands in the search."""

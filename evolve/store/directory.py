@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 from evolve.config.assemble import from_text, to_toml
 from evolve.config.formats import FORMAT, LAST_OF_FORMER, format_of
@@ -45,8 +46,14 @@ class Run:
     record: Record
     _lock: RunLock | None = None
 
+    def __repr__(self) -> str:
+        """Short: a record is long."""
+        best = "" if self.best is None else f", best fitness {self.best.fitness:.4g}"
+        evaluated = f"{len(self.candidates)} of {self.config.candidates} candidates evaluated"
+        return f"<Run {str(self.path)!r}: {self.config.task}, {evaluated}{best}>"
+
     @classmethod
-    def create(cls, path: Path | str, config: RunConfig, origin: str | None = None) -> Run:
+    def create(cls, path: Path | str, config: RunConfig, origin: str | None = None) -> Self:
         """New run in a directory that does not exist or is empty; `origin` names the animal that it starts from.
 
         Raises:
@@ -69,7 +76,7 @@ class Run:
         return cls(path, config, Record(path / CANDIDATES))
 
     @classmethod
-    def open(cls, path: Path | str) -> Run:
+    def open(cls, path: Path | str) -> Self:
         """A run as it is on disk.
 
         Raises:

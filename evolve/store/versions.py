@@ -13,6 +13,7 @@ from typing import Any
 
 from evolve.store.atomic_files import write_whole
 from evolve.store.regular_files import read
+from optics.numerics.device import device
 
 __all__ = ["altered", "fingerprint", "origin", "present", "record_start", "recorded"]
 
@@ -34,6 +35,7 @@ PACKAGES = (
 def present() -> dict[str, str]:
     """Versions of what decides a run's numbers, as they are now."""
     versions = {"python": platform.python_version(), "machine": platform.machine(), "commit": _commit()}
+    versions["device"] = device()
     for package in PACKAGES:
         try:
             versions[package] = metadata.version(package)

@@ -4,6 +4,7 @@ accuracy        Plan, AccuracyError: what a result promises
 arguments       checks of what users give
 autodiff        Array, Scalar: values that may carry derivatives
 backend         the LLVM library that Dr.Jit compiles with
+device          processor or GPU
 bessel          J0 on Dr.Jit arrays
 cost            what operations cost: how methods predict their time
 field           a sampled complex field

@@ -1,14 +1,16 @@
-"""Dr.Jit's types for one dtype, on the CUDA device where there is one and LLVM otherwise."""
+"""Dr.Jit's types for one dtype, on the device that is asked for."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from optics.numerics.autodiff import Array, Scalar, is_differentiable
+from optics.numerics.device import Device, make_ready
 
 __all__ = ["Precision", "opaque", "padded_for_packets", "precision"]
 
@@ -28,21 +30,21 @@ class Precision:
     complex_dtype: type[np.complexfloating]
 
 
-@lru_cache(maxsize=2)
 def precision(dtype: str = "float32") -> Precision:
     """The types for "float32" or "float64".
 
     Raises:
         ValueError: any other dtype.
-        BackendError: no LLVM that Dr.Jit can use.
+        BackendError: no LLVM, or no GPU, that Dr.Jit can use.
     """
     if dtype not in ("float32", "float64"):
         raise ValueError(f"dtype = {dtype!r}: must be 'float32' or 'float64'")
-    from optics.numerics.backend import require
+    return _precision(dtype, make_ready())
 
-    require()
-    import drjit.auto.ad as types
 
+@lru_cache(maxsize=4)
+def _precision(dtype: str, place: Device) -> Precision:
+    types = import_module("drjit.llvm.ad" if place == "cpu" else "drjit.cuda.ad")
     if dtype == "float32":
         return Precision(
             dtype, types.Float, types.TensorXf, types.Float64, types.TensorXf64, types.UInt32, np.complex64

@@ -15,7 +15,8 @@ from sim.envs.simulation import Simulation, check_least_return
 from sim.envs.vec_env import EyesVecEnv
 from sim.eyes.eyes import Eyes
 from sim.render.batched_renderer import BatchedRenderer
-from sim.render.fidelity import Fidelity, chosen_fidelity, fidelity_asked
+from sim.render.fidelity import Fidelity, fidelity_asked
+from sim.render.fidelity_choice import chosen_fidelity
 from sim.render.prepared_scene import PreparedScene
 from sim.tasks.reward import check_mode
 from sim.worlds.course import Course

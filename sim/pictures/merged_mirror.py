@@ -14,13 +14,13 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum
-from sim.render.frozen_kernels import aligned
 from sim.scene import lights, shapes, surfaces, tessellation
 from sim.scene.cameras import Viewpoint
+from sim.scene.device_arrays import aligned
 from sim.scene.mirror import VISIBLE_GROUPS, Mirror
 from sim.scene.shapes import Part
 from sim.scene.tessellation import Triangles
-from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject
+from sim.scene.variant import Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
 
 
@@ -31,7 +31,7 @@ class MergedMirror(Mirror):
     """
 
     def __init__(self, model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None = None) -> None:
-        super().__init__(model, None, bodies=None, groups=VISIBLE_GROUPS, variant=DEFAULT_VARIANT, spectra=spectra)
+        super().__init__(model, None, bodies=None, groups=VISIBLE_GROUPS, variant=default_variant(), spectra=spectra)
         planes = {g for g in self._parts if surfaces.geom_type(model, g) == mujoco.mjtGeom.mjGEOM_PLANE}
         outer = {f"geom_{g}_" for g in self._parts if g not in planes}
         self.closed = frozenset(

@@ -4,8 +4,12 @@ one_ray             see: one world, one ray for each receptor
 batched_renderer    BatchedRenderer: one wavefront
 wavefront           its kernel, and the poses that it reads
 reference_renderer  ReferenceRenderer: Mitsuba's integrators, slowly
-fidelity            choose_fidelity, Fidelity: as little work as noise allows
-fidelity_trials     a few random views on which that is tried
+fidelity            Fidelity: how finely, and why
+fidelity_choice     choose_fidelity: as little work as noise allows
+fidelity_stages     how that is chosen for bands, depth layers and light
+sample_choice       and for rays or areas
+fidelity_trials     trials of what was not chosen yet
+random_views        the views that they look through
 prepared_scene      PreparedScene: what choosing a fidelity and rendering both begin with
 band_error          what a few spectral bands make of measured colours
 memory_budget       whether there is memory for it

@@ -20,11 +20,13 @@ from optics.numerics.autodiff import Array
 from sim.eyes.eyes import Eyes, eye_positions, eye_rotations
 from sim.eyes.sensor import BoxSampling, Sensor
 from sim.render import memory_budget
-from sim.render.fidelity import AREAS, Fidelity, chosen_fidelity
+from sim.render.fidelity import AREAS, Fidelity
+from sim.render.fidelity_choice import chosen_fidelity
 from sim.render.frozen_kernels import garbage_kept
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.render.prepared_scene import PreparedScene
 from sim.render.wavefront import PoseBuffer, Wavefront
+from sim.scene.device_arrays import floats
 from sim.scene.variant import variant
 from sim.tracing import lighting
 from sim.tracing.areas.area_tracer import AreaTracer
@@ -83,8 +85,7 @@ class BatchedRenderer:
         self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.of)(fidelity.light)
         self._check_memory(n_envs)
         if isinstance(sampling, BoxSampling) and fidelity.samples == AREAS:
-            # What is upright has closed forms along columns of any height; spheres' outlines want rows, too.
-            self.sensor: Sensor = sampling.areas(fidelity.rays_per_receptor, in_rows=len(self._static.spheres) > 0)
+            self.sensor: Sensor = scene.area_sensor(sampling, fidelity.rays_per_receptor)
         else:
             self.sensor = sampling.sensor(fidelity.rays_per_receptor)
         if self.eye.pupil is None:  # a whole number of its own for every receptor
@@ -122,9 +123,9 @@ class BatchedRenderer:
         self._poses, self._slot = PoseBuffer(n_envs, len(self._static.spheres)), FrameSlot()
         with variant(self._static.variant):
             self._inputs = {
-                "directions": mi.Float(_in_agent_frame(self.eyes, self.sensor.directions)),
-                "origins": mi.Float(_in_fours(eye_positions(self.eyes.azimuths()), 0.0)),
-                "bounce_samples": mi.Float(self.sensor.bounce_samples.ravel()),
+                "directions": floats(_in_agent_frame(self.eyes, self.sensor.directions)),
+                "origins": floats(_in_fours(eye_positions(self.eyes.azimuths()), 0.0)),
+                "bounce_samples": floats(self.sensor.bounce_samples),
                 **self.tracer.inputs,
             }
             wavefront = Wavefront(n_envs, self.eyes.n_eyes, self.sensor, self.tracer, self._poses)
@@ -133,6 +134,7 @@ class BatchedRenderer:
             # the last receptors silently dark (tests/test_parameters.py runs each life twice and has met it).
             self._inputs["lanes"] = dr.arange(mi.UInt32, wavefront.lanes)
             dr.eval(self._inputs["lanes"])
+            self._inputs |= wavefront.sizes
             reduced = self.sensor.rays_per_receptor
             self._rays: Any = dr.freeze(lambda scene, poses, inputs: wavefront(scene, poses, inputs, 1))
             self._sums: Any = dr.freeze(lambda scene, poses, inputs: wavefront(scene, poses, inputs, reduced))

@@ -1,13 +1,16 @@
-"""A few random views of a world, on which numbers of rays are tried before any kernel is recorded.
+"""Views of a world on which ways of sampling it are tried before any kernel is recorded.
 
-A trial looks through some of an eye's receptors, at random places and headings of a world, and compares what it sees
-with what many times as many rays see. All is drawn with fixed seeds: the same world and eyes give the same answer.
+A trial looks through some of an eye's receptors and compares what it sees with what many times as many rays see. It is
+judged where that matters: over all receptors in views of any place, and over those that see an object in views in
+which there is one near, lest what decides over an agent's life vanish among receptors that see floor and wall. All is
+drawn with fixed seeds: the same world and eyes give the same answer.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
@@ -15,68 +18,37 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.eyes.depth_layers import DepthLayers
-from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.eyes.sensor import BoxSampling, EyeSampling, Trial
-from sim.render.frozen_kernels import aligned
 from sim.render.prepared_scene import PreparedScene
+from sim.render.random_views import RandomViews, near_views, on_objects, random_views
+from sim.scene.device_arrays import floats
 from sim.scene.variant import variant
-from sim.tasks.placement import CLEARANCE
 from sim.tracing import lighting
-from sim.worlds.world import World
+from sim.tracing.areas.patch import Area
 
 # Choices: how much a trial may cost, and how much finer than what it tries its truth is.
 RECEPTORS = 24  # looked through, at most
 RAYS = 2**19  # of one trial, at most, unless that leaves too few views
+TRUE_RAYS = 2**21  # the same of a truth for areas
 VIEWS = (12, 96)  # of one trial, at least and at most
 FINER = 8  # times as many rays, at least, for what is taken as the truth
 TRUE = 4096  # rays of it, at least, behind a pupil
+TRUE_AREA = (1024, 8192)  # rays of it for each receptor, at least and at most, where areas are tried
 WEIGHTS = 2**23  # of it, at most, unless it would not be finer
-# [m] from a cell's centre, along either axis: less than half a cell without the agent's body, 1 - 0.2.
-STRAY = 0.75
+ON_OBJECT = 0.02  # share of what a receptor sees, at least, where it sees an object
 
 
 @dataclass(frozen=True)
-class RandomViews:
-    """Views of single eyes; first axis: view.
+class Population:
+    """Views, and which receptors of them count, (view, receptor)."""
 
-    position: of the agent [m], (n, 2) · heading [rad], (n,) · objects: centres [m], (n, k, 3) · eye: which, (n,)
-    """
+    views: RandomViews
+    counted: np.ndarray
 
-    position: np.ndarray
-    heading: np.ndarray
-    objects: np.ndarray
-    eye: np.ndarray
-
-    def take(self, n: int) -> RandomViews:
-        """The first n."""
-        return RandomViews(self.position[:n], self.heading[:n], self.objects[:n], self.eye[:n])
-
-    def __len__(self) -> int:
-        return len(self.heading)
-
-
-def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
-    """Agents about the cells where agents or objects may start, looking anywhere; objects on theirs."""
-    rng = np.random.default_rng(0)
-    k = len(world.objects)
-    heights = np.array([world.model.body(name).pos[2] for name in world.objects])
-    everywhere = np.concatenate([world.agent_spawn, world.object_spawn.reshape(-1, 2)])
-    position, objects = np.empty((n, 2)), np.empty((n, k, 3))
-    for i in range(n):
-        if k:
-            places = world.object_spawn[rng.choice(len(world.object_spawn), k, replace=len(world.object_spawn) < k)]
-            objects[i] = np.column_stack([places, heights])
-        position[i] = _clear_of(objects[i, :, :2], everywhere, rng)
-    return RandomViews(position, rng.uniform(-np.pi, np.pi, n), objects, rng.integers(eyes.n_eyes, size=n))
-
-
-def _clear_of(objects: np.ndarray, cells: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    place = np.zeros(2)
-    for _ in range(100):
-        place = cells[rng.integers(len(cells))] + rng.uniform(-STRAY, STRAY, 2)
-        if (np.linalg.norm(objects - place, axis=-1) > CLEARANCE).all():
-            break
-    return place
+    def rms(self, error: np.ndarray) -> float:
+        """Of an error (view, channel, receptor) in the first so many views; 0 where nothing counts."""
+        counted = np.broadcast_to(self.counted[: len(error), None], error.shape)
+        return float(np.sqrt(np.mean(error[counted] ** 2))) if counted.any() else 0.0
 
 
 class FidelityTrials:
@@ -88,13 +60,28 @@ class FidelityTrials:
         receptors = np.random.default_rng(0).permutation(int(np.prod(scene.eyes.resolution)))
         self._receptors = np.sort(receptors[:RECEPTORS])
 
+    @cached_property
+    def _everywhere(self) -> Population:
+        return Population(self._views, np.ones((len(self._views), len(self._receptors)), bool))
+
+    def _populations(self, sampling: EyeSampling) -> list[Population]:
+        if not len(self._scene.static.spheres):
+            return [self._everywhere]
+        near = near_views(self._scene.world, self._eyes, VIEWS[1])
+        trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
+        hits = on_objects(near, *near.in_agents(self._eyes, trial.directions), self._scene.static.spheres.radii)
+        weights = trial.weights.sum(axis=0)
+        shares = np.einsum("rp,vp->vr", weights, hits) / weights.sum(axis=-1)
+        return [self._everywhere, Population(near, shares > ON_OBJECT)]
+
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
-        """Root mean square error of the signals with so many rays per receptor.
+        """Root mean square error of the signals with so many rays per receptor, of the population that has more.
 
         Raises:
             NoRaysError: a receptor has none, when the function that is returned is called.
         """
-        truths: dict[int, np.ndarray] = {}
+        truths: dict[int, list[np.ndarray]] = {}
+        populations = self._populations(sampling)
         receptors = np.prod(self._eyes.resolution)
         least = TRUE / receptors if self._eye.pupil else FINER
         planes = sampling.depth.count * self._eye.bands * len(self._receptors)
@@ -105,12 +92,45 @@ class FidelityTrials:
             finer = max(2 * rays_per_receptor, min(max(FINER * rays_per_receptor, least), most))
             level = int(np.ceil(np.log(finer) / np.log(4) - 1e-9))
             if level not in truths:
-                truths[level] = self._signals(sampling.trial(4.0**level, self._receptors), sampling.depth, light)
-            truth = truths[level]
-            found = self._signals(sampling.trial(rays_per_receptor, self._receptors), sampling.depth, light, len(truth))
-            return _rms(found - truth)
+                true = sampling.trial(4.0**level, self._receptors)
+                truths[level] = [self._signals(true, sampling.depth, light, p.views) for p in populations]
+            trial = sampling.trial(rays_per_receptor, self._receptors)
+            size = len(trial.directions) * len(truths[level][0])  # no views beyond the truth's
+            return max(
+                population.rms(self._signals(trial, sampling.depth, light, population.views, size) - truth)
+                for population, truth in zip(populations, truths[level], strict=True)
+            )
 
         return error
+
+    def area_errors(self, sampling: BoxSampling, light: str) -> Callable[[int], float]:
+        """The same with so many areas per receptor; the truth's own noise is part of it.
+
+        Raises:
+            ValueError: eyes or worlds that areas cannot see.
+        """
+        self._scene.areas(light)
+        per_receptor = int(np.clip(TRUE_RAYS // (VIEWS[1] // 2 * len(self._receptors)), *TRUE_AREA))
+        populations, true = self._populations(sampling), sampling.trial(per_receptor, self._receptors)
+        truths = [self._signals(true, sampling.depth, light, p.views, TRUE_RAYS) for p in populations]
+
+        def error(areas: int) -> float:
+            found = (
+                (p, self._area_signals(sampling, areas, light, p.views.take(len(t))) - t)
+                for p, t in zip(populations, truths, strict=True)
+            )
+            return max(population.rms(error) for population, error in found)
+
+        return error
+
+    def reflected_more_often(self, sampling: BoxSampling) -> float:
+        """Root mean square of what light that is reflected more than twice adds to the signals, as areas see it.
+
+        Raises:
+            ValueError: it cannot be followed.
+        """
+        twice, all_ = (self._area_signals(sampling, 1, light, self._views) for light in lighting.LEVELS[1:])
+        return _rms(all_ - twice)
 
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
         """Root mean square of what light that is reflected twice adds to the signals, and of direct light's signals.
@@ -119,7 +139,7 @@ class FidelityTrials:
             ValueError: it cannot be followed.
         """
         trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
-        direct, both = (self._signals(trial, sampling.depth, light) for light in lighting.LEVELS)
+        direct, both = (self._signals(trial, sampling.depth, light) for light in lighting.LEVELS[:2])
         return _rms(both - direct), _rms(direct)
 
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
@@ -147,47 +167,61 @@ class FidelityTrials:
         _, z = self._trace(self._views, BoxSampling(self._eye).trial(4, self._receptors), lighting.DIRECT)
         return np.sort(np.array(z))
 
-    def _signals(self, trial: Trial, depth: DepthLayers, light: str, n: int | None = None) -> np.ndarray:
-        """(view, channel, receptor), of as many views as the rays allow."""
+    def _signals(
+        self, trial: Trial, depth: DepthLayers, light: str, views: RandomViews | None = None, most: int = RAYS
+    ) -> np.ndarray:
+        """(view, channel, receptor), of as many views as that many rays allow."""
         rays = len(trial.directions)
-        views = self._views.take(n or int(np.clip(RAYS // rays, *VIEWS)))
+        views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))
         components, z = self._trace(views, trial, light)
         with variant(self._scene.static.variant):
             shared = [np.array(share * c) for share in depth.shares(dr.rcp(z)) for c in components]
         layers = np.reshape(shared, (depth.count, len(components), len(views), rays))
-        # signals_c = sum_b mixing[c, b] sum_l sum_k basis[k, b] sum_p W_lb[r, p] light_lk[p]
-        basis = self._scene.tracers.of(light).basis
-        factors = self._eye.throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
         planes = trial.weights.reshape(depth.count, -1, *trial.weights.shape[1:])
-        weights = np.einsum("ckb,lbrp->clkrp", factors, planes, optimize=True).astype(np.float32)
+        weights = np.einsum("ckb,lbrp->clkrp", self._factors(light), planes, optimize=True).astype(np.float32)
         return np.einsum("clkrp,lkvp->vcr", weights, layers, optimize=True)
+
+    def _factors(self, light: str) -> np.ndarray:
+        """(channel, component, band): signals_c = sum_b mixing[c, b] sum_l sum_k basis[k, b] sum_p W_lb[r, p]
+        light_lk[p]."""
+        basis = self._scene.tracers.of(light).basis
+        return self._eye.throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
+
+    def _area_signals(self, sampling: BoxSampling, areas: int, light: str, views: RandomViews) -> np.ndarray:
+        """The same of so many areas for each receptor."""
+        tracer, sensor = self._scene.areas(light), self._scene.area_sensor(sampling, areas)
+        count = sensor.rays_per_receptor
+        mine = sensor.directions.reshape(-1, count, 3)[self._receptors].reshape(-1, 3)
+        origins, directions = views.in_agents(self._eyes, mine)
+        n = len(mine)
+        assert sensor.extent is not None
+        with variant(self._scene.static.variant):
+            origin = _points(origins, n)
+            width, height = (dr.opaque(mi.Float, side) for side in sensor.extent)
+            agent = _points(views.agents, n)
+            ray = mi.Ray3f(origin, mi.Vector3f([floats(d) for d in np.moveaxis(directions, -1, 0)]))
+            area = Area.of(ray, agent, (width, height))
+            centres = [_points(views.objects[:, k], n) for k in range(views.objects.shape[1])]
+            components = tracer.radiance(area, agent, centres, tracer.inputs)
+            dr.eval(components)
+            light_ = np.reshape([np.array(c) for c in components], (len(components), len(views), -1, count))
+        mixing = self._eye.throughput * np.einsum("cb,kb->ck", self._eye.spectral_bands.weights, tracer.basis)
+        return np.einsum("ck,kvr->vcr", mixing, light_.mean(axis=-1))
 
     def _trace(self, views: RandomViews, trial: Trial, light: str) -> tuple[list[Array], Array]:
         """Components of light along a trial's rays of each view's eye, and from how far along its axis [m]: Dr.Jit,
         flat (view, ray)."""
-        directions, azimuths = trial.directions, self._eyes.azimuths()
-        in_agent = np.einsum("eij,rj->eir", eye_rotations(azimuths), directions)[views.eye]
-        origins = eye_positions(azimuths)[views.eye]
-        cos, sin = np.cos(views.heading), np.sin(views.heading)
-        zero, one = np.zeros_like(cos), np.ones_like(cos)
-        turn = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
-        world = np.einsum("ijv,vjr->ivr", turn, in_agent)
-        agent = np.column_stack([views.position, np.full(len(views), EYE_HEIGHT)])
-        start = agent + np.einsum("ijv,vj->vi", turn, origins)
-        rays, tracer = len(directions), self._scene.tracers.of(light)
-
-        def lanes(points: np.ndarray) -> Array:
-            """The same for all rays of a view."""
-            return mi.Point3f([_lanes(np.repeat(column, rays)) for column in points.T])
-
+        origins, world = views.in_agents(self._eyes, trial.directions)
+        rays, tracer = len(trial.directions), self._scene.tracers.of(light)
         with variant(self._scene.static.variant):
-            ray = mi.Ray3f(lanes(start), mi.Vector3f([_lanes(d) for d in world]))
-            centres = [lanes(views.objects[:, k]) for k in range(views.objects.shape[1])]
+            ray = mi.Ray3f(_points(origins, rays), mi.Vector3f([floats(d) for d in np.moveaxis(world, -1, 0)]))
+            centres = [_points(views.objects[:, k], rays) for k in range(views.objects.shape[1])]
+            agent = _points(views.agents, rays)
             bounce_sample = None
             if light == lighting.BOUNCE:
-                bounce_sample = mi.Point2f([_lanes(np.tile(column, len(views))) for column in trial.bounce_samples.T])
-            components, t = tracer.radiance(tracer.scene, ray, lanes(agent), centres, tracer.inputs, bounce_sample)
-            z = t * _lanes(np.tile(directions[:, 2], len(views)))
+                bounce_sample = mi.Point2f([floats(np.tile(column, len(views))) for column in trial.bounce_samples.T])
+            components, t = tracer.radiance(tracer.scene, ray, agent, centres, tracer.inputs, bounce_sample)
+            z = t * floats(np.tile(trial.directions[:, 2], len(views)))
             dr.eval(components, z)
             return components, z
 
@@ -196,8 +230,6 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _lanes(values: np.ndarray) -> Array:
-    """An array of the device's. Aligned, or Dr.Jit would compile the same kernel anew for every alignment."""
-    lanes = aligned(values.size, np.float32)
-    lanes[:] = values.ravel()
-    return mi.Float(lanes)
+def _points(points: np.ndarray, rays: int) -> Array:
+    """The same for all rays of a view."""
+    return mi.Point3f([floats(np.repeat(column, rays)) for column in points.T])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import optics
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import Eyes
-from sim.eyes.sensor import EyeSampling, eye_sampling
+from sim.eyes.sensor import BoxSampling, BoxSensor, EyeSampling, eye_sampling
 from sim.render.band_error import with_band_averaged_lights
 from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.static_scene import StaticScene, build_static_scene
@@ -44,6 +44,11 @@ class PreparedScene:
         if self.eye.pupil is not None:
             raise ValueError("samples = 'areas': eyes behind a pupil are sampled by rays only")
         return self.tracers.areas(light)
+
+    def area_sensor(self, sampling: BoxSampling, per_receptor: float) -> BoxSensor:
+        """What areas are seen along: so many parts of each receptor's square. What is upright has closed forms along
+        columns of any height; spheres' outlines want rows, too."""
+        return sampling.areas(per_receptor, in_rows=len(self.static.spheres) > 0)
 
     def sampling(self, depth: DepthLayers) -> EyeSampling:
         """How the eye is sampled with these depth layers; its PSFs are computed once, when first asked for.

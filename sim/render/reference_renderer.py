@@ -17,7 +17,6 @@ from sim.eyes.eyes import EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.render.band_error import with_band_averaged_lights
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import mirror
-from sim.scene.variant import DEFAULT_VARIANT
 from sim.worlds.state import WorldState, pose
 from sim.worlds.world import World
 
@@ -33,7 +32,7 @@ class ReferenceRenderer:
         blurred as if from infinity
     depth_layers: kernels between them, or "auto"
     sampler: of Mitsuba: "multijitter" for less noise
-    variant: of Mitsuba, spectral; scalar_spectral runs without LLVM
+    variant: of Mitsuba, spectral, the device's if None; scalar_spectral runs without LLVM
     seed: of the samples; may be changed between pictures
 
     Raises:
@@ -52,7 +51,7 @@ class ReferenceRenderer:
         depths: tuple[float, float] | None = None,
         depth_layers: int | str = "auto",
         sampler: str = "independent",
-        variant: str = DEFAULT_VARIANT,
+        variant: str | None = None,
         seed: int = 0,
     ) -> None:
         self.world, self.eyes, self.eye = world, eyes, eyes.eye()

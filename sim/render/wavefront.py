@@ -7,9 +7,9 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT
+from sim.eyes.eyes import EYE_HEIGHT
 from sim.eyes.sensor import Sensor
-from sim.render.frozen_kernels import aligned
+from sim.scene.device_arrays import aligned, floats, whole_numbers
 from sim.scene.variant import MitsubaObject
 from sim.tracing import lighting
 from sim.tracing.areas.area_tracer import AreaTracer
@@ -50,12 +50,20 @@ class Wavefront:
         self.stride, self.n_spheres = poses.stride, poses.n_spheres
         self.tracer, self.depth, self.extent = tracer, sensor.depth, sensor.extent
 
+    @property
+    def sizes(self) -> dict[str, Array]:
+        """Inputs, not constants: eyes of any resolution and field of view, in any number of worlds, share a kernel."""
+        sizes = {"sizes": whole_numbers([self.n_rays, self.n_eyes, self.lanes])}
+        return sizes | ({"extent": floats(np.array(self.extent))} if self.extent else {})
+
     def __call__(self, scene: MitsubaObject, poses: Array, inputs: dict[str, Array], reduced: int) -> Array:
         lane = inputs["lanes"]
-        view = lane // self.n_rays
-        world = view // self.n_eyes
-        sample = lane - view * self.n_rays
-        eye = view - world * self.n_eyes
+        # Lanes that only fill up a packet read 0, and to divide by that ends the process.
+        n_rays, n_eyes, lanes = (dr.maximum(dr.gather(mi.UInt32, inputs["sizes"], i), 1) for i in range(3))
+        view = lane // n_rays
+        world = view // n_eyes
+        sample = lane - view * n_rays
+        eye = view - world * n_eyes
         if isinstance(self.tracer, AreaTracer):
             components = self.tracer.radiance(*self._area(poses, inputs, world, eye, sample), inputs)
         else:
@@ -65,7 +73,7 @@ class Wavefront:
         else:
             out = dr.zeros(mi.Float, self.lanes * len(components))
             for k, value in enumerate(components):
-                dr.scatter(out, value, lane + k * self.lanes, mode=dr.ReduceMode.Permute)
+                dr.scatter(out, value, lane + k * lanes, mode=dr.ReduceMode.Permute)
         # One reduction of one array: a reduction per component would trace the rays once per component.
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
 
@@ -90,13 +98,10 @@ class Wavefront:
     def _area(
         self, poses: Array, inputs: dict[str, Array], world: Array, eye: Array, sample: Array
     ) -> tuple[Area, Array, list[Array]]:
-        """The lane's area, and the centres as for a ray. Eyes are level: their x is level and their y upright."""
+        """The lane's area, and the centres as for a ray."""
         ray, _, agent, centres = self._ray(poses, inputs, world, eye, sample)
-        assert self.extent is not None
-        width, height = self.extent
-        axis = mi.Vector2f((ray.o - agent).xy) * (1 / BODY_RADIUS)
-        right = mi.Vector2f(axis.y, -axis.x) * width
-        return Area(ray.o, ray.d.xy, right, ray.d.z, mi.Float(height)), agent, centres
+        width, height = (dr.gather(mi.Float, inputs["extent"], i) for i in range(2))
+        return Area.of(ray, agent, (width, height)), agent, centres
 
     def _ray(
         self, poses: Array, inputs: dict[str, Array], world: Array, eye: Array, ray: Array
@@ -113,6 +118,6 @@ class Wavefront:
 
         agent = mi.Point3f(x, y, EYE_HEIGHT)
         origin = agent + turned(row("origins", eye))
-        direction = row("directions", eye * self.n_rays + ray)
+        direction = row("directions", eye * dr.gather(mi.UInt32, inputs["sizes"], 0) + ray)
         centres = [mi.Point3f(*list(row("", world * (self.stride // 4) + (1 + k)))[:3]) for k in range(self.n_spheres)]
         return mi.Ray3f(origin, turned(direction)), direction.w, agent, centres

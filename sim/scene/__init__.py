@@ -15,5 +15,6 @@ cameras        cameras -> sensors
 rays           what a sensor sees of a scene
 inventory      what has no counterpart, in words
 color          sRGB and linear light
+device_arrays  numbers where kernels read them
 variant        Mitsuba's variant, for the span of a call
 """

@@ -19,7 +19,7 @@ from optics.spectra.spectrum import Spectrum
 from sim.scene import bsdfs, cameras, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
 from sim.scene.spectra import of_geom, resolve
-from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject
+from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
 
 VISIBLE_GROUPS = (0, 1, 2)  # MuJoCo draws these unless told otherwise
@@ -35,7 +35,7 @@ def mirror(
     *,
     bodies: Sequence[str] | None = None,
     groups: Sequence[int] = VISIBLE_GROUPS,
-    variant: str = DEFAULT_VARIANT,
+    variant: str | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
 ) -> Mirror:
     """Mirror a MuJoCo model.
@@ -44,7 +44,7 @@ def mirror(
     data: poses to start from; None: the model's reference pose
     bodies: names of the bodies whose geoms are wanted ("world" is the static one); None: all
     groups: geom groups that are visible; a geom of alpha 0 never is
-    variant: a spectral Mitsuba variant; scalar_spectral runs without LLVM, slowly
+    variant: a spectral Mitsuba variant, the device's if None; scalar_spectral runs without LLVM, slowly
     spectra: reflectances of materials and emission of lights, by name, in the place of their colours:
         `optics.Spectrum`, or what `optics.reflectance` and `optics.illuminant` know by name; {"headlight": "A"} is the
         camera's
@@ -53,7 +53,9 @@ def mirror(
         ValueError: a model that does not compile, an unknown body, a variant without spectra, a model without visible
             geoms, or spectra of what the model does not have; warns once, by MirrorWarning, of what has no counterpart.
     """
-    return Mirror(source.load(model), data, bodies=bodies, groups=groups, variant=variant, spectra=spectra)
+    return Mirror(
+        source.load(model), data, bodies=bodies, groups=groups, variant=variant or default_variant(), spectra=spectra
+    )
 
 
 class Mirror:

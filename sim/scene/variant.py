@@ -9,6 +9,7 @@ from typing import Any
 import mitsuba as mi
 
 from optics.numerics import backend
+from optics.numerics.device import device
 
 # Types of Mitsuba exist once a variant is set, so that no checker can see them: these names say what an `Any` is. What
 # Mitsuba makes of arrays (rays, points, interactions) is an `optics.numerics.autodiff.Array`.
@@ -16,17 +17,29 @@ MitsubaObject = Any  # a scene, shape, BSDF, sensor, sampler, integrator, textur
 Description = dict[str, Any]  # of one of them, for mi.load_dict
 
 DEFAULT_VARIANT = "llvm_ad_spectral"
+ON_GPU = "cuda_ad_spectral"
+
+
+def default_variant() -> str:
+    """Mitsuba's spectral variant for the device that is asked for.
+
+    Raises:
+        optics.BackendError: there is no such device.
+    """
+    return ON_GPU if device() == "cuda" else DEFAULT_VARIANT
 
 
 @contextmanager
-def variant(name: str = DEFAULT_VARIANT) -> Iterator[None]:
-    """Mitsuba's variant inside the block; afterwards the caller's own is in force again, if there was one.
+def variant(name: str | None = None) -> Iterator[None]:
+    """Mitsuba's variant inside the block, the device's if None; afterwards the caller's own is in force again, if
+    there was one.
 
     (`mi.variant_context` fails where none was set before.)
 
     Raises:
         optics.BackendError: LLVM is wanted and cannot run.
     """
+    name = name or default_variant()
     before = mi.variant()
     if before == name:
         yield

@@ -9,6 +9,7 @@ materials are grey.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import drjit as dr
@@ -17,6 +18,7 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.eyes.eyes import EYE_HEIGHT
+from sim.scene.device_arrays import floats
 from sim.tracing import lighting, spheres
 from sim.tracing.reflectance_atlas import Atlas, bake
 from sim.tracing.static_scene import StaticScene
@@ -28,6 +30,7 @@ from sim.worlds.world import World
 RANK_TOLERANCE = 1e-6
 # Chosen: deviation of a grey's reflectances from band to band, in Mitsuba's spectra of grey colours, that is not a hue.
 GREY = 1e-4
+Irradiance = Callable[[Array, Array], list[Array]]  # per component, at a point of a surface with this normal
 ROW = 12  # floats per face: column and row of the texel as affine functions of (x, y, z), then where the texture is
 
 
@@ -97,7 +100,7 @@ class ClosedForm:
     ) -> None:
         walls = walls_of(world.model, static.geoms)
         self.light = light
-        if light == lighting.BOUNCE:
+        if light != lighting.DIRECT:
             _check_tops(world, walls, static)
         self.footprints: Footprints = footprints_of(walls)
         self.why = f"{len(walls)} upright walls, {self.footprints.how}"
@@ -106,11 +109,11 @@ class ClosedForm:
         if any(source.direction[2] <= 0 for source in self.lights):
             raise NoClosedForm("a light shines from below")
         geoms, place = np.unique(walls.geoms, return_inverse=True)
-        visible = static.bodies if light == lighting.BOUNCE else static.spheres
+        visible = static.spheres if light == lighting.DIRECT else static.bodies
         bsdfs = [*(static.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
         atlas = bake(world.model, [*geoms, *visible.geoms], bsdfs, wavelengths)
         irradiance = np.array([source.irradiance for source in self.lights]).reshape(-1, len(wavelengths))
-        fewest = reflected_components_of if light == lighting.BOUNCE else components_of
+        fewest = components_of if light == lighting.DIRECT else reflected_components_of
         self.components = fewest(atlas.texels, irradiance)
         self.basis = self.components.basis
         self.faces = face_rows(walls.uv, atlas, place)
@@ -134,7 +137,7 @@ class ClosedForm:
         texels = self.components.reflectance.astype(np.float32)
         tables = {f"texels_{k}": np.ascontiguousarray(column) for k, column in enumerate(texels.T)}
         tables |= {"faces": self.faces.astype(np.float32).ravel(), **self.footprints.tables}
-        return {name: mi.Float(table) for name, table in tables.items()}
+        return {name: floats(table) for name, table in tables.items()}
 
     def radiance(
         self,
@@ -155,10 +158,13 @@ class ClosedForm:
             light = [dr.select(hit.lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
         return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
 
-    def returned(self, ray: Array, shade: Array, radius: float) -> list[Array]:
-        """Direct light that walls and floor send back along each ray, per component, in the shade of one sphere."""
+    def returned(self, ray: Array, shade: Array, radius: float, more: Irradiance | None = None) -> list[Array]:
+        """Light that walls and floor send back along each ray, per component: direct light in the shade of one sphere,
+        and what else arrives there, if that is known."""
         hit = self._hit(ray, [], self._static)
         light = self._irradiance(hit, [shade], self._static, [radius])
+        if more:
+            light = [e + other for e, other in zip(light, more(hit.point, hit.normal), strict=True)]
         return [dr.select(hit.lit, r * e, 0) for r, e in zip(hit.reflectance, light, strict=True)]
 
     def _hit(self, ray: Array, centres: list[Array], inputs: dict[str, Array]) -> _Hit:

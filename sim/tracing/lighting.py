@@ -19,7 +19,8 @@ from optics.numerics.autodiff import Array
 from sim.scene.variant import MitsubaObject
 
 LANES = 4  # wavelengths in one mi.Spectrum
-DIRECT, BOUNCE = LEVELS = ("direct", "bounce")  # what of the light is followed: "bounce" adds what is reflected twice
+# What of the light is followed: "bounce" adds what is reflected twice, "all" what is reflected more often.
+DIRECT, BOUNCE, ALL = LEVELS = ("direct", "bounce", "all")
 
 
 @dataclass(frozen=True)

@@ -79,8 +79,10 @@ class Tracers:
         """The one that sees by areas.
 
         Raises:
-            ValueError: a world that cannot be seen so.
+            ValueError: a world that cannot be seen so, and a tracer that was asked for and has no areas.
         """
+        if self._name == Traced.name:
+            raise ValueError(f"samples = 'areas': tracer = {self._name!r} traces rays only")
         if light not in self._areas:
             try:
                 self._areas[light] = self._by_areas(light)
@@ -106,6 +108,8 @@ def tracer_of(
         ValueError: an unknown name, for "closed_form" where the world has none, for lights other than directional ones,
             for surfaces that are not Lambertian, and for light that bounces off an agent with a texture.
     """
+    if light == lighting.ALL:
+        raise ValueError("light = 'all': rays follow light that is reflected twice at most, see samples = 'areas'")
     if light == lighting.BOUNCE and shapes.is_textured(world.model, static.bodies.geoms[-1]):
         raise ValueError("light = 'bounce': the agent's body has a texture, which would have to turn with it")
     if name not in TRACERS:

@@ -29,8 +29,8 @@ def validate(arguments: Namespace) -> int:
         return 2
     backend.require()
     failed = []
-    for script in scripts:
-        print(f"{script.stem}", flush=True)
+    for number, script in enumerate(scripts, start=1):
+        print(f"{number}/{len(scripts)} {script.stem}", flush=True)
         child = subprocess.run([sys.executable, "-m", f"validation.{script.stem}"], cwd=CHECKOUT, check=False)
         failed += [script.stem] if child.returncode else []
     print(f"failed: {', '.join(failed)}" if failed else f"all {len(scripts)} passed")

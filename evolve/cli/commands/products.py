@@ -2,45 +2,76 @@
 
 from __future__ import annotations
 
+import json
+import webbrowser
 from argparse import Namespace
+from pathlib import Path
 
+from evolve.cli.waiting import Waiting
+from evolve.report.write import FILE as REPORT
 from evolve.store.directory import Run
-from optics.numerics import backend
+from optics.numerics import device
 
-__all__ = ["export", "replay", "report"]
+__all__ = ["REPORT", "export", "open_page", "replay", "report"]
 
 
 def replay(arguments: Namespace) -> int:
     """Let an agent play one episode again: a table here, and a page that plays it."""
     run = _open(arguments)
-    from evolve.report.replay import write_replay
+    with _waiting(arguments, "an episode is played and written"):
+        from evolve.report.replay import episode_facts, episode_table, write_replay
 
-    for path in write_replay(run, arguments.candidate, arguments.seed, arguments.rrd):
-        print(f"replay: {path}")
+        chosen = (arguments.candidate, arguments.seed, arguments.rrd, arguments.out)
+        episode, paths = write_replay(run, *chosen)
+    if arguments.json:
+        print(json.dumps({**episode_facts(episode), "files": [str(path) for path in paths]}, indent=1))
+    else:
+        print(episode_table(episode))
+        print("\n".join(f"replay: {path}" for path in paths))
+    open_page(paths[0], arguments)
     return 0
 
 
 def report(arguments: Namespace) -> int:
     """Write the report."""
     run = _open(arguments)
-    from evolve.report.write import write
+    with _waiting(arguments, "the report is written"):
+        from evolve.report.write import write
 
-    print(f"report: {write(run)}")
+        page = write(run, out=arguments.out)
+    print(json.dumps({"report": str(page)}) if arguments.json else f"report: {page}")
+    open_page(page, arguments)
     return 0
 
 
 def export(arguments: Namespace) -> int:
     """Write what an agent saw, one EXR file per frame."""
     run = _open(arguments)
-    from evolve.report.exr_export import export_run
+    with _waiting(arguments, "EXR files are written"):
+        from evolve.report.exr_export import export_run
 
-    files = export_run(run, arguments.candidate, arguments.seed)
-    print(f"EXR files: {len(files)} in {files[0].parent}, the first: {files[0].name}")
+        files = export_run(run, arguments.candidate, arguments.seed, arguments.out)
+    if arguments.json:
+        print(json.dumps({"exr": [str(file) for file in files]}, indent=1))
+    else:
+        print(f"EXR files: {len(files)} in {files[0].parent}, the first: {files[0].name}")
     return 0
+
+
+def open_page(page: Path, arguments: Namespace) -> None:
+    """In a browser, if that is asked for."""
+    if arguments.open:
+        webbrowser.open(page.resolve().as_uri())
+
+
+def _waiting(arguments: Namespace, text: str) -> Waiting:
+    """A wait of one step, which takes half a minute at most."""
+    wait = Waiting(1, shown=not (arguments.json or arguments.quiet))
+    return wait.of_one_step(text)
 
 
 def _open(arguments: Namespace) -> Run:
     """The run, on a machine that can see."""
     run = Run.open(arguments.directory)
-    backend.require()
+    device.make_ready()
     return run

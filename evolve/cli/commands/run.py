@@ -6,12 +6,16 @@ import json
 import sys
 from argparse import Namespace
 from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
 
 from evolve.cli.commands import INTERRUPTED
-from evolve.cli.progress import Bar, Events, Lines, Watchers, watcher
-from evolve.cli.run_plan import RunPlan
+from evolve.cli.commands.products import REPORT, open_page
+from evolve.cli.progress import Bar, Events, Lines, Silent, Watchers, watcher
+from evolve.cli.run_plan import RunPlan, steps_each
 from evolve.cli.start_from import starts_from
 from evolve.cli.tensorboard import TensorBoardWriter
+from evolve.cli.waiting import Waiting
 from evolve.config.assemble import assemble
 from evolve.config.lint import lint
 from evolve.config.run_config import ConfigError, RunConfig
@@ -25,7 +29,7 @@ from evolve.search.worker import evaluate_candidate, prepare_device
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, next_directory
 from evolve.store.versions import altered, present, record_start, recorded
-from optics.numerics import backend
+from optics.numerics import device
 
 __all__ = ["resume", "start"]
 
@@ -39,11 +43,13 @@ def start(arguments: Namespace) -> int:
         arguments.task, arguments.preset, arguments.config, [*arguments.set, *flags], starts, arguments.scale
     )
     Search(config)  # an unknown optimizer, say, is refused before anything is written
-    backend.require()
+    device.make_ready()
     directory = arguments.out or next_directory(config.task, arguments.preset.removesuffix(f"-{config.task}"))
     if arguments.dry_run:
         return _show(RunPlan.of(config, directory), arguments.json)
-    notes = [] if arguments.json else lint(config)  # looks at the world, which takes its time: nothing is begun yet
+    notes = (
+        [] if arguments.json or arguments.quiet else lint(config)
+    )  # looks at the world, which takes its time: nothing is begun yet
     run = Run.create(directory, config, starts.name.removeprefix("--from ") if starts else None)
     if not arguments.json:
         for note in notes:
@@ -57,17 +63,18 @@ def resume(arguments: Namespace) -> int:
     """Carry an interrupted run to its end."""
     _require_scheduler(arguments)
     run = Run.open(arguments.directory)
-    backend.require()
+    device.make_ready()
     with run.lock():
         run.repair()
-        if run.notice:
+        if run.notice and not arguments.quiet:
             print(f"note: {run.notice}", file=sys.stderr)
         if finished(run):
             if not arguments.json:
                 print(f"{run.path}: all {run.config.candidates} candidates have been evaluated")
-            return _finish(run, arguments.json)
+            return _already_finished(run, arguments)
         run.require_present_format()
-        _note_changes(run)
+        if not arguments.quiet:
+            _note_changes(run)
         record_start(run.path, len(run.candidates))
         if not arguments.json:
             print(
@@ -104,10 +111,25 @@ def _carry(run: Run, arguments: Namespace) -> int:
         return INTERRUPTED
     if not arguments.json:
         print(watch.tally.closing())
-    return _finish(run, arguments.json)
+    return _finish(run, arguments)
 
 
-def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lines:
+def _already_finished(run: Run, arguments: Namespace) -> int:
+    """What a run that was killed at its very end still lacks; nothing where all is there."""
+    page, frames = run.path / REPORT, sorted((run.path / "exr").glob("*.exr"))
+    if not page.is_file() or not frames:
+        return _finish(run, arguments)
+    if not arguments.json:
+        print(f"nothing is left to do; report: {page}")
+    elif run.best is not None:
+        print(json.dumps(_finished_event(run, run.best, page, frames)))
+    open_page(page, arguments)
+    return 0
+
+
+def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lines | Silent:
+    if arguments.quiet:
+        return Silent(run, sys.stderr, workers)
     return watcher(run, sys.stdout if arguments.json else sys.stderr, workers, arguments.json)
 
 
@@ -123,29 +145,39 @@ def _require_scheduler(arguments: Namespace) -> None:
         raise ConfigError("--executor dask needs --scheduler ADDRESS, and no other executor takes one")
 
 
-def _finish(run: Run, as_json: bool) -> int:
+def _finish(run: Run, arguments: Namespace) -> int:
     """Write report and EXR files, and name them; 1 if no candidate could be evaluated."""
     failures = [candidate for candidate in run.candidates if candidate.failure]
     if run.best is None:
         print(f"evolve: every candidate failed; the last one: {failures[-1].failure}", file=sys.stderr)
         return 1
-    if not as_json:
+    if not arguments.json:
         print("\n".join(_outcome(run, run.best, failures)))
         print("writing report and EXR files ...", flush=True)
-    from evolve.analysis import episode
-    from evolve.report import exr_export
-    from evolve.report.write import write
+    with Waiting(3, shown=not (arguments.json or arguments.quiet)) as wait:
+        wait.step("the best agent plays an episode")
+        from evolve.analysis import episode
+        from evolve.report import exr_export
+        from evolve.report.write import write
 
-    best = episode.record(run)
-    page, frames = write(run, best), exr_export.export_episode(best, run.path / "exr")
-    if as_json:
-        products = {"directory": str(run.path), "report": str(page), "exr": [str(frame) for frame in frames]}
-        print(json.dumps({"event": "finished", "best": run.best.id, "fitness": run.best.fitness, **products}))
-        return 0
-    print(f"run directory: {run.path}")
-    print(f"report: {page}")
-    print(f"EXR files: {len(frames)} in {frames[0].parent}, the first: {frames[0].name}")
+        best = episode.record(run)
+        wait.step("writing the report")
+        page = write(run, best)
+        wait.step("writing EXR files")
+        frames = exr_export.export_episode(best, run.path / "exr")
+    if arguments.json:
+        print(json.dumps(_finished_event(run, run.best, page, frames)))
+    else:
+        print(f"run directory: {run.path}")
+        print(f"report: {page}")
+        print(f"EXR files: {len(frames)} in {frames[0].parent}, the first: {frames[0].name}")
+    open_page(page, arguments)
     return 0
+
+
+def _finished_event(run: Run, best: Candidate, page: Path, frames: list[Path]) -> dict[str, Any]:
+    products = {"directory": str(run.path), "report": str(page), "exr": [str(frame) for frame in frames]}
+    return {"event": "finished", "best": best.id, "fitness": best.fitness, **products}
 
 
 def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
@@ -165,10 +197,10 @@ def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
 
 
 def _plan(config: RunConfig) -> str:
-    search, steps = config.search, config.learning.total_steps
+    search = config.search
     genes = sum(use.open for use in config.genome.values())
     return (
-        f"{config.task}, {search.generations} generations x {search.population} candidates x {steps:,} steps"
+        f"{config.task}, {search.generations} generations x {search.population} candidates x {steps_each(config)} steps"
         f"{f' in up to {search.rungs} budget stages' if search.rungs > 1 else ''}, "
         f"{genes} genes open"
     )

@@ -1,4 +1,4 @@
-"""`evolve status`: how a run stands, read from its record alone, once or again and again."""
+"""`evolve status` and `evolve list`: how runs stand, read from their records alone, once or again and again."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from evolve.cli.output import as_it_is
@@ -16,7 +17,7 @@ from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.lock import holder
 
-__all__ = ["standing", "status"]
+__all__ = ["listing", "standing", "status"]
 
 WATCH_S = 2.0  # between two looks
 SHOWN = 12  # generations, the latest
@@ -37,6 +38,36 @@ def status(arguments: Namespace) -> int:
             return 0
         time.sleep(WATCH_S)
         now = standing(Run.open(arguments.directory))
+
+
+def listing(arguments: Namespace) -> int:
+    """Print the runs in a directory, one line each, the latest last; what cannot be read says why."""
+    folders = [path for path in arguments.directory.iterdir() if (path / "config.toml").exists()]
+    found = [_standing_or_reason(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime)]
+    if arguments.json:
+        print(json.dumps(found, indent=1, allow_nan=False))
+        return 0
+    if not found:
+        print(f"{arguments.directory}: holds no runs")
+    width = max((len(one["directory"]) for one in found), default=0)
+    for one in found:
+        print(f"{one['directory']:<{width}}  {_in_one_line(one)}")
+    return 0
+
+
+def _standing_or_reason(path: Path) -> dict[str, Any]:
+    try:
+        return {name: value for name, value in standing(Run.open(path)).items() if name != "generations"}
+    except (ValueError, OSError) as error:
+        return {"directory": str(path), "state": "unreadable", "reason": " ".join(str(error).split())}
+
+
+def _in_one_line(one: dict[str, Any]) -> str:
+    if one["state"] == "unreadable":
+        return f"unreadable: {one['reason']}"
+    best = "" if one["best"] is None else f", best fitness {one['best']['fitness']:.4g}"
+    count = one["candidates"]
+    return f"{one['task']:<11} {one['state']:<11} {count['evaluated']} of {count['planned']} candidates{best}"
 
 
 def _show(arguments: Namespace, now: dict[str, Any]) -> None:

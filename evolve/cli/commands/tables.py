@@ -6,14 +6,29 @@ import json
 from argparse import Namespace
 
 from evolve.config.run_config import TASKS, SearchConfig
+from evolve.config.sources import preset_about, preset_names
 from evolve.genome.genes import CLUSTERS, GENES, Gene
 
-__all__ = ["genes", "tasks"]
+__all__ = ["genes", "presets", "tasks"]
 
 
 def tasks(arguments: Namespace) -> int:
     """Print the tasks."""
+    if arguments.json:
+        print(json.dumps(dict(TASKS), indent=1))
+        return 0
     print("\n".join(f"{name:<12}{meaning}" for name, meaning in TASKS.items()))
+    return 0
+
+
+def presets(arguments: Namespace) -> int:
+    """Print the presets: their task, if they bring one, their scales, and what they are for."""
+    found = [preset_about(name) for name in preset_names()]
+    if arguments.json:
+        print(json.dumps(found, indent=1))
+        return 0
+    for one in found:
+        print(f"{one['name']:<24}{one['task'] or 'any task':<12}{', '.join(one['scales']) or '-':<16}{one['about']}")
     return 0
 
 

@@ -8,6 +8,7 @@ half_planes    shares that straight lines cut off
 columns        walls, floor and sky behind an area
 sphere_areas   spheres in front of them
 light_table    light that walls and floor send on to each other
+light_nodes    where that is known, and between
 light_baking   how that is found
 light_store    and kept on disk
 cell_grid      the cells that it is kept for

@@ -14,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from sim.scene.device_arrays import floats
 from sim.tracing import lighting
 from sim.tracing.areas import sphere_areas
 from sim.tracing.areas.branches import only_where
@@ -62,7 +63,7 @@ class AreaTracer:
         self._illumination = Illumination(rays, bodies.radii)
         seen = slice(n_seen)
         self._reflected = None
-        if rays.light == lighting.BOUNCE:
+        if rays.light != lighting.DIRECT:
             self._reflected = LightTable(rays, bodies.radii[seen], heights[seen])
         rows = np.concatenate([rays.faces[:, :4], rays.faces[:, 8:10]], axis=1)
         spheres = [place[:2] for _, place in rays.sphere_textures]
@@ -76,7 +77,7 @@ class AreaTracer:
         self._floor_texture = Texture(mi.Float(first), mi.Float(columns))
         parts = (rays.footprints, self._columns, self._illumination, self._stripes, self._reflected)
         tables = {"faces": _in_eights(rows[:-1])} | {k: v for part in parts if part for k, v in part.tables.items()}
-        self.inputs = {name: mi.Float(np.ascontiguousarray(table, np.float32)) for name, table in tables.items()}
+        self.inputs = {name: floats(table) for name, table in tables.items()}
 
     def radiance(self, area: Area, agent: Array, centres: list[Array], inputs: dict[str, Array]) -> list[Array]:
         """Mean of what comes out of each area, one array per component; agent, centres: of the spheres that move."""

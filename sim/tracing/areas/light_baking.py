@@ -5,60 +5,25 @@ Nothing that moves is in the tables, but the shadow that a body casts on the flo
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.eyes.receptive_fields import low_discrepancy
+from sim.scene.device_arrays import floats
 from sim.tracing import lighting
-from sim.tracing.areas.cell_grid import CellGrid
-from sim.tracing.closed_form_tracer import ClosedForm
-from sim.tracing.walls import NoClosedForm, Walls
+from sim.tracing.areas.light_nodes import BODY_SPACING, MARGIN, SIDES, SPACING, LightNodes, NodeLight
+from sim.tracing.closed_form_tracer import ClosedForm, Irradiance
 
 # Chosen. In navigation, nodes half as dense make the error twice as large; four times as many rays, or bodies' places
 # twice as dense, change it by a fiftieth.
-SPACING = 0.25  # [m] of nodes on floor and walls, at most
-BODY_SPACING = 1.0  # [m] of the places of bodies, at most
 RAYS = 256  # from a node
 NORMALS = 96  # of a body's surface, to which sixteen harmonics are fitted
-MARGIN = 0.02  # [m] from a cell's borders, at least: nodes lie on one side of each edge
-MOST_NODES = 2**22
-LANES = 2**21  # rays traced at once
 FOURS = 4  # of floats: sixteen harmonics
-SIDES = np.array([[-1, 0], [1, 0], [0, -1], [0, 1]])  # on which side of its cell a wall stands
-
-
-@dataclass(frozen=True)
-class LightNodes:
-    """Where light is known. floor, top: heights of the floor and of the walls' tops [m] · across, up, places: nodes
-    along a cell, up a wall, and places of bodies along a cell."""
-
-    grid: CellGrid
-    floor: float
-    top: float
-    across: int
-    up: int
-    places: int
-
-    @classmethod
-    def of(cls, walls: Walls) -> LightNodes:
-        """Of a world of walls of one height.
-
-        Raises:
-            NoClosedForm: no walls, or too many nodes.
-        """
-        if not len(walls):
-            raise NoClosedForm("no walls, between which light would be reflected")
-        grid, floor, top = CellGrid.of(walls), walls.floor, float(walls.top.max())
-        across, up = _count(grid.side, SPACING), _count(top - floor, SPACING)
-        total = grid.free.sum() * across * (across + len(SIDES) * up)
-        if total > MOST_NODES:
-            raise NoClosedForm(f"{total} nodes for reflected light")
-        return cls(grid, floor, top, across, up, _count(grid.side, BODY_SPACING))
+ORDERS = 16  # of reflections, at most; each is worth no more than the share of light that surfaces send on
+CHANGE = 1e-3  # of the most light that arrives anywhere: less is no change
+LANES = 2**21  # rays traced at once
 
 
 class Baking:
@@ -66,6 +31,8 @@ class Baking:
 
     def __init__(self, tracer: ClosedForm, nodes: LightNodes, kinds: list[tuple[float, float]]) -> None:
         self._tracer, self._nodes, self._kinds = tracer, nodes, kinds
+        self._orders = ORDERS if tracer.light == lighting.ALL else 1
+        self._arriving: Irradiance | None = None  # what is known so far, where it is wanted
 
     @property
     def ingredients(self) -> list[np.ndarray]:
@@ -74,18 +41,36 @@ class Baking:
         settings = [SPACING, BODY_SPACING, RAYS, NORMALS, MARGIN]
         lights = [light.direction for light in self._tracer.lights]
         surfaces = [walls.lower, walls.upper, walls.top, walls.floor_lower, walls.floor_upper, self._tracer.faces]
-        light = [components.reflectance, components.levels, *lights]
+        light = [components.reflectance, components.levels, *lights, self._orders]
         return [np.asarray(a, np.float64) for a in (*surfaces, walls.floor, *light, self._kinds, settings)]
 
     def tables(self) -> dict[str, np.ndarray]:
-        """All of them, float32, flat, by name: one for each component."""
-        found: dict[str, np.ndarray] = {}
-        for name, light in (("floor", self._on_floor()), ("walls", self._on_walls())):
-            found |= {f"bounced_{name}_{k}": column for k, column in enumerate(light.T.astype(np.float32))}
+        """All of them, float32, flat, by name: one for each component. Each time round, light has been reflected once
+        more, until that changes nothing."""
+        found = self._surfaces()
+        for _ in range(self._orders - 1):
+            self._arriving = self._between(found)
+            before, found = found, self._surfaces()
+            if all(np.abs(found[name] - before[name]).max() <= CHANGE * found[name].max() for name in found):
+                break
         for i, kind in enumerate(self._kinds):
             light = self._on_body(*kind)
             found |= {f"bounced_body_{i}_{k}": light[..., k].ravel() for k in range(light.shape[-1])}
         return {name: np.ascontiguousarray(table) for name, table in found.items()}
+
+    def _between(self, found: dict[str, np.ndarray]) -> Irradiance:
+        """What these tables say of any point."""
+        light = NodeLight(self._nodes, len(self._tracer.basis))
+        inputs = {name: floats(table) for name, table in (found | {"cells": self._nodes.cells}).items()}
+        return lambda point, normal: light.on_surface(point, normal, inputs)
+
+    def _surfaces(self) -> dict[str, np.ndarray]:
+        tables = {"floor": self._on_floor(), "walls": self._on_walls()}
+        return {
+            f"bounced_{name}_{k}": np.ascontiguousarray(column)
+            for name, light in tables.items()
+            for k, column in enumerate(light.T.astype(np.float32))
+        }
 
     def _on_floor(self) -> np.ndarray:
         """(node, component), in order of cell, y and x."""
@@ -139,36 +124,22 @@ class Baking:
         """Irradiance of what walls and floor reflect onto points (n, 3), per component, (n, component); shade: radius
         and centre of a body at each point that casts its shadow."""
         rays = RAYS
-        samples = mi.Point2f(
-            *(mi.Float(np.tile(c, max(LANES // rays, 1)).astype(np.float32)) for c in low_discrepancy(rays).T)
-        )
+        samples = mi.Point2f(*(floats(np.tile(c, max(LANES // rays, 1))) for c in low_discrepancy(rays).T))
         dr.eval(samples)
         step, found = max(LANES // rays, 1), []
         for first in range(0, len(points), step):
             part = slice(first, first + step)
             # As many lanes every time, so that one kernel serves all.
             point, normal, body = (
-                mi.Point3f(*(mi.Float(np.repeat(np.resize(c, step), rays).astype(np.float32)) for c in a[part].T))
+                mi.Point3f(*(floats(np.repeat(np.resize(c, step), rays)) for c in a[part].T))
                 for a in (points, normals, shade[1] if shade else points)
             )
             ray = lighting.onwards(point, mi.Normal3f(normal), samples)
-            light = self._tracer.returned(ray, body, shade[0] if shade else 0.0)
+            light = self._tracer.returned(ray, body, shade[0] if shade else 0.0, self._arriving)
             means = [dr.block_reduce(dr.ReduceOp.Add, c, rays) for c in light]
             dr.eval(means)
             found.append(np.stack([np.array(m) / rays for m in means], axis=-1)[: len(points[part])])
         return np.concatenate(found) if found else np.zeros((0, len(self._tracer.basis)))
-
-
-def spherical_harmonics(x: Array, y: Array, z: Array) -> list[Array]:
-    """Spherical harmonics of degree 0 to 3 in the direction (x, y, z), not normalised."""
-    xx, yy, zz = x * x, y * y, z * z
-    flat = [x * 0 + 1, x, y, z, x * y, y * z, z * x, xx - yy, 3 * zz - 1]
-    cubic = [y * (3 * xx - yy), x * y * z, y * (5 * zz - 1), z * (5 * zz - 3), x * (5 * zz - 1), z * (xx - yy)]
-    return [*flat, *cubic, x * (xx - 3 * yy)]
-
-
-def _count(length: float, spacing: float) -> int:
-    return max(math.ceil(length / spacing - 1e-6), 1) + 1
 
 
 def _within(length: float, nodes: int) -> np.ndarray:
@@ -182,3 +153,11 @@ def _evenly(n: int) -> np.ndarray:
     z, azimuth = 1 - 2 * i / n, np.pi * (1 + np.sqrt(5)) * i
     r = np.sqrt(1 - z * z)
     return np.stack([r * np.cos(azimuth), r * np.sin(azimuth), z], axis=-1)
+
+
+def spherical_harmonics(x: Array, y: Array, z: Array) -> list[Array]:
+    """Spherical harmonics of degree 0 to 3 in the direction (x, y, z), not normalised."""
+    xx, yy, zz = x * x, y * y, z * z
+    flat = [x * 0 + 1, x, y, z, x * y, y * z, z * x, xx - yy, 3 * zz - 1]
+    cubic = [y * (3 * xx - yy), x * y * z, y * (5 * zz - 1), z * (5 * zz - 3), x * (5 * zz - 1), z * (xx - yy)]
+    return [*flat, *cubic, x * (xx - 3 * yy)]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import mitsuba as mi
 
 from optics.numerics.autodiff import Array
+from sim.eyes.eyes import BODY_RADIUS
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,15 @@ class Area:
     right: Array
     up: Array
     height: Array
+
+    @classmethod
+    def of(cls, middle: Array, agent: Array, extent: tuple[Array, Array]) -> Area:
+        """Around a ray (not normalised: its part along the eye's axis is 1) of an eye on an agent's equator; extent:
+        width and height on the tangent plane. Eyes are level: their x is level and their y upright."""
+        width, height = extent
+        axis = mi.Vector2f((middle.o - agent).xy) * (1 / BODY_RADIUS)
+        right = mi.Vector2f(axis.y, -axis.x) * width
+        return cls(middle.o, middle.d.xy, right, middle.d.z, mi.Float(height))
 
     def level(self, a: Array) -> Array:
         """The level part of the direction at a."""

@@ -19,7 +19,7 @@ BESIDE = 1e-3  # [m] in front of a wall: in the cell from which it is seen
 NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1))
 
 
-def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, radius: float) -> list[Array]:
+def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, radius: Array) -> list[Array]:
     """Share of a patch on which a sphere casts no shadow, for each light."""
     way = centre - patch.point
     slope = max(math.hypot(*d[:2]) / d[2] for d in directions)
@@ -33,7 +33,7 @@ def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, 
     return only_where(near, lit, [1.0] * len(directions))
 
 
-def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: float) -> Array:
+def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: Array) -> Array:
     """Near the patch the shadow's rim is a straight line, or two; on larger patches it is a disk that lies within."""
     towards = mi.Vector3f(*direction)
     ahead = dr.dot(way, towards)
@@ -43,7 +43,7 @@ def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: f
     p, q = dr.dot(across, patch.along), dr.dot(across, patch.across)
     strip = share_above(radius - distance, p, q) - share_above(-radius - distance, p, q)
     seen = dr.abs(dr.dot(towards, dr.cross(patch.along, patch.across)))  # from the light
-    disk = math.pi * radius**2 / dr.maximum(seen, NEVER_ZERO)
+    disk = math.pi * dr.square(radius) / dr.maximum(seen, NEVER_ZERO)
     return 1 - dr.select(ahead > 0, dr.minimum(strip, disk), 0)
 
 

@@ -151,9 +151,11 @@ def test_exr_files_hold_what_the_eyes_saw(episode, tmp_path):
     assert left.attributes["eye_azimuth_deg"] == pytest.approx(30)
 
 
-def test_replay_sums_up_and_writes_a_page(run, episode, capsys):
-    (page,) = replay.write_replay(run, seed=3)
-    printed = dict(line.split(None, 1) for line in capsys.readouterr().out.splitlines() if len(line.split()) == 2)
+def test_replay_sums_up_and_writes_a_page(run, episode):
+    played, (page,) = replay.write_replay(run, seed=3)
+    table = replay.episode_table(played)
+    printed = dict(line.split(None, 1) for line in table.splitlines() if len(line.split()) == 2)
+    assert replay.episode_facts(played)["return"] == pytest.approx(float(printed["return"]), abs=0.01)
     assert float(printed["return"]) == pytest.approx(episode.reward.sum(), abs=0.01)
     assert sum(float(printed[name]) for name in ("progress", "goal", "adversary", "contact")) == pytest.approx(
         episode.reward.sum(), abs=0.03

@@ -1,6 +1,8 @@
 """Which test covers which module of evolve/cli.
 
 main: test_main.py
+arguments: test_main.py
+waiting: test_products.py
 progress: test_progress.py
 output: test_output.py
 run_plan: test_run_plan.py
@@ -9,9 +11,11 @@ start_from: test_start_from.py
 tensorboard: test_tensorboard.py
 doctor: test_doctor.py
 commands.run: test_commands.py, test_run_plan.py, search/test_kill.py
-commands.status: test_status_and_compare.py, test_commands.py, test_hostile_runs.py
+commands.status: test_main.py, test_status_and_compare.py, test_commands.py, test_hostile_runs.py
 commands.tables: test_main.py
-commands.products: test_commands.py, test_main.py
+commands.products: test_products.py, test_commands.py, test_main.py
+commands.settings: test_main.py
+commands.completion: test_main.py
 commands.checks: test_checks.py
 commands.compare: test_status_and_compare.py
 """

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from evolve.cli import doctor
+from evolve.cli.main import main
 from optics.numerics import backend
 
 
@@ -44,3 +45,32 @@ def test_missing_package_is_not_good(monkeypatch):
     findings = doctor.examine()
     assert findings["packages"] == {"no-such-package": "not installed"}
     assert not findings["good"]
+
+
+@pytest.mark.parametrize(("platform", "supported"), [("linux", True), ("darwin", True), ("win32", False)])
+def test_systems_are_named(monkeypatch, platform, supported):
+    said = doctor.unsupported(platform)
+    assert (said is None) is supported
+    monkeypatch.setattr(doctor, "unsupported", lambda: said)
+    monkeypatch.setattr(doctor, "PACKAGES", ())
+    monkeypatch.setattr(doctor, "_render", lambda variants, environment: dict.fromkeys(variants, "works"))
+    findings = doctor.examine()
+    assert findings["good"] is supported
+    assert ("WSL 2" in "\n".join(doctor._lines(findings))) is not supported
+
+
+def test_windows_is_refused_in_one_line(monkeypatch, capsys):
+    monkeypatch.setattr("sys.platform", "win32")
+    monkeypatch.setattr(doctor, "unsupported", lambda: "win32: is not supported")
+    with pytest.raises(SystemExit) as stop:
+        main(["genes"])
+    assert stop.value.code == 2
+    assert capsys.readouterr().err == "evolve: error: win32: is not supported\n"
+
+
+def test_namesakes_are_named(monkeypatch):
+    monkeypatch.setattr(doctor, "namesakes", lambda: ["the project glass 9 holds a package optics too"])
+    monkeypatch.setattr(doctor, "_render", lambda variants, environment: dict.fromkeys(variants, "works"))
+    findings = doctor.examine()
+    assert findings["good"], "they are no harm"
+    assert "note                the project glass 9 holds" in "\n".join(doctor._lines(findings))

@@ -55,7 +55,7 @@ def test_successive_halving_costs_what_its_stages_cost(tmp_path, paced):
     plan = RunPlan.of(config, tmp_path).measured()
     first, second = 10 + 25 + (1 + 1) * 5, 10 + 75 + (3 + 1) * 5
     assert plan.hours["start"] == pytest.approx(10 * (2 * first + 1 * second) / 3600), "6 and 2 on 4 workers"
-    assert plan.record()["steps"] == 10 * (6 * 25_000 + 2 * 75_000)
+    assert plan.record()["steps"] == 10 * (6 * 28_672 + 2 * 73_728), "whole rollouts of 4,096"
     assert "budget stages  6 to 25,000 steps, 2 to 100,000 steps" in "\n".join(plan.lines())
 
 
@@ -77,7 +77,8 @@ def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, mon
     assert main(["run", "detection", "--preset", "quick", "--dry-run", "--json", *late]) == 0
     plan = json.loads(capsys.readouterr().out)
     assert plan["evaluations"] == 12
-    assert plan["steps"] == 1_200_000
+    assert plan["steps"] == 12 * 102_400
+    assert "up to 102,400 (100,000 rounded up to rollouts of 4,096) each, 1,228,800 in all" in out
     assert plan["genes"]["doe_00"] == 1
     assert plan["hours"].keys() == {"start", "middle"}
     assert list(tmp_path.iterdir()) == []

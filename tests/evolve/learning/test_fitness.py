@@ -11,6 +11,7 @@ from evolve.config.run_config import WorldConfig
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.learning.ppo import play
+from evolve.search.successive_halving import trained_steps
 from sim.envs.assembly import vec_env_in
 from tests.evolve.small_run import LEARNING, PHENOTYPE, small_config
 
@@ -31,6 +32,15 @@ def test_fitness_is_the_mean_return_of_the_evaluation_episodes(outcome):
     assert evaluation.failure is None
     assert evaluation.steps == LEARNING.total_steps
     assert [steps for steps, _ in evaluation.curve] == [512]
+
+
+def test_a_plan_counts_the_steps_that_are_trained(tmp_path):
+    """Whole rollouts, 256 steps each, in two stretches that an evaluation parts."""
+    learning = replace(LEARNING, total_steps=600, eval_interval=300)
+    config = small_config(learning=learning)
+    trained = evaluate(PHENOTYPE, config, 5, tmp_path / "0.safetensors").steps
+    assert trained == trained_steps(learning, 0, 600) == 768
+    assert trained_steps(learning, 512, 600) == 768
 
 
 def test_the_policy_is_as_wide_as_the_animals_brain(tmp_path):

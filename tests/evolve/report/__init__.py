@@ -4,6 +4,8 @@ page: test_report_page.py
 write: test_report_page.py
 markup: test_markup.py, test_report_page.py
 tables: test_report_page.py
+lineup: test_lineup.py
+agent_figure: test_lineup.py
 figures: test_report_page.py
 svg: test_theme.py, test_markup.py, test_report_page.py
 theme: test_theme.py

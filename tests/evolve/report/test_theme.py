@@ -3,7 +3,7 @@
 import re
 
 from evolve.report.svg import drawing, inline
-from evolve.report.theme import ACCENT, CSS, VARIABLES
+from evolve.report.theme import ACCENT, CSS, LINES, VARIABLES
 
 
 def test_every_colour_has_a_light_and_a_dark_value():
@@ -24,3 +24,34 @@ def test_figures_are_drawn_in_the_pages_colours():
     assert not set(VARIABLES) & set(re.findall("#[0-9a-f]{6}", drawn.markup + looks))
     assert set(re.findall('data-look="([^"]*)"', drawn.markup)) == set(drawn.rules)
     assert 'aria-label="a line that falls"' in drawn.markup
+
+
+def luminance(colour):
+    """Relative luminance (WCAG 2.2)."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one, other):
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_text_can_be_read_in_light_and_in_dark():
+    """Contrast of 4.5 at least (WCAG 2.2, 1.4.3), which the palette's own green and vermillion have not."""
+    values = {name: re.findall(rf"--{name}:(#[0-9a-f]{{6}})", CSS)[:2] for name in VARIABLES_BY_NAME}
+    for name in ("ink", "muted", "accent", "vermillion", "green", "purple"):
+        for background in ("paper", "panel"):
+            for text, behind in zip(values[name], values[background], strict=True):
+                assert contrast(text, behind) >= 4.5, (name, background)
+    assert contrast("#009e73", "#fefefe") < 4.5
+    assert contrast("#000000", "#ffffff") == 21
+
+
+def test_lines_are_of_the_theme_so_that_none_vanishes_in_the_dark():
+    assert set(LINES) <= set(VARIABLES)
+    assert len(set(LINES)) == len(LINES) == 6
+
+
+VARIABLES_BY_NAME = [value.removeprefix("var(--").removesuffix(")") for value in VARIABLES.values()]

@@ -4,6 +4,7 @@ accuracy: point_spread/test_psf.py
 arguments: test_any_input.py
 autodiff: point_spread/test_derivatives.py
 backend: test_backend.py
+device: test_device.py
 bessel: test_bessel.py
 cost: test_fourier.py, point_spread/test_planner.py
 field: test_fourier.py, methods/test_textbook.py

@@ -5,6 +5,10 @@ batched_renderer: test_batched_renderer.py, test_one_ray.py, test_reference_rend
 wavefront: test_batched_renderer.py, test_one_ray.py
 reference_renderer: test_reference_renderer.py
 fidelity: test_fidelity.py, eyes/test_depth_layers.py
+fidelity_choice: test_fidelity.py, eyes/test_depth_layers.py
+fidelity_stages: test_fidelity.py, eyes/test_depth_layers.py
+sample_choice: test_fidelity.py
+random_views: test_fidelity.py
 fidelity_trials: test_fidelity.py, eyes/test_depth_layers.py
 prepared_scene: test_batched_renderer.py, test_fidelity.py
 band_error: test_band_error.py

@@ -10,7 +10,8 @@ import pytest
 import optics
 import sim
 from sim.envs.simulation import Simulation
-from sim.render.fidelity import PERFECT_LENS_RAYS, PUPIL_RAYS
+from sim.render.sample_choice import AREA_WORTH, PERFECT_LENS_RAYS, PUPIL_RAYS
+from tests.sim.tracing.area_views import ROW, sees_object, views
 
 DETECTION = sim.Eyes(n_eyes=2, resolution=(9, 11))
 FEW = sim.Eyes(n_eyes=2, resolution=(5, 6))
@@ -42,29 +43,42 @@ def lived_through(world, n=16):
     return simulation.state
 
 
+def near_objects(world, eyes):
+    """States in which half of the agents have an object near, and which receptors see one, (env, eye, h, w)."""
+    state = views(world, 32, seed=2)
+    return state, sees_object(world, eyes, state)
+
+
 @cache
 def picked(name):
-    """The world of a case, states that were lived through in it, and the pick."""
+    """The world of a case and the pick."""
     task, eyes = CASES[name]
     world = sim.build_world(task, seed=11)
-    return world, lived_through(world), sim.choose_fidelity(world, eyes)
+    return world, sim.choose_fidelity(world, eyes)
 
 
-def signals(world, eyes, state, fidelity, rays):
-    """Of so many rays per receptor."""
-    return sim.BatchedRenderer(world, eyes, state.n, replace(fidelity, rays_per_receptor=rays)).signals(state)
+def signals(world, eyes, state, fidelity, samples):
+    """(env, eye, h, w, channel), of so many samples per receptor."""
+    renderer = sim.BatchedRenderer(world, eyes, state.n, replace(fidelity, rays_per_receptor=samples))
+    return np.moveaxis(renderer.signals(state), 2, -1)
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_pick_is_enough_and_not_far_more_than_enough(name):
+    """Over all receptors where agents come, and over those that see an object where one is near."""
     eyes = CASES[name][1]
-    world, state, fidelity = picked(name)
+    world, fidelity = picked(name)
     rays = fidelity.rays_per_receptor
-    truth = signals(world, eyes, state, fidelity, FINER * rays)
+    states = [(lived_through(world), np.s_[:])]
+    if world.objects:
+        states.append(near_objects(world, eyes))
+    truths = [signals(world, eyes, state, fidelity, FINER * rays) for state, _ in states]
 
     def actual_error(n):
         """Beside many more rays in the same light."""
-        return np.sqrt(np.mean((signals(world, eyes, state, fidelity, n) - truth) ** 2))
+        found = [signals(world, eyes, state, fidelity, n) for state, _ in states]
+        errors = [(f - t)[seen] for f, t, (_, seen) in zip(found, truths, states, strict=True)]
+        return max(np.sqrt(np.mean(error**2)) for error in errors)
 
     assert actual_error(rays) < eyes.noise_sigma / 2
     # A third as many rays would not do, or there is no lower number: errors fall like n^-0.6 ... n^-1.
@@ -72,6 +86,46 @@ def test_the_pick_is_enough_and_not_far_more_than_enough(name):
     fewer = max((n for n in numbers if n <= rays / 3), default=None)
     if fewer is not None:
         assert actual_error(fewer) > 0.35 * eyes.noise_sigma
+
+
+@pytest.mark.parametrize(("task", "eyes"), [("detection", sim.Eyes()), ("maze", ROW), ("navigation", ROW)])
+def test_perfect_lenses_see_by_areas_where_rays_would_be_many(task, eyes, recwarn):
+    """With all light, and as well as promised, over all receptors and over those that see an object near: in the light
+    that rays can follow, where they are the truth."""
+    world = sim.build_world(task)
+    fidelity = sim.choose_fidelity(world, eyes, bands="own")
+    assert (fidelity.samples, fidelity.light) == ("areas", "all")
+    assert fidelity.predicted_error <= fidelity.tolerance == 0.005
+    assert not recwarn
+    state, seen = near_objects(world, eyes)
+    by_areas = signals(world, eyes, state, replace(fidelity, light="bounce"), fidelity.rays_per_receptor)
+    rays = sim.Fidelity(1, eyes.bands, light="bounce")
+    truth = signals(world, eyes, state, rays, 1024 if world.objects else 8192)
+    for error in (by_areas - truth, (by_areas - truth)[seen]):
+        assert np.sqrt(np.mean(error**2)) < eyes.noise_sigma / 2 if error.size else not world.objects
+
+
+def test_rays_are_kept_where_few_will_do():
+    """Each costs less than an area."""
+    fidelity = sim.choose_fidelity(sim.build_world("detection"), replace(DETECTION, noise_sigma=0.2), bands="own")
+    assert fidelity.samples == "rays"
+    assert fidelity.rays_per_receptor <= AREA_WORTH
+
+
+def test_what_cannot_be_kept_is_said():
+    """Once, with how much it is missed by, and what misses it."""
+    world = sim.build_world("detection")
+    with pytest.warns(sim.FidelityWarning, match=r"times what is allowed, 2.0e-04: mostly (areas|rays)") as warned:
+        fidelity = sim.choose_fidelity(world, FEW, tolerance=2e-4, bands="own")
+    assert len(warned) == 1
+    assert fidelity.predicted_error > 2e-4
+
+
+def test_an_asked_for_tracer_has_no_areas():
+    world = sim.build_world("detection")
+    assert sim.choose_fidelity(world, FEW, bands="own", tracer="mitsuba").samples == "rays"
+    with pytest.raises(ValueError, match="tracer = 'mitsuba' traces rays only"):
+        sim.BatchedRenderer(world, FEW, 1, sim.Fidelity(1, FEW.bands, samples="areas"), "mitsuba")
 
 
 def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
@@ -85,13 +139,14 @@ def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
     found = [rays(a) for a in (0.1, 0.25, 0.6)]
     assert found == sorted(found)
     assert found[0] < 1 < found[-1]
-    assert found[0] < rays(0.1, noise_sigma=0.0) < PUPIL_RAYS[-1]
+    assert found[0] < rays(0.1, noise_sigma=0.002) < PUPIL_RAYS[-1]
 
 
 def test_light_is_followed_as_far_as_it_matters():
     """Walls light each other in a maze: behind a narrow pupil that is lost in the noise, behind a wide one not. What
     the trials expect of it is what agents see, to a factor of 1.5."""
-    world, state, wide = picked("navigation, a = 0.6")
+    world, wide = picked("navigation, a = 0.6")
+    state = lived_through(world)
     narrow = sim.choose_fidelity(world, behind_lens(NAVIGATION, 0.1))
     assert (narrow.light, wide.light) == ("direct", "bounce")
     direct, both = (
@@ -137,7 +192,7 @@ def test_it_can_be_overruled():
 
 
 def test_it_says_why():
-    fidelity = picked("detection, a = 1/4")[2]
+    fidelity = picked("detection, a = 1/4")[1]
     lines = str(fidelity).splitlines()
     assert [line.split()[0] for line in lines] == ["stage", "bands", "depth", "light", "rays"]
     assert fidelity.predicted_error <= fidelity.tolerance == 0.005
@@ -159,7 +214,8 @@ def test_it_says_why():
         (lambda world: sim.choose_fidelity(world, DETECTION, bands="few"), "bands = 'few': must be 'auto' or 'own'"),
         (lambda world: sim.choose_fidelity(world, DETECTION, tolerance=0), "tolerance = 0"),
         (lambda world: sim.Fidelity(1.0, 0), "bands = 0"),
-        (lambda world: sim.Fidelity(1.0, 3, light="path"), "light = 'path': must be one of 'direct', 'bounce'"),
+        (lambda world: sim.Fidelity(1.0, 3, light="path"), "light = 'path': must be one of 'direct', 'bounce', 'all'"),
+        (lambda world: sim.Fidelity(1.0, 3, light="all"), "light = 'all': must go with samples = 'areas'"),
     ],
 )
 def test_bad_arguments_are_named(call, named):

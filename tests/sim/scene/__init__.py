@@ -15,5 +15,6 @@ bsdfs: test_bsdfs.py
 lights: test_lights.py, test_mirror_light.py
 sky: test_sky.py
 spectra: test_spectra.py
+device_arrays: render/test_frozen_kernels.py
 color: test_color.py, test_exr.py
 """

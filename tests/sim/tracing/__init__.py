@@ -10,6 +10,7 @@ wall_intersection: test_closed_form_tracer.py
 reflectance_atlas: test_closed_form_tracer.py
 areas.area_tracer: test_areas.py
 areas.light_table: test_light_table.py
+areas.light_nodes: test_light_table.py
 areas.light_baking: test_light_table.py
 areas.light_store: test_light_table.py
 areas.cell_grid: test_light_table.py

@@ -57,7 +57,11 @@ def views(world, n=VIEWS, seed=0) -> WorldState:
     spots = np.concatenate([world.agent_spawn, world.object_spawn])
     position = spots[rng.integers(len(spots), size=n)] + rng.uniform(-0.6, 0.6, (n, 2))
     heading = rng.uniform(-np.pi, np.pi, n)
-    for i in range(0, n if world.objects else 0, 2):
+    for i in range(n if world.objects else 0):
+        if i % 2:
+            while np.linalg.norm(objects[i, :, :2] - position[i], axis=1).min() < 0.8:
+                position[i] = spots[rng.integers(len(spots))]
+            continue
         while True:
             azimuth, distance = rng.uniform(-np.pi, np.pi), rng.uniform(0.8, 4)
             position[i] = objects[i, 0, :2] - distance * np.array([np.cos(azimuth), np.sin(azimuth)])

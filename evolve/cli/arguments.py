@@ -1,0 +1,244 @@
+"""The arguments of every command, their help with examples, and suggestions for what was mistyped."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn, TypeAlias
+
+__all__ = ["SHELLS", "build_parser", "parse"]
+
+SHELLS = ("bash", "zsh", "tcsh")
+FIRST = """\
+begin here:
+  evolve doctor                              does it work here?
+  evolve run detection --preset quick        evolve eyes, a few minutes
+  evolve list                                the runs under runs/
+  evolve report runs/detection-quick-1 --open
+every command has examples: evolve run --help
+"""
+EXAMPLES = {
+    "run": """\
+  evolve run detection --preset quick                       a few minutes
+  evolve run navigation --dry-run                           genes, hours and disk; nothing is begun
+  evolve run detection --set search.generations=10 --out runs/first
+  evolve run foraging --from runs/first:12                  from an animal of another run
+""",
+    "resume": "  evolve resume runs/first --open\n",
+    "status": "  evolve status runs/first --watch\n",
+    "compare": "  evolve compare runs/first runs/second --html both.html\n",
+    "replay": "  evolve replay runs/first --open\n  evolve replay runs/first --candidate 12 --seed 3\n",
+    "report": "  evolve report runs/first --open\n",
+    "export": "  evolve export runs/first --candidate 12 --out frames\n",
+    "list": "  evolve list\n  evolve list /data/runs --json\n",
+    "config": "  evolve config show detection --preset quick\n  evolve config schema > settings.schema.json\n",
+    "completion": "  evolve completion bash > ~/.local/share/bash-completion/completions/evolve\n",
+}
+Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse, with errors of one line that suggest what was meant."""
+
+    def error(self, message: str) -> NoReturn:
+        said = re.sub(r" \(choose from (.*)\)", "", message)
+        wrong = re.search(r"invalid choice: '(.*)'", said)
+        hint = _nearest(wrong[1], _choices(message)) if wrong else ""
+        print(f"{self.prog}: error: {said}{hint} (see {self.prog} --help)", file=sys.stderr)
+        raise SystemExit(2)
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """What was asked for.
+
+    Raises:
+        SystemExit: help or the version was, with code 0; or something that there is not, with code 2 after one line.
+    """
+    parser = build_parser()
+    if not arguments:
+        parser.print_help()
+        raise SystemExit(0)
+    parsed, unknown = parser.parse_known_args(arguments)
+    if unknown:
+        own: Parser = parsed.parser
+        options = [option for option in own._option_string_actions if option.startswith("--")]
+        flag = unknown[0].partition("=")[0]
+        own.error(f"unrecognized arguments: {' '.join(unknown)}{_nearest(flag, options) if flag[:1] == '-' else ''}")
+    return parsed
+
+
+def _choices(message: str) -> list[str]:
+    listed = re.search(r"\(choose from (.*)\)", message)
+    return re.findall(r"[\w-]+", listed[1]) if listed else []
+
+
+def _nearest(word: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def build_parser() -> Parser:
+    """All commands."""
+    parser = Parser(
+        prog="evolve",
+        description="Evolve eyes that see through wave optics.",
+        epilog=FIRST,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"rhabdom {_version()}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", parser_class=Parser)
+    _add_runs(commands)
+    _add_watching(commands)
+    _add_products(commands)
+    _add_tables(commands)
+    return parser
+
+
+def _version() -> str:
+    from rhabdom import __version__
+
+    return __version__
+
+
+def _add_runs(commands: Commands) -> None:
+    """Commands that carry a run on."""
+    run = _command(commands, "run", "run.start", "start a run: evolve eyes and brains for a task")
+    _add_settings(run)
+    run.add_argument("--seed", type=int, help="same as --set seed=N")
+    run.add_argument("--workers", type=int, metavar="N", help="same as --set workers=N (0: one worker per core)")
+    run.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/TASK-PRESET-N)")
+    run.add_argument(
+        "--from",
+        dest="start_from",
+        metavar="RUN[:ID]",
+        help="start from an animal of another run (default: the best one)",
+    )
+    run.add_argument(
+        "--dry-run", action="store_true", help="print the plan with the hours and disk space it needs, then stop"
+    )
+    resume = _command(commands, "resume", "run.resume", "continue an interrupted run", directory=True)
+    for command in (run, resume):
+        told = command.add_mutually_exclusive_group()
+        told.add_argument("--json", action="store_true", help="print one line of JSON per event")
+        told.add_argument("--quiet", action="store_true", help="print nothing but errors")
+        command.add_argument("--open", action="store_true", help="open the report in a browser when it is written")
+        command.add_argument(
+            "--executor",
+            choices=("local", "dask"),
+            default="local",
+            help="where candidates are evaluated (default: local)",
+        )
+        command.add_argument(
+            "--scheduler", metavar="ADDRESS", help="address of the Dask scheduler, such as tcp://host:8786"
+        )
+        command.add_argument(
+            "--device",
+            choices=("auto", "cpu", "cuda"),
+            help="where PSFs, eyes and rays are computed (default: RHABDOM_DEVICE, else cpu)",
+        )
+        command.add_argument(
+            "--tensorboard", action="store_true", help="also write TensorBoard files to DIR/tensorboard"
+        )
+
+
+def _add_settings(command: argparse.ArgumentParser) -> None:
+    """What a configuration is put together from."""
+    command.add_argument(
+        "task",
+        metavar="TASK",
+        nargs="?",
+        help="task to evolve for; not needed if the preset sets one (list: evolve tasks)",
+    )
+    command.add_argument(
+        "--preset",
+        metavar="NAME",
+        default="paper",
+        help="settings to start from: quick (minutes), paper (a day; default), or an experiment (list: evolve presets)",
+    )
+    command.add_argument("--scale", help="size of an experiment: laptop (hours on two cores; default) or paper (days)")
+    command.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings; overrides the preset")
+    command.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="one setting; overrides the file"
+    )
+
+
+def _add_watching(commands: Commands) -> None:
+    """Commands that read records."""
+    status = _command(commands, "status", "status.status", "show the state of a run", directory=True)
+    status.add_argument("--json", action="store_true", help="print JSON")
+    status.add_argument("--watch", action="store_true", help="print again at every change until the run ends")
+    listing = _command(commands, "list", "status.listing", "list the runs in a directory")
+    listing.add_argument(
+        "directory", type=Path, nargs="?", default=Path("runs"), metavar="DIR", help="directory of runs (default: runs)"
+    )
+    listing.add_argument("--json", action="store_true", help="print JSON")
+    compare = _command(commands, "compare", "compare.compare", "compare runs side by side")
+    compare.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories")
+    compare.add_argument("--json", action="store_true", help="print JSON")
+    compare.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page with their fitness curves")
+
+
+def _add_products(commands: Commands) -> None:
+    """Commands that make files of a run."""
+    for name, meaning, out in (
+        ("replay", "play one episode of the best agent, and print the result", "FILE"),
+        ("report", "write the HTML report", "FILE"),
+        ("export", "write what the best agent sees as spectral EXR files", "DIR"),
+    ):
+        product = _command(commands, name, f"products.{name}", meaning, directory=True)
+        if name != "report":
+            product.add_argument("--candidate", type=int, metavar="ID", help="candidate to play (default: the best)")
+            product.add_argument("--seed", type=_seed, default=0, help="seed of the episode (default: 0)")
+        if name == "replay":
+            product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
+        if name != "export":
+            product.add_argument("--open", action="store_true", help="open the page in a browser")
+        product.add_argument("--out", type=Path, metavar=out, help="where to write (default: in the run directory)")
+        told = product.add_mutually_exclusive_group()
+        told.add_argument("--json", action="store_true", help="print JSON")
+        told.add_argument("--quiet", action="store_true", help="print nothing but errors")
+
+
+def _add_tables(commands: Commands) -> None:
+    """Commands that say what there is, and whether it works."""
+    _command(commands, "validate", "checks.validate", "compare the optics with closed forms; this needs a checkout")
+    doctor = _command(commands, "doctor", "checks.doctor", "say what is installed and whether it works")
+    tasks = _command(commands, "tasks", "tables.tasks", "list the tasks")
+    presets = _command(commands, "presets", "tables.presets", "list the presets")
+    genes = _command(commands, "genes", "tables.genes", "list the genes")
+    for command in (doctor, tasks, presets, genes):
+        command.add_argument("--json", action="store_true", help="print JSON")
+    config = _command(commands, "config", "settings.config", "show settings: all of a run's, or the schema of them")
+    config.add_argument("what", choices=("show", "schema"), help="show: as TOML, for --config; schema: as JSON schema")
+    _add_settings(config)
+    completion = _command(commands, "completion", "completion.completion", "print a shell's completion of this command")
+    completion.add_argument("shell", choices=SHELLS, help="the shell")
+
+
+def _seed(text: str) -> int:
+    """A seed as NumPy takes it."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 0 or more")
+    return int(text)
+
+
+def _command(
+    commands: Commands, name: str, home: str, meaning: str, directory: bool = False
+) -> argparse.ArgumentParser:
+    """A command that lives in evolve.cli.commands.<home>."""
+    parser = commands.add_parser(
+        name,
+        help=meaning,
+        description=f"{meaning[0].upper()}{meaning[1:]}.",
+        epilog=f"examples:\n{EXAMPLES[name]}" if name in EXAMPLES else None,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    module, function = home.split(".")
+    parser.set_defaults(module=module, function=function, parser=parser)
+    if directory:
+        parser.add_argument("directory", type=Path, metavar="DIR", help="run directory")
+    return parser

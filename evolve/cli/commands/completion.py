@@ -1,0 +1,17 @@
+"""`evolve completion`: what a shell needs to complete this command."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+import shtab
+
+from evolve.cli.arguments import build_parser
+
+__all__ = ["completion"]
+
+
+def completion(arguments: Namespace) -> int:
+    """Print the completion script of a shell."""
+    print(shtab.complete(build_parser(), shell=arguments.shell))
+    return 0

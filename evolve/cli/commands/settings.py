@@ -1,0 +1,76 @@
+"""`evolve config`: all settings of a run that is not begun, and what each may be."""
+
+from __future__ import annotations
+
+import json
+import math
+from argparse import Namespace
+from dataclasses import Field, fields
+from typing import Any
+
+from evolve.config.assemble import assemble, to_toml
+from evolve.config.formats import FORMAT
+from evolve.config.run_config import SECTIONS, TASKS, RunConfig
+from evolve.genome.genes import ALL_GENES, GENES, Gene
+from evolve.genome.interval import Interval
+
+__all__ = ["config", "schema"]
+
+KINDS = {"int": "integer", "float": "number", "bool": "boolean", "str": "string"}
+
+
+def config(arguments: Namespace) -> int:
+    """Print settings as TOML, or their schema as JSON."""
+    if arguments.what == "schema":
+        print(json.dumps(schema(), indent=1))
+        return 0
+    chosen = assemble(arguments.task, arguments.preset, arguments.config, arguments.set, scale=arguments.scale)
+    print(to_toml(chosen), end="")
+    return 0
+
+
+def schema() -> dict[str, Any]:
+    """JSON schema (draft 2020-12) of a run's config.toml and of files for `--config`; what one setting means for
+    another it cannot say, `evolve config show` does."""
+    top = {f.name: _setting(f) for f in fields(RunConfig) if f.name in ("seed", "workers")}
+    sections = {name: _object({f.name: _setting(f) for f in fields(cls)}) for name, cls in SECTIONS.items()}
+    genome = _object({name: _gene(gene) for name, gene in ALL_GENES.items()}, closed=False)
+    properties = {"format": {"const": FORMAT}, "task": {"enum": list(TASKS)}, **top, **sections, "genome": genome}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "rhabdom run", **_object(properties)}
+
+
+def _object(properties: dict[str, Any], closed: bool = True) -> dict[str, Any]:
+    return {"type": "object", "properties": properties, "additionalProperties": not closed}
+
+
+def _setting(definition: Field[Any]) -> dict[str, Any]:
+    """One setting: kind, range, default, meaning."""
+    kind = str(definition.type)
+    found: dict[str, Any] = {"description": definition.metadata["meaning"], "default": definition.default}
+    valid = definition.metadata["valid"]
+    limits = {} if valid is None else _limits(valid)
+    if kind == "float | str":
+        return found | {"anyOf": [{"type": "number", **limits}, {"const": "auto"}]}
+    return found | {"type": KINDS[kind], **limits}
+
+
+def _limits(valid: Interval) -> dict[str, float]:
+    """A range as JSON schema has it; what has no end has no maximum."""
+    least = {"exclusiveMinimum" if valid.open_low else "minimum": valid.low}
+    return least | ({"maximum": valid.high} if math.isfinite(valid.high) else {})
+
+
+def _gene(gene: Gene) -> dict[str, Any]:
+    """What a run may say of a gene."""
+    kind = "integer" if gene.kind == "integer" else "number"
+    value = {"type": kind, **_limits(gene.range)}
+    default = GENES[gene.name].default if gene.name in GENES else gene.default
+    return {"description": gene.meaning} | _object(
+        {
+            "open": {"type": "boolean", "default": default.open},
+            "low": {**value, "default": default.low},
+            "high": {**value, "default": default.high},
+            "start": {**value, "default": default.start},
+            "opens_at": {"type": "integer", "minimum": 0, "default": default.opens_at},
+        }
+    )

@@ -1,0 +1,58 @@
+"""A wait with a bar on a terminal: what is being done, how much of it, for how long; nothing where nobody looks on."""
+
+from __future__ import annotations
+
+import sys
+from types import TracebackType
+from typing import Any, TextIO
+
+from evolve.cli.output import as_it_is, printable
+
+__all__ = ["Waiting"]
+
+
+class Waiting:
+    """Steps of a wait whose lengths nobody knows; a context manager.
+
+    steps: how many there are
+    shown: whether anything is
+    out: stderr if None
+    """
+
+    def __init__(self, steps: int, shown: bool = True, out: TextIO | None = None) -> None:
+        self._out = out or sys.stderr
+        self._steps, self._shown, self._bar = steps, shown, None
+        self._done = -1
+        self._first: str | None = None
+        self._progress: Any = None
+
+    def of_one_step(self, text: str) -> Waiting:
+        """The same, whose only step begins with it."""
+        self._first = text
+        return self
+
+    def __enter__(self) -> Waiting:
+        if self._shown and self._out.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+            columns = (SpinnerColumn(), BarColumn(bar_width=20), TimeElapsedColumn(), TextColumn("{task.description}"))
+            self._progress = Progress(*columns, console=Console(file=as_it_is(self._out)), transient=True)
+            self._progress.start()
+            self._bar = self._progress.add_task("", total=self._steps)
+        if self._first is not None:
+            self.step(self._first)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._progress is not None:
+            self._progress.stop()
+
+    def step(self, text: str) -> None:
+        """The next step begins."""
+        self._done += 1
+        if self._progress is not None:
+            shown = printable(text).replace("[", "\\[")
+            self._progress.update(self._bar, completed=self._done, description=shown)

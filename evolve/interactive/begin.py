@@ -1,0 +1,66 @@
+"""`evolve.run`: a run from its beginning to its end."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from evolve.cli.start_from import starts_from
+from evolve.config.assemble import assemble
+from evolve.interactive.carry_on import Callback, carry_on
+from evolve.interactive.opened_run import OpenedRun
+from evolve.search.search import Search
+from evolve.store.directory import next_directory
+from optics.numerics import device
+
+__all__ = ["run"]
+
+
+def run(
+    task: str | None = None,
+    preset: str = "paper",
+    settings: Mapping[str, Any] | None = None,
+    *,
+    config: Path | str | None = None,
+    scale: str | None = None,
+    start_from: str | None = None,
+    out: Path | str | None = None,
+    callbacks: Sequence[Callback] = (),
+    progress: bool = True,
+) -> OpenedRun:
+    """Evolve, as the command `evolve run` does, and return the run when it has ended.
+
+    The record is the same, whoever began the run: `evolve status`, `resume` and `report` know it too.
+
+    task: to evolve for; may be missing where the preset names one
+    preset: settings to start from: "quick" (minutes), "paper" (a day), or an experiment
+    settings: by their dotted names, {"search.generations": 2, "seed": 1}; they override all others
+    config: TOML file of settings, which override the preset's
+    scale: of an experiment: "laptop" or "paper"
+    start_from: "RUN:ID", an animal of another run
+    out: run directory; runs/TASK-PRESET-N if None
+    callbacks: each called as callback(run, candidate) after every evaluated candidate; an exception ends the run
+    progress: whether to print how it goes, to stderr
+
+    Raises:
+        ConfigError: a setting that cannot be used; one line.
+        RunError: the directory holds something already, or cannot be written.
+        BackendError: Dr.Jit has no LLVM that it can use.
+    """
+    starts = starts_from(start_from) if start_from else None
+    assignments = [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
+    chosen = assemble(task, preset, None if config is None else Path(config), assignments, starts, scale)
+    Search(chosen)  # an unknown optimizer, say, is refused before anything is written
+    device.make_ready()
+    directory = Path(out) if out is not None else next_directory(chosen.task, preset.removesuffix(f"-{chosen.task}"))
+    begun = OpenedRun.create(directory, chosen, starts.name.removeprefix("--from ") if starts else None)
+    with begun.lock():
+        carry_on(begun, callbacks, progress)
+    return begun
+
+
+def _toml(value: Any) -> str:
+    """A setting as `--set` takes it: JSON writes numbers, texts, true and false as TOML does."""
+    return json.dumps(value)

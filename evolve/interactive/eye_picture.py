@@ -1,0 +1,70 @@
+"""An animal's eyes, drawn: where they look, what light passes, and what becomes of a point."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle, Wedge
+
+import optics
+from evolve.config.run_config import EyeConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.report.eye_figures import DECADES, WhiteLight, middle_of_psf, relief_heights
+
+__all__ = ["eye_picture"]
+
+
+def eye_picture(phenotype: Phenotype, config: EyeConfig) -> Figure:
+    """Fields of view around the head, and for each eye the relief of its pupil [µm] and its PSF in white daylight on a
+    logarithmic scale, with a receptor's outline; a perfect lens has neither."""
+    eye = phenotype.eyes(config).eye()
+    figure, panels = pyplot.subplots(1, 1 if eye.pupil is None else 3, squeeze=False, layout="constrained")
+    figure.set_size_inches(3.6 * panels.size, 3.4)
+    _head(panels[0, 0], phenotype, config)
+    if eye.pupil is not None:
+        _relief(panels[0, 1], eye.pupil)
+        _psf(panels[0, 2], eye)
+    return figure
+
+
+def _head(axes: Axes, phenotype: Phenotype, config: EyeConfig) -> None:
+    """From above, heading up."""
+    half = phenotype.fov_deg / 2
+    for azimuth in np.degrees(phenotype.eyes(config).azimuths()):
+        towards = 90 + azimuth
+        axes.add_patch(Wedge((0, 0), 3, towards - half, towards + half, alpha=0.25))
+        place = np.array([np.cos(np.radians(towards)), np.sin(np.radians(towards))])
+        axes.add_patch(Circle(tuple(place), 0.18, color="0.1"))
+    axes.add_patch(Circle((0, 0), 1, fc="0.85", ec="0.3"))
+    axes.set(xlim=(-3.1, 3.1), ylim=(-3.1, 3.1), aspect="equal", xticks=[], yticks=[])
+    axes.set_title(f"{phenotype.n_eyes} eyes of {phenotype.fov_deg:.0f}°, from above")
+
+
+def _relief(axes: Axes, pupil: optics.Pupil) -> None:
+    heights, inside = relief_heights(pupil)
+    radius = 1e6 * pupil.aperture_radius
+    shown = np.where(inside, 1e6 * heights, np.nan)
+    picture = axes.imshow(shown, extent=(-radius, radius, -radius, radius), origin="lower")
+    axes.set(title="relief of the pupil", xlabel="x [µm]", ylabel="y [µm]")
+    _bar(axes, picture, "height [µm]")
+
+
+def _psf(axes: Axes, eye: optics.Eye) -> None:
+    light = WhiteLight.through(eye)
+    picture, half = middle_of_psf(light)
+    peak, edge, pitch = picture.max() / 1e12, 1e6 * half, 1e6 * eye.receptor_pitch
+    floor = peak * 10.0**-DECADES
+    norm = LogNorm(floor, peak)
+    image = axes.imshow(np.maximum(picture / 1e12, floor), extent=(-edge, edge, -edge, edge), origin="lower", norm=norm)
+    axes.add_patch(Rectangle((-pitch / 2, -pitch / 2), pitch, pitch, fill=False, ec="white"))
+    axes.set(title="point spread function", xlabel="x on the retina [µm]", xlim=(-edge, edge), ylim=(-edge, edge))
+    _bar(axes, image, "PSF [1/µm²]")
+
+
+def _bar(axes: Axes, picture: Any, label: str) -> None:
+    pyplot.colorbar(picture, ax=axes, shrink=0.8, label=label)

@@ -1,0 +1,53 @@
+"""What a notebook shows of a run and of an animal: a few facts, every text escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from evolve.analysis.statistics import acuity_cpd, generation_statistics
+from evolve.report.markup import Html, html, joined, rounded
+from evolve.store.candidate import Candidate
+from evolve.store.directory import Run
+
+__all__ = ["animal_as_html", "run_as_html"]
+
+SHOWN = 12  # generations, the latest
+
+
+def run_as_html(run: Run) -> Html:
+    """A run's facts, and its latest generations."""
+    facts = {
+        "task": run.config.task,
+        "candidates": f"{len(run.candidates)} of {run.config.candidates} evaluated",
+        "best": "none yet" if run.best is None else f"no. {run.best.id}, fitness {rounded(run.best.fitness)}",
+    }
+    rows = [
+        (str(row.generation), rounded(row.best), rounded(row.median), str(row.failed))
+        for row in generation_statistics(run.candidates)[-SHOWN:]
+    ]
+    return _facts(str(run.path), facts) + (_table(("generation", "best", "median", "failed"), rows) if rows else Html())
+
+
+def animal_as_html(candidate: Candidate) -> Html:
+    """How a candidate fared, and what it is."""
+    animal = candidate.phenotype
+    height, width = animal.resolution
+    facts = {
+        "fitness": candidate.failure or rounded(candidate.fitness),
+        "episodes solved": "–" if candidate.failure else f"{100 * candidate.success_rate:.0f} %",
+        "eyes": f"{animal.n_eyes} of {height} × {width} receptors, {rounded(animal.fov_deg)}° wide",
+        "acuity": f"{rounded(acuity_cpd(animal))} cycles per degree",
+        "brain": f"{animal.layers} layers of {animal.neurons} neurons, {animal.memory_frames} frames of memory",
+    }
+    return _facts(f"candidate {candidate.id}, generation {candidate.generation}", facts)
+
+
+def _facts(title: str, facts: dict[str, str]) -> Html:
+    rows = joined(html("<tr><th>{}</th><td>{}</td></tr>", name, value) for name, value in facts.items())
+    return html("<table><caption>{}</caption>{}</table>", title, rows)
+
+
+def _table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> Html:
+    head = joined(html("<th>{}</th>", cell) for cell in header)
+    body = joined(html("<tr>{}</tr>", joined(html("<td>{}</td>", cell) for cell in row)) for row in rows)
+    return html("<table><tr>{}</tr>{}</table>", head, body)

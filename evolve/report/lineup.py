@@ -1,0 +1,55 @@
+"""The first animal beside the best one, with a slider through the best of each generation between them."""
+
+from __future__ import annotations
+
+from evolve.analysis.statistics import acuity_cpd, champions
+from evolve.report.agent_figure import agent_figure
+from evolve.report.markup import Html, html, joined, rounded
+from evolve.store.candidate import Candidate
+from evolve.store.directory import Run
+
+__all__ = ["lineup"]
+
+MOST = 60  # animals: a page of thousands of generations shows as many of them, evenly spread
+
+
+def lineup(run: Run) -> Html:
+    """Two cards side by side, of which lineup.js lets the reader choose the right one."""
+    best = _thinned(champions(run.candidates))
+    if not best:
+        return Html()
+    first, last = best[0], len(best) - 1
+    cards = joined(_card(run, generation, candidate, f"line-{i}") for i, (generation, candidate) in enumerate(best))
+    slider = html(
+        '<label class="pick">Best animal after generation <output>{}</output>'
+        '<input type="range" min="0" max="{}" value="{}" step="1"></label>',
+        *(best[-1][0], last, last),
+    )
+    return html(
+        '<div class="lineup"><div class="first"><h4>The first generation’s best</h4>{}</div>'
+        "<div><h4>{}</h4>{}</div></div>\n",
+        *(_card(run, *first, "line-first"), slider if last else html("The best of all"), cards),
+    )
+
+
+def _thinned(best: list[tuple[int, Candidate]]) -> list[tuple[int, Candidate]]:
+    """At most MOST of them, the first and the last among them."""
+    if len(best) <= MOST:
+        return best
+    return [best[round(i * (len(best) - 1) / (MOST - 1))] for i in range(MOST)]
+
+
+def _card(run: Run, generation: int, candidate: Candidate, name: str) -> Html:
+    animal = candidate.phenotype
+    height, width = animal.resolution
+    facts = {
+        "candidate": str(candidate.id),
+        "fitness": rounded(candidate.fitness),
+        "episodes solved": f"{100 * candidate.success_rate:.0f} %",
+        "eyes": f"{animal.n_eyes} of {height} × {width}, {rounded(animal.fov_deg)}° each",
+        "acuity": f"{rounded(acuity_cpd(animal))} cycles/degree",
+        "brain": f"{animal.neurons} neurons, {animal.memory_frames} frames",
+    }
+    rows = joined(html("<dt>{}</dt><dd>{}</dd>", key, value) for key, value in facts.items())
+    drawn = agent_figure(animal.eyes(run.config.eye), name)
+    return html('<div class="card" data-generation="{}">{}<dl>{}</dl></div>', generation, drawn, rows)

@@ -1,0 +1,87 @@
+"""Where the packages `optics`, `sim` and `evolve` are, and who else bears their names.
+
+In a checkout they stand beside this package. Installed, they stand in `rhabdom/packages`, which `rhabdom.pth` adds to
+Python's path: the package index holds another project named `optics`, and two that share a folder overwrite each
+other's files, and delete them when one is uninstalled.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
+from importlib.util import spec_from_loader
+from pathlib import Path
+from types import ModuleType
+
+__all__ = ["HOME", "NAMES", "come_first", "namesakes"]
+
+NAMES = ("optics", "sim", "evolve")
+_BESIDE = Path(__file__).resolve().parent / "packages"
+HOME = _BESIDE if _BESIDE.is_dir() else _BESIDE.parents[1]  # the folder that holds the three
+
+
+def come_first() -> None:
+    """Make `import optics`, `sim` and `evolve` find rhabdom's, and `rhabdom.optics` be the same package as `optics`.
+
+    Nothing changes where Python finds them by itself. Where another project's come first, one line warns of them.
+
+    Raises:
+        ImportError: another `optics`, `sim` or `evolve` has been imported already; one line names it.
+    """
+    if not any(isinstance(finder, _Alias) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _Alias())
+    for name in NAMES:
+        if (loaded := sys.modules.get(name)) is not None and (at := _place(loaded.__spec__)) != HOME / name:
+            raise ImportError(f"{at}: is imported as {name}, which rhabdom needs for its own: import rhabdom first")
+    before = {name: PathFinder.find_spec(name) for name in NAMES}
+    if all(spec is not None and _place(spec) == HOME / name for name, spec in before.items()):
+        return
+    sys.path.insert(0, str(HOME))
+    others = [f"{_place(spec)}" for name, spec in before.items() if spec is not None and _place(spec) != HOME / name]
+    if others:
+        said = "; ".join(namesakes()) or f"rename {', '.join(others)}"
+        warnings.warn(f"rhabdom's packages hide others of the same names: {said}", RuntimeWarning, stacklevel=3)
+
+
+def namesakes() -> list[str]:
+    """Other projects that have installed a package `optics`, `sim` or `evolve`, a line each: which, and the remedy."""
+    from importlib import metadata  # reads what is installed: not at every import
+
+    owners = metadata.packages_distributions()
+    return [
+        f"the project {other} {metadata.version(other)} holds a package {name} too: pip uninstall {other}"
+        for name in NAMES
+        for other in dict.fromkeys(owners.get(name, ()))
+        if other != "rhabdom"
+    ]
+
+
+def _place(spec: ModuleSpec | None) -> Path | None:
+    """Folder of a package, or file of a module."""
+    if spec is None or spec.origin is None:
+        return None
+    path = Path(spec.origin).resolve()
+    return path.parent if path.stem == "__init__" else path
+
+
+class _Alias(MetaPathFinder, Loader):
+    """`rhabdom.optics.eye` is the module `optics.eye`, and no second copy of it."""
+
+    def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
+        head, _, rest = name.partition(".")
+        return spec_from_loader(name, self) if head == "rhabdom" and rest.split(".")[0] in NAMES else None
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        module = import_module(spec.name.removeprefix("rhabdom."))
+        spec.loader_state = module.__spec__
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        """It has been executed under its own name, which it keeps: the import system has just given it another."""
+        spec = module.__spec__
+        assert spec is not None
+        module.__spec__ = spec.loader_state

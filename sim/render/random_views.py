@@ -1,0 +1,124 @@
+"""Random views of a world, on which ways of seeing it are tried: the same ones for the same world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
+from sim.tasks.placement import CLEARANCE
+from sim.worlds.world import World
+
+# [m] from a cell's centre, along either axis: less than half a cell without the agent's body, 1 - 0.2.
+STRAY = 0.75
+NEAR = (0.8, 4.0)  # [m] from an object's centre: where what eyes make of it decides what agents do
+TRIES = 100
+
+
+@dataclass(frozen=True)
+class RandomViews:
+    """Views of single eyes; first axis: view.
+
+    position: of the agent [m], (n, 2) · heading [rad], (n,) · objects: centres [m], (n, k, 3) · eye: which, (n,)
+    """
+
+    position: np.ndarray
+    heading: np.ndarray
+    objects: np.ndarray
+    eye: np.ndarray
+
+    def take(self, n: int) -> RandomViews:
+        """The first n."""
+        return RandomViews(self.position[:n], self.heading[:n], self.objects[:n], self.eye[:n])
+
+    def __len__(self) -> int:
+        return len(self.heading)
+
+    @property
+    def agents(self) -> np.ndarray:
+        """Centres of the agents' bodies [m], (n, 3)."""
+        return np.column_stack([self.position, np.full(len(self), EYE_HEIGHT)])
+
+    def in_agents(self, eyes: Eyes, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where the eyes are (n, 3) [m], and directions (r, 3) in an eye's frame, (n, r, 3): both as the agents'
+        frames would have them if they only stood elsewhere, in the world's axes."""
+        azimuths = eyes.azimuths()
+        cos, sin = np.cos(self.heading), np.sin(self.heading)
+        zero, one = np.zeros_like(cos), np.ones_like(cos)
+        turn = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
+        in_agent = np.einsum("eij,rj->eri", eye_rotations(azimuths), directions)[self.eye]
+        offsets = np.einsum("ijv,vj->vi", turn, eye_positions(azimuths)[self.eye])
+        return self.agents + offsets, np.einsum("ijv,vrj->vri", turn, in_agent)
+
+
+def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
+    """Agents about the cells where agents or objects may start, looking anywhere; objects on theirs."""
+    rng = np.random.default_rng(0)
+    cells, objects = _cells(world), _objects(world, n, rng)
+    position = np.empty((n, 2))
+    for i in range(n):
+        position[i] = _clear_of(objects[i, :, :2], lambda: cells[rng.integers(len(cells))] + _stray(rng))
+    return RandomViews(position, rng.uniform(-np.pi, np.pi, n), objects, rng.integers(eyes.n_eyes, size=n))
+
+
+def near_views(world: World, eyes: Eyes, n: int) -> RandomViews:
+    """Agents with an object NEAR before one of their eyes, somewhere in its field of view."""
+    rng = np.random.default_rng(1)
+    objects, cells = _objects(world, n, rng), _cells(world)
+    position, heading, eye = np.empty((n, 2)), np.empty(n), rng.integers(eyes.n_eyes, size=n)
+    half = np.radians(eyes.fov_deg) / 2
+    for i in range(n):
+
+        def beside(target: np.ndarray = objects[i, 0, :2]) -> np.ndarray:
+            for _ in range(TRIES):
+                azimuth, distance = rng.uniform(-np.pi, np.pi), rng.uniform(*NEAR)
+                place = target + distance * np.array([np.cos(azimuth), np.sin(azimuth)])
+                if np.abs(cells - place).max(axis=1).min() <= STRAY:
+                    break
+            return place
+
+        position[i] = _clear_of(objects[i, :, :2], beside, NEAR[0] - 1e-9)
+        towards = objects[i, 0, :2] - position[i]
+        heading[i] = np.arctan2(towards[1], towards[0]) - eyes.azimuths()[eye[i]] + rng.uniform(-half, half)
+    return RandomViews(position, heading, objects, eye)
+
+
+def on_objects(views: RandomViews, origins: np.ndarray, directions: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Which of the directions (n, r, 3) meet an object's ball, (n, r)."""
+    found = np.zeros(directions.shape[:2], bool)
+    for k, radius in enumerate(radii):
+        way = views.objects[:, k] - origins
+        along = np.einsum("vri,vi->vr", directions, way)
+        found |= (along > 0) & ((way**2).sum(axis=-1)[:, None] - along**2 < radius**2)
+    return found
+
+
+def _cells(world: World) -> np.ndarray:
+    return np.concatenate([world.agent_spawn, world.object_spawn.reshape(-1, 2)])
+
+
+def _objects(world: World, n: int, rng: np.random.Generator) -> np.ndarray:
+    """Their centres [m], (n, k, 3)."""
+    k = len(world.objects)
+    heights = np.array([world.model.body(name).pos[2] for name in world.objects])
+    objects = np.empty((n, k, 3))
+    for i in range(n if k else 0):
+        places = world.object_spawn[rng.choice(len(world.object_spawn), k, replace=len(world.object_spawn) < k)]
+        objects[i] = np.column_stack([places, heights])
+    return objects
+
+
+def _stray(rng: np.random.Generator) -> np.ndarray:
+    return rng.uniform(-STRAY, STRAY, 2)
+
+
+def _clear_of(objects: np.ndarray, draw: Callable[[], np.ndarray], clearance: float = CLEARANCE) -> np.ndarray:
+    """The first place drawn, of TRIES, that is clear of objects."""
+    place = np.zeros(2)
+    for _ in range(TRIES):
+        place = draw()
+        if (np.linalg.norm(objects - place, axis=-1) > clearance).all():
+            break
+    return place

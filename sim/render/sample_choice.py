@@ -1,0 +1,98 @@
+"""How many samples a receptor wants, and of which kind: rays, or areas where a world has closed forms for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from sim.eyes.receptive_fields import NoRaysError
+from sim.eyes.sensor import BoxSampling, EyeSampling
+from sim.render.fidelity import AREAS, RAYS, Level
+from sim.render.fidelity_stages import CAUTION
+from sim.render.fidelity_trials import FidelityTrials
+from sim.tracing.lighting import ALL, BOUNCE
+
+# Numbers of rays that are tried: steps of about √2, so that hardly more are traced than are needed.
+PERFECT_LENS_RAYS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
+PUPIL_RAYS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
+NUMBERS_OF_AREAS = (1, 2, 4, 6, 9, 12, 16, 20, 25, 30)
+# What an area costs, in rays: 1.5 to 5.4 of them (docs/measurements/rendering.md); fewer rays than that are tried, too.
+AREA_WORTH = 3
+
+
+@dataclass(frozen=True)
+class Samples:
+    """kind: "rays" or "areas" · light, level: what was chosen, and why · number: for each receptor · enough: whether
+    they err by no more than was allowed."""
+
+    kind: str
+    light: Level
+    number: float
+    level: Level
+    enough: bool
+
+    @property
+    def error(self) -> float:
+        """With the light that is left out."""
+        return math.hypot(self.light.predicted_error or 0, self.level.predicted_error or 0)
+
+
+def fewest_samples(
+    trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: float, without_light: float
+) -> Samples:
+    """The cheapest that err by no more than allowed; the best there are where none do.
+
+    light: what rays would follow of it · without_light: allowed, where no light is left out
+    """
+    errors = trials.errors(sampling, light.level)
+
+    def rays(numbers: tuple[float, ...]) -> Samples:
+        return Samples(RAYS, light, *_fewest(errors, numbers, allowed, RAYS))
+
+    if not isinstance(sampling, BoxSampling):
+        return rays(PUPIL_RAYS)
+    if (few := rays(PERFECT_LENS_RAYS[:AREA_WORTH])).enough:
+        return few
+    areas = _areas(trials, sampling, light, allowed, without_light)
+    if areas is None:
+        return rays(PERFECT_LENS_RAYS)
+    if not areas.enough:
+        return min(areas, rays(PERFECT_LENS_RAYS), key=lambda samples: (not samples.enough, samples.error))
+    cheaper = rays(tuple(n for n in PERFECT_LENS_RAYS if n <= AREA_WORTH * areas.number))
+    return cheaper if cheaper.enough else areas
+
+
+def _areas(
+    trials: FidelityTrials, sampling: BoxSampling, light: Level, allowed: float, without_light: float
+) -> Samples | None:
+    """None where they cannot see the world."""
+    try:
+        errors = trials.area_errors(sampling, light.level)
+        if light.level == BOUNCE:
+            more, allowed = trials.reflected_more_often(sampling), without_light
+            light = Level("light", ALL, None, f"light that is reflected more than twice is worth {more:.1e}; in tables")
+    except ValueError:
+        return None
+    return Samples(AREAS, light, *_fewest(lambda n: errors(int(n)), NUMBERS_OF_AREAS, allowed, AREAS))
+
+
+def _fewest(
+    error: Callable[[float], float], numbers: tuple[float, ...], allowed: float, kind: str
+) -> tuple[float, Level, bool]:
+    """The lowest of these numbers of samples whose error fits. Errors fall no faster than 1/n: numbers that
+    could not do by that are left out. With its level, and whether it is enough."""
+    at, tried = 0, 0
+    while True:
+        tried += 1
+        try:
+            predicted = CAUTION * error(numbers[at])
+        except NoRaysError:
+            predicted = math.inf
+        if predicted <= allowed or at == len(numbers) - 1:
+            break
+        least = numbers[at] * (predicted / allowed if math.isfinite(predicted) else 1)
+        at = next((i for i in range(at + 1, len(numbers)) if numbers[i] >= least), len(numbers) - 1)
+    found = "fewest of" if predicted <= allowed else "not enough, but the most of"
+    why = f"{found} {numbers[0]:g} ... {numbers[-1]:g} for {allowed:.1e}, {tried} tried"
+    return numbers[at], Level(kind, f"{numbers[at]:g} per receptor", predicted, why), predicted <= allowed

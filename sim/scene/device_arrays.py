@@ -1,0 +1,37 @@
+"""NumPy's numbers where kernels read them, aligned: Dr.Jit compiles a kernel anew for every alignment of its inputs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+
+ALIGNMENT = 64  # [bytes]
+# [bytes] that a kernel takes at once, at most: it may read past an array's end
+# (`optics.numerics.precision.padded_for_packets`)
+PACKET = 128
+
+
+def aligned(n: int, dtype: type) -> np.ndarray:
+    """n zeros that start on 64 bytes."""
+    size = np.dtype(dtype).itemsize
+    raw = np.zeros(n * size + ALIGNMENT + PACKET, np.uint8)
+    first = -raw.ctypes.data % ALIGNMENT
+    return raw[first : first + n * size].view(dtype)
+
+
+def floats(values: np.ndarray) -> Array:
+    """A copy of them, flat, float32."""
+    found = aligned(np.size(values), np.float32)
+    found[:] = np.ravel(values)
+    return mi.Float(found)
+
+
+def whole_numbers(values: Any) -> Array:
+    """The same as uint32."""
+    found = aligned(np.size(values), np.uint32)
+    found[:] = np.ravel(values)
+    return mi.UInt32(found)

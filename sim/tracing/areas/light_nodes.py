@@ -1,0 +1,118 @@
+"""Where the light that walls and floor send on to each other is known, and what it is in between.
+
+Every free cell of the grid has nodes of its own on its floor and on each of the walls around it, and places for bodies.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.tracing.areas.cell_grid import CellGrid
+from sim.tracing.areas.patch import Patch
+from sim.tracing.walls import NoClosedForm, Walls
+
+# Chosen. In navigation, nodes half as dense make the error twice as large; bodies' places twice as dense change it by a
+# fiftieth.
+SPACING = 0.25  # [m] of nodes on floor and walls, at most
+BODY_SPACING = 1.0  # [m] of the places of bodies, at most
+MARGIN = 0.02  # [m] from a cell's borders, at least: nodes lie on one side of each edge
+MOST_NODES = 2**22
+SIDES = np.array([[-1, 0], [1, 0], [0, -1], [0, 1]])  # on which side of its cell a wall stands
+
+
+@dataclass(frozen=True)
+class LightNodes:
+    """Where light is known. floor, top: heights of the floor and of the walls' tops [m] · across, up, places: nodes
+    along a cell, up a wall, and places of bodies along a cell."""
+
+    grid: CellGrid
+    floor: float
+    top: float
+    across: int
+    up: int
+    places: int
+
+    @classmethod
+    def of(cls, walls: Walls) -> LightNodes:
+        """Of a world of walls of one height.
+
+        Raises:
+            NoClosedForm: no walls, or too many nodes.
+        """
+        if not len(walls):
+            raise NoClosedForm("no walls, between which light would be reflected")
+        grid, floor, top = CellGrid.of(walls), walls.floor, float(walls.top.max())
+        across, up = _count(grid.side, SPACING), _count(top - floor, SPACING)
+        total = grid.free.sum() * across * (across + len(SIDES) * up)
+        if total > MOST_NODES:
+            raise NoClosedForm(f"{total} nodes for reflected light")
+        return cls(grid, floor, top, across, up, _count(grid.side, BODY_SPACING))
+
+    @property
+    def cells(self) -> np.ndarray:
+        """Their numbers, float32, flat, for the kernel."""
+        return self.grid.numbers.astype(np.float32).ravel()
+
+
+class NodeLight:
+    """Light between the nodes; the tables that it reads are handed to each call.
+
+    nodes: where it is known · components: of light
+    """
+
+    def __init__(self, nodes: LightNodes, components: int) -> None:
+        self._nodes, self._components = nodes, components
+
+    def on_floor(self, patch: Patch, inputs: dict[str, Array]) -> list[Array]:
+        """Irradiance of what is reflected onto a patch of the floor, per component."""
+        cell, x, y = self._nodes.grid.locate(patch.point, inputs["cells"])
+        n = self._nodes.across
+        return self._interpolate("bounced_floor", cell * (n * n), (x, n), (y, n), inputs)
+
+    def on_wall(self, patch: Patch, inputs: dict[str, Array]) -> list[Array]:
+        """The same of a wall."""
+        normal = patch.normal
+        cell, x, y = self._nodes.grid.locate(patch.point + normal * MARGIN, inputs["cells"])
+        along_y = dr.abs(normal.x) > 0.5
+        side = dr.select(along_y, dr.select(normal.x > 0, 0.0, 1.0), dr.select(normal.y > 0, 2.0, 3.0))
+        z = (patch.point.z - self._nodes.floor) * (1 / (self._nodes.top - self._nodes.floor))
+        first = (cell * len(SIDES) + side) * (self._nodes.across * self._nodes.up)
+        across = dr.select(along_y, y, x)
+        return self._interpolate("bounced_walls", first, (across, self._nodes.across), (z, self._nodes.up), inputs)
+
+    def on_surface(self, point: Array, normal: Array, inputs: dict[str, Array]) -> list[Array]:
+        """The same at a point of the one or the other."""
+        nothing = mi.Vector3f(0)
+        patch = Patch(point, normal, nothing, nothing)
+        either = zip(self.on_floor(patch, inputs), self.on_wall(patch, inputs), strict=True)
+        return [dr.select(normal.z > 0.5, floor, wall) for floor, wall in either]
+
+    def _interpolate(
+        self, name: str, first: Array, across: tuple[Array, int], up: tuple[Array, int], inputs: dict[str, Array]
+    ) -> list[Array]:
+        found = list(corners(first, across, up))
+        return [
+            sum((dr.gather(mi.Float, inputs[f"{name}_{k}"], i) * w for i, w in found), mi.Float(0))
+            for k in range(self._components)
+        ]
+
+
+def corners(first: Array, *axes: tuple[Array, int]) -> Iterator[tuple[Array, Array]]:
+    """Index and weight of the four nodes around a place (x, y) in [0, 1], of so many nodes along each axis."""
+    (x, nx), (y, ny) = axes
+    x, y = dr.clip(x, 0, 1) * (nx - 1), dr.clip(y, 0, 1) * (ny - 1)
+    i, j = dr.minimum(dr.floor(x), nx - 2), dr.minimum(dr.floor(y), ny - 2)
+    for b, wy in ((0, 1 - (y - j)), (1, y - j)):
+        for a, wx in ((0, 1 - (x - i)), (1, x - i)):
+            yield mi.UInt32(first + (j + b) * nx + i + a), wx * wy
+
+
+def _count(length: float, spacing: float) -> int:
+    return max(math.ceil(length / spacing - 1e-6), 1) + 1

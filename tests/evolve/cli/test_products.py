@@ -1,0 +1,79 @@
+"""`evolve report`, `replay` and `export` write where they are told, print what they are asked to, and open a browser;
+`resume` of a finished run does nothing."""
+
+import io
+import json
+
+import pytest
+
+from evolve.cli import waiting
+from evolve.cli.commands import products
+
+
+@pytest.fixture
+def browser(monkeypatch):
+    opened = []
+    monkeypatch.setattr(products.webbrowser, "open", opened.append)
+    return opened
+
+
+def test_replay_elsewhere_as_json_in_a_browser(call, run, browser, tmp_path):
+    before = set(run.path.rglob("*"))
+    page = tmp_path / "new" / "page.html"
+    code, out, err = call("replay", run.path, "--seed", 3, "--json", "--open", "--out", page)
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert found["files"] == [str(page)]
+    assert found["actions"] == 256
+    assert sum(found["terms"].values()) == pytest.approx(found["return"], abs=1e-3)
+    assert browser == [page.as_uri()]
+    assert page.read_text().startswith("<!doctype html>")
+    assert set(run.path.rglob("*")) == before
+
+
+def test_quiet_is_quiet_and_errors_are_not(call, run, browser, tmp_path):
+    assert call("export", run.path, "--quiet", "--out", tmp_path / "frames") == (0, "", "")
+    assert len(list((tmp_path / "frames").glob("*.exr"))) == 32
+    code, out, err = call("export", run.path, "--quiet", "--candidate", 9)
+    assert (code, out) == (2, "")
+    assert "there is no candidate 9" in err
+    assert browser == []
+
+
+def test_resume_of_a_finished_run_does_nothing_and_says_so(call, finished, browser, tmp_path):
+    (finished / "report.html").write_text("as it was")
+    (finished / "exr").mkdir(exist_ok=True)
+    (finished / "exr" / "one.exr").write_bytes(b"as it was")
+    before = {path: path.read_bytes() for path in finished.rglob("*") if path.is_file()}
+    try:
+        code, out, _ = call("resume", finished, "--open")
+        assert code == 0
+        assert "all 12 candidates have been evaluated" in out
+        assert f"nothing is left to do; report: {finished / 'report.html'}" in out
+        assert browser == [(finished / "report.html").as_uri()]
+        assert {path: path.read_bytes() for path in finished.rglob("*") if path.is_file()} == before
+        event = json.loads(call("resume", finished, "--json")[1])
+        assert event["event"] == "finished"
+        assert event["exr"] == [str(finished / "exr" / "one.exr")]
+    finally:
+        (finished / "report.html").unlink()
+        (finished / "exr" / "one.exr").unlink()
+        (finished / "exr").rmdir()
+
+
+class Terminal(io.StringIO):
+    """Somebody looks on."""
+
+    def isatty(self):
+        return True
+
+
+def test_a_wait_shows_what_is_done_on_a_terminal_alone():
+    seen, unseen, quiet = Terminal(), io.StringIO(), Terminal()
+    for out, shown in ((seen, True), (unseen, True), (quiet, False)):
+        with waiting.Waiting(2, shown, out) as wait:
+            wait.step("writing [this]\x1b]0;title\x07")
+            wait.step("writing that")
+    assert "writing that" in seen.getvalue()
+    assert "\x1b]0;" not in seen.getvalue()
+    assert unseen.getvalue() == quiet.getvalue() == ""

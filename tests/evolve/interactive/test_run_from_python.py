@@ -1,0 +1,150 @@
+"""`evolve.run` and the command make the same record; notebooks are the tutorials, and run."""
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+import evolve
+from evolve.interactive import carry_on
+from evolve.search.local_executor import LocalExecutor
+from evolve.store.directory import Run
+from tests.evolve.closed_form import TINY, bowl
+from tests.test_docs import CODE, agrees
+
+ROOT = Path(__file__).resolve().parents[3]
+NOTEBOOKS = ROOT / "docs" / "notebooks"
+SETTINGS = dict(text.split("=") for text in TINY) | {"genome.optical.open": False, "workers": 2, "seed": 7}
+SETTINGS = {key: int(value) if str(value).isdecimal() else value for key, value in SETTINGS.items()}
+
+
+@pytest.fixture
+def closed_form(monkeypatch):
+    """The real engine with a fitness that is known."""
+    monkeypatch.setattr(carry_on, "evaluate_candidate", bowl)
+    monkeypatch.setattr(carry_on, "LocalExecutor", lambda evaluate, count, prepare: LocalExecutor(evaluate, count))
+
+
+def record(path: Path) -> list[dict[str, object]]:
+    lines = [json.loads(line) for line in (path / "candidates.jsonl").read_text().splitlines()]
+    return sorted(({**line, "seconds": 0} for line in lines), key=lambda line: line["id"])
+
+
+def test_record_is_the_commands(closed_form, call, finished, tmp_path, monkeypatch):
+    seen = []
+    run = evolve.run(
+        "detection", settings=SETTINGS, out=tmp_path / "run", callbacks=[lambda r, c: seen.append((r, c.id))]
+    )
+    assert sorted(number for _, number in seen) == list(range(12))
+    assert all(told is run for told, _ in seen)
+    assert isinstance(run, evolve.Run)
+    import evolve.cli.commands.run as command
+
+    monkeypatch.setattr(command, "evaluate_candidate", bowl)
+    monkeypatch.setattr(command, "LocalExecutor", lambda evaluate, count, prepare: LocalExecutor(evaluate, count))
+    monkeypatch.setattr(command, "_finish", lambda run, *rest: 0)
+    assigned = [part for key, value in SETTINGS.items() for part in ("--set", f"{key}={str(value).lower()}")]
+    code, _, err = call("run", "detection", *assigned, "--out", tmp_path / "other")
+    assert code == 0, err
+    assert record(run.path) == record(tmp_path / "other")
+    assert (run.path / "config.toml").read_bytes() == (tmp_path / "other" / "config.toml").read_bytes()
+    assert run.best.fitness == Run.open(run.path).best.fitness
+
+
+def test_a_callback_may_end_the_run_which_can_go_on(closed_form, tmp_path):
+    class EnoughError(Exception):
+        pass
+
+    def enough(run, candidate):
+        if len(run.candidates) == 5:
+            raise EnoughError
+
+    begin = partial(evolve.run, "detection", settings=SETTINGS, progress=False)
+    with pytest.raises(EnoughError):
+        begin(out=tmp_path / "run", callbacks=[enough])
+    run = evolve.Run.open(tmp_path / "run")
+    assert len(run.candidates) == 5
+    run.resume(progress=False)
+    whole = begin(out=tmp_path / "whole")
+    assert record(run.path) == record(whole.path)
+    starts = (run.path / "versions.json").read_bytes()
+    run.resume()
+    assert (run.path / "versions.json").read_bytes() == starts, "a finished run is left as it is"
+
+
+def test_what_cannot_be_used_is_refused_before_anything_is_written(tmp_path):
+    for arguments, message in (
+        ({"settings": {"search.poplation": 3}}, "did you mean"),
+        ({"settings": {"search.population": 1.5}}, "must be an integer"),
+        ({"preset": "qick"}, "did you mean 'quick'"),
+        ({"settings": {"search.optimizer": "none"}}, "none"),
+    ):
+        with pytest.raises(evolve.ConfigError, match=message):
+            evolve.run("detection", out=tmp_path / "run", **arguments)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_script_needs_no_guard(tmp_path):
+    """Workers do not run the script again, which would begin another run in each of them."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from pathlib import Path\n"
+        "import evolve\n"
+        "from evolve.interactive import carry_on\n"
+        "from evolve.search.local_executor import LocalExecutor\n"
+        "from tests.evolve.closed_form import bowl\n"
+        "with Path('began').open('a') as log: log.write('once\\n')\n"
+        "carry_on.evaluate_candidate = bowl\n"
+        "carry_on.LocalExecutor = lambda evaluate, count, prepare: LocalExecutor(evaluate, count)\n"
+        f"print(evolve.run('detection', settings={SETTINGS!r}))\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, script]
+    child = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert "12 of 12 candidates evaluated" in child.stdout, child.stderr
+    assert (tmp_path / "began").read_text() == "once\n"
+    assert [path.name for path in (tmp_path / "runs").iterdir()] == ["detection-paper-1"]
+
+
+@pytest.fixture(scope="module")
+def maker():
+    spec = importlib.util.spec_from_file_location("notebooks", ROOT / "docs" / "site" / "notebooks.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", ["optics", "rl", "evolution", "python"])
+def test_notebooks_are_the_tutorials(maker, name):
+    """The pages' code is run by other tests, so that of the notebooks is too. (Else: python docs/site/notebooks.py.)"""
+    page = (ROOT / "docs" / "tutorial" / f"{name}.md").read_text()
+    stored = nbformat.read(NOTEBOOKS / f"{name}.ipynb", as_version=4)
+    assert stored == maker.notebook(page)
+    nbformat.validate(stored)
+    code = "".join(f"{cell.source}\n" for cell in stored.cells if cell.cell_type == "code")
+    assert code == "".join(maker.CODE.findall(page))
+    prose = "\n".join(cell.source for cell in stored.cells if cell.cell_type == "markdown")
+    for target in maker.LINK.findall(prose):
+        assert (NOTEBOOKS / target.partition("#")[0]).exists(), target
+
+
+def test_a_notebook_runs_as_jupyter_runs_it(tmp_path, monkeypatch):
+    """The one whose cells show tables and figures; they print what the page shows."""
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    book = nbformat.read(NOTEBOOKS / "python.ipynb", as_version=4)
+    NotebookClient(book, timeout=300, resources={"metadata": {"path": tmp_path}}).execute()
+    shown = {kind for cell in book.cells for output in cell.get("outputs", ()) for kind in output.get("data", ())}
+    assert "image/png" in shown
+    printed = [cell.outputs for cell in book.cells if cell.cell_type == "code"]
+    page = (ROOT / "docs" / "tutorial" / "python.md").read_text()
+    for (_, expected), outputs in zip(CODE.findall(page), printed, strict=True):
+        texts = [output.text for output in outputs if output.output_type == "stream" and output.name == "stdout"]
+        assert not expected or agrees(expected, "".join(texts))
+    assert Run.open(tmp_path / "runs" / "python").best is not None

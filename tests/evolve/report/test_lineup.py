@@ -1,0 +1,85 @@
+"""The page leads with the animal: who it is, its replay, its head and eyes, first beside best."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sim
+from evolve.analysis.statistics import champions
+from evolve.report import lineup as cards
+from evolve.report.agent_figure import agent_figure
+from evolve.report.markup import duration
+from tests.evolve.report.reported import BEST
+
+
+def polygons(drawn, kind):
+    """Their points; `kind` is what stands before them."""
+    return [
+        np.array([[float(v) for v in point.split(",")] for point in found.split()])
+        for found in re.findall(rf'{kind} points="([^"]+)"', drawn.markup)
+    ]
+
+
+def area(points):
+    x, y = points.T
+    return abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))) / 2
+
+
+def test_the_replay_comes_first_and_numbers_later(content, page):
+    order = re.findall(r'<section id="(\w+)">', content)
+    assert order[:3] == ["episode", "animals", "best"]
+    assert order.index("numbers") > 2
+    links = re.findall(r'<a href="#(\w+)">', content[content.index("<nav") : content.index("</nav>")])
+    assert links == order
+    assert "Candidate 3, the best of 6, has 2 eyes of 4 × 5 receptors" in " ".join(page.texts["all"].split())
+
+
+def test_first_and_best_are_the_records(run, content):
+    expected = [(str(generation), str(candidate.id)) for generation, candidate in champions(run.candidates)]
+    found = re.findall(r'data-generation="(\d+)">.*?<dt>candidate</dt><dd>(\d+)</dd>', content, re.DOTALL)
+    assert found == [expected[0], *expected]
+    assert found[-1][1] == str(BEST)
+
+
+def test_a_long_run_shows_its_first_and_its_last(run):
+    best = champions(run.candidates)
+    long = [(number, best[0][1]) for number in range(1000)]
+    thinned = cards._thinned(long)
+    assert len(thinned) == cards.MOST
+    assert (thinned[0][0], thinned[-1][0]) == (0, 999)
+    assert cards._thinned(best) == best
+
+
+@pytest.mark.parametrize("n_eyes", [1, 2, 8])
+def test_every_eye_is_drawn_with_its_field(n_eyes):
+    eyes = sim.Eyes(n_eyes=n_eyes, resolution=(4, 4), fov_deg=30, placement_range_deg=90)
+    drawn = agent_figure(eyes, "it")
+    fields, disks = polygons(drawn, "<polygon"), polygons(drawn, 'class="eye"')
+    assert len(fields) == len(disks) == n_eyes
+    wide = agent_figure(replace(eyes, fov_deg=60), "it")
+    for narrow, wider in zip(fields, polygons(wide, "<polygon"), strict=True):
+        assert 1.5 < area(wider) / area(narrow) < 2.5
+
+
+def test_eyes_in_front_hide_those_behind():
+    """Eyes all around: those on the far side are drawn before the head, which covers them."""
+    drawn = agent_figure(sim.Eyes(n_eyes=8, resolution=(1, 1), fov_deg=20, placement_range_deg=180), "it")
+    before, after = drawn.markup.split("<circle r=")
+    assert before.count('class="eye"') > 0
+    assert after.count('class="eye"') > before.count('class="eye"'), "the animal looks at the reader"
+
+
+def test_the_family_tree_leads_to_the_table(run, content):
+    targets = set(re.findall(r'xlink:href="#(candidate-\d+)"', content))
+    assert targets == {f"candidate-{c.id}" for c in run.candidates if c.failure is None}
+    assert {f'<tr id="{name}"' in content or f' id="{name}">' in content for name in targets} == {True}
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [(0.4, "0.40 s"), (90, "90 s"), (179, "3.0 min"), (7199, "120 min"), (9e4, "25 h"), (2e6, "23 days")],
+)
+def test_durations_are_said_as_people_say_them(seconds, said):
+    assert duration(seconds) == said

@@ -1,0 +1,5 @@
+"""Which test covers which module of rhabdom.
+
+importing: test_importing.py, test_wheel.py
+command: test_wheel.py
+"""
