@@ -51,7 +51,7 @@ def find() -> tuple[np.ndarray, list[tuple[float, float, int]]]:
 
 def strehl(control_points: np.ndarray) -> float:
     pupil = optics.Pupil(RADIUS, optics.BSplineRelief(control_points), n=INDEX)
-    return float(optics.strehl_ratio(optics.psf(pupil, [WAVELENGTH], FOCAL_LENGTH, dx=0.25e-6, shape=(33, 33)))[0])
+    return float(optics.strehl_ratio(optics.psf(pupil, [WAVELENGTH], FOCAL_LENGTH))[0])
 
 
 def paraboloid() -> np.ndarray:

@@ -28,7 +28,7 @@ _CONTENTS = {
     "Grid": "numerics.grid",
     "HeightMap": "elements.relief",
     "PSFBatch": "point_spread.batch",
-    "PSFResult": "point_spread.psf",
+    "PSFResult": "point_spread.psf_result",
     "PhotonBudget": "spectra.photon_budget",
     "Pigment": "spectra.pigment",
     "PixelRelief": "elements.pixel_relief",
@@ -44,10 +44,11 @@ _CONTENTS = {
     "SpectralBands": "spectra.bands",
     "Spectrum": "spectra.spectrum",
     "StackResult": "propagation.system",
-    "encircled_energy": "point_spread.image_quality",
+    "VectorFocus": "point_spread.vector_focus",
+    "encircled_energy": "point_spread.concentration",
     "illuminant": "spectra.spectrum",
-    "image_quality": "point_spread.image_quality",
-    "mtf": "point_spread.image_quality",
+    "image_quality": "point_spread.contrast",
+    "mtf": "point_spread.contrast",
     "plan": "point_spread.psf",
     "propagate": "propagation.propagate",
     "propagate_through": "propagation.system",
@@ -56,7 +57,8 @@ _CONTENTS = {
     "receptors_of": "spectra.receptors",
     "reflectance": "spectra.spectrum",
     "require": "numerics.backend",
-    "strehl_ratio": "point_spread.image_quality",
+    "strehl_ratio": "point_spread.concentration",
+    "vector_focus": "point_spread.vector_focus",
 }
 
 __all__ = sorted(_CONTENTS)

@@ -1,7 +1,8 @@
 """B0: does the predicted error hold? Random pupils, distances, windows, tolerances and reliefs
 
 Cases are drawn at random: Fresnel number 0.01 to 1000, NA 0.01 to 0.7, reliefs up to 40 µm (none, ideal lens,
-B-spline, both, height map), windows of 17 to 129 samples a side, tolerances 1e-5 (float32) or 1e-8 (float64) to 3e-2.
+B-spline, both, height map), circles, rings, slits, regular polygons and stars, windows of 17 to 257 samples a side, a
+quarter of them with pitches of 0.3 to 4 times λz/2R, tolerances 1e-5 (float32) or 1e-8 (float64) to 3e-2.
 The actual error is the relative L2 of intensity against the direct Rayleigh-Sommerfeld sum in float64. That sum is
 asked for a thousandth of the tolerance or a thirtieth of the prediction, whichever is less. A case whose direct sum
 would take more than 5 s is drawn again, and counted.
@@ -252,7 +253,7 @@ _COLORS = ("#0072B2", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#555555", "#5
 
 def main(arguments: list[str] | None = None) -> int:
     options_parser = parser(__doc__)
-    options_parser.add_argument("--cases", type=int, default=510)
+    options_parser.add_argument("--cases", type=int, default=1000)
     options_parser.add_argument("--seed", type=int, default=0)
     options_parser.add_argument("--methods", type=int, default=0, help="time every method on so many of the cases")
     options = options_parser.parse_args(arguments)

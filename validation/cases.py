@@ -1,4 +1,4 @@
-"""Random pupils, distances, windows and tolerances over the whole domain that the planner is made for."""
+"""Random pupils, apertures, distances, windows and tolerances over the whole domain that the planner is made for."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ from typing import Any
 import numpy as np
 
 import optics
+from optics.apertures.aperture import Aperture
 
-__all__ = ["WAVELENGTH", "Case", "draw_case"]
+__all__ = ["KINDS", "OPENINGS", "WAVELENGTH", "Case", "draw_case"]
 
 WAVELENGTH = 550e-9
 FRESNEL_NUMBERS = (1e-2, 1e3)
 APERTURES = (1e-2, 0.7)
 TALLEST_RELIEF = 40e-6
-SIDES = (17, 129)
+SIDES = (17, 257)
+COARSE, COARSEST = 0.25, 4.0  # share of the windows that have a pitch of 0.3 to so many times λz/2R
 LOOSEST = 3e-2
 TIGHTEST = {"float32": 1e-5, "float64": 1e-8}
 KINDS = {"flat": 0.1, "lens": 0.15, "B-spline": 0.35, "lens + B-spline": 0.3, "height map": 0.1}
+OPENINGS = {"circle": 0.4, "annulus": 0.15, "slit": 0.2, "regular polygon": 0.1, "star": 0.15}
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,7 @@ class Case:
     """aperture: NA = R/√(R² + z²). relief: peak height of a relief [m], 0 without. window: dx and shape."""
 
     kind: str
+    opening: str
     pupil: optics.Pupil
     distance: float
     window: dict[str, Any]
@@ -43,7 +47,7 @@ class Case:
     def __str__(self) -> str:
         height, width = self.window["shape"]
         return (
-            f"{self.kind}, Fresnel number {self.fresnel_number:.3g}, NA {self.aperture:.3g}, "
+            f"{self.kind} in a {self.opening}, Fresnel number {self.fresnel_number:.3g}, NA {self.aperture:.3g}, "
             f"relief {self.relief:.2g} m, n {self.pupil.n.a:.3g}, {height} x {width} at {self.window['dx']:.3g} m, "
             f"tolerance {self.tolerance:.2g}, {self.dtype}"
         )
@@ -63,15 +67,33 @@ def draw_case(rng: np.random.Generator) -> Case:
     elif kind == "height map":
         surface = _hills(rng) * relief
     lens = distance if "lens" in kind else None
-    pupil = optics.Pupil(radius, surface, n=rng.uniform(1.05, 2.0), thin_lens_focal_length=lens)
+    opening = str(rng.choice(list(OPENINGS), p=list(OPENINGS.values())))
+    shape = {"n": rng.uniform(1.05, 2.0), "aperture": _aperture(rng, opening)}
+    pupil = optics.Pupil(radius, surface, thin_lens_focal_length=lens, **shape)
     window = _window(rng, radius, distance, lens is not None)
     dtype = str(rng.choice(["float32", "float64"]))
     tolerance = _log_uniform(rng, TIGHTEST[dtype], LOOSEST)
-    return Case(kind, pupil, distance, window, tolerance, dtype, fresnel_number, aperture, relief)
+    return Case(kind, opening, pupil, distance, window, tolerance, dtype, fresnel_number, aperture, relief)
 
 
 def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(10 ** rng.uniform(math.log10(low), math.log10(high)))
+
+
+def _aperture(rng: np.random.Generator, opening: str) -> Aperture:
+    """Slits down to a twentieth of the radius, stars with 3 to 9 points."""
+    if opening == "annulus":
+        return optics.Annulus(rng.uniform(0.05, 0.95))
+    if opening == "slit":
+        width, height = (_log_uniform(rng, 0.05, 1.4) for _ in range(2))
+        return optics.Slit(width, height)
+    if opening == "regular polygon":
+        return optics.Polygon.regular(int(rng.integers(3, 9)), rng.uniform(0, 360))
+    if opening == "star":
+        n = 2 * int(rng.integers(3, 10))
+        angle, reach = np.arange(n) * 2 * np.pi / n, rng.uniform(0.3, 1.0, n)
+        return optics.Polygon(np.column_stack([reach * np.cos(angle), reach * np.sin(angle)]))
+    return optics.Circle()
 
 
 def _hills(rng: np.random.Generator) -> np.ndarray:
@@ -83,9 +105,13 @@ def _hills(rng: np.random.Generator) -> np.ndarray:
 
 
 def _window(rng: np.random.Generator, radius: float, distance: float, focused: bool) -> dict[str, Any]:
-    """Half its width: part of the pupil's shadow or some Airy radii, whichever is wider; at most 50° off the axis."""
+    """Half its width: part of the pupil's shadow or some Airy radii, whichever is wider, or else what so many samples
+    of a coarse pitch take; at most 50° off the axis."""
     shadow = radius * rng.uniform(0.3, 1.5) * (0.1 if focused else 1.0)
     rings = rng.uniform(3, 12) * WAVELENGTH * distance / (2 * radius)
-    half = min(max(shadow, rings), 1.2 * distance)
     shape = tuple(int(n) for n in rng.integers(SIDES[0], SIDES[1] + 1, 2))
+    half = max(shadow, rings)
+    if rng.random() < COARSE:
+        half = _log_uniform(rng, 0.3, COARSEST) * WAVELENGTH * distance / (2 * radius) * max(shape) / 2
+    half = min(half, 1.2 * distance)
     return {"dx": half / (max(shape) / 2), "shape": shape}

@@ -12,7 +12,7 @@ from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
 from optics.apertures.soft_polygon import SoftPolygon
 from optics.apertures.triangulation import crossing, kernel_point, triangle_nodes, triangles
-from optics.numerics.arguments import finite, positive, shown
+from optics.numerics.arguments import finite, positive, shown, without_derivative
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["Polygon", "Slit"]
@@ -105,8 +105,8 @@ class Slit(Aperture):
     height: float
 
     def __post_init__(self) -> None:
-        positive("width", self.width, "pupil radii")
-        positive("height", self.height, "pupil radii")
+        positive("width", without_derivative("width", self.width), "pupil radii")
+        positive("height", without_derivative("height", self.height), "pupil radii")
         if np.hypot(self.width, self.height) > 2 * RIM:
             raise ValueError(
                 f"(width, height) = ({shown(self.width)}, {shown(self.height)}): must fit into the unit circle, "
@@ -156,6 +156,7 @@ def _twice_area(vertices: np.ndarray) -> float:
 
 def _checked(value: Any) -> np.ndarray:
     """The vertices as an (n, 2) array; ValueError unless they make a simple polygon within the unit circle."""
+    without_derivative("vertices", value)
     try:
         vertices = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):

@@ -47,6 +47,10 @@ class PixelRelief(Relief):
         column, row = (dr.clip(dr.floor((place + 1) * (n / 2)), 0, n - 1) for place in (x, y))
         return dr.gather(types.Float64, types.Float64(known), types.Index(row * n + column))
 
+    @property
+    def span(self) -> float:
+        return float(np.ptp(self._heights))
+
     def bandwidth(self, level: float) -> float:
         """Jumps have no end of frequencies."""
         return 0.0 if self._level else math.inf

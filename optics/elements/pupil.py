@@ -15,12 +15,16 @@ from optics.elements.refractive_index import RefractiveIndex
 from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
 from optics.elements.wavefront_slopes import Slopes, _derivative
-from optics.numerics.arguments import finite, in_range, of_kind, positive, reals
+from optics.numerics.arguments import finite, in_range, of_kind, positive, reals, without_derivative
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
 
 __all__ = ["Pupil"]
+
+TALLEST = 100.0  # choice, radii: a relief as high as one is no thin element any more
+ANY_HEIGHT = 1e-3  # choice [m]: not too tall for any pupil
+SENSOR_DISTANCE = 240e-6  # choice [m]: of a pupil without a lens, where nobody says
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +54,7 @@ class Pupil:
 
     def __post_init__(self) -> None:
         positive("aperture_radius", self.aperture_radius)
-        in_range("medium_n", self.medium_n, 1.0, 10.0)
+        in_range("medium_n", without_derivative("medium_n", self.medium_n), 1.0, 10.0)
         if not isinstance(self.n, RefractiveIndex):
             in_range("n", self.n, 1.0, 10.0)
             object.__setattr__(self, "n", RefractiveIndex(self.n))
@@ -58,6 +62,12 @@ class Pupil:
         if self.height is not None and not isinstance(self.height, Relief):
             height = self.height if is_differentiable(self.height) else reals("height", self.height)
             object.__setattr__(self, "height", HeightMap(height))
+        if self.height is not None and self.height.span > max(TALLEST * number(self.aperture_radius), ANY_HEIGHT):
+            raise ValueError(
+                f"height spans {self.height.span:.3g} m over a pupil of radius {number(self.aperture_radius):.3g} m: "
+                f"must be in metres, at most {TALLEST:g} radii or {ANY_HEIGHT:g} m "
+                "(a phase φ [rad] is a height φ λ / (2π (n - medium_n)))"
+            )
         if self.thin_lens_focal_length is not None:
             positive("abs(thin_lens_focal_length)", abs(finite("thin_lens_focal_length", self.thin_lens_focal_length)))
 
@@ -75,6 +85,23 @@ class Pupil:
     def pixels(self) -> int:
         """Squares across the pupil between which its relief jumps; 0: it is smooth."""
         return 0 if self.height is None else int(self.height.pixels)
+
+    def image_distance(self, source_distance: float) -> float:
+        """Where [m] behind the pupil a sensor is that nobody has placed: in the image of a source at this distance [m]
+        if there is an ideal lens, 1/z = 1/f - 1/s, and at 240 µm otherwise. It stays there: no derivative moves it.
+
+        Raises:
+            ValueError: the lens makes no real image.
+        """
+        if self.thin_lens_focal_length is None:
+            return SENSOR_DISTANCE
+        power = 1 / number(self.thin_lens_focal_length) - 1 / source_distance
+        if power <= 0:
+            raise ValueError(
+                f"sensor_distance is missing: a lens of focal length {number(self.thin_lens_focal_length):.3g} m "
+                f"makes no real image of a source at {source_distance:.3g} m, so say where the sensor is [m]"
+            )
+        return 1 / power
 
     @cached_property
     def _level(self) -> Pupil:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from optics.numerics.arguments import finite, in_range, positive, vacuum_wavelength
+from optics.numerics.arguments import finite, in_range, positive, vacuum_wavelength, without_derivative
 from optics.numerics.autodiff import Scalar, number
 
 __all__ = ["RefractiveIndex"]
@@ -33,7 +33,7 @@ class RefractiveIndex:
     def from_abbe(cls, n_d: float, abbe_number: float) -> RefractiveIndex:
         """The Cauchy curve with index n_d at 587.562 nm and the given Abbe number (infinite: no dispersion)."""
         in_range("n_d", n_d, 1.0, 10.0)
-        number = positive("abbe_number", abbe_number, "1", infinite=True)
+        number = positive("abbe_number", without_derivative("abbe_number", abbe_number), "1", infinite=True)
         b = (n_d - 1) / number / (LINE_F**-2 - LINE_C**-2)
         return cls(n_d - b / LINE_D**2, b)
 

@@ -21,6 +21,8 @@ from optics.numerics.precision import Precision
 
 __all__ = ["BSplineRelief", "HeightMap", "Relief"]
 
+FEWEST_FOR_JUMPS = 16  # choice: samples a side
+
 
 class Relief(ABC):
     """A height map [m]."""
@@ -37,6 +39,16 @@ class Relief(ABC):
     @abstractmethod
     def knots(self) -> int:
         """Polynomial pieces across the pupil."""
+
+    @property
+    def span(self) -> float:
+        """Highest less lowest of the numbers [m] that the relief is made of."""
+        return 0.0
+
+    @property
+    def jump(self) -> float:
+        """Largest step [m] between neighbouring samples that a smooth relief is too coarse for; 0: none."""
+        return 0.0
 
     @property
     def pixels(self) -> int:
@@ -103,6 +115,10 @@ class BSplineRelief(Relief):
             total = dr.fma(along[i], row, total)
         return total
 
+    @property
+    def span(self) -> float:
+        return float(np.ptp(plain(self.control_points)))
+
     def bandwidth(self, level: float) -> float:
         return 1.0  # a cubic polynomial: half a cycle per half width, doubled
 
@@ -142,6 +158,18 @@ class HeightMap(Relief):
         object.__setattr__(self, "_heights", samples)
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", samples)
+
+    @property
+    def span(self) -> float:
+        return float(np.ptp(self._heights))
+
+    @property
+    def jump(self) -> float:
+        """Of half the whole span or more from one of many samples to the next, as where a lens is wrapped."""
+        if len(self._heights) < FEWEST_FOR_JUMPS:
+            return 0.0
+        steepest = max(float(np.abs(np.diff(self._heights, axis=axis)).max()) for axis in (0, 1))
+        return steepest if steepest > self.span / 2 else 0.0
 
     @cached_property
     def _margin(self) -> int:

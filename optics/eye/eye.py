@@ -18,7 +18,7 @@ from optics.eye.summary import Description, describe
 from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, plain, to_user
 from optics.numerics.precision import precision
-from optics.point_spread.psf import PSFResult
+from optics.point_spread.psf_result import PSFResult
 from optics.spectra.bands import SpectralBands
 from optics.spectra.photon_budget import PhotonBudget
 from optics.spectra.receptors import receptors_of

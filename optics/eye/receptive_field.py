@@ -17,7 +17,7 @@ from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
 from optics.numerics.matrices import matmul
 from optics.numerics.precision import precision
-from optics.point_spread.psf import PSFResult, spread
+from optics.point_spread.psf_result import PSFResult, spread
 from optics.point_spread.request import Request
 
 __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]

@@ -11,8 +11,9 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.numerics.accuracy import Plan
 from optics.numerics.autodiff import Scalar, number, plain
-from optics.point_spread.image_quality import image_quality, mtf, strehl_ratio
-from optics.point_spread.psf import PSFResult
+from optics.point_spread.concentration import strehl_ratio
+from optics.point_spread.contrast import image_quality, mtf
+from optics.point_spread.psf_result import PSFResult
 from optics.spectra.bands import SpectralBands
 from optics.spectra.spectrum import daylight
 

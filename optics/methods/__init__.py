@@ -14,6 +14,7 @@ low_rank             by one matrix product
 far_field            by one transform onto directions for each of a few nodes of the window
 fresnel              approximate: Fresnel and Fraunhofer, and how wrong they are
 geometric            approximate: density of rays; the pinhole
+richards_wolf        the vector focus of symmetric pupils, and how wrong scalar theory is
 rays                 where geometrical optics sends the light
 pupil_sampling       where matrix products sample the pupil
 spectral_taper       how a spectrum ends before grazing incidence

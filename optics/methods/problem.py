@@ -96,6 +96,13 @@ class Problem:
     def fresnel_number(self) -> float:
         return self.radius**2 / (self.wavelength * self.distance)
 
+    @property
+    def steepest_sine(self) -> float:
+        """Of rays that meet in a point of the window: no steeper than from the rim to the axis, nor than light leaves
+        the pupil."""
+        from_rim = self.radius / math.hypot(self.radius, self.distance)
+        return min(from_rim, self.phase_band_inside * self.wavelength + self.wavelength / self.radius)
+
     def soft_edge(self, band: float) -> PupilEdge:
         """The aperture as samples can carry it that leave frequencies up to `band` [1/m] untouched."""
         return PupilEdge(self.aperture.soften(band * self.radius, self.ripple, EDGE_REACH), self.radius)

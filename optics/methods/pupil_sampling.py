@@ -23,6 +23,8 @@ from optics.numerics.precision import Precision, opaque
 
 __all__ = ["GridSamples", "PixelSamples", "PupilSamples", "pixel_samples", "samples_of"]
 
+MOST_ACROSS = 1e6  # choice, by memory
+
 
 class PupilSamples(Protocol):
     """Rows and columns of samples of a pupil."""
@@ -117,9 +119,12 @@ def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, rad
 
 
 def samples_of(problem: Problem) -> PupilSamples | None:
-    """As few as the turns of pupil and path together allow; None where pixels are too coarse for them."""
+    """As few as the turns of pupil and path together allow; None where pixels are too coarse for them, or
+    a grid would be too large."""
     if problem.pixelated is not None:
         return pixel_samples(problem.pixelated, *node_rule(problem), problem.radius)
     edge = problem.soft_edge(problem.turning)
     pitch = 1 / (problem.turning + edge.stopband)
+    if edge.outermost / pitch > MOST_ACROSS:
+        return None
     return GridSamples(edge, Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch))

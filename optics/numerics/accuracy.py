@@ -14,6 +14,9 @@ MOST_SAMPLES = 4096
 FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}  # of a method's sums, relative to the field's root mean square
 
 
+STEEP = 1e-2  # choice: error of scalar theory from which on a plan names it, at NA 0.22
+
+
 class AccuracyError(ValueError):
     """Asked for more than any method can give here; the message says what can be had."""
 
@@ -36,6 +39,8 @@ class Plan:
     samples: (y, x) samples of the pupil; for nodes (radial, angular) or (count, 1).
     padding: period of the pupil's transform over its samples, where there is one.
     predicted_error: relative L2 error of the intensity over the window.
+    scalar_error: what scalar theory itself errs by where rays as steep as these meet, in unpolarised light, which no
+        method here makes less: see `optics.vector_focus`.
     seconds: predicted time of a warm call on two cores.
     options: every method that was weighed.
     """
@@ -48,6 +53,7 @@ class Plan:
     seconds: float = 0.0
     options: tuple[Option, ...] = ()
     padding: float = 1.0
+    scalar_error: float = 0.0
 
     def __str__(self) -> str:
         rows = {
@@ -56,6 +62,7 @@ class Plan:
             "padding": f"{self.padding:.2f}",
             "dtype": self.dtype,
             "predicted error": f"{self.predicted_error:.1e}",
+            **({"scalar theory": f"errs by {self.scalar_error:.1g}"} if self.scalar_error >= STEEP else {}),
             "predicted time": f"{self.seconds:.2g} s",
             "why": self.why,
         }

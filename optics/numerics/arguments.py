@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.autodiff import number
+from optics.numerics.autodiff import is_differentiable, number
 
 __all__ = [
     "close_match",
@@ -25,6 +25,7 @@ __all__ = [
     "vacuum_wavelength",
     "vacuum_wavelengths",
     "whole",
+    "without_derivative",
 ]
 
 
@@ -70,9 +71,25 @@ def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False
     return number
 
 
+def without_derivative(name: str, value: Any) -> Any:
+    """`value`; ValueError if it, or an entry of a list, asks for a derivative: it would be dropped."""
+    if isinstance(value, (tuple, list)):
+        for entry in value:
+            without_derivative(name, entry)
+    elif getattr(value, "requires_grad", False) or (is_differentiable(value) and _asks(value)):
+        raise ValueError(f"{name} asks for a derivative, which it does not carry to the picture: give a plain number")
+    return value
+
+
+def _asks(value: Any) -> bool:
+    import drjit as dr
+
+    return bool(dr.grad_enabled(value))
+
+
 def vacuum_wavelength(value: Any) -> float:
     """`value` [m] as float; ValueError unless it is > 0 and no longer than LONGEST_WAVE, as nanometres would be."""
-    wavelength = _number("wavelength", value)
+    wavelength = _number("wavelength", without_derivative("wavelength", value))
     if not SMALLEST <= wavelength <= LONGEST_WAVE:
         raise ValueError(
             f"wavelength = {shown(value)}: must be greater than 0 and at most {LONGEST_WAVE:g}, in m{UNIT}"
@@ -82,7 +99,7 @@ def vacuum_wavelength(value: Any) -> float:
 
 def vacuum_wavelengths(values: Any) -> np.ndarray:
     """`values` [m] as a float64 array of any shape, each checked as by `vacuum_wavelength`."""
-    wavelengths = reals("wavelengths", values)
+    wavelengths = reals("wavelengths", without_derivative("wavelengths", values))
     for end in (wavelengths.min(), wavelengths.max()) if wavelengths.size else ():
         vacuum_wavelength(end)
     return wavelengths
@@ -135,9 +152,13 @@ def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | N
 def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
     """(x, y) as finite floats."""
     try:
-        x, y = value
-    except (TypeError, ValueError):
+        x, y = without_derivative(name, value)
+    except TypeError:
         raise ValueError(f"{name} = {shown(value)}: must be two {what}") from None
+    except ValueError as error:
+        raise ValueError(
+            str(error) if " asks " in str(error) else f"{name} = {shown(value)}: must be two {what}"
+        ) from None
     return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optics.numerics.arguments import point_2d, positive, shape_2d
+from optics.numerics.arguments import point_2d, positive, shape_2d, without_derivative
 from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision, opaque
 
@@ -28,12 +28,18 @@ class Grid:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", shape_2d("shape", self.shape))
-        object.__setattr__(self, "dx", positive("dx", self.dx))  # a NumPy scalar would take a Dr.Jit array for its own
+        object.__setattr__(
+            self, "dx", positive("dx", without_derivative("dx", self.dx))
+        )  # a NumPy scalar would take a Dr.Jit array for its own
         object.__setattr__(self, "centre", point_2d("centre", self.centre))
 
     @classmethod
     def square(cls, n: int, dx: float) -> Grid:
         return cls((n, n), dx)
+
+    def moved(self, centre: tuple[float, float]) -> Grid:
+        """The same samples about another centre (x, y)."""
+        return Grid(self.shape, self.dx, centre)
 
     @property
     def x(self) -> np.ndarray:

@@ -1,10 +1,14 @@
 """The point spread function of a pupil: which method computes it, whether it was right, and what it is worth.
 
 psf            psf, plan
+psf_result     PSFResult: a picture, and how to look again
 request        Request: what is asked
 planner        the cheapest method within the tolerance
 pictures       requests answered, and what becomes of a wrong picture
 spot_check     a picture held against the direct sum at a few points
+vector_focus   vector_focus: beyond scalar theory
+population     one plan for many pupils
 batch          psf_batch: many eyes at once
-image_quality  mtf, strehl_ratio, encircled_energy, image_quality
+contrast       mtf, image_quality
+concentration  strehl_ratio, encircled_energy
 """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence, Sized
+from collections.abc import Iterator, Sequence, Sized
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,11 +12,12 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import Plan
-from optics.numerics.arguments import shown, vacuum_wavelength
-from optics.numerics.autodiff import Array, Scalar
+from optics.numerics.arguments import in_range, of_kind, positive, shown, vacuum_wavelength
+from optics.numerics.autodiff import Array, Scalar, number
 from optics.numerics.grid import Grid
-from optics.numerics.precision import precision
+from optics.numerics.precision import Precision, padded_for_packets, precision
 from optics.point_spread.pictures import pictures
+from optics.point_spread.population import Member, population_pictures
 from optics.point_spread.request import Setup
 
 __all__ = ["PSFBatch", "psf_batch"]
@@ -46,7 +47,7 @@ class PSFBatch:
 def psf_batch(
     pupils: Sequence[Pupil],
     wavelengths: Sequence[float] = (550e-9,),
-    sensor_distance: Scalar = 240e-6,
+    sensor_distance: Scalar | None = None,
     source_distances: Sequence[Scalar] = (math.inf,),
     *,
     dx: float = 0.25e-6,
@@ -57,28 +58,65 @@ def psf_batch(
 ) -> PSFBatch:
     """`optics.psf` of every pupil, source on the axis at every distance [m] and vacuum wavelength [m], over one window.
 
-    Nothing is computed before everything is planned, and each picture is being computed while the next is prepared.
+    sensor_distance: None: where each pupil's ideal lens images the first source; see `optics.psf`.
+
+    Pupils with smooth reliefs of 4 x 4 points, or none, share one plan and one stack of matrix products where the
+    tolerance is 1e-3 or more and that is good enough: thousands a second. The others are all planned before any is
+    computed, and each is being computed while the next is prepared.
 
     Raises:
         ValueError: a bad argument, or an empty sequence.
         AccuracyError: see `optics.psf`.
     """
-    import drjit as dr
-
     for name, values in (("pupils", pupils), ("wavelengths", wavelengths), ("source_distances", source_distances)):
         if not isinstance(values, Sized) or len(values) == 0:
             raise ValueError(f"{name} = {shown(values)}: must be a sequence of at least one")
     window = Grid(shape, dx)
-    setups = [
-        Setup(sensor_distance, PointSource(depth), window, tolerance, method, dtype) for depth in source_distances
-    ]
-    requests = [
-        setup.request(pupil, vacuum_wavelength(wavelength))
-        for pupil in pupils
-        for setup in setups
-        for wavelength in wavelengths
-    ]
-    flat, plans = zip(*pictures(requests), strict=True)
-    whole = flat[0] if len(flat) == 1 else dr.concat(flat)
+    in_range("tolerance", tolerance, 1e-12, 0.5)
+    members = list(_members(pupils, wavelengths, sensor_distance, source_distances))
+    by_one_plan = population_pictures(members, window, tolerance) if (method, dtype) == ("auto", "float32") else ()
+    known = {index: (image, plan) for index, image, plan in by_one_plan}
+    rest = [index for index in range(len(members)) if index not in known]
+    requests = []
+    for member in (members[index] for index in rest):
+        setup = Setup(member.distance, PointSource(member.source), window, tolerance, method, dtype)
+        requests.append(setup.request(member.pupil, member.wavelength))
+    whole, plans = _joined(known, dict(zip(rest, pictures(requests), strict=True)), precision(dtype))
     sizes = len(pupils), len(source_distances), len(wavelengths), *window.shape
     return PSFBatch(precision(dtype).Tensor(whole, sizes), window.dx, tuple(plans))
+
+
+def _members(
+    pupils: Sequence[Pupil],
+    wavelengths: Sequence[float],
+    sensor_distance: Scalar | None,
+    source_distances: Sequence[Scalar],
+) -> Iterator[Member]:
+    """Eyes, depths, wavelengths, the last fastest."""
+    if sensor_distance is not None:
+        positive("sensor_distance", sensor_distance)
+    lambdas = [vacuum_wavelength(wavelength) for wavelength in wavelengths]
+    first = number(PointSource(source_distances[0]).distance)
+    for depth in source_distances:
+        positive("source_distance", depth, infinite=True)
+    for pupil in pupils:
+        of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
+        at = pupil.image_distance(first) if sensor_distance is None else sensor_distance
+        yield from (Member(pupil, wavelength, at, depth) for depth in source_distances for wavelength in lambdas)
+
+
+def _joined(
+    known: dict[int, tuple[np.ndarray, Plan]], rest: dict[int, tuple[Array, Plan]], types: Precision
+) -> tuple[Array, list[Plan]]:
+    """All pictures in a row, and their plans."""
+    import drjit as dr
+
+    both = {**known, **rest}
+    plans = [both[index][1] for index in range(len(both))]
+    if not rest:
+        return types.Float(padded_for_packets(np.stack([known[index][0] for index in range(len(known))]))), plans
+    flat = [
+        types.Float(padded_for_packets(each)) if isinstance(each, np.ndarray) else each
+        for each in (both[index][0] for index in range(len(both)))
+    ]
+    return (flat[0] if len(flat) == 1 else dr.concat(flat)), plans

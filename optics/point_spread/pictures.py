@@ -104,12 +104,18 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> tuple[Array, Plan
     named = attempt.approximates and asked.method == attempt.plan.method
     if error <= tolerance or named:
         return attempt.stated(error)
-    better = attempt.repeated(error, tolerance) if tries > 1 else None
+    found = (
+        f"tolerance = {tolerance:g}: a check against the direct sum finds an error of {error:.1g} by "
+        f"{attempt.plan.method} in {problem.dtype}"
+    )
+    try:
+        better = attempt.repeated(error, tolerance) if tries > 1 else None
+    except AccuracyError as refused:
+        needs = str(refused).partition(": ")[0].partition(" needs ")[2]
+        more = f", and to do better needs {needs}" if needs else ""
+        raise AccuracyError(f"{found}{more}; widen the tolerance or shrink the window") from None
     if better is None:
-        raise AccuracyError(
-            f"tolerance = {tolerance:g}: a check against the direct sum finds an error of {error:.1g} by "
-            f"{attempt.plan.method} in {problem.dtype}; widen the tolerance or ask for another method or dtype"
-        )
+        raise AccuracyError(f"{found}; widen the tolerance or ask for another method or dtype")
     return _checked(better, asked, tries - 1)
 
 

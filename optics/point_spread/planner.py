@@ -35,6 +35,7 @@ from optics.methods.low_rank import low_rank
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
+from optics.methods.richards_wolf import scalar_theory_error
 from optics.methods.sampling import Sampling
 from optics.numerics.accuracy import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Option, Plan
 
@@ -57,6 +58,12 @@ APPROXIMATE: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "pinhole": pinhole,
 }
 METHODS = EXACT | APPROXIMATE
+# Why a method may have no sampling at all.
+UNSUITED = {
+    "hankel": "for circles and rings with reliefs that are the same all around, lit along the axis: this pupil is not",
+    "low_rank": "the matrix between this pupil and so wide a window has more entries than are allowed",
+    "far_field": "this window is too wide, too near to the pupil or too finely asked for to be interpolated in angle",
+}
 # Have nodes where light jumps from pixel to pixel; no grid has.
 FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "low_rank": low_rank,
@@ -91,7 +98,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
     ]
     if not fitting:
         candidates = [option for option in cheapest.values() if option and option.model_error <= allowed]
-        raise AccuracyError(_refusal(problem, candidates, most_seconds))
+        raise AccuracyError(_refusal(problem, candidates, most_seconds, method))
     best = min(fitting, key=_seconds)
     return _plan(problem, best, cheapest, most_seconds), best
 
@@ -150,7 +157,8 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None],
         + ("cheapest of those that meet the tolerance" if len(weighed) > 1 else "asked for")
     )
     error = _sampling_error(problem) + best.model_error
-    return Plan(best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), best.padding)
+    sampled = best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), best.padding
+    return Plan(*sampled, scalar_theory_error(problem.steepest_sine))
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:
@@ -165,13 +173,15 @@ def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: f
     return f"{option.seconds / best.seconds:.1f} times as slow"
 
 
-def _refusal(problem: Problem, found: list[Sampling], most_seconds: float) -> str:
+def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, method: str) -> str:
     width = 2 * problem.window.half_width
     if not found and problem.pixelated is not None:
         return (
             "this method cannot sample a pixelated relief within its limits; ask for method='auto' or one of "
             f"{', '.join(FOR_PIXELS)}"
         )
+    if not found and method in UNSUITED and not (method == "hankel" and problem.symmetric):
+        return f"method = {method!r}: {UNSUITED[method]}; ask for method='auto' or 'exact'"
     if not found:
         return (
             f"tolerance = {problem.tolerance:g} over a window of {width:.3g} m at a distance of "

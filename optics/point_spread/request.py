@@ -9,12 +9,14 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.methods.problem import Problem
 from optics.methods.sampling import Sampling
-from optics.numerics.accuracy import Plan
+from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import Scalar
 from optics.numerics.grid import Grid
 from optics.point_spread.planner import choose
 
 __all__ = ["Request", "Setup"]
+
+MOST_SECONDS_OF_JUMPS = 2.0  # choice
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,22 @@ class Request:
         Raises:
             AccuracyError: no method meets the tolerance within the limits on memory and time.
         """
-        return choose(self.problem, self.method, self.most_seconds)
+        relief = self.beam.pupil.height
+        jump = 0.0 if relief is None else relief.jump
+        try:
+            plan, sampling = choose(self.problem, self.method, self.most_seconds)
+        except AccuracyError as error:
+            raise AccuracyError(f"{error}; {_wrapped(jump)}" if jump else str(error)) from None
+        if jump and plan.seconds > MOST_SECONDS_OF_JUMPS:
+            raise AccuracyError(f"about {plan.seconds:.2g} s by {plan.method}: {_wrapped(jump)}")
+        return plan, sampling
+
+
+def _wrapped(jump: float) -> str:
+    return (
+        f"height jumps by {jump:.3g} m from sample to sample, as where a lens is wrapped, and HeightMap joins them by "
+        "steep slopes: optics.PixelRelief(height) has the steps themselves"
+    )
 
 
 @dataclass(frozen=True)

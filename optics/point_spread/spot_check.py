@@ -133,23 +133,27 @@ def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarra
     return exact
 
 
-KINDS = 5  # of points, as `_chances` counts them
+KINDS = 6  # of points, as `_chances` counts them
 
 
 def _chances(bright: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """With which each point is drawn, flat: a fifth each evenly, in proportion to the intensity, to its square, to the
-    nearness of a side, and of a corner.
+    """With which each point is drawn, flat: a sixth each evenly, in proportion to the intensity, to its square, to the
+    nearness of a side, of a corner, and to the intensity near sides and corners.
 
     An even error of the amplitude weighs as the intensity's root: the second fifth sees it where a focus leaves the
     others blind. A focus of one sample has its errors beside it: the square is spread over its neighbours. Phases turn
-    fastest at the sides and the corners: a quadrature fails there first, and within a few samples.
+    fastest at the sides and the corners: a quadrature fails there first, and within a few samples; of a slit's light
+    few places at the sides have any, and errors are where there is light.
     """
     height, width = shape
     squares = np.zeros((height + 2, width + 2))
     squares[1:-1, 1:-1] = np.square(bright).reshape(shape)
     rows = squares[:-2] + squares[1:-1] + squares[2:]
     near = (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]).ravel()
-    return _fixed_chances(shape) + bright / (KINDS * bright.sum()) + near / (KINDS * near.sum())
+    rim, fixed = _fixed_chances(shape)
+    lit = bright * rim
+    found = fixed + bright / bright.sum() + near / near.sum()
+    return (found + lit / lit.sum() if lit.any() else found + fixed / 3) / KINDS
 
 
 @lru_cache(maxsize=16)
@@ -164,8 +168,15 @@ STEEP = 12
 
 
 @lru_cache(maxsize=16)
-def _fixed_chances(shape: tuple[int, int]) -> np.ndarray:
-    """Those that do not depend on the picture, flat."""
+def _fixed_chances(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """The nearness of sides and corners, flat; and the sum of the three chances that do not depend on the picture."""
+    height, width = shape
     y, x = (np.square(np.linspace(-1, 1, n)) if n > 1 else np.ones(1) for n in shape)
-    sides, corners = np.maximum.outer(y, x).ravel() ** STEEP, (np.add.outer(y, x).ravel() / 2) ** STEEP
-    return (1 / sides.size + sides / sides.sum() + corners / corners.sum()) / KINDS
+    # Each pair of sides has its share, however short: half of it the outermost samples alone.
+    sides = np.zeros(shape)
+    for steepness in (STEEP, math.inf):
+        across, along = x**steepness, y**steepness
+        sides += across[None, :] / (across.sum() * height) + along[:, None] / (along.sum() * width)
+    corners = (np.add.outer(y, x) / 2) ** STEEP
+    rim = sides.ravel() / 4 + corners.ravel() / corners.sum()
+    return rim, 1 / rim.size + rim

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
-from optics.numerics.arguments import finite, in_range, vacuum_wavelength
+from optics.numerics.arguments import finite, in_range, vacuum_wavelength, without_derivative
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum, predicted_seconds
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, precision
@@ -87,6 +87,8 @@ def propagate(
     """
     if method not in ("auto", *PROPAGATION_METHODS):
         raise ValueError(f"method = {method!r}: must be 'auto' or one of {', '.join(PROPAGATION_METHODS)}")
+    for name, value in (("u", u), ("distance", distance), ("medium_n", medium_n)):
+        without_derivative(name, value)
     given = _field(u)
     window = Grid(out_shape or given.shape[-2:], dx if out_dx is None else out_dx, out_centre)
     lit = _lit(given)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from validation import B0_planner as B0
-from validation.cases import APERTURES, FRESNEL_NUMBERS, KINDS, TALLEST_RELIEF, draw_case
+from validation.cases import APERTURES, FRESNEL_NUMBERS, KINDS, OPENINGS, TALLEST_RELIEF, WAVELENGTH, draw_case
 
 CASES = 25
 
@@ -61,6 +61,10 @@ def test_cases_span_the_domain():
         assert high / 1.1 < max(values) <= high
     assert TALLEST_RELIEF / 1.2 < max(case.relief for case in cases) <= TALLEST_RELIEF
     assert {case.kind for case in cases} == set(KINDS)
+    assert {case.opening for case in cases} == set(OPENINGS)
+    assert max(max(case.window["shape"]) for case in cases) > 250
+    apart = [case.window["dx"] * 2 * case.pupil.radius / (WAVELENGTH * case.distance) for case in cases]
+    assert np.mean(np.array(apart) > 1) > 0.03
     radii = [case.pupil.radius for case in cases]
     numbers = [radius**2 / (550e-9 * case.distance) for radius, case in zip(radii, cases, strict=True)]
     assert numbers == pytest.approx([case.fresnel_number for case in cases])

@@ -11,6 +11,7 @@ problem: point_spread/test_planner.py
 pupil_sampling: test_textbook.py, elements/test_pixel_relief.py
 rayleigh_sommerfeld: test_textbook.py, test_oracles_circular.py
 rays: test_geometric.py
+richards_wolf: test_richards_wolf.py
 sampling: point_spread/test_planner.py
 spectral_taper: test_textbook.py
 textbook: test_textbook.py

@@ -1,10 +1,14 @@
 """Which test fails when a module of optics/point_spread is broken.
 
 batch: test_batch.py
-image_quality: test_image_quality.py
+concentration: test_measures.py, test_measure_errors.py
+contrast: test_measures.py, test_measure_errors.py
 pictures: test_pictures.py
 planner: test_planner.py
+population: test_population.py
 psf: test_psf.py, test_derivatives.py, test_robustness.py
 request: test_psf.py
+psf_result: test_psf.py, test_measure_errors.py
 spot_check: test_spot_check.py
+vector_focus: methods/test_richards_wolf.py
 """

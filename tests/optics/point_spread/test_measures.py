@@ -42,15 +42,17 @@ def test_mtf_is_one_at_zero_frequency_and_nothing_beyond_the_cutoff():
 
 
 def test_all_that_arrives_is_what_a_small_window_measures_contrast_by():
-    """Two rings hold 0.91 of the light: by their own light contrasts are a tenth too high."""
+    """Two rings hold 0.91 of the light. What is missing is looked at, or else it may be anywhere in the contrasts."""
     result = ideal(8, 1.6e-6, 13)
-    f = np.array([0.3, 0.5, 0.7]) * optics.mtf(result).cutoff[0]
-    expected = circular_mtf(f, optics.mtf(result).cutoff[0])
-    (by_all,), (by_window,) = (optics.mtf(result, arriving).profile(f) for arriving in (1.0, None))
-    assert np.abs(by_all - expected).max() < 0.02
-    np.testing.assert_allclose(by_window, by_all / result.power[0], rtol=1e-4)
-    assert optics.mtf(result, 1.0).mtf[0, 6, 6] == 1
-    np.testing.assert_allclose(optics.mtf(result, 0.95).profile(f)[0], by_all / 0.95, rtol=1e-4)
+    transfer, as_it_is = optics.mtf(result), optics.mtf(result, tolerance=1)
+    f = np.array([0.3, 0.5, 0.7]) * transfer.cutoff[0]
+    expected = circular_mtf(f, transfer.cutoff[0])
+    assert np.abs(transfer.profile(f)[0] - expected).max() < 6e-3 < transfer.predicted_error[0] <= 0.02
+    assert 0.05 < as_it_is.predicted_error[0] < 0.12
+    assert as_it_is.fx.size == 13 < transfer.fx.size
+    assert np.abs(as_it_is.profile(f)[0] - expected).max() < 0.02  # by all that arrives
+    assert optics.mtf(result, 1.0).mtf.max() == 1
+    np.testing.assert_allclose(optics.mtf(result, 1.0).predicted_error, transfer.predicted_error, atol=5e-3)
     with pytest.raises(ValueError, match=r"arriving = 0\.5: must be in"):
         optics.mtf(result, 0.5)
     with pytest.raises(ValueError, match=r"arriving has shape \(2,\): must be a number, or one per wavelength \(1,\)"):
@@ -61,9 +63,9 @@ def test_mtf_keeps_the_order_of_axes():
     """A PSF stretched along x blurs along fx."""
     result = ideal(8, 2e-6, 65)
     x, y = result.x[None, :], result.y[:, None]
-    stretched = np.exp(-(x**2) / (2 * 8e-6**2) - y**2 / (2 * 4e-6**2))[None]
+    stretched = np.exp(-(x**2) / (2 * 8e-6**2) - y**2 / (2 * 4e-6**2))[None] / (2 * np.pi * 8e-6 * 4e-6)
     transfer = optics.mtf(
-        optics.PSFResult(stretched, 2e-6, result.wavelengths, FOCAL_LENGTH, result.pupil, result.plans)
+        optics.PSFResult(stretched, 2e-6, result.wavelengths, FOCAL_LENGTH, result.pupil, result.plans), tolerance=1
     )
     along_x = np.interp(2e4, transfer.fx, transfer.mtf[0, 32])
     along_y = np.interp(2e4, transfer.fy, transfer.mtf[0, :, 32])
@@ -87,17 +89,21 @@ def test_strehl_ratio_under_defocus():
     assert on_axis == pytest.approx(np.sinc(waves) ** 2, rel=5e-3)
 
 
-def test_encircled_energy_follows_airy_and_converges_with_the_pitch():
+def test_encircled_energy_follows_airy_at_any_pitch():
+    """f/16 departs from Airy by 2e-3. Samples 8.8 µm apart would be the coarsest that can be added up at all."""
     f_number = 16
     radius = FOCAL_LENGTH / (2 * f_number)
     radii = np.array([5e-6, 1.07e-5, 2e-5])
     expected = reference.airy_encircled_energy(radii, WAVELENGTH, radius, FOCAL_LENGTH)
-    errors = []
-    for dx in (2e-6, 1e-6, 0.5e-6):
+    found = []
+    for dx in (8e-6, 2e-6, 0.5e-6):
         n = 2 * int(30e-6 / dx) + 1
-        errors.append(np.abs(optics.encircled_energy(ideal(f_number, dx, n), radii)[0] - expected).max())
-    assert errors[-1] < 2e-3  # f/16 departs from Airy by about that much
-    assert errors[0] > 4 * errors[-1]
+        value, error = optics.encircled_energy(ideal(f_number, dx, n), radii, with_error=True)
+        found.append(value[0])
+        assert error.max() < 3e-3
+        assert np.abs(value[0] - expected).max() < 2e-3 + error.max()
+    np.testing.assert_allclose(found[0], found[2], atol=3e-5)
+    np.testing.assert_allclose(found[1], found[2], atol=3e-5)
 
 
 def test_encircled_energy_follows_its_centre():
@@ -130,16 +136,3 @@ def test_bad_arguments_are_named():
 def test_one_sample_has_no_profile():
     with pytest.raises(ValueError, match="must be at least 2 x 2"):
         optics.mtf(optics.Eye().psf()).profile([0.0])
-
-
-def test_the_cutoff_is_the_mediums():
-    """In water waves are shorter, so the same pupil passes finer gratings: the MTF reaches zero a third further on."""
-    focus = 1.33 * FOCAL_LENGTH  # of a lens with this focal length in air
-    pupil = optics.Pupil(15e-6, thin_lens_focal_length=focus, medium_n=1.33)
-    result = optics.psf(pupil, [WAVELENGTH], focus, dx=1.3e-6, shape=(257, 257))
-    transfer = optics.mtf(result)
-    assert transfer.cutoff[0] == pytest.approx(2 * 15e-6 * 1.33 / WAVELENGTH / np.hypot(15e-6, focus))
-    f = np.linspace(0.1, 1, 10) * transfer.cutoff[0]
-    measured = transfer.profile(f)[0]
-    np.testing.assert_allclose(measured, circular_mtf(f, transfer.cutoff[0]), atol=0.02)
-    assert np.abs(measured - circular_mtf(f, transfer.cutoff[0] / 1.33)).max() > 0.1

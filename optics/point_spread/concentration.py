@@ -1,0 +1,233 @@
+"""How concentrated the light is: its peak, and what lands within a circle.
+
+Where the PSF carries derivatives, so do these numbers: they are Dr.Jit arrays then, NumPy arrays otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from optics.apertures.circular import disk_profile
+from optics.apertures.soft_edge import SoftEdge
+from optics.numerics.accuracy import AccuracyError
+from optics.numerics.arguments import point_2d, reals, shown, without_derivative
+from optics.numerics.autodiff import Array, to_user
+from optics.numerics.grid import Grid
+from optics.numerics.precision import opaque, precision
+from optics.point_spread.contrast import flat
+from optics.point_spread.psf_result import SUM_ERROR, PSFResult
+
+__all__ = ["encircled_energy", "strehl_ratio"]
+
+AT_A_PEAK = 1 / 32  # choice: of 1/cutoff, the pitch whose paraboloid errs by PARABOLOID_ERROR
+LOBES = 0.4  # choice: of 1/cutoff, the coarsest pitch between whose samples no lobe is lost
+BETWEEN = 1 / 16  # choice: of 1/cutoff, at which the spline through them is looked at
+MOST_SPLINED = 700  # choice, by memory: samples a side
+CLIMBS = 8  # choice: windows that are moved to their brightest sample
+NEIGHBOURHOOD = 9  # choice: samples a side of such a window
+PARABOLOID_ERROR = 3e-5
+RIPPLE = 1e-5  # choice: of the circle's spectrum
+FINE = 1 / 3  # choice: of 1/cutoff, the coarsest pitch for circles; the finer, the less they need around them
+
+
+def strehl_ratio(result: PSFResult, with_error: bool = False) -> np.ndarray | Array:
+    """Peak of the PSF over the peak that the same aperture makes without aberration, (wavelength,).
+
+    Unaberrated is the spherical wave that converges on the sensor's axis; with L = √(z² + r²) its field there is
+
+        U = ∫ z/(2πL²) (1/L - ik) dξ
+
+    (first Rayleigh-Sommerfeld integral of exp(-ikL(r)); for a circle |1 - z/L - ikz ln(L/z)|). The peak is that of the
+    brightest sample's surroundings, which are looked at more finely where samples are coarse.
+
+    with_error: whether to return (value, predicted error), each (wavelength,).
+
+    Raises:
+        AccuracyError: the peak lies outside the window, or the samples are too coarse for it and finer ones cannot be
+            had; says which would do.
+    """
+    import drjit as dr
+
+    types = precision("float64")
+    peaks, errors = zip(*(_peak(result, index) for index in range(result.tensor.shape[0])), strict=True)
+    peak = types.Float(peaks[0] if len(peaks) == 1 else dr.concat(list(peaks)))
+    nodes = result.pupil.aperture.nodes(0.5, 10.0)
+    radius, z = opaque(types, result.pupil.aperture_radius), opaque(types, result.sensor_distance)
+    weight = types.Float(nodes.weight)
+    slant = dr.sqrt(z * z + radius * radius * types.Float(nodes.x**2 + nodes.y**2))
+    size = weight * z / (2 * np.pi * slant * slant)
+    wavenumber = types.Float(2 * np.pi * result.pupil.medium_n / result.wavelengths)
+    near, far = dr.sum(size / slant), dr.sum(size) * wavenumber
+    ideal = (near * near + far * far) * radius * radius / result.pupil.aperture.area
+    ratio = types.Tensor(peak / ideal, (len(peaks),))
+    return (to_user(ratio), np.array(errors) * ratio.numpy()) if with_error else to_user(ratio)
+
+
+def _peak(result: PSFResult, index: int) -> tuple[Array, float]:
+    """Highest value near the brightest sample at one wavelength, and its relative error."""
+    fine = AT_A_PEAK / float(result.cutoff[index])
+    image, wanted = result.psf[index], "the Strehl ratio"
+    if result.holds_cells or (min(image.shape) > 2 and result.dx <= fine and not _at_rim(image)):
+        return _vertex(result, index)
+    if not (result.can_be_seen_anew or _at_rim(image)) and result.dx * float(result.cutoff[index]) <= LOBES:
+        return _vertex(result, index)
+    seen = result.with_pitch(LOBES / float(result.cutoff.max()), wanted)
+    centre, pitch = _brightest(seen, index), min(seen.dx, fine)
+    for _ in range(CLIMBS):
+        _check_inside(result, centre)
+        seen = result.through(Grid.square(NEIGHBOURHOOD, pitch).moved(centre), wanted, slice(index, index + 1))
+        if not _at_rim(seen.psf[0]):
+            return _vertex(seen, 0)
+        row, column = np.unravel_index(seen.psf[0].argmax(), seen.psf[0].shape)
+        centre = float(seen.x[column]), float(seen.y[row])
+    raise AccuracyError(f"no peak was found within {CLIMBS} windows of {NEIGHBOURHOOD} samples, {pitch:.3g} m apart")
+
+
+def _brightest(result: PSFResult, index: int) -> tuple[float, float]:
+    """Where (x, y) the spline through the samples is brightest: of two lobes the higher may have the lower sample."""
+    from scipy.ndimage import map_coordinates
+
+    image = result.psf[index].astype(np.float64)
+    height, width = image.shape
+    parts = (
+        max(1, math.ceil(result.dx * float(result.cutoff[index]) / BETWEEN)) if max(height, width) < MOST_SPLINED else 1
+    )
+    down, across = (np.arange((n - 1) * parts + 1) / parts for n in (height, width))
+    finer = map_coordinates(image, np.meshgrid(down, across, indexing="ij"), order=5, mode="mirror")
+    row, column = np.unravel_index(finer.argmax(), finer.shape)
+    return float(result.x[0] + across[column] * result.dx), float(result.y[0] + down[row] * result.dx)
+
+
+def _at_rim(image: np.ndarray) -> bool:
+    row, column = np.unravel_index(image.argmax(), image.shape)
+    return row in (0, image.shape[0] - 1) or column in (0, image.shape[1] - 1)
+
+
+def _check_inside(result: PSFResult, at: tuple[float, float]) -> None:
+    room = result.dx * (0.5 + 1e-6)
+    for place, samples in zip(at, (result.x, result.y), strict=True):
+        if not samples[0] - room <= place <= samples[-1] + room:
+            raise AccuracyError(
+                f"the light grows towards ({at[0]:.3g}, {at[1]:.3g}) m, beyond the window's rim: the Strehl ratio "
+                "needs a window that holds the peak; widen it or move its centre"
+            )
+
+
+def _vertex(result: PSFResult, index: int) -> tuple[Array, float]:
+    """Of the paraboloid through the brightest sample and its neighbours; with the relative error."""
+    import drjit as dr
+
+    types, (_, height, width) = precision("float64"), result.tensor.shape
+    image = result.psf[index].astype(np.float64)
+    row, column = (int(n) for n in np.unravel_index(image.argmax(), image.shape))
+    values, start = types.Float(flat(result.tensor)), index * height * width
+
+    def value(i: int, j: int) -> Array:
+        return dr.gather(types.Float, values, types.Index(start + i * width + j))
+
+    peak = value(row, column)
+    if not result.holds_cells:
+        left, right, below, above = (value(row + i, column + j) for i, j in ((0, -1), (0, 1), (-1, 0), (1, 0)))
+        corners = [value(row + i, column + j) * (i * j / 4) for i in (-1, 1) for j in (-1, 1)]
+        # p + g·x - xᵀBx/2 is highest at x = B⁻¹g, by gᵀB⁻¹g/2.
+        gx, gy, bxy = (right - left) / 2, (above - below) / 2, -sum(corners[1:], corners[0])
+        bxx, byy = 2 * peak - left - right, 2 * peak - below - above
+        determinant = bxx * byy - bxy * bxy
+        rise = (byy * gx * gx - 2 * bxy * gx * gy + bxx * gy * gy) / (2 * dr.maximum(determinant, 1e-300))
+        peak = peak + dr.select((determinant > 0) & (bxx > 0), rise, 0)
+    around = float(np.linalg.norm(image)) / float(image[row, column])
+    plan = result.plans[index if len(result.plans) > 1 else 0]
+    # What a cosine at the cut-off would err by, half way between samples.
+    coarse = (2 * math.pi * result.dx * float(result.cutoff[index])) ** 4 / 170
+    return peak, plan.predicted_error * around + max(PARABOLOID_ERROR, 0.0 if result.holds_cells else coarse)
+
+
+def encircled_energy(
+    result: PSFResult,
+    radii: np.ndarray | float,
+    centre: tuple[float, float] | None = None,
+    with_error: bool = False,
+) -> np.ndarray | Array:
+    """Fraction of the pupil's power within `radii` [m] of `centre` (x, y) [m] on the sensor, (wavelength, radius).
+
+    A sum over samples, each with the share of it that lies within the circle. The circle is convolved with a kernel
+    whose spectrum is 1 where the intensity has one, and 0 beyond what samples can tell apart: the sum is then that of
+    the sharp circle. It takes samples beyond the circle, which are computed where the window has none.
+
+    centre: None for the middle of the PSF's window. with_error: whether to return (value, predicted error).
+
+    Raises:
+        ValueError: a radius that is negative or leaves the window.
+        AccuracyError: the samples are too coarse, or too few around the circle, and others cannot be had; says which
+            would do.
+    """
+    import drjit as dr
+
+    wanted = np.atleast_1d(reals("radii", without_derivative("radii", radii)))
+    if wanted.ndim > 1:
+        raise ValueError(f"radii has shape {wanted.shape}: must be a number or a row of them [m]")
+    middle = result.centre if centre is None else point_2d("centre", centre)
+    x, y = result.x - middle[0], result.y - middle[1]
+    edge = min(-x[0], x[-1], -y[0], y[-1])
+    if edge < 0:
+        raise ValueError(f"centre = {shown(centre)}: must lie within the PSF's window, around {shown(result.centre)}")
+    if not ((wanted >= 0) & (wanted <= edge * (1 + 1e-9))).all():
+        raise ValueError(f"radii = {shown(radii)}: must be in [0, {edge:g}] m, inside the PSF's window")
+    cutoff = float(result.cutoff.max())
+    seen = result if result.holds_cells else _around(result, middle, float(wanted.max()), edge, cutoff)
+    x, y = seen.x[None, :] - middle[0], seen.y[:, None] - middle[1]
+    distance = np.hypot(x, y)
+    inside = np.stack([_within(distance, r, seen, cutoff).ravel() for r in wanted])
+    types, waves, size = precision("float64"), seen.tensor.shape[0], distance.size
+    error = (
+        SUM_ERROR
+        * np.array([[plan.predicted_error] for plan in seen.plans])
+        * np.maximum(
+            np.einsum("wp,rp->wr", np.abs(seen.psf.reshape(waves, size)).astype(np.float64), np.abs(inside))
+            * seen.dx**2,
+            RIPPLE,
+        )
+        + 20 * RIPPLE
+    )
+    if isinstance(seen.tensor, np.ndarray) or not dr.grad_enabled(seen.tensor):
+        found = np.einsum("wp,rp->wr", seen.psf.reshape(waves, size).astype(np.float64), inside) * seen.dx**2
+        return (found, error) if with_error else found
+    values = types.Float(dr.ravel(seen.tensor))
+    parts = [
+        dr.sum(dr.gather(types.Float, values, dr.arange(types.Index, size) + k * size) * types.Float(row.copy()))
+        for k in range(waves)
+        for row in inside
+    ]
+    total = to_user(
+        types.Tensor((parts[0] if len(parts) == 1 else dr.concat(parts)) * seen.dx**2, (waves, len(wanted)))
+    )
+    return (total, error) if with_error else total
+
+
+def _kernel(dx: float, cutoff: float) -> SoftEdge:
+    """In units of 1/cutoff: lets the intensity's frequencies pass, and none that samples fold onto them."""
+    return SoftEdge(1.0, 1 / (dx * cutoff) - 1, RIPPLE)
+
+
+def _around(result: PSFResult, middle: tuple[float, float], radius: float, edge: float, cutoff: float) -> PSFResult:
+    """With samples fine enough, and as far beyond the circle as the kernel reaches."""
+    if result.dx <= FINE / cutoff and radius + _kernel(result.dx, cutoff).reach / cutoff <= edge:
+        return result
+    pitch = min(result.dx, FINE / cutoff)
+    half = math.ceil((radius + _kernel(pitch, cutoff).reach / cutoff) / pitch)
+    return result.through(Grid((2 * half + 1, 2 * half + 1), pitch, middle), "encircled energy")
+
+
+def _within(distance: np.ndarray, radius: float, result: PSFResult, cutoff: float) -> np.ndarray:
+    """Share of each sample that lies within the circle."""
+    if radius == 0:
+        return np.zeros(distance.shape)
+    if result.holds_cells:
+        return np.clip((radius - distance) / result.dx + 0.5, 0, 1)
+    kernel = _kernel(result.dx, cutoff)
+    share = (distance <= radius).astype(np.float64)
+    near = np.abs(distance - radius) < kernel.reach / cutoff
+    share[near] = disk_profile(kernel, radius * cutoff, distance[near] * cutoff)
+    return share

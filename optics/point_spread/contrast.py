@@ -1,0 +1,233 @@
+"""Contrast over spatial frequency, and one number for an eye.
+
+Where the PSF carries derivatives, so do these numbers: they are Dr.Jit arrays then, NumPy arrays otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.accuracy import AccuracyError
+from optics.numerics.arguments import in_range, positive, reals, shown, without_derivative
+from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
+from optics.numerics.field import Field
+from optics.numerics.fourier import dft2
+from optics.numerics.grid import Grid
+from optics.numerics.precision import opaque, padded_for_packets, precision
+from optics.point_spread.psf_result import PSFResult
+
+__all__ = ["MTF", "flat", "image_quality", "mtf"]
+
+ORIENTATIONS = 64  # choice: over which a profile is a mean
+HELD_TOO_MUCH = 1e-2  # choice: above all that arrives, by which sums may err
+GROWTHS = 3  # choice: windows that are tried
+ROOM = 0.5  # choice: half steps, each a factor of √2, that a grown window is wider than it must be
+
+
+@dataclass(frozen=True, eq=False)
+class MTF:
+    """Modulation transfer function on a square grid of spatial frequencies, zero frequency at n//2.
+
+    tensor: (wavelength, fy, fx) in Dr.Jit, 1 at zero frequency; mtf: the same as a NumPy array.
+    fx, fy: cycles per metre on the sensor, 1 / (widest side of the window) apart.
+    cutoff: (wavelength,) frequency [1/m] beyond which a pupil of this size passes nothing, 2 sin θ / λ.
+    predicted_error: (wavelength,) of any contrast.
+    """
+
+    tensor: Array
+    fx: np.ndarray
+    fy: np.ndarray
+    cutoff: np.ndarray
+    predicted_error: np.ndarray
+
+    @cached_property
+    def mtf(self) -> np.ndarray:
+        return np.asarray(self.tensor.numpy())
+
+    def profile(self, frequencies: np.ndarray) -> np.ndarray | Array:
+        """Mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency); 0 beyond the grid.
+
+        Interpolated linearly between the grid's frequencies.
+
+        Raises:
+            ValueError: the MTF of a single sample.
+        """
+        import drjit as dr
+
+        if self.fx.size < 2:
+            raise ValueError("a PSF of one sample has no frequencies but 0: must be at least 2 x 2")
+        types = precision("float64")
+        f = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
+        angle = 2 * np.pi * (np.arange(ORIENTATIONS) + 0.5) / ORIENTATIONS
+        side, waves = self.fx.size, self.tensor.shape[0]
+        places = [np.outer(f, part) / (self.fx[1] - self.fx[0]) + side // 2 for part in (np.sin(angle), np.cos(angle))]
+        y, x = (np.tile(place.ravel(), waves) for place in places)
+        inside = (y >= 0) & (y <= side - 1) & (x >= 0) & (x <= side - 1)
+        row, column = (np.clip(np.floor(place), 0, side - 2).astype(np.int64) for place in (y, x))
+        plane = np.repeat(np.arange(waves), f.size * ORIENTATIONS) * side * side
+        total = types.Float(0)
+        for i, down in enumerate((1 - (y - row), y - row)):
+            for j, across in enumerate((1 - (x - column), x - column)):
+                at = types.Index((plane + (row + i) * side + column + j).astype(np.uint32))
+                total += dr.gather(types.Float, self.tensor.array, at) * types.Float(down * across * inside)
+        mean = dr.block_reduce(dr.ReduceOp.Add, total, ORIENTATIONS) / ORIENTATIONS
+        return to_user(types.Tensor(mean, (waves, f.size)))
+
+
+def mtf(result: PSFResult, arriving: Any = None, tolerance: float = 0.02) -> MTF:
+    """|F{PSF}| over all the light that arrives (Goodman, Introduction to Fourier Optics, §6.3.2).
+
+    arriving: what of the pupil's power arrives on the unbounded plane, a number or (wavelength,), in (0, 1]. None: all
+        but what the pupil's edge, and slopes of its relief beyond grazing, make evanescent.
+    tolerance: of any contrast. What the window loses of the light may be missing at any frequency, and samples further
+        apart than 1/(2 cutoff) fold frequencies onto each other: the same light is then looked at through a wider or
+        finer window of its own.
+
+    Raises:
+        ValueError: arriving has another shape, or less arrives than is in the window (but for a hundredth).
+        AccuracyError: the samples or the window cannot carry contrasts to the tolerance, and others cannot be had; says
+            which would do.
+    """
+    positive("tolerance", tolerance, "contrast")
+    light, unsure = _arriving(result, arriving)
+    known = light.numpy()
+    seen = _wide(result.with_pitch(0.5 / float(result.cutoff.max()), "the MTF"), known, tolerance)
+    lost = np.maximum(known - plain(seen.held), 0)
+    error = lost + unsure + seen.sum_error
+    if float(error.max()) > tolerance and tolerance < 1:
+        raise AccuracyError(
+            f"tolerance = {tolerance:g}: contrasts err by up to {float(error.max()):.2g}, of which the picture's own "
+            f"error is {float(seen.sum_error.max()):.2g}, light beyond the window {float(lost.max()):.2g}, and light "
+            f"that may never arrive {float(unsure.max()):.2g} (arriving= says how much does): widen it, or ask for a "
+            "better PSF"
+        )
+    return _transformed(seen, light, error)
+
+
+def _wide(result: PSFResult, known: np.ndarray, tolerance: float) -> PSFResult:
+    """Through a window that loses no more than the tolerance. Diffracted light falls like r⁻³: what a window loses goes
+    with the inverse of its width. Widths and pitches come in steps: a small change of the pupil changes none."""
+    seen, coarsest = result, 0.5 / float(result.cutoff.max())
+    for _ in range(GROWTHS):
+        lost = float((known - plain(seen.held)).max())
+        if lost <= tolerance or tolerance >= 1:
+            break
+        half = max(seen.tensor.shape[1:]) * seen.dx / 2
+        half *= 2 ** (math.ceil(2 * math.log2(lost / tolerance) + ROOM) / 2)
+        pitch = seen.dx * max(1, math.floor(coarsest / seen.dx * (1 + 1e-9)))
+        side = 2 * math.ceil(half / pitch - 1e-6) + 1
+        seen = seen.through(Grid((side, side), pitch, seen.centre), "the MTF")
+    return seen
+
+
+def _transformed(seen: PSFResult, light: Array, error: np.ndarray) -> MTF:
+    """light: all that arrives, (wavelength,), with derivatives."""
+    import drjit as dr
+
+    types = precision("float64")
+    waves, height, width = seen.tensor.shape
+    side = max(height, width)
+    pitch, middle = 1 / (side * seen.dx), (side // 2) * side + side // 2
+    values, planes, held = types.Float(flat(seen.tensor)), [], plain(seen.held)
+    at_zero, known = dr.arange(types.Index, side * side) == middle, light.numpy()
+    for index in range(waves):
+        plane = dr.gather(types.Float, values, dr.arange(types.Index, height * width) + index * height * width)
+        field = Field(plane, dr.zeros(types.Float, height * width), Grid((height, width), seen.dx), types)
+        otf = dft2(field, side, (side, side), -1, pitch)
+        size = dr.sqrt(dr.maximum(otf.intensity, 1e-300))
+        if known[index] <= held[index]:
+            planes.append(size / dr.gather(types.Float, size, types.Index(middle)))
+            continue
+        planes.append(dr.select(at_zero, 1, size * seen.dx**2 / dr.gather(types.Float, light, types.Index(index))))
+    tensor = types.Tensor(planes[0] if waves == 1 else dr.concat(planes), (waves, side, side))
+    f = Grid.square(side, pitch).x
+    return MTF(tensor, f, f, seen.cutoff, error)
+
+
+def _arriving(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]:
+    """Share of the pupil's power that arrives anywhere, and how unsure that is, (wavelength,)."""
+    types = precision("float64")
+    if arriving is None:
+        return _not_evanescent(result)
+    held, known = plain(result.power), reals("arriving", arriving)
+    if known.shape not in ((), held.shape):
+        raise ValueError(f"arriving has shape {known.shape}: must be a number, or one per wavelength {held.shape}")
+    if not ((known > 0) & (known <= 1) & (known > held - HELD_TOO_MUCH)).all():
+        raise ValueError(f"arriving = {shown(arriving)}: must be in (0, 1], not less than the window's {shown(held)}")
+    return types.Float(np.full(held.shape, known)), np.zeros(held.shape)
+
+
+def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
+    """All but evanescent light, and how unsure that is.
+
+    A straight edge has 1/(2π²f) of |its spectrum|² per length beyond the frequency f: of an aperture with perimeter P
+    and area A the share λP/(2π²A) is evanescent. So is what the relief bends beyond grazing.
+    """
+    import drjit as dr
+
+    pupil, outline, types = result.pupil, result.pupil.aperture.outline, precision("float64")
+    perimeter = 2 * math.pi * sum(outline.radii)
+    if outline.vertices is not None:
+        perimeter += float(np.hypot(*(np.roll(outline.vertices, -1, axis=0) - outline.vertices).T).sum())
+    wavelength = types.Float(result.wavelengths / pupil.medium_n)
+    ratio = perimeter / (2 * math.pi**2 * pupil.aperture.area)
+    edge = dr.minimum(wavelength * ratio / opaque(types, pupil.aperture_radius), 0.5)
+    bent = np.zeros(len(result.wavelengths))
+    if result.can_be_seen_anew:
+        for index, request in enumerate(result.requests):
+            x, _ = pupil.slopes(request.beam.wavelength, request.beam.source).rays(1.0, pupil.medium_n)
+            bent[index] = float(np.mean(~np.isfinite(x)))
+    return (1 - edge) * types.Float(1 - bent), np.square(edge.numpy()) + bent
+
+
+def image_quality(
+    result: PSFResult,
+    nyquist: float,
+    throughput: Scalar = 1.0,
+    noise_sigma: float = 0.0,
+    tolerance: float = 0.02,
+    with_error: bool = False,
+) -> np.ndarray | Array:
+    """Throughput times the area of the MTF above the noise floor, up to the retina's Nyquist frequency, (wavelength,).
+
+        IQ = T / f_N ∫_0^f_N max(MTF(f) - σ / T, 0) df,   in [0, 1]
+
+    The contrast that noise drowns, σ / T, rises as the pupil closes. After Tiwary, Young et al. (2025).
+
+    nyquist: f_N = 1 / (2 receptor pitch) [1/m]. throughput: T = a². noise_sigma: σ in units of the signal.
+    tolerance: see `optics.mtf`. with_error: whether to return (value, predicted error), each (wavelength,).
+
+    Raises:
+        ValueError: names argument, value and valid range.
+        AccuracyError: see `optics.mtf`.
+    """
+    import drjit as dr
+
+    positive("nyquist", without_derivative("nyquist", nyquist))
+    in_range("throughput", throughput, 0, 1)
+    in_range("noise_sigma", without_derivative("noise_sigma", noise_sigma), 0, 1e6)
+    waves = result.tensor.shape[0]
+    if number(throughput) == 0:
+        return (np.zeros(waves), np.zeros(waves)) if with_error else np.zeros(waves)
+    types = precision("float64")
+    f = np.linspace(0, nyquist, 257)
+    weight = np.full(f.size, 1 / (f.size - 1))
+    weight[[0, -1]] /= 2
+    light = opaque(types, throughput)
+    transfer = mtf(result, tolerance=tolerance)
+    contrast = types.Float(flat(transfer.profile(f)))
+    above = dr.maximum(contrast - noise_sigma / light, 0) * types.Float(np.tile(weight, waves))
+    value = to_user(types.Tensor(light * dr.block_reduce(dr.ReduceOp.Add, above, f.size), (waves,)))
+    return (value, number(throughput) * transfer.predicted_error) if with_error else value
+
+
+def flat(tensor: np.ndarray | Array) -> Array:
+    """Row by row, Dr.Jit or NumPy."""
+    import drjit as dr
+
+    return padded_for_packets(tensor) if isinstance(tensor, np.ndarray) else dr.ravel(tensor)

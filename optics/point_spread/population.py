@@ -1,0 +1,272 @@
+"""One plan for a whole population: pupils of any size and relief over one window, as one stack of matrix products.
+
+Each picture is low_rank's of rank 1: a Fourier kernel times a slow rest that is taken at the window's centre,
+
+    U(x) ≈ Σ_ξ P(ξ) z/(λD²) e^{ik(D - z)} e^{-ik ξ·x/c},   D = √(ξ² + z²),
+
+with pupils sampled in units of their own radius, so that all share a soft edge, positions and B-splines. What the rest
+does away from the centre is this method's own error: it is told for each picture from its own light, and who asks for
+less gets the picture in the ordinary way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from optics.apertures.aperture import EDGE_REACH, Aperture
+from optics.elements.pupil import Pupil
+from optics.elements.relief import BSplineRelief
+from optics.methods.problem import SLOPE_MARGIN
+from optics.numerics.accuracy import Plan
+from optics.numerics.autodiff import Scalar, is_differentiable
+from optics.numerics.grid import Grid
+from optics.numerics.interpolation import cubic_bsplines
+from optics.numerics.precision import precision
+
+__all__ = ["Member", "population_pictures"]
+
+LOOSEST = 1e-3  # choice: tolerance from which on float32 and rank 1 are worth trying
+FEW_WAVES = 3000.0  # choice: that float32 may carry
+FAR = 200.0  # choice: kz from which on the kernel's near term is nothing
+RIPPLE = 0.3  # choice: of the soft edge, of the tolerance; test_population.py
+SAMPLING = 0.2  # choice: of the tolerance, what the soft edge may make of it
+SPREAD = 1.4  # choice: error of the intensity per spread of the phase; test_population.py
+TURNS = 1.3  # choice: steps between numbers of samples: neighbours share a plan
+STACK = 2_000_000  # choice, by memory: pupil samples in a stack
+SECONDS = 3e-4  # that a picture takes, roughly
+RINGS = 12  # choice: of the window, over which the error is told
+SLOPES = np.linspace(-1, 1, 9) * (1 + EDGE_REACH)  # places where a relief's slope is looked at
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """One picture of a population. wavelength in vacuum, distances [m]."""
+
+    pupil: Pupil
+    wavelength: float
+    distance: Scalar
+    source: Scalar
+
+    @property
+    def plain(self) -> bool:
+        """Whether it has a smooth relief of 4 x 4 points at most, and asks for no derivative."""
+        pupil = self.pupil
+        numbers = (
+            pupil.aperture_radius,
+            self.distance,
+            self.source,
+            pupil.n.a,
+            pupil.n.b,
+            pupil.thin_lens_focal_length,
+        )
+        if any(is_differentiable(value) for value in numbers):
+            return False
+        relief = pupil.height
+        return relief is None or (isinstance(relief, BSplineRelief) and not is_differentiable(relief.control_points))
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Radius, wavelength in the medium, distances of sensor and source, focal length [m]."""
+        focal = self.pupil.thin_lens_focal_length
+        wavelength = self.wavelength / self.pupil.medium_n
+        return self.pupil.radius, wavelength, self.distance, self.source, math.inf if focal is None else focal
+
+    @property
+    def relief(self) -> np.ndarray:
+        """Control points of its waves."""
+        if self.pupil.height is None:
+            return np.zeros((4, 4))
+        waves: np.ndarray = self.pupil.height.control_points * (
+            self.pupil.index_step(self.wavelength) / self.wavelength
+        )
+        return waves
+
+
+def population_pictures(
+    members: Sequence[Member], window: Grid, tolerance: float
+) -> Iterator[tuple[int, np.ndarray, Plan]]:
+    """Of a population those pictures that one plan answers well enough: which, the PSF (y, x) [1/m²], the plan.
+
+    window: about the axis. A tolerance below LOOSEST is nobody's.
+    """
+    groups: dict[tuple[Aperture, int], list[int]] = defaultdict(list)
+    plain = [index for index, member in enumerate(members) if member.plain]
+    if tolerance < LOOSEST or window.centre != (0.0, 0.0) or not plain:
+        return
+    for index, turns in zip(plain, _turns(_Stack.of([members[index] for index in plain]), window), strict=True):
+        if math.isfinite(turns):
+            step = math.ceil(math.log(max(turns, 1.0)) / math.log(TURNS))
+            groups[members[index].pupil.aperture, step].append(index)
+    for (aperture, step), group in groups.items():
+        samples = _samples(aperture, TURNS**step, RIPPLE * tolerance)
+        size = max(1, STACK // max(samples.at.size**2, math.prod(window.shape)))
+        for start in range(0, len(group), size):
+            part = group[start : start + size]
+            stack = _Stack.of([members[index] for index in part])
+            images = _images(stack, samples, window) / np.float32(aperture.area)
+            errors = _model_errors(stack, images, window) + SAMPLING * tolerance
+            for index, image, error in zip(part, images, errors, strict=True):
+                if error <= tolerance:
+                    yield index, image, _plan(samples, float(error))
+
+
+def _plan(samples: _Samples, error: float) -> Plan:
+    shape = (samples.at.size, samples.at.size)
+    return Plan("low_rank", shape, "float32", error, "one of a population: rank 1, not spot-checked", SECONDS)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stack:
+    """Numbers of many members, each (member, 1, 1) float32, and reliefs (member, 4, 4)."""
+
+    radius: np.ndarray
+    wavelength: np.ndarray
+    distance: np.ndarray
+    source: np.ndarray
+    focal: np.ndarray
+    relief: np.ndarray
+
+    @classmethod
+    def of(cls, members: Sequence[Member]) -> _Stack:
+        columns = np.array([member.numbers for member in members], np.float32).T[:, :, None, None]
+        radius, wavelength, distance, source, focal = columns
+        return cls(
+            radius, wavelength, distance, source, focal, np.array([member.relief for member in members], np.float32)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """Of a soft aperture, in radii: places along an axis, their pitch, transmittance (y, x), B-splines (place, 4)."""
+
+    at: np.ndarray
+    pitch: float
+    soft: np.ndarray
+    splines: np.ndarray
+
+
+@lru_cache(maxsize=64)
+def _samples(aperture: Aperture, turns: float, ripple: float) -> _Samples:
+    """As few as carry so many turns per radius."""
+    types, soft = precision("float64"), aperture.soften(turns, ripple, EDGE_REACH)
+    pitch = 1 / (turns + soft.stopband)
+    grid = Grid.square(2 * math.ceil((1 + soft.reach) / pitch) + 1, pitch)
+    x, y = grid.coordinates(types)
+    inside = soft.transmittance(x, y, types).numpy().reshape(grid.shape)
+    splines = np.stack(cubic_bsplines((grid.x + 1) / 2), axis=1)
+    return _Samples(grid.x.astype(np.float32), pitch, inside.astype(np.float32), splines.astype(np.float32))
+
+
+def _turns(stack: _Stack, window: Grid) -> np.ndarray:
+    """Turns per radius of pupil and path to any point of the window together, (member,); infinite where float32 or the
+    far kernel does not do."""
+    r = stack.radius * np.hypot(SLOPES[:, None], SLOPES[None, :]).astype(np.float32)
+    outward = r / np.hypot(r, stack.distance) + r / np.hypot(r, stack.source)
+    outward -= np.sign(stack.focal) * r / np.hypot(r, stack.focal)
+    steep = outward * stack.radius / stack.wavelength / np.maximum(r / stack.radius, 1e-6)
+    splines = [np.stack(part, axis=1).astype(np.float32) for part in _splines_and_slopes((SLOPES + 1) / 2)]
+    along_x = splines[0] @ stack.relief @ splines[1].T + steep * SLOPES[None, None, :].astype(np.float32)
+    along_y = splines[1] @ stack.relief @ splines[0].T + steep * SLOPES[None, :, None].astype(np.float32)
+    found = SLOPE_MARGIN * np.hypot(along_x, along_y).max(axis=(1, 2))
+    found += (stack.radius * window.half_diagonal / (stack.wavelength * stack.distance))[:, 0, 0]
+    waves = np.abs(found) + (np.square(stack.radius) / (stack.distance * stack.wavelength))[:, 0, 0]
+    near = (stack.distance / stack.wavelength)[:, 0, 0] * 2 * math.pi < FAR
+    return np.where((waves > FEW_WAVES) | near | ~np.isfinite(found), math.inf, found)
+
+
+def _splines_and_slopes(t: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """B-splines at t and their slopes by x, t = (x + 1)/2."""
+    s = 1 - t
+    slopes = [-s * s / 2, (3 * t * t - 4 * t) / 2, -(3 * s * s - 4 * s) / 2, t * t / 2]
+    return list(cubic_bsplines(t)), [slope / 2 for slope in slopes]
+
+
+def _sine(stack: _Stack, window: Grid, at: np.ndarray) -> np.ndarray:
+    """Of the ray from ξ along one axis, ξ/c(ξ): c² = z² + ξ² + what the other axis and the window have on average."""
+    elsewhere = np.square(stack.radius) / 4 + np.float32((0.4 * window.own_half_width) ** 2)
+    found: np.ndarray = at / np.sqrt(np.square(stack.distance) + np.square(at) + elsewhere)
+    return found
+
+
+def _images(stack: _Stack, samples: _Samples, window: Grid) -> np.ndarray:
+    """|U|²/R², (member, y, x)."""
+    u = samples.at
+    r2 = np.square(stack.radius) * (np.square(u)[:, None] + np.square(u)[None, :])
+    square_z = np.square(stack.distance)
+    path = r2 / (np.sqrt(r2 + square_z) + stack.distance)
+    if np.isfinite(stack.source).any():
+        path += r2 / (np.sqrt(r2 + np.square(stack.source)) + stack.source)
+    if np.isfinite(stack.focal).any():
+        path -= np.sign(stack.focal) * r2 / (np.sqrt(r2 + np.square(stack.focal)) + np.abs(stack.focal))
+    waves = path / stack.wavelength
+    if stack.relief.any():
+        waves += samples.splines @ stack.relief @ samples.splines.T
+    size = samples.soft * (square_z / (r2 + square_z))
+    size *= np.float32(samples.pitch**2) * stack.radius / (stack.distance * stack.wavelength)
+    field = _turned(size, waves)
+    across = _fourier(stack, u, window, window.x)
+    down = across if window.shape[0] == window.shape[1] else _fourier(stack, u, window, window.y)
+    out = np.matmul(np.matmul(down, field), across.swapaxes(1, 2))
+    found: np.ndarray = np.square(out.real) + np.square(out.imag)
+    return found
+
+
+def _fourier(stack: _Stack, u: np.ndarray, window: Grid, at: np.ndarray) -> np.ndarray:
+    sines = _sine(stack, window, stack.radius * u) / stack.wavelength
+    return _turned(np.ones(1, np.float32), -sines * at.astype(np.float32)[None, :, None])
+
+
+def _turned(size: np.ndarray, waves: np.ndarray) -> np.ndarray:
+    """size · exp(2πi waves); sines of small float32 angles are many times faster than complex exponentials."""
+    angle = (waves - np.rint(waves)) * np.float32(2 * math.pi)
+    found = np.empty(waves.shape, np.complex64)
+    np.multiply(size, np.cos(angle), out=found.real)
+    np.multiply(size, np.sin(angle), out=found.imag)
+    return found
+
+
+def _model_errors(stack: _Stack, images: np.ndarray, window: Grid) -> np.ndarray:
+    """Relative L2 error that the fixed rest makes, (member,): its spread over the pupil at each radius of the window,
+    as an error of the amplitude, weighed with the light there and that of its ring."""
+    ring, count = _rings(window)
+    flat = images.reshape(len(images), -1)
+    squares = np.stack([np.bincount(ring, np.square(image), RINGS) for image in flat.astype(np.float64)])
+    means = np.stack([np.bincount(ring, image, RINGS) for image in flat.astype(np.float64)]) / count
+    spread = _spread(stack, window)
+    wrong = np.square(SPREAD * spread) * (squares + count * np.square(means))
+    found: np.ndarray = np.sqrt(wrong.sum(axis=1) / squares.sum(axis=1))
+    return found
+
+
+@lru_cache(maxsize=8)
+def _rings(window: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Ring of each sample, flat, by its distance from the axis, and how many samples each ring has."""
+    radius = np.hypot(window.x[None, :], window.y[:, None]).ravel()
+    ring = np.minimum((radius / max(window.half_diagonal, window.dx) * RINGS).astype(np.intp), RINGS - 1)
+    return ring, np.maximum(np.bincount(ring, minlength=RINGS), 1)
+
+
+def _spread(stack: _Stack, window: Grid) -> np.ndarray:
+    """Root mean square phase [rad] over the pupil, less its mean, that the rest has at the outer end of each ring more
+    than at the centre, (member, ring): along an axis and along a diagonal, whichever is more."""
+    turns = (np.arange(40) + 0.5) * (math.sqrt(5) - 1) / 2
+    r = np.sqrt((np.arange(40) + 0.5) / 40)
+    xi = stack.radius[:, 0, :, None].astype(np.float64) * (r * np.exp(2j * np.pi * turns))
+    out = np.arange(1, RINGS + 1) / RINGS * max(window.half_diagonal, window.dx)
+    z = stack.distance.astype(np.float64)[:, 0, :, None]
+    sines = _sine(stack, window, xi.real) + 1j * _sine(stack, window, xi.imag)
+    worst = np.zeros((len(stack.radius), RINGS))
+    for angle in (0.0, math.pi / 4):
+        x = (out * np.exp(1j * angle))[None, :, None]
+        along, size = (x * xi.conj()).real, np.abs(xi) ** 2
+        rho = np.sqrt(np.abs(x) ** 2 + z * z)
+        there = (size - 2 * along) / (np.sqrt(rho**2 + size - 2 * along) + rho) + (x * sines.conj()).real
+        waves = (there - size / (np.sqrt(z * z + size) + z)) / stack.wavelength.astype(np.float64)[:, 0, :, None]
+        worst = np.maximum(worst, 2 * math.pi * waves.std(axis=2))
+    return worst

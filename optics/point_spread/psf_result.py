@@ -1,0 +1,194 @@
+"""A PSF over a window, and the same light looked at anew where a measure needs finer or wider samples.
+
+A point of the sensor at distance z sees a pupil of radius R under rays whose sines differ by 2R/√(R² + z²) at most,
+so that the intensity there has no frequency beyond f_c = 2R/(λ√(R² + z²)), whatever the pupil does to the light.
+Samples dx apart repeat its spectrum every 1/dx: sums over them are right from dx < 1/f_c on (about λz/2R), and every
+contrast from dx <= 1/(2 f_c) on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from optics.elements.pupil import Pupil
+from optics.methods.problem import Problem
+from optics.numerics.accuracy import AccuracyError, Plan
+from optics.numerics.autodiff import Array, Scalar, number, to_user
+from optics.numerics.grid import Grid
+from optics.numerics.precision import precision
+from optics.point_spread.pictures import pictures
+from optics.point_spread.planner import APPROXIMATE
+from optics.point_spread.request import Request
+
+__all__ = ["PSFResult", "spread"]
+
+MOST_AGAIN = 2049  # choice: samples along a side of a window that a measure asks for by itself
+MOST_SECONDS = 20.0  # choice: that such a window may take
+SUM_ERROR = 3.0  # choice: how much more than the picture a sum may err, relatively: test_measure_errors.py
+OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are means over cells
+
+
+@dataclass(frozen=True, eq=False)
+class PSFResult:
+    """PSF on a grid of sensor positions, sample n//2 at `centre` (x, y) [m], row and y growing together.
+
+    tensor: the PSF as a Dr.Jit tensor (wavelength, y, x) that carries the derivatives of what it was made from.
+    psf: the same as a NumPy array [1/m²]; its integral over an unbounded plane is the fraction of the pupil's power
+        that arrives (evanescent light does not). Never renormalised.
+    plans: one per wavelength; `plan` is the least accurate of them.
+    requests: what was asked, one per wavelength, so that measures may look again; none for a picture from elsewhere.
+    """
+
+    tensor: Array
+    dx: float
+    wavelengths: np.ndarray
+    sensor_distance: Scalar
+    pupil: Pupil
+    plans: tuple[Plan, ...]
+    centre: tuple[float, float] = (0.0, 0.0)
+    requests: tuple[Request, ...] = ()
+
+    @cached_property
+    def psf(self) -> np.ndarray:
+        return self.tensor if isinstance(self.tensor, np.ndarray) else np.asarray(self.tensor.numpy())
+
+    @property
+    def plan(self) -> Plan:
+        return max(self.plans, key=lambda plan: plan.predicted_error)
+
+    @property
+    def window(self) -> Grid:
+        return Grid(self.tensor.shape[1:], self.dx, self.centre)
+
+    @property
+    def x(self) -> np.ndarray:
+        return self.window.x
+
+    @property
+    def y(self) -> np.ndarray:
+        return self.window.y
+
+    @property
+    def power(self) -> np.ndarray | Array:
+        """Fraction of the pupil's power inside the window, (wavelength,): of its cells, half of one beyond the
+        outermost samples. Where the samples are too coarse to be added up, finer ones are.
+
+        Raises:
+            AccuracyError: they are too coarse, and finer ones cannot be had; says which would do.
+        """
+        return self._resolved.held
+
+    @property
+    def power_error(self) -> np.ndarray:
+        """Predicted error of `power`, (wavelength,): of the picture, and half of what lies at the window's rim, where
+        samples cut no sharper than a cell."""
+        seen = self._resolved
+        image = seen.psf.astype(np.float64)
+        total, inner = (part.sum(axis=(1, 2)) * seen.dx**2 for part in (image, image[:, 1:-1, 1:-1]))
+        found: np.ndarray = seen.sum_error + (0.0 if seen.holds_cells else (total - inner) / 2)
+        return found
+
+    @property
+    def cutoff(self) -> np.ndarray:
+        """Frequency [1/m] beyond which the intensity has none, 2R/√(R² + z²) n/λ, (wavelength,)."""
+        radius, distance = self.pupil.radius, number(self.sensor_distance)
+        found: np.ndarray = 2 * radius / math.hypot(radius, distance) * self.pupil.medium_n / self.wavelengths
+        return found
+
+    @property
+    def holds_cells(self) -> bool:
+        """Whether samples are means over cells, whose sums miss nothing, and not values at points."""
+        return all(plan.method in OF_CELLS for plan in self.plans)
+
+    @property
+    def held(self) -> np.ndarray | Array:
+        """Sum over the samples times their area, (wavelength,), whatever their pitch."""
+        import drjit as dr
+
+        waves, flat = self.tensor.shape[0], self.psf.reshape(len(self.psf), -1)
+        if isinstance(self.tensor, np.ndarray) or not dr.grad_enabled(self.tensor):
+            return flat.sum(axis=1, dtype=np.float64) * self.dx**2
+        types = precision("float64")
+        sums = dr.block_reduce(dr.ReduceOp.Add, types.Float(dr.ravel(self.tensor)), flat.shape[1]) * self.dx**2
+        return to_user(types.Tensor(sums, (waves,)))
+
+    @property
+    def sum_error(self) -> np.ndarray:
+        """What the picture's own error makes of sums over it, in shares of the pupil's power, (wavelength,)."""
+        errors = [plan.predicted_error for plan in self.plans]
+        own = np.array(errors if len(errors) == len(self.psf) else [max(errors)] * len(self.psf))
+        found: np.ndarray = SUM_ERROR * own * self.psf.sum(axis=(1, 2), dtype=np.float64) * self.dx**2
+        return found
+
+    @property
+    def can_be_seen_anew(self) -> bool:
+        """Whether it is known how the PSF was made: of a mean over wavelengths, or a picture from elsewhere, it is
+        not."""
+        return [request.beam.wavelength for request in self.requests] == list(self.wavelengths)
+
+    def through(self, window: Grid, what: str, waves: slice = slice(None)) -> PSFResult:
+        """The same light through another window, to the same tolerance, of some of the wavelengths.
+
+        what: is measured, for the message.
+
+        Raises:
+            AccuracyError: it is not known how the PSF was made, or the window is too large.
+        """
+        height, width = window.shape
+        here = f"{self.tensor.shape[1]} x {self.tensor.shape[2]} samples {self.dx:.3g} m apart"
+        needs = f"{what} needs {height} x {width} samples {window.dx:.3g} m apart, and this PSF has {here}"
+        if not self.can_be_seen_anew or max(window.shape) > MOST_AGAIN:
+            raise AccuracyError(f"{needs}: ask for dx={window.dx:.3g}, shape=({height}, {width})")
+        try:
+            return spread([_through(request, window) for request in self.requests[waves]])
+        except AccuracyError as error:
+            raise AccuracyError(f"{needs}; those are refused: {error}") from None
+
+    def with_pitch(self, coarsest: float, what: str) -> PSFResult:
+        """The PSF itself where its samples are no more than `coarsest` [m] apart; else over the same window an odd
+        number for each, so that they fill the same cells.
+
+        Raises:
+            AccuracyError: see `through`.
+        """
+        if self.dx <= coarsest or self.holds_cells:
+            return self
+        parts = 2 * math.ceil((self.dx / coarsest - 1) / 2 - 1e-9) + 1
+        pitch, (height, width) = self.dx / parts, self.tensor.shape[1:]
+        # Of an even number the middle sample's cell begins at the window's middle: so does its middle part.
+        shift = pitch * (parts - 1) / 2
+        x, y = (at - shift * (n % 2 == 0) for at, n in zip(self.centre, (width, height), strict=True))
+        return self.through(Grid((parts * height, parts * width), pitch, (x, y)), what)
+
+    @cached_property
+    def _resolved(self) -> PSFResult:
+        """With samples that can be added up."""
+        return self.with_pitch(0.5 / float(self.cutoff.max()), "power")
+
+
+def _through(request: Request, window: Grid) -> Request:
+    asked = request.problem
+    problem = Problem.of(request.beam, window, asked.tolerance, asked.dtype)
+    method = request.method if request.method in APPROXIMATE else "auto"
+    return replace(request, problem=problem, method=method, most_seconds=MOST_SECONDS)
+
+
+def spread(requests: Sequence[Request]) -> PSFResult:
+    """PSFs of one pupil at several wavelengths, over one window.
+
+    Raises:
+        AccuracyError: no method meets the tolerance, or a window is so dark that rounding breaks it.
+    """
+    import drjit as dr
+
+    flat, plans = zip(*pictures(requests), strict=True)
+    beam, window, types = requests[0].beam, requests[0].problem.window, precision(requests[0].problem.dtype)
+    tensor = types.Tensor(flat[0] if len(flat) == 1 else dr.concat(flat), (len(flat), *window.shape))
+    wavelengths = np.array([request.beam.wavelength for request in requests])
+    where = (window.dx, wavelengths, beam.distance, beam.pupil)
+    return PSFResult(tensor, *where, tuple(plans), window.centre, tuple(requests))

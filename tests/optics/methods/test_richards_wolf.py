@@ -1,0 +1,139 @@
+"""The vector focus against sums of plane waves, Rayleigh-Sommerfeld's integral at low NA, and published spots."""
+
+import math
+
+import numpy as np
+import pytest
+
+import optics
+from optics.methods.richards_wolf import SCALAR_ERRORS, Light, focal_integrals, scalar_theory_error
+
+WAVELENGTH = 500e-9
+
+
+def lens(sine, z=1e-3, aplanatic=False, **options):
+    radius = z * sine if aplanatic else z * math.tan(math.asin(sine))
+    return optics.Pupil(radius, thin_lens_focal_length=z, **options)
+
+
+def focus(sine, aplanatic=False, **options):
+    kind = "aplanatic" if aplanatic else "flat"
+    options = {"dx": 10e-9, "shape": (81, 81), **options}
+    return optics.vector_focus(lens(sine, aplanatic=aplanatic), WAVELENGTH, apodization=kind, **options)
+
+
+def width(profile, dx):
+    """Full width at half height by linear interpolation, from the middle outwards."""
+    half = profile[len(profile) // 2 :]
+    at = int(np.argmax(half < half[0] / 2))
+    return 2 * dx * (at - 1 + (half[at - 1] - half[0] / 2) / (half[at - 1] - half[at]))
+
+
+def test_spot_of_an_objective_of_na_09():
+    """365 by 270 nm along and across the polarisation, where scalar theory has 253 (flat) or 277."""
+    found = focus(0.9, aplanatic=True, polarization=(1, 0))
+    assert width(found.psf[40], 10e-9) == pytest.approx(365e-9, abs=1.5e-9)
+    assert width(found.psf[:, 40], 10e-9) == pytest.approx(270e-9, abs=1.5e-9)
+    assert width(focus(0.9).scalar[40], 10e-9) == pytest.approx(253e-9, abs=1.5e-9)
+
+
+@pytest.mark.parametrize("polarization", [(1, 0), (0, 1), (1, 1j), (1, -2)])
+def test_it_is_the_sum_of_plane_waves_turned_with_their_rays(polarization):
+    """A double integral over directions: field ∝ (ŝ-part) + (p-part, turned from the pupil's radius to the ray)."""
+    found = focus(0.8, aplanatic=True, polarization=polarization, dx=90e-9, shape=(5, 7))
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    alpha, k = math.asin(0.8), 2 * math.pi / WAVELENGTH
+    theta, weight = alpha * (nodes + 1) / 2, weights * alpha / 2
+    phi = np.arange(64) * 2 * np.pi / 64
+    t, p = (a.ravel() for a in np.meshgrid(theta, phi, indexing="ij"))
+    amplitude = np.repeat(weight, 64) * (2 * np.pi / 64) * np.sqrt(np.cos(t)) * np.sin(t)
+    jones = np.array(polarization) / np.linalg.norm(polarization)
+    radial, azimuthal = jones[0] * np.cos(p) + jones[1] * np.sin(p), jones[1] * np.cos(p) - jones[0] * np.sin(p)
+    # The ray from pupil point p runs towards -p: the radial field tips forwards.
+    e = np.array(
+        [
+            radial * np.cos(t) * np.cos(p) - azimuthal * np.sin(p),
+            radial * np.cos(t) * np.sin(p) + azimuthal * np.cos(p),
+            radial * np.sin(t),
+        ]
+    )
+    x, y = np.meshgrid((np.arange(7) - 3) * 90e-9, (np.arange(5) - 2) * 90e-9)
+    turn = np.sin(t) * (np.cos(p) * x[..., None] + np.sin(p) * y[..., None])
+    field = np.einsum("cn,yxn->cyx", e * amplitude, np.exp(-1j * k * turn)) * k * 1e-3 / (2 * np.pi)
+    expected = np.abs(field) ** 2 / (np.pi * (0.8e-3) ** 2)
+    np.testing.assert_allclose(found.intensity, expected, rtol=0, atol=1e-8 * expected.max())
+
+
+def test_at_low_na_it_is_rayleigh_sommerfelds():
+    pupil = optics.Pupil(0.1e-3, thin_lens_focal_length=1e-3)
+    window = {"dx": 0.5e-6, "shape": (33, 33)}
+    exact = optics.psf(pupil, [WAVELENGTH], 1e-3, dtype="float64", tolerance=1e-6, **window).psf[0]
+    vector = optics.vector_focus(pupil, WAVELENGTH, **window)
+    off = np.linalg.norm(vector.scalar - exact) / np.linalg.norm(exact)
+    assert off < 1e-3  # 1 / (2k z (1 - cos θ)) of the near term, and what is left of the edge
+    assert np.linalg.norm(vector.psf - exact) / np.linalg.norm(exact) == pytest.approx(
+        scalar_theory_error(0.0995), rel=0.3
+    )
+
+
+def test_defocus_and_spherical_relief_are_in_it():
+    """W counts: 20 µm behind the focus, against the scalar integral of the same light."""
+    pupil = optics.Pupil(0.15e-3, optics.BSplineRelief.paraboloid(0, 40.0, 0.15e-3), thin_lens_focal_length=1e-3)
+    window = {"dx": 0.5e-6, "shape": (33, 33)}
+    exact = optics.psf(pupil, [WAVELENGTH], 1.02e-3, dtype="float64", tolerance=1e-6, **window).psf[0]
+    scalar = optics.vector_focus(pupil, WAVELENGTH, 1.02e-3, **window).scalar
+    assert np.linalg.norm(scalar - exact) / np.linalg.norm(exact) < 2e-3
+
+
+def test_all_components_together_hold_the_light_of_scalar_theory():
+    """Each plane wave has |e| = 1: integrals over the plane agree."""
+    found = focus(0.7, dx=0.1e-6, shape=(201, 201))
+    assert found.psf.sum() == pytest.approx(found.scalar.sum(), rel=2e-3)
+    assert found.intensity[2].sum() > 0.1 * found.psf.sum()
+
+
+@pytest.mark.parametrize("sine", [0.05, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95])
+def test_scalar_theorys_error_is_as_tabulated(sine):
+    rho = np.linspace(0, 12 / sine, 800) * WAVELENGTH
+    ends, light = (0.0, math.asin(sine)), Light(lambda theta: 1 / np.cos(theta))
+    along, axial, twice, scalar = focal_integrals(rho, 2 * math.pi / WAVELENGTH, 1e-3, ends, light)
+    vector, scalar = along**2 + 2 * axial**2 + twice**2, scalar**2
+    error = math.sqrt(np.sum(rho * (vector - scalar) ** 2) / np.sum(rho * vector**2))
+    assert scalar_theory_error(sine) == pytest.approx(
+        math.sqrt(np.sum(rho * (vector - scalar) ** 2) / np.sum(rho * scalar**2)), rel=0.01
+    )
+    assert scalar_theory_error(sine) == pytest.approx(error, rel=0.3)
+    assert SCALAR_ERRORS[0][1] * sine**2 == pytest.approx(error, rel=0.02 + sine**2)  # of second order
+
+
+def test_steep_plans_name_it_and_others_do_not():
+    steep = optics.plan(lens(0.9, 30e-6), WAVELENGTH, 30e-6, dx=0.1e-6, shape=(33, 33), tolerance=1e-2)
+    assert steep.scalar_error == pytest.approx(0.26, abs=0.02)
+    assert "scalar theory    errs by 0.3" in str(steep)
+    hole = optics.plan(optics.Pupil(30e-6), WAVELENGTH, 30e-6, dx=0.5e-6, shape=(33, 33), tolerance=1e-2)
+    assert hole.scalar_error < 1e-3  # as wide an angle, but the light goes straight on
+    assert "scalar theory" not in str(hole)
+
+
+def test_rings_have_more_light_along_the_axis():
+    ring = optics.vector_focus(lens(0.9, aperture=optics.Annulus(0.9)), WAVELENGTH, polarization=(1, 0), dx=20e-9)
+    whole = optics.vector_focus(lens(0.9), WAVELENGTH, polarization=(1, 0), dx=20e-9)
+    share = [found.intensity[2].sum() / found.psf.sum() for found in (ring, whole)]
+    assert share[0] > 1.3 * share[1]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"polarization": (0, 0)}, "polarization = .*not \\(0, 0\\)"),
+        ({"polarization": "x"}, "polarization = 'x'"),
+        ({"apodization": "aplan"}, "did you mean 'aplanatic'"),
+        ({"pupil": optics.Pupil(1e-3, aperture=optics.Slit(1, 1), thin_lens_focal_length=1e-3)}, "the same all around"),
+        ({"pupil": optics.Pupil(20e-6, thin_lens_focal_length=1e-3)}, "Fresnel number .* at least 20"),
+        ({"pupil": optics.Pupil(1e-3), "apodization": "aplanatic"}, "must be an ideal lens without relief"),
+        ({"sensor_distance": -1}, "sensor_distance = -1"),
+    ],
+)
+def test_bad_arguments_are_named(change, words):
+    with pytest.raises(ValueError, match=words):
+        optics.vector_focus(**{"pupil": lens(0.7), "wavelength": WAVELENGTH, **change})

@@ -1,0 +1,139 @@
+"""Measures know their sampling: coarse or narrow windows give the same numbers, or none, and predicted errors hold."""
+
+import math
+from dataclasses import replace
+
+import drjit as dr
+import numpy as np
+import pytest
+from drjit.auto.ad import Float64
+
+import optics
+from validation import reference
+from validation.cases import draw_case
+
+WAVELENGTH = 550e-9
+LENS, FOCUS = optics.Pupil(1e-3, thin_lens_focal_length=4e-3), 4e-3
+APART = WAVELENGTH * FOCUS / 2e-3  # λz/2R, 1.1 µm
+
+
+def focus(dx, n, **options):
+    return optics.psf(LENS, [WAVELENGTH], FOCUS, dx=dx, shape=(n, n), **options)
+
+
+@pytest.fixture(scope="module")
+def fine():
+    return focus(0.2 * APART, 287)
+
+
+@pytest.mark.parametrize("dx", [3e-6, 1.1e-6, 0.55e-6, 2.2e-6])
+def test_coarse_samples_measure_what_fine_ones_do(dx, fine):
+    """Samples 3 µm apart add up to a power of 5.7: they are looked at again."""
+    n = 2 * round(31.5e-6 / dx / 2 - 0.5) + 1
+    result = focus(dx, n)
+    side = n * dx / 2
+    inside = (np.abs(fine.x)[None, :] <= side) & (np.abs(fine.y)[:, None] <= side)
+    held = (fine.psf[0] * inside).sum() * fine.dx**2
+    assert abs(result.power[0] - held) < result.power_error[0] + 2e-3
+    if dx == 3e-6:
+        assert result.held[0] > 5
+    (strehl,), (error,) = optics.strehl_ratio(result, with_error=True)
+    assert abs(strehl - 1) < error < 1e-3
+    radii = np.array([0.61, 2.0]) * APART * 2
+    (energy,), (errors,) = optics.encircled_energy(result, radii, with_error=True)
+    np.testing.assert_allclose(energy, optics.encircled_energy(fine, radii)[0], atol=errors.max())
+    transfer = optics.mtf(result)
+    f = np.array([0.15, 0.5, 0.8]) * transfer.cutoff[0]
+    off = np.abs(transfer.profile(f)[0] - reference.circular_mtf(f, WAVELENGTH, 1e-3, FOCUS))
+    # f/2 departs from the paraxial form by 6e-3 at low frequencies
+    assert off.max() < transfer.predicted_error[0] + 0.03
+    quality, (error,) = optics.image_quality(result, 1e5, with_error=True)
+    assert abs(quality[0] - optics.image_quality(fine, 1e5)[0]) < error < 0.02
+
+
+def test_a_picture_that_nobody_can_look_at_again_is_refused_with_what_would_do():
+    lost = replace(focus(3e-6, 21), requests=())
+    wanted = r"needs \d+ x \d+ samples [\d.e-]+ m apart, and this PSF has 21 x 21 samples 3e-06 m apart: ask for dx="
+    for measure in (
+        lambda: lost.power,
+        lambda: optics.strehl_ratio(lost),
+        lambda: optics.encircled_energy(lost, 1e-5),
+        lambda: optics.mtf(lost),
+        lambda: optics.image_quality(lost, 1e5),
+    ):
+        with pytest.raises(optics.AccuracyError, match=wanted):
+            measure()
+    assert lost.held[0] > 5
+
+
+def test_a_mean_over_wavelengths_is_not_mistaken_for_one_of_them():
+    result = optics.psf(LENS, [WAVELENGTH, 600e-9], FOCUS, dx=3e-6, shape=(21, 21))
+    white = replace(result, tensor=result.psf.mean(axis=0)[None], wavelengths=np.array([575e-9]))
+    assert result.can_be_seen_anew
+    assert not white.can_be_seen_anew
+
+
+def test_a_window_without_the_peak_has_no_strehl_ratio():
+    beside = focus(0.3e-6, 9, centre=(2e-6, 0.0))  # the first dark ring is at 1.3 µm
+    with pytest.raises(optics.AccuracyError, match="needs a window that holds the peak"):
+        optics.strehl_ratio(beside)
+
+
+def test_the_higher_of_two_lobes_is_found_between_samples():
+    """Of two stars' lobes, that with the lower sample is the higher one."""
+    result = focus(0.45e-6, 41, source_angle=(0.05e-3, 0.03e-3))
+    sampled = result.psf.max() / (focus(0.05e-6, 11).psf.max())
+    assert sampled < 0.97
+    assert optics.strehl_ratio(result)[0] == pytest.approx(1, abs=2e-3)
+
+
+def test_even_windows_are_split_about_their_own_cells():
+    """Of 20 samples the middle is half a sample off: finer ones must fill the same cells."""
+    off, whole = focus(3e-6, 20), focus(0.25e-6, 239, centre=(-1.5e-6, -1.5e-6))
+    assert off.with_pitch(0.3e-6, "it").x[[0, -1]] == pytest.approx(
+        [off.x[0] - 1.5e-6 + 3e-6 / 22, off.x[-1] + 1.5e-6 - 3e-6 / 22]
+    )
+    assert off.power[0] == pytest.approx(whole.power[0], abs=3e-4)
+
+
+def test_measures_carry_derivatives_through_what_they_look_at_again():
+    """Of power, Strehl ratio and encircled energy by the distance of the sensor, against central differences."""
+
+    def measured(z):
+        result = optics.psf(LENS, [WAVELENGTH], z, dx=3e-6, shape=(9, 9), dtype="float64", tolerance=1e-8)
+        return result.power, optics.strehl_ratio(result), optics.encircled_energy(result, 4e-6)
+
+    at, step = FOCUS + 4e-6, 2e-8
+    before, after = measured(at - step), measured(at + step)
+    for index in range(3):
+        z = Float64(at)
+        dr.enable_grad(z)
+        value = measured(z)[index]
+        dr.backward(dr.sum(value.array))
+        expected = (np.sum(after[index]) - np.sum(before[index])) / (2 * step)
+        assert dr.grad(z)[0] == pytest.approx(expected, rel=2e-3), index
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_predicted_errors_hold_on_random_pupils(seed):
+    """Of any aperture and relief, against sums over samples ten to a cycle at a tolerance of 1e-5."""
+    rng = np.random.default_rng(seed)
+    while True:
+        case = draw_case(rng)
+        if 0.1 < case.fresnel_number < 10 and case.aperture < 0.4 and case.relief < 3e-6:
+            break
+    cutoff = 2 * case.aperture / WAVELENGTH
+    n, pitch = 2 * int(rng.integers(5, 15)) + 1, rng.uniform(0.3, 1.6) * 0.5 / cutoff
+    where = ([WAVELENGTH], case.distance)
+    try:
+        result = optics.psf(case.pupil, *where, dx=pitch, shape=(n, n), tolerance=10 ** rng.uniform(-3.5, -2))
+    except optics.AccuracyError:
+        return
+    parts = 2 * math.ceil(pitch * cutoff / 0.2) + 1
+    exact = {"dx": pitch / parts, "shape": (n * parts, n * parts), "tolerance": 1e-5, "dtype": "float64"}
+    whole = optics.psf(case.pupil, *where, **exact)
+    assert abs(result.power[0] - whole.psf.sum() * whole.dx**2) <= result.power_error[0]
+    radius = 0.9 * n // 2 * pitch
+    inside = np.clip((radius - np.hypot(whole.x, whole.y[:, None])) / whole.dx + 0.5, 0, 1)
+    (energy,), (error,) = optics.encircled_energy(result, radius, with_error=True)
+    assert abs(energy[0] - (whole.psf[0] * inside).sum() * whole.dx**2) <= error[0] + 2e-4

@@ -1,0 +1,91 @@
+"""A population's pictures, by one plan, against the exact integral; what it cannot do well goes the ordinary way."""
+
+import math
+
+import numpy as np
+import pytest
+from drjit.auto.ad import Float64
+
+import optics
+from optics import Grid
+from optics.point_spread.population import Member, _sine, _spread, _Stack, population_pictures
+from validation.reference import relative_l2
+
+Z, LAMBDA = 240e-6, 550e-9
+
+
+def eyes(count, seed=0, **options):
+    """Of 15 to 40 µm, with reliefs near a lens."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        radius = rng.uniform(15e-6, 40e-6)
+        lens = optics.BSplineRelief.paraboloid(0, 1 / (0.5 * Z), radius).control_points
+        yield optics.Pupil(radius, optics.BSplineRelief(lens + rng.random((4, 4)) * rng.uniform(0, 3e-6)), **options)
+
+
+def members(pupils, source=math.inf):
+    return [Member(pupil, LAMBDA, Z, source) for pupil in pupils]
+
+
+APERTURES = [optics.Circle(), optics.Annulus(0.5), optics.Slit(0.4, 1.3), optics.Polygon.regular(6)]
+
+
+@pytest.mark.parametrize("aperture", APERTURES, ids=lambda aperture: type(aperture).__name__)
+@pytest.mark.parametrize(("dx", "shape", "source"), [(0.25e-6, (65, 65), math.inf), (0.5e-6, (33, 48), 3e-3)])
+def test_predicted_errors_hold_and_are_not_cowardly(aperture, dx, shape, source):
+    pupils, window = list(eyes(6, aperture=aperture)), Grid(shape, dx)
+    found = list(population_pictures(members(pupils, source), window, 1e-2))
+    assert len(found) >= 4
+    for index, image, plan in found:
+        exact = optics.psf(pupils[index], [LAMBDA], Z, source, dx=dx, shape=shape, tolerance=1e-5).psf[0]
+        error = relative_l2(image, exact)
+        assert error <= plan.predicted_error <= 1e-2
+        assert plan.predicted_error < 30 * error
+
+
+def test_in_a_medium_behind_any_lens():
+    lens = optics.Pupil(30e-6, medium_n=1.336, thin_lens_focal_length=Z)
+    diverging = optics.Pupil(30e-6, thin_lens_focal_length=-2 * Z)
+    window = Grid((33, 33), 0.4e-6)
+    for pupil in (lens, diverging, optics.Pupil(12e-6)):
+        [(_, image, plan)] = population_pictures(members([pupil]), window, 2e-2)
+        exact = optics.psf(pupil, [LAMBDA], Z, dx=0.4e-6, shape=(33, 33), tolerance=1e-5).psf[0]
+        assert relative_l2(image, exact) <= plan.predicted_error
+
+
+def test_the_batch_takes_it_and_leaves_it_the_rest():
+    """A height map, a wide pupil whose rest is not slow, and a derivative go the ordinary way: all in one batch."""
+    wide = optics.Pupil(200e-6, thin_lens_focal_length=Z)
+    pupils = [*eyes(3), optics.Pupil(20e-6, np.zeros((5, 5))), wide, optics.Pupil(Float64(20e-6))]
+    options = {"dx": 0.25e-6, "shape": (33, 33), "tolerance": 1e-2}
+    batch = optics.psf_batch(pupils, [LAMBDA, 600e-9], Z, [math.inf, 2e-3], **options)
+    together = ["population" in plan.why for plan in batch.plans]
+    assert together == [True] * 12 + [False] * 12
+    for place in ((0, 0, 1), (2, 1, 0), (3, 0, 0), (4, 1, 1), (5, 0, 0)):
+        eye, depth, wave = place
+        alone = optics.psf(pupils[eye], [(LAMBDA, 600e-9)[wave]], Z, (math.inf, 2e-3)[depth], **options)
+        assert relative_l2(batch.psf[place], alone.psf[0]) < 1e-2
+    exactly = optics.psf_batch(list(eyes(1)), [LAMBDA], Z, dx=0.25e-6, shape=(33, 33), tolerance=1e-4)
+    assert "population" not in exactly.plan.why
+
+
+def test_one_kernel_scale_for_all_rays_would_be_worse():
+    """The rest keeps three times less phase with ξ/c(ξ) than with ξ over the distance."""
+    stack, window = _Stack.of(members(eyes(4))), Grid((65, 65), 0.25e-6)
+    ours = _spread(stack, window)[:, -1]
+    xi = stack.radius[:, 0, 0] * 0.7
+    plain, bent = xi / stack.distance[:, 0, 0], _sine(stack, window, xi[:, None, None])[:, 0, 0]
+    assert (bent < plain).all()
+    worse = 2 * np.pi * (plain - bent) * window.half_diagonal / LAMBDA
+    assert (worse > ours).all()
+
+
+def test_bad_input_is_named():
+    with pytest.raises(ValueError, match="sensor_distance = -1"):
+        optics.psf_batch(list(eyes(1)), sensor_distance=-1, tolerance=1e-2)
+    with pytest.raises(ValueError, match="tolerance = 2"):
+        optics.psf_batch(list(eyes(1)), tolerance=2)
+    with pytest.raises(ValueError, match="pupil = 7"):
+        optics.psf_batch([7], tolerance=1e-2)
+    with pytest.raises(ValueError, match="source_distance = 0"):
+        optics.psf_batch(list(eyes(1)), source_distances=[0], tolerance=1e-2)

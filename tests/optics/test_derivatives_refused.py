@@ -1,0 +1,59 @@
+"""What carries no derivative says so: none is dropped in silence."""
+
+import drjit as dr
+import numpy as np
+import pytest
+from drjit.auto.ad import Float64, TensorXf64
+
+import optics
+
+PUPIL = optics.Pupil(10e-6, thin_lens_focal_length=100e-6)
+FIELD = np.ones((4, 4), dtype=complex)
+
+
+def asking(value):
+    found = Float64(value)
+    dr.enable_grad(found)
+    return found
+
+
+def corners():
+    found = TensorXf64(np.array([[0.5, 0], [0, 0.5], [-0.5, 0]]))
+    dr.enable_grad(found)
+    return found
+
+
+DROPPED = {
+    "wavelength": lambda: optics.psf(PUPIL, [asking(550e-9)]),
+    "wavelengths": lambda: optics.psf(PUPIL, asking([500e-9, 600e-9])),
+    "source_angle": lambda: optics.psf(PUPIL, source_angle=(asking(0.1), 0.0)),
+    "centre": lambda: optics.psf(PUPIL, centre=(0.0, asking(1e-6))),
+    "dx": lambda: optics.psf(PUPIL, dx=asking(1e-6)),
+    "medium_n": lambda: optics.Pupil(10e-6, medium_n=asking(1.3)),
+    "inner": lambda: optics.Annulus(asking(0.5)),
+    "width": lambda: optics.Slit(asking(0.5), 1.0),
+    "height": lambda: optics.Slit(0.5, asking(1.0)),
+    "vertices": lambda: optics.Polygon(corners()),
+    "abbe_number": lambda: optics.RefractiveIndex.from_abbe(1.5, asking(58.0)),
+    "radii": lambda: optics.encircled_energy(optics.psf(PUPIL, shape=(9, 9)), asking(1e-6)),
+    "nyquist": lambda: optics.image_quality(optics.psf(PUPIL, shape=(9, 9)), asking(1e5)),
+    "noise_sigma": lambda: optics.image_quality(optics.psf(PUPIL, shape=(9, 9)), 1e5, 1.0, asking(0.1)),
+    "distance": lambda: optics.propagate(FIELD, dx=1e-6, wavelength=5e-7, distance=asking(1e-3)),
+}
+
+
+@pytest.mark.parametrize("name", DROPPED)
+def test_it_is_refused(name):
+    with pytest.raises(ValueError, match=r"asks for a derivative, which it does not carry") as error:
+        DROPPED[name]()
+    assert str(error.value).startswith(name.removesuffix("s"))
+
+
+def test_torch_asks_too():
+    torch = pytest.importorskip("torch")
+    with pytest.raises(ValueError, match="inner asks for a derivative"):
+        optics.Annulus(torch.tensor(0.5, requires_grad=True))
+
+
+def test_plain_arrays_of_drjit_are_numbers():
+    assert optics.Annulus(Float64(0.5)).area == pytest.approx(np.pi * 0.75)
