@@ -20,7 +20,7 @@ def test_a_renderer_says_what_it_has_room_for(pupil):
     with pytest.raises(ValueError, match=r"rays_per_receptor = 1e\+07: 99 worlds .* GiB .* use at most .* rays"):
         sim.BatchedRenderer(world, eyes, 99, sim.Fidelity(1e7, eyes.bands))
     with pytest.raises(ValueError, match="fewer worlds at once"):
-        sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(1, eyes.bands)).resized(10**12)
+        sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(1, eyes.bands)).resized(10**9)
 
 
 def test_what_it_recommends_fits(monkeypatch):
