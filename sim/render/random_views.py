@@ -13,7 +13,7 @@ from sim.worlds.world import World
 
 # [m] from a cell's centre, along either axis: less than half a cell without the agent's body, 1 - 0.2.
 STRAY = 0.75
-NEAR = (0.8, 4.0)  # [m] from an object's centre: where what eyes make of it decides what agents do
+NEAR = (0.8, 8.0)  # [m] from an object's centre: where what eyes make of it decides what agents do
 TRIES = 100
 
 
