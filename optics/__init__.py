@@ -45,6 +45,8 @@ _CONTENTS = {
     "Spectrum": "spectra.spectrum",
     "StackResult": "propagation.system",
     "VectorFocus": "point_spread.vector_focus",
+    "WavefrontMap": "elements.wavefront",
+    "Zernike": "elements.wavefront",
     "encircled_energy": "point_spread.concentration",
     "illuminant": "spectra.spectrum",
     "image_quality": "point_spread.contrast",
