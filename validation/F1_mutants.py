@@ -10,6 +10,9 @@ evenly from all places of the three packages where such a mistake can be made. A
 user could see (the same results, a little sooner or later) is no mistake: it is listed as alike, with the reason, and
 does not count.
 
+Eight mutants were tried by hand, with tests that this leaves out or that were written for them, and are stored with the
+rest. The reasons of those that are alike or survived come from reading the code.
+
 Trials are stored (`docs/validation/data/F1.csv`), because they take a minute each; the page comes from the store, and
 `--trials` goes on where the store ends. `--again` tries once more what has survived, after a test was written, say.
 

@@ -111,7 +111,7 @@ def test_killed_and_surviving_are_told_apart_and_the_tree_is_mended(copy):
 
 def test_the_stored_trials_hold_and_are_on_the_page():
     rows = F1_mutants.stored(ROOT / F1_mutants.STORED)
-    assert len(rows) >= 200
+    assert len(rows) >= 195
     assert {row.package for row in rows} == set(F1_mutants.PACKAGES)
     assert F1_mutants.broken(rows) == []
     assert (ROOT / "docs" / "validation" / "F1.md").read_text() == F1_mutants.page(rows).markdown
