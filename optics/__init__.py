@@ -46,6 +46,7 @@ _CONTENTS = {
     "StackResult": "propagation.system",
     "VectorFocus": "point_spread.vector_focus",
     "WavefrontMap": "elements.wavefront",
+    "WhitePSF": "point_spread.white",
     "Zernike": "elements.wavefront",
     "encircled_energy": "point_spread.concentration",
     "illuminant": "spectra.spectrum",
@@ -61,6 +62,7 @@ _CONTENTS = {
     "require": "numerics.backend",
     "strehl_ratio": "point_spread.concentration",
     "vector_focus": "point_spread.vector_focus",
+    "white_psf": "point_spread.white",
 }
 
 __all__ = sorted(_CONTENTS)
