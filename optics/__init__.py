@@ -45,6 +45,9 @@ _CONTENTS = {
     "Spectrum": "spectra.spectrum",
     "StackResult": "propagation.system",
     "VectorFocus": "point_spread.vector_focus",
+    "WavefrontMap": "elements.wavefront",
+    "WhitePSF": "point_spread.white",
+    "Zernike": "elements.wavefront",
     "encircled_energy": "point_spread.concentration",
     "illuminant": "spectra.spectrum",
     "image_quality": "point_spread.contrast",
@@ -59,6 +62,7 @@ _CONTENTS = {
     "require": "numerics.backend",
     "strehl_ratio": "point_spread.concentration",
     "vector_focus": "point_spread.vector_focus",
+    "white_psf": "point_spread.white",
 }
 
 __all__ = sorted(_CONTENTS)

@@ -1,4 +1,4 @@
-"""The pupil: an aperture with a relief and, for validation, an ideal lens."""
+"""The pupil: an aperture with a relief, a wavefront, and an ideal lens."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from optics.elements.pixel_relief import PixelRelief
 from optics.elements.refractive_index import RefractiveIndex
 from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
+from optics.elements.wavefront import Aberration
 from optics.elements.wavefront_slopes import Slopes, _derivative
 from optics.numerics.arguments import finite, in_range, of_kind, positive, reals, without_derivative
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
@@ -29,7 +30,7 @@ SENSOR_DISTANCE = 240e-6  # choice [m]: of a pupil without a lens, where nobody 
 
 @dataclass(frozen=True, eq=False)
 class Pupil:
-    """Transmittance A(x, y) exp(ik (n - medium_n) h(x, y)), thin-element model.
+    """Transmittance A(x, y) exp(ik [(n - medium_n) h(x, y) - W(x, y)]), thin-element model.
 
     aperture_radius: R [m].
     height: None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (see HeightMap); or a Relief, such
@@ -38,8 +39,10 @@ class Pupil:
     medium_n: index of what surrounds the pupil, on both sides.
     thin_lens_focal_length: adds an ideal lens exp(-ik(√(r² + f²) - f)) [m]; negative diverges.
     aperture: its shape within the circle of radius R: Circle (default), Annulus, Polygon, Slit.
+    wavefront: W [m], in vacuum at every wavelength: Zernike, or WavefrontMap, over a circle no smaller than the pupil.
 
-    Radius, height, n and focal length may be Dr.Jit arrays (a height map: a tensor): derivatives flow through them.
+    Radius, height, n, focal length and W's numbers may be Dr.Jit arrays (a height map: a tensor): derivatives flow
+    through them.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -51,6 +54,7 @@ class Pupil:
     medium_n: float = 1.0
     thin_lens_focal_length: Scalar | None = None
     aperture: Aperture = field(default_factory=Circle)
+    wavefront: Aberration | None = None
 
     def __post_init__(self) -> None:
         positive("aperture_radius", self.aperture_radius)
@@ -68,8 +72,23 @@ class Pupil:
                 f"must be in metres, at most {TALLEST:g} radii or {ANY_HEIGHT:g} m "
                 "(a phase φ [rad] is a height φ λ / (2π (n - medium_n)))"
             )
+        if self.wavefront is not None:
+            self._check_wavefront(of_kind("wavefront", self.wavefront, Aberration, "Zernike({(2, 0): 0.1})"))
         if self.thin_lens_focal_length is not None:
             positive("abs(thin_lens_focal_length)", abs(finite("thin_lens_focal_length", self.thin_lens_focal_length)))
+
+    def _check_wavefront(self, wavefront: Aberration) -> None:
+        radius, most = number(self.aperture_radius), max(TALLEST * number(self.aperture_radius), ANY_HEIGHT)
+        if wavefront.radius is not None and wavefront.radius < radius * (1 - 1e-9):
+            raise ValueError(
+                f"wavefront is known over a radius of {wavefront.radius:.3g} m: must be the pupil's, {radius:.3g} m, "
+                "or more"
+            )
+        if wavefront.span > most:
+            raise ValueError(
+                f"wavefront spans {wavefront.span:.3g} m: must be at most {most:.3g} m "
+                "(Zernike's coefficients are in µm, a map's samples in m)"
+            )
 
     @cached_property
     def radius(self) -> float:
@@ -118,7 +137,8 @@ class Pupil:
 
     def rotationally_symmetric(self, wavelength: float) -> bool:
         relief_is = not self.bends(wavelength) or self.height.rotationally_symmetric
-        return self.aperture.rotationally_symmetric and relief_is
+        wavefront_is = self.wavefront is None or self.wavefront.rotationally_symmetric
+        return self.aperture.rotationally_symmetric and relief_is and wavefront_is
 
     def path(self, x: Array, y: Array, wavelength: float, source: PointSource, types: Precision) -> Array:
         """Optical path [m] through source and pupil at points (x, y) [m], flat float64 arrays."""
@@ -133,6 +153,10 @@ class Pupil:
         if self.bends(wavelength):
             scale = 1 / opaque(types, self.aperture_radius)
             total += opaque(types, self.index_step(wavelength)) * self.height.height(x * scale, y * scale, types)
+        if self.wavefront is not None:
+            own = self.aperture_radius if self.wavefront.radius is None else self.wavefront.radius
+            scale = 1 / opaque(types, own)
+            total -= self.wavefront.ahead(x * scale, y * scale, types)
         return total
 
     def slopes(self, wavelength: float, source: PointSource) -> Slopes:
@@ -149,18 +173,21 @@ class Pupil:
         return self.height.scatter(turns, self.aperture, share) / self.radius
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
-        """Spatial frequency [1/m] above which the relief changes the phase by less than `tolerance` rad."""
-        step = abs(number(self.index_step(wavelength)))
-        if self.height is None or step == 0:
-            return 0.0
-        level = tolerance * wavelength / (2 * np.pi * step)
-        return self.height.bandwidth(level) / self.radius
+        """Spatial frequency [1/m] above which relief and wavefront change the phase by less than `tolerance` rad.
+        Jumps between pixels count for nothing: they are sampled for themselves."""
+        level, step = tolerance * wavelength / (2 * np.pi), abs(number(self.index_step(wavelength)))
+        found = 0.0
+        if self.height is not None and step != 0 and not self.pixels:
+            found = self.height.bandwidth(level / step) / self.radius
+        return found if self.wavefront is None else max(found, self.wavefront.bandwidth(level) / self.radius)
 
 
 @lru_cache(maxsize=64)
 def _slopes(pupil: Pupil, wavelength: float, distance: float, angle: tuple[float, float]) -> Slopes:
     types = precision("float64")
-    pieces = pupil.height.knots if pupil.bends(wavelength) else 0
+    pieces = max(
+        pupil.height.knots if pupil.bends(wavelength) else 0, 0 if pupil.wavefront is None else pupil.wavefront.knots
+    )
     n = int(min(1025, max(65 if pieces else 33, 4 * pieces + 1)))
     grid = Grid.square(n, 2 * (1 + EDGE_REACH) * pupil.radius / (n - 1))
     x, y = grid.coordinates(types)

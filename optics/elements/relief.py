@@ -243,17 +243,17 @@ class HeightMap(Relief):
         return len(self._heights) == 1
 
 
-def square_heights(samples: Any) -> np.ndarray:
+def square_heights(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
     """The same without derivatives, as an array that nobody can change.
 
     Raises:
         ValueError: not square, empty, or not finite.
     """
-    heights = np.array(plain(samples) if is_differentiable(samples) else reals("height", samples))
+    heights = np.array(plain(samples) if is_differentiable(samples) else reals(name, samples))
     if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.size == 0:
-        raise ValueError(f"height has shape {heights.shape}: must be square (n, n), n at least 1")
+        raise ValueError(f"{name} has shape {heights.shape}: must be square (n, n), n at least 1")
     if not np.isfinite(heights).all():
-        raise ValueError("height holds NaN or infinity: must be finite heights [m]")
+        raise ValueError(f"{name} holds NaN or infinity: must be finite {what}")
     heights.setflags(write=False)
     return heights
 

@@ -140,7 +140,7 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
     pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
     slopes = pupil.slopes(wavelength, beam.source)
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
-    detail = 0.0 if pixels else pupil.bandwidth(wavelength, tolerance / 10)  # choice: a tenth, of the phase [rad]
+    detail = pupil.bandwidth(wavelength, tolerance / 10)  # choice: a tenth, of the phase [rad]
     turning, inside = slopes.turning(distance, window, pupil.medium_n)
     return Problem(
         aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,

@@ -32,7 +32,7 @@ __all__ = [
 MOST_DIGITS = 14.0  # choice: of float64 sums, which carry 16
 SPARE_DIGITS = 0.5  # choice: the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
 ON_AXIS = 1e-9  # rounding, of the radius
-FAR = 0.25  # choice: radius over distance below which the kernel is smooth enough for any nodes
+FAR = 0.25  # choice: radius over distance below which nodes that follow a phase follow the kernel, too
 
 
 Rule = tuple[Aperture, float, float, bool]
@@ -105,10 +105,11 @@ def node_rule(problem: Problem) -> tuple[float, float]:
 def turns(problem: Problem, digits: float) -> float:
     """Cycles per radius for which the nodes must be enough: the phase's, and near the pupil those that stand for the
     kernel's poles at height z above the plane: Gauss-Legendre over [0, R] and the trapezoid rule around a ring of
-    radius R converge like e^{-4nz/R} and e^{-nz/R}.
+    radius R converge like e^{-4nz/R} and e^{-nz/R}. In a focus, where no phase turns, these poles alone count.
     """
-    nearness = max(problem.radius / problem.distance - FAR, 0.0)
-    return problem.radius * problem.turning_inside + digits * math.log(10) / (2 * math.pi) * nearness
+    phase, poles = problem.radius * problem.turning_inside, digits * math.log(10) / (2 * math.pi)
+    nearness = problem.radius / problem.distance
+    return max(phase + poles * max(nearness - FAR, 0.0), poles * nearness)
 
 
 def node_count(aperture: Aperture, cycles: float, digits: float) -> int:

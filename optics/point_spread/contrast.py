@@ -6,7 +6,8 @@ Where the PSF carries derivatives, so do these numbers: they are Dr.Jit arrays t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,7 +22,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, padded_for_packets, precision
 from optics.point_spread.psf_result import PSFResult
 
-__all__ = ["MTF", "flat", "image_quality", "mtf"]
+__all__ = ["MTF", "combined_mtf", "flat", "image_quality", "mtf"]
 
 ORIENTATIONS = 64  # choice: over which a profile is a mean
 HELD_TOO_MUCH = 1e-2  # choice: above all that arrives, by which sums may err
@@ -107,6 +108,22 @@ def mtf(result: PSFResult, arriving: Any = None, tolerance: float = 0.02) -> MTF
             "better PSF"
         )
     return _transformed(seen, light, error)
+
+
+def combined_mtf(
+    result: PSFResult, weights: np.ndarray, combined: Callable[[PSFResult, np.ndarray], Array], tolerance: float
+) -> MTF:
+    """As `mtf`, of sums of the PSF's wavelengths: weights (sum, wavelength), combined(result, weights) (sum, y, x)."""
+    positive("tolerance", tolerance, "contrast")
+    light, unsure = _arriving(result, None)
+    known = light.numpy()
+    seen = _wide(result.with_pitch(0.5 / float(result.cutoff.max()), "the MTF"), known, tolerance)
+    error = weights @ (np.maximum(known - plain(seen.held), 0) + unsure + seen.sum_error)
+    if float(error.max()) > tolerance and tolerance < 1:
+        raise AccuracyError(f"tolerance = {tolerance:g}: contrasts err by up to {float(error.max()):.2g}: widen it")
+    shortest = np.array([result.wavelengths[row > 0].min() for row in weights])
+    sums = replace(seen, tensor=combined(seen, weights), wavelengths=shortest, requests=())
+    return _transformed(sums, precision("float64").Float(weights @ known), error)
 
 
 def _wide(result: PSFResult, known: np.ndarray, tolerance: float) -> PSFResult:

@@ -65,7 +65,7 @@ class Member:
             pupil.n.b,
             pupil.thin_lens_focal_length,
         )
-        if any(is_differentiable(value) for value in numbers):
+        if pupil.wavefront is not None or any(is_differentiable(value) for value in numbers):
             return False
         relief = pupil.height
         return relief is None or (isinstance(relief, BSplineRelief) and not is_differentiable(relief.control_points))

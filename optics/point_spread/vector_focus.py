@@ -107,10 +107,11 @@ def _flat(pupil: Pupil, wavelength: float, z: float) -> tuple[tuple[float, float
 
 def _aplanatic(pupil: Pupil, z: float) -> tuple[tuple[float, float], Light]:
     """r = z sin θ, all rays in phase."""
-    if pupil.height is not None or pupil.thin_lens_focal_length is None or pupil.radius >= z:
+    bare = pupil.height is None and pupil.wavefront is None
+    if not bare or pupil.thin_lens_focal_length is None or pupil.radius >= z:
         raise ValueError(
-            f"apodization = 'aplanatic': must be an ideal lens without relief, its radius {pupil.radius:.3g} m below "
-            f"the distance {z:.3g} m"
+            f"apodization = 'aplanatic': must be an ideal lens without relief or wavefront, its radius "
+            f"{pupil.radius:.3g} m below the distance {z:.3g} m"
         )
     inner = pupil.aperture.inner_radius * pupil.radius
     return (math.asin(inner / z), math.asin(pupil.radius / z)), Light(lambda theta: np.sqrt(np.cos(theta)))

@@ -35,6 +35,8 @@ DROPPED = {
     "height": lambda: optics.Slit(0.5, asking(1.0)),
     "vertices": lambda: optics.Polygon(corners()),
     "abbe_number": lambda: optics.RefractiveIndex.from_abbe(1.5, asking(58.0)),
+    "radius": lambda: optics.Zernike([0.1], radius=asking(1e-3)),
+    "coefficients_um": lambda: optics.Zernike([0.1, asking(0.2)]),
     "radii": lambda: optics.encircled_energy(optics.psf(PUPIL, shape=(9, 9)), asking(1e-6)),
     "nyquist": lambda: optics.image_quality(optics.psf(PUPIL, shape=(9, 9)), asking(1e5)),
     "noise_sigma": lambda: optics.image_quality(optics.psf(PUPIL, shape=(9, 9)), 1e5, 1.0, asking(0.1)),

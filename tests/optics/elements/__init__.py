@@ -6,5 +6,6 @@ pupil: test_pupil.py
 refractive_index: test_refractive_index.py
 relief: test_relief.py
 source: test_source.py
+wavefront: test_wavefront.py
 wavefront_slopes: test_pupil.py
 """

@@ -43,6 +43,16 @@ class TestExactIntegral:
         assert reference.relative_l2(result.psf[0], exact) < result.plan.predicted_error <= 1e-7
         assert reference.relative_l2(airy, exact) > 1e-3
 
+    @pytest.mark.parametrize("f_number", [1, 2, 8, 30])
+    def test_middle_of_a_focus_alone(self, f_number):
+        """No phase turns there, and the kernel still falls towards the rim: |U| = |1 - z/L - ikz ln(L/z)|."""
+        focus = {"sensor_distance": 300e-6, "shape": (1, 1), "tolerance": 1e-8, "dtype": "float64"}
+        result = optics.psf(lens(f_number), [WAVELENGTH], **focus)
+        z, radius = 300e-6, result.pupil.radius
+        slant = math.hypot(z, radius)
+        field = 1 - z / slant - 2j * math.pi / WAVELENGTH * z * math.log(slant / z)
+        assert result.psf[0, 0, 0] == pytest.approx(abs(field) ** 2 / result.pupil.area, rel=1e-8)
+
     @pytest.mark.parametrize(("dtype", "tolerance"), [("float32", 1e-4), ("float64", 1e-7)])
     def test_aperture_in_the_near_field(self, dtype, tolerance):
         """Radius 50 µm at 200 µm, ±60 µm: Fresnel number 23, light and shadow in one window."""

@@ -11,4 +11,5 @@ request: test_psf.py
 psf_result: test_psf.py, test_measure_errors.py
 spot_check: test_spot_check.py
 vector_focus: methods/test_richards_wolf.py
+white: test_white.py
 """

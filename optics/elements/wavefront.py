@@ -1,0 +1,248 @@
+"""Wavefronts: what an eye, or any other optics, does to the light's phase beside its lens, as aberrometers report it.
+
+The sign is that of reports on human eyes: positive where the wavefront that leaves the eye is ahead, so that a positive
+defocus is a myope's. Light that enters has an optical path shorter by as much.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from optics.elements.relief import HeightMap, square_heights
+from optics.numerics.arguments import finite, positive, reals, shown, without_derivative
+from optics.numerics.autodiff import Array, is_differentiable, number, plain
+from optics.numerics.precision import Precision, opaque
+
+__all__ = ["HIGHEST", "Aberration", "WavefrontMap", "Zernike", "mode"]
+
+HIGHEST = 30  # choice: radial order
+UM = 1e-6
+
+
+class Aberration(ABC):
+    """How far a wavefront that leaves the pupil is ahead [m], over a circle or square of `radius` [m] (None: the
+    pupil's)."""
+
+    radius: float | None
+
+    @abstractmethod
+    def ahead(self, x: Array, y: Array, types: Precision) -> Array:
+        """[m] at positions in units of the radius: flat Dr.Jit float64 arrays in and out."""
+
+    @abstractmethod
+    def bandwidth(self, level: float) -> float:
+        """Spatial frequency [cycles per radius] above which its content is below `level` [m]."""
+
+    @property
+    @abstractmethod
+    def knots(self) -> int:
+        """Polynomial pieces across it that slopes should be told apart by."""
+
+    @property
+    @abstractmethod
+    def span(self) -> float:
+        """Highest less lowest [m], or somewhat more."""
+
+    @property
+    def rotationally_symmetric(self) -> bool:
+        """Whether it depends on the distance from the axis alone, under any change that is asked about."""
+        return False
+
+    def _check_radius(self) -> None:
+        if self.radius is not None:
+            object.__setattr__(self, "radius", positive("radius", without_derivative("radius", self.radius)))
+
+
+@dataclass(frozen=True, eq=False)
+class Zernike(Aberration):
+    """W = Σ c_n^m Z_n^m(x, y) by Zernike's polynomials, in the order, sign and normalisation of OSA and ANSI:
+
+        Z_n^m = √((2 - δ_m0)(n + 1)) R_n^|m|(ρ) {cos mθ, m >= 0; sin |m|θ, m < 0},   x = ρ cos θ, y = ρ sin θ
+
+    (Thibos, Applegate, Schwiegerling & Webb, J. Refract. Surg. 18, S652, 2002), with a variance of 1 over the circle.
+
+    coefficients_um: {(n, m): [µm]}, or a vector [µm] by the index j = (n(n + 2) + m)/2, piston first.
+    radius: of the circle [m] that they are reported for, at least the pupil's; None: the pupil's.
+
+    A Dr.Jit vector, or Dr.Jit numbers in a dictionary, carry derivatives.
+
+    Raises:
+        ValueError: no such mode, its order is above 30, or a coefficient is no finite number.
+    """
+
+    coefficients_um: Any
+    radius: float | None = None
+    modes: dict[tuple[int, int], float] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._check_radius()
+        given = self.coefficients_um
+        if isinstance(given, Mapping):
+            for key in given:
+                _check_mode(key)
+            named = {(int(n), int(m)): finite(f"coefficients_um[{n}, {m}]", c) for (n, m), c in given.items()}
+            object.__setattr__(self, "coefficients_um", {(int(n), int(m)): c for (n, m), c in given.items()})
+        else:
+            named = _of_vector(given)
+        object.__setattr__(self, "modes", named)
+
+    def ahead(self, x: Array, y: Array, types: Precision) -> Array:
+        total = types.Float64(0)
+        for (n, m), value in self.modes.items():
+            if value != 0 or self._asks:
+                total += self._coefficient(n, m, value, types) * mode(n, m, x, y)
+        return total
+
+    def at(self, x: Any, y: Any) -> np.ndarray:
+        """W [m] at positions in units of the radius, NumPy arrays; beyond 1 the polynomials go on."""
+        x, y = np.broadcast_arrays(reals("x", x), reals("y", y))
+        total = np.zeros(x.shape)
+        for (n, m), value in self.modes.items():
+            total += UM * value * mode(n, m, x, y)
+        return total
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of W [m] over its whole circle, piston aside: √Σc²."""
+        return UM * math.sqrt(sum(value**2 for key, value in self.modes.items() if key != (0, 0)))
+
+    def bandwidth(self, level: float) -> float:
+        return max(1.0, self._order / 2) if self.span > level or self._asks else 0.0
+
+    @property
+    def knots(self) -> int:
+        return max(1, self._order)
+
+    @property
+    def span(self) -> float:
+        return 2 * UM * sum(abs(value) * _norm(*key) for key, value in self.modes.items() if key != (0, 0))
+
+    @property
+    def rotationally_symmetric(self) -> bool:
+        return all(m == 0 for (_, m), value in self.modes.items() if value != 0 or self._asks)
+
+    @cached_property
+    def _asks(self) -> bool:
+        given = self.coefficients_um
+        return any(map(is_differentiable, given.values())) if isinstance(given, dict) else is_differentiable(given)
+
+    @property
+    def _order(self) -> int:
+        return max((n for (n, _), value in self.modes.items() if value != 0 or self._asks), default=0)
+
+    def _coefficient(self, n: int, m: int, value: float, types: Precision) -> Array:
+        """[m]"""
+        import drjit as dr
+
+        given = self.coefficients_um
+        if isinstance(given, dict):
+            return opaque(types, given[n, m]) * UM
+        if not is_differentiable(given):
+            return opaque(types, value) * UM
+        return dr.gather(types.Float64, types.Float64(dr.ravel(given)), types.Index((n * (n + 2) + m) // 2)) * UM
+
+
+@dataclass(frozen=True, eq=False)
+class WavefrontMap(Aberration):
+    """W [m] sampled at cell centres over the square [-radius, radius]², joined by cubic splines (see HeightMap).
+
+    samples: (n, n), (y, x), ahead as in Zernike: of an optical path difference, its negative. Not wrapped; what lies
+        outside the pupil must be finite too, and smoothly so.
+    radius: [m], at least the pupil's; None: the pupil's.
+
+    A Dr.Jit tensor of samples carries derivatives.
+
+    Raises:
+        ValueError: not square, empty, or not finite.
+    """
+
+    samples: np.ndarray | Array
+    radius: float | None = None
+    _map: HeightMap = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._check_radius()
+        values = square_heights(self.samples, "samples", "[m], outside the pupil too")
+        if not is_differentiable(self.samples):
+            object.__setattr__(self, "samples", values)
+        object.__setattr__(self, "_map", HeightMap(self.samples))
+
+    def ahead(self, x: Array, y: Array, types: Precision) -> Array:
+        return self._map.height(x, y, types)
+
+    def bandwidth(self, level: float) -> float:
+        return self._map.bandwidth(level)
+
+    @property
+    def knots(self) -> int:
+        return self._map.knots
+
+    @property
+    def span(self) -> float:
+        return self._map.span
+
+    @property
+    def rotationally_symmetric(self) -> bool:
+        return self._map.rotationally_symmetric
+
+
+def mode(n: int, m: int, x: Any, y: Any) -> Any:
+    """Z_n^m at (x, y), NumPy or Dr.Jit: ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin}, k = (n - |m|)/2, by the recurrence of
+    Jacobi's polynomials, which loses no digits at high orders (Abramowitz & Stegun 22.7.1)."""
+    sine, cosine = x * 0, x * 0 + 1.0
+    for _ in range(abs(m)):
+        cosine, sine = cosine * x - sine * y, cosine * y + sine * x
+    t, order = 2 * (x * x + y * y) - 1, abs(m)
+    before, now = x * 0, x * 0 + 1.0
+    for k in range(1, (n - order) // 2 + 1):
+        c = 2 * k + order
+        if k == 1:
+            before, now = now, 1 + (order + 2) / 2 * (t - 1)
+            continue
+        raised = (c - 1) * (c * (c - 2) * t - order**2) * now - 2 * (k - 1) * (k + order - 1) * c * before
+        before, now = now, raised / (2 * k * (k + order) * (c - 2))
+    return _norm(n, m) * now * (cosine if m >= 0 else sine)
+
+
+def _norm(n: int, m: int) -> float:
+    return math.sqrt((2 - (m == 0)) * (n + 1))
+
+
+def _check_mode(key: Any) -> None:
+    try:
+        n, m = key
+        fits = n == int(n) and m == int(m) and abs(m) <= n <= HIGHEST and (n - m) % 2 == 0
+    except (TypeError, ValueError, OverflowError):
+        fits = False
+    if not fits:
+        raise ValueError(
+            f"coefficients_um has {shown(key)}: must be modes (n, m) with n up to {HIGHEST}, |m| <= n and n - m even"
+        )
+
+
+def _of_vector(given: Any) -> dict[tuple[int, int], float]:
+    """By OSA's index."""
+    vector = (
+        plain(given)
+        if is_differentiable(given)
+        else reals("coefficients_um", without_derivative("coefficients_um", given))
+    )
+    most = (HIGHEST + 1) * (HIGHEST + 2) // 2
+    if vector.ndim != 1 or not 0 < vector.size <= most:
+        raise ValueError(
+            f"coefficients_um has shape {vector.shape}: must be {{(n, m): µm}}, or a vector of 1 to {most} [µm]"
+        )
+    if not np.isfinite(vector).all():
+        raise ValueError("coefficients_um holds NaN or infinity: must be finite [µm]")
+    modes = {}
+    for j, value in enumerate(vector):
+        n = math.ceil((math.sqrt(9 + 8 * j) - 3) / 2 - 1e-12)
+        modes[n, 2 * j - n * (n + 2)] = number(value)
+    return modes
