@@ -51,8 +51,8 @@ NAMED = (
     ),
     *_mutants("optics/eye/kernel_interpolation.py", ("too dark counts as too bright", "in (1, -1)))", "in (1, 1)))")),
     *_mutants(
-        "optics/point_spread/image_quality.py",
-        ("the cutoff knows the medium", "* result.pupil.medium_n / result.wavelengths\n", "/ result.wavelengths\n"),
+        "optics/point_spread/psf_result.py",
+        ("the cutoff knows the medium", "* self.pupil.medium_n / self.wavelengths\n", "/ self.wavelengths\n"),
     ),
     *_mutants(
         "optics/numerics/backend.py",

@@ -32,7 +32,7 @@ __all__ = [
 MOST_DIGITS = 14.0  # choice: of float64 sums, which carry 16
 SPARE_DIGITS = 0.5  # choice: the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
 ON_AXIS = 1e-9  # rounding, of the radius
-FAR = 0.25  # choice: radius over distance below which the kernel is smooth enough for any nodes
+FAR = 0.25  # choice: radius over distance below which the kernel is smooth enough for nodes that a turning phase needs
 
 
 Rule = tuple[Aperture, float, float, bool]
@@ -107,8 +107,9 @@ def turns(problem: Problem, digits: float) -> float:
     kernel's poles at height z above the plane: Gauss-Legendre over [0, R] and the trapezoid rule around a ring of
     radius R converge like e^{-4nz/R} and e^{-nz/R}.
     """
-    nearness = max(problem.radius / problem.distance - FAR, 0.0)
-    return problem.radius * problem.turning_inside + digits * math.log(10) / (2 * math.pi) * nearness
+    nearness, poles = problem.radius / problem.distance, digits * math.log(10) / (2 * math.pi)
+    turning = problem.radius * problem.turning_inside
+    return max(turning + poles * max(nearness - FAR, 0.0), poles * nearness)
 
 
 def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
