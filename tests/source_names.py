@@ -169,6 +169,7 @@ def _defined(node: ast.stmt) -> set[str]:
 def words() -> set[str]:
     """Every name, argument and attribute, and every string that may be a key, in all that is not a test."""
     found = set(dir(builtins)) | set(SETTINGS) | {setting.split(".")[-1] for setting in SETTINGS} | set(GENE_FIELDS)
+    found |= set(re.findall(r"[A-Z]+(?:_[A-Z]+)+", (ROOT / "with-env").read_text(encoding="utf-8")))
     for module, tree in modules().items():
         if module.split(".")[0] == "tests":
             continue

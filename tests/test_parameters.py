@@ -102,7 +102,7 @@ def hired(config, animal):
     with TemporaryDirectory() as folder, mock.patch.object(evolve.cli.commands.run, "LocalExecutor") as executor:
         executor.side_effect = KeyboardInterrupt
         evolve.cli.commands.run._carry(
-            Run.create(Path(folder) / "run", config), Namespace(json=False, executor="local", tensorboard=False)
+            Run.create(Path(folder) / "run", config), Namespace(json=False, executor="local", tensorboard=False), None
         )
         return executor.call_args.args[1]
 

@@ -97,10 +97,9 @@ def test_the_doctor_is_content(bare):
 
 def test_missing_llvm_is_one_line(bare, tmp_path):
     code = "import rhabdom; rhabdom.optics.psf(rhabdom.optics.Pupil(aperture_radius=2e-5), sensor_distance=2e-4)"
-    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(tmp_path / "libLLVM.so")}
-    environment.pop("PYTHONPATH", None)
+    environment = {**ELSEWHERE, "DRJIT_LIBLLVM_PATH": str(tmp_path / "libLLVM.so")}
     child = subprocess.run(
-        [bare / "bin" / "python", "-c", code], env=ELSEWHERE, capture_output=True, text=True, check=False
+        [bare / "bin" / "python", "-c", code], env=environment, capture_output=True, text=True, check=False
     )
     last = child.stderr.strip().splitlines()[-1]
     assert "BackendError: Dr.Jit has no usable LLVM library" in last

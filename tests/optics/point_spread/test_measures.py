@@ -136,3 +136,16 @@ def test_bad_arguments_are_named():
 def test_one_sample_has_no_profile():
     with pytest.raises(ValueError, match="must be at least 2 x 2"):
         optics.mtf(optics.Eye().psf()).profile([0.0])
+
+
+def test_the_cutoff_is_the_mediums():
+    """In water waves are shorter, so the same pupil passes finer gratings: the MTF reaches zero a third further on."""
+    focus = 1.33 * FOCAL_LENGTH  # of a lens with this focal length in air
+    pupil = optics.Pupil(15e-6, thin_lens_focal_length=focus, medium_n=1.33)
+    result = optics.psf(pupil, [WAVELENGTH], focus, dx=1.3e-6, shape=(257, 257))
+    transfer = optics.mtf(result)
+    assert transfer.cutoff[0] == pytest.approx(2 * 15e-6 * 1.33 / WAVELENGTH / np.hypot(15e-6, focus))
+    f = np.linspace(0.1, 1, 10) * transfer.cutoff[0]
+    measured = transfer.profile(f)[0]
+    np.testing.assert_allclose(measured, circular_mtf(f, transfer.cutoff[0]), atol=0.02)
+    assert np.abs(measured - circular_mtf(f, transfer.cutoff[0] / 1.33)).max() > 0.1

@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 
-from sim.render.frozen_kernels import ALIGNMENT, PACKET, aligned
+from sim.scene.device_arrays import ALIGNMENT, PACKET, aligned
 
 # A first environment becomes garbage; collection falls due in the middle of the second one's recording.
 PROGRAM = """

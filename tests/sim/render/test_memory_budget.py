@@ -17,10 +17,10 @@ SOME = Demand(8, 64, 2, (15, 15), 1, 0)
 @pytest.mark.parametrize("pupil", [None, optics.Pupil(30e-6)])
 def test_a_renderer_says_what_it_has_room_for(pupil):
     world, eyes = sim.build_world("detection"), dataclasses.replace(EYES, optics=pupil)
-    with pytest.raises(ValueError, match=r"rays_per_receptor = 1e\+12: 1 worlds .* GiB .* use at most .* rays"):
-        sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(1e12, eyes.bands))
+    with pytest.raises(ValueError, match=r"rays_per_receptor = 1e\+07: 99 worlds .* GiB .* use at most .* rays"):
+        sim.BatchedRenderer(world, eyes, 99, sim.Fidelity(1e7, eyes.bands))
     with pytest.raises(ValueError, match="fewer worlds at once"):
-        sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(1, eyes.bands)).resized(10**12)
+        sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(1, eyes.bands)).resized(10**9)
 
 
 def test_what_it_recommends_fits(monkeypatch):

@@ -271,10 +271,15 @@ def test_the_kernel_is_recorded_once(cases):
 
 def test_a_body_shines_as_lamberts_sphere():
     """Its disk seen from where the light comes from is 2/3 as bright as a matt disk, from behind it is dark, and from
-    the side 2/(3π) (its phase function is sin α + (π - α) cos α, over π)."""
-    straight = SimpleNamespace(_levels=np.array([[0.8]]), _directions=[[0.0, 0.0, 1.0]], _colours=[[0.5]])
+    the side 2/(3π) (its phase function is sin α + (π - α) cos α, over π). From close by only the nearest point is
+    seen, which is as bright as the light falls on it."""
+    straight = SimpleNamespace(_levels=np.array([[0.8]]), _directions=[[0.0, 0.0, 1.0]], _colours=[[0.5]], _radii=[0.2])
     with variant():
-        now = SimpleNamespace(lit=[[mi.Float(1.0)]])
-        for towards, expected in (((0, 0, 1), 2 / 3), ((1, 0, 0), 2 / (3 * np.pi)), ((0, 0, -1), 0.0)):
-            (sent,) = Illumination._sent(straight, 0, mi.Vector3f(*towards), now)
-            assert sent.numpy() == pytest.approx(0.8 * 0.5 * expected, abs=1e-6)
+        straight._reaching = lambda k, disk, now: [mi.Float(1.0)]
+        now = SimpleNamespace(bodies=[mi.Point3f(0, 0, 1)])
+        ways = ((0, 0, 1), (1, 0, 0), (0, 0, -1), (0.6, 0, 0.8))
+        for nearness, expected in ((0.0, (2 / 3, 2 / (3 * np.pi), 0.0, None)), (1.0, (1.0, 0.0, 0.0, 0.8))):
+            for towards, share in zip(ways, expected, strict=True):
+                if share is not None:
+                    (sent,) = Illumination._sent(straight, mi.UInt32(0), mi.Vector3f(*towards), nearness, now)
+                    assert sent.numpy() == pytest.approx(0.8 * 0.5 * share, abs=1e-6)
