@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -185,20 +185,18 @@ def acuity_cpd(phenotype: Phenotype) -> float:
 
 def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:
     """The PSF of white daylight, (1, y, x): bands weighted as the mean of the receptor channels weighs them."""
-    share = _of_daylight(eye)
-    image = np.tensordot(share, psf.psf.astype(np.float64), axes=1)
-    mean = share @ eye.spectral_bands.wavelengths
-    return replace(psf, tensor=image[None], wavelengths=np.array([mean]), plans=(psf.plan,))
+    return psf.mean(_of_daylight(eye))
 
 
 def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
     """Strehl ratio in white daylight: the PSF's peak, over that of an aperture as wide without aberration at any
-    wavelength. (That at the mean wavelength is lower: peaks go with 1/λ².)"""
+    wavelength. (That at the mean wavelength is lower: peaks go with 1/λ².) NaN where the window holds no peak."""
     import optics
 
-    share, peaks = _of_daylight(eye), psf.psf.astype(np.float64).max(axis=(1, 2))
-    ideal = peaks / optics.strehl_ratio(psf)
-    return float(polychromatic(eye, psf).psf.max() / (share @ ideal))
+    try:
+        return float(optics.strehl_ratio(polychromatic(eye, psf))[0])
+    except optics.AccuracyError:
+        return math.nan
 
 
 def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:

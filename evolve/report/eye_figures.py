@@ -175,7 +175,7 @@ def _cuts(light: WhiteLight) -> Html:
 def _mtf(light: WhiteLight) -> Html:
     """Contrast over spatial frequency beside what the aperture allows at best."""
     eye, scale = light.eye, light.per_degree
-    cutoff = optics.mtf(light.psf).cutoff
+    cutoff = light.psf.cutoff
     nyquist = 1 / (2 * eye.receptor_pitch)
     frequency = np.geomspace(min(nyquist / 8, cutoff.max() / 100), cutoff.max(), 240)
     contrast = optics.mtf(light.white).profile(frequency)[0]
@@ -208,7 +208,7 @@ def diffraction_limit(light: WhiteLight, frequency: np.ndarray) -> np.ndarray:
     """MTF of a circular aperture as wide, without aberrations, in white daylight, (frequency,): the bands' limits
     (2/π)(arccos s - s √(1 - s²)), s = f / cutoff (Goodman, §6.3.3), weighted by their light."""
     weights = light.eye.spectral_bands.weights.mean(axis=0) * daylight(light.psf.wavelengths)
-    s = np.clip(frequency / optics.mtf(light.psf).cutoff[:, None], 0, 1)
+    s = np.clip(frequency / light.psf.cutoff[:, None], 0, 1)
     limits = 2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
     return weights / weights.sum() @ limits
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -139,7 +139,7 @@ def describe(eye: DescribedEye, z: Scalar) -> Description:
         diffraction, strehl, quality = math.inf, 1.0, max(1 - noise, 0.0)
         noise_limit = math.inf if noise < 1 else 0.0
     else:
-        diffraction = float(mtf(white).cutoff[0])
+        diffraction = float(white.cutoff[0])
         nearest = int(np.argmin(np.abs(result.wavelengths - wavelength)))
         strehl = float(plain(strehl_ratio(result))[nearest])
         quality = float(plain(image_quality(white, 1 / (2 * eye.receptor_pitch), light, noise))[0])
@@ -166,10 +166,8 @@ def describe(eye: DescribedEye, z: Scalar) -> Description:
 def _white(eye: DescribedEye, result: PSFResult) -> tuple[PSFResult, float]:
     """The PSF of white daylight as the mean of the channels weighs it, and its mean wavelength [m]."""
     worth = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
-    image = np.tensordot(worth / worth.sum(), result.psf.astype(np.float64), axes=1)
-    wavelength = float(np.average(eye.spectral_bands.wavelengths, weights=worth))
-    wavelengths = np.array([wavelength])
-    return replace(result, tensor=image[None], wavelengths=wavelengths, plans=(result.plan,)), wavelength
+    white = result.mean(worth / worth.sum())
+    return white, float(white.wavelengths[0])
 
 
 def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:

@@ -24,7 +24,8 @@ __all__ = ["encircled_energy", "strehl_ratio"]
 AT_A_PEAK = 1 / 32  # choice: of 1/cutoff, the pitch whose paraboloid errs by PARABOLOID_ERROR
 LOBES = 0.4  # choice: of 1/cutoff, the coarsest pitch between whose samples no lobe is lost
 BETWEEN = 1 / 16  # choice: of 1/cutoff, at which the spline through them is looked at
-MOST_SPLINED = 700  # choice, by memory: samples a side
+MOST_SPLINED = 20_000  # choice, by time: samples about which is looked, the brightest
+NOT_YET = 0.9  # choice: of the bound below which no sample is beside the peak; the picture errs, too
 CLIMBS = 8  # choice: windows that are moved to their brightest sample
 NEIGHBOURHOOD = 9  # choice: samples a side of such a window
 PARABOLOID_ERROR = 3e-5
@@ -40,7 +41,8 @@ def strehl_ratio(result: PSFResult, with_error: bool = False) -> np.ndarray | Ar
         U = ∫ z/(2πL²) (1/L - ik) dξ
 
     (first Rayleigh-Sommerfeld integral of exp(-ikL(r)); for a circle |1 - z/L - ikz ln(L/z)|). The peak is that of the
-    brightest sample's surroundings, which are looked at more finely where samples are coarse.
+    brightest sample's surroundings, which are looked at more finely where samples are coarse. That of a mean over
+    wavelengths (`PSFResult.mean`) is compared with the mean of their unaberrated peaks.
 
     with_error: whether to return (value, predicted error), each (wavelength,).
 
@@ -53,16 +55,28 @@ def strehl_ratio(result: PSFResult, with_error: bool = False) -> np.ndarray | Ar
     types = precision("float64")
     peaks, errors = zip(*(_peak(result, index) for index in range(result.tensor.shape[0])), strict=True)
     peak = types.Float(peaks[0] if len(peaks) == 1 else dr.concat(list(peaks)))
+    mixed = result.shares is not None and result.can_be_seen_anew
+    waves = [request.beam.wavelength for request in result.requests] if mixed else result.wavelengths
+    ideal = _unaberrated(result, np.array(waves))
+    if mixed:
+        ideal = dr.sum(ideal * types.Float(np.asarray(result.shares)))
+    ratio = types.Tensor(peak / ideal, (len(peaks),))
+    return (to_user(ratio), np.array(errors) * ratio.numpy()) if with_error else to_user(ratio)
+
+
+def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
+    """Peak that the same aperture makes without aberration, (wavelength,), flat."""
+    import drjit as dr
+
+    types = precision("float64")
     nodes = result.pupil.aperture.nodes(0.5, 10.0)
     radius, z = opaque(types, result.pupil.aperture_radius), opaque(types, result.sensor_distance)
     weight = types.Float(nodes.weight)
     slant = dr.sqrt(z * z + radius * radius * types.Float(nodes.x**2 + nodes.y**2))
     size = weight * z / (2 * np.pi * slant * slant)
-    wavenumber = types.Float(2 * np.pi * result.pupil.medium_n / result.wavelengths)
+    wavenumber = types.Float(2 * np.pi * result.pupil.medium_n / wavelengths)
     near, far = dr.sum(size / slant), dr.sum(size) * wavenumber
-    ideal = (near * near + far * far) * radius * radius / result.pupil.aperture.area
-    ratio = types.Tensor(peak / ideal, (len(peaks),))
-    return (to_user(ratio), np.array(errors) * ratio.numpy()) if with_error else to_user(ratio)
+    return (near * near + far * far) * radius * radius / result.pupil.aperture.area
 
 
 def _peak(result: PSFResult, index: int) -> tuple[Array, float]:
@@ -73,7 +87,7 @@ def _peak(result: PSFResult, index: int) -> tuple[Array, float]:
         return _vertex(result, index)
     if not (result.can_be_seen_anew or _at_rim(image)) and result.dx * float(result.cutoff[index]) <= LOBES:
         return _vertex(result, index)
-    seen = result.with_pitch(LOBES / float(result.cutoff.max()), wanted)
+    seen = result.with_pitch(LOBES / result.highest_cutoff, wanted)
     centre, pitch = _brightest(seen, index), min(seen.dx, fine)
     for _ in range(CLIMBS):
         _check_inside(result, centre)
@@ -86,18 +100,28 @@ def _peak(result: PSFResult, index: int) -> tuple[Array, float]:
 
 
 def _brightest(result: PSFResult, index: int) -> tuple[float, float]:
-    """Where (x, y) the spline through the samples is brightest: of two lobes the higher may have the lower sample."""
-    from scipy.ndimage import map_coordinates
+    """Where (x, y) the spline through the samples is brightest: of two lobes the higher may have the lower sample.
+
+    What is nowhere negative, has no frequency beyond the cutoff f and a peak p is at least p cos²(πfd) at a distance
+    d < 1/(2f) from it (M. Riesz 1914): a sample beside the peak is as bright as that.
+    """
+    from scipy.ndimage import map_coordinates, spline_filter
 
     image = result.psf[index].astype(np.float64)
-    height, width = image.shape
-    parts = (
-        max(1, math.ceil(result.dx * float(result.cutoff[index]) / BETWEEN)) if max(height, width) < MOST_SPLINED else 1
+    apart = result.dx * (result.highest_cutoff if result.shares is not None else float(result.cutoff[index]))
+    least = NOT_YET * math.cos(math.pi * min(apart / math.sqrt(2), 0.5)) ** 2 * image.max()
+    bright = np.flatnonzero(image >= least)
+    bright = bright[np.argsort(image.ravel()[bright])[-MOST_SPLINED:]]
+    parts = max(1, math.ceil(apart / BETWEEN))
+    inside = (np.arange(2 * (parts // 2) + 1) - parts // 2) / parts
+    offsets = np.stack(np.meshgrid(inside, inside, indexing="ij")).reshape(2, 1, -1)
+    places = np.stack(np.unravel_index(bright, image.shape))[:, :, None] + offsets
+    places = np.clip(places.reshape(2, -1), 0, np.array(image.shape)[:, None] - 1)
+    finer = map_coordinates(
+        spline_filter(image, order=5, mode="mirror"), places, order=5, mode="mirror", prefilter=False
     )
-    down, across = (np.arange((n - 1) * parts + 1) / parts for n in (height, width))
-    finer = map_coordinates(image, np.meshgrid(down, across, indexing="ij"), order=5, mode="mirror")
-    row, column = np.unravel_index(finer.argmax(), finer.shape)
-    return float(result.x[0] + across[column] * result.dx), float(result.y[0] + down[row] * result.dx)
+    row, column = places[:, finer.argmax()]
+    return float(result.x[0] + column * result.dx), float(result.y[0] + row * result.dx)
 
 
 def _at_rim(image: np.ndarray) -> bool:
@@ -175,7 +199,7 @@ def encircled_energy(
         raise ValueError(f"centre = {shown(centre)}: must lie within the PSF's window, around {shown(result.centre)}")
     if not ((wanted >= 0) & (wanted <= edge * (1 + 1e-9))).all():
         raise ValueError(f"radii = {shown(radii)}: must be in [0, {edge:g}] m, inside the PSF's window")
-    cutoff = float(result.cutoff.max())
+    cutoff = result.highest_cutoff
     seen = result if result.holds_cells else _around(result, middle, float(wanted.max()), edge, cutoff)
     x, y = seen.x[None, :] - middle[0], seen.y[:, None] - middle[1]
     distance = np.hypot(x, y)

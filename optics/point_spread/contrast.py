@@ -21,6 +21,7 @@ from optics.numerics.fourier import dft2
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, padded_for_packets, precision
 from optics.point_spread.psf_result import PSFResult
+from optics.point_spread.request import Request
 
 __all__ = ["MTF", "combined_mtf", "flat", "image_quality", "mtf"]
 
@@ -97,7 +98,7 @@ def mtf(result: PSFResult, arriving: Any = None, tolerance: float = 0.02) -> MTF
     positive("tolerance", tolerance, "contrast")
     light, unsure = _arriving(result, arriving)
     known = light.numpy()
-    seen = _wide(result.with_pitch(0.5 / float(result.cutoff.max()), "the MTF"), known, tolerance)
+    seen = _wide(result.with_pitch(0.5 / result.highest_cutoff, "the MTF"), known, tolerance)
     lost = np.maximum(known - plain(seen.held), 0)
     error = lost + unsure + seen.sum_error
     if float(error.max()) > tolerance and tolerance < 1:
@@ -129,7 +130,7 @@ def combined_mtf(
 def _wide(result: PSFResult, known: np.ndarray, tolerance: float) -> PSFResult:
     """Through a window that loses no more than the tolerance. Diffracted light falls like r⁻³: what a window loses goes
     with the inverse of its width. Widths and pitches come in steps: a small change of the pupil changes none."""
-    seen, coarsest = result, 0.5 / float(result.cutoff.max())
+    seen, coarsest = result, 0.5 / result.highest_cutoff
     for _ in range(GROWTHS):
         lost = float((known - plain(seen.held)).max())
         if lost <= tolerance or tolerance >= 1:
@@ -196,10 +197,16 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     edge = dr.minimum(wavelength * ratio / opaque(types, pupil.aperture_radius), 0.5)
     bent = np.zeros(len(result.wavelengths))
     if result.can_be_seen_anew:
-        for index, request in enumerate(result.requests):
-            x, _ = pupil.slopes(request.beam.wavelength, request.beam.source).rays(1.0, pupil.medium_n)
-            bent[index] = float(np.mean(~np.isfinite(x)))
+        bent = np.array([_bent_beyond_grazing(request) for request in result.requests])
+        bent = bent if result.shares is None else np.atleast_1d(result.shares @ bent)
     return (1 - edge) * types.Float(1 - bent), np.square(edge.numpy()) + bent
+
+
+def _bent_beyond_grazing(request: Request) -> float:
+    """Share of the pupil's light."""
+    pupil = request.beam.pupil
+    x, _ = pupil.slopes(request.beam.wavelength, request.beam.source).rays(1.0, pupil.medium_n)
+    return float(np.mean(~np.isfinite(x)))
 
 
 def image_quality(

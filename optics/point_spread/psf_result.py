@@ -18,6 +18,7 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.methods.problem import Problem
 from optics.numerics.accuracy import AccuracyError, Plan
+from optics.numerics.arguments import reals, shown
 from optics.numerics.autodiff import Array, Scalar, number, to_user
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
@@ -42,6 +43,7 @@ class PSFResult:
         that arrives (evanescent light does not). Never renormalised.
     plans: one per wavelength; `plan` is the least accurate of them.
     requests: what was asked, one per wavelength, so that measures may look again; none for a picture from elsewhere.
+    shares: (request,) of which a picture is the mean, see `mean`; None: one picture per request.
     """
 
     tensor: Array
@@ -52,6 +54,7 @@ class PSFResult:
     plans: tuple[Plan, ...]
     centre: tuple[float, float] = (0.0, 0.0)
     requests: tuple[Request, ...] = ()
+    shares: np.ndarray | None = None
 
     @cached_property
     def psf(self) -> np.ndarray:
@@ -127,9 +130,34 @@ class PSFResult:
 
     @property
     def can_be_seen_anew(self) -> bool:
-        """Whether it is known how the PSF was made: of a mean over wavelengths, or a picture from elsewhere, it is
-        not."""
-        return [request.beam.wavelength for request in self.requests] == list(self.wavelengths)
+        """Whether it is known how the PSF was made: of a picture from elsewhere it is not."""
+        asked = [request.beam.wavelength for request in self.requests]
+        if self.shares is None:
+            return asked == list(self.wavelengths)
+        return len(asked) == len(self.shares) and bool(np.allclose(self.shares @ asked, self.wavelengths, rtol=1e-9))
+
+    @property
+    def highest_cutoff(self) -> float:
+        """Frequency [1/m] beyond which no picture has any, nor any that it is the mean of."""
+        if self.shares is None or not self.can_be_seen_anew:
+            return float(self.cutoff.max())
+        shortest = min(request.beam.wavelength for request in self.requests)
+        return float(self.cutoff.max() * self.wavelengths.max() / shortest)
+
+    def mean(self, shares: np.ndarray) -> PSFResult:
+        """The PSF of light of all wavelengths at once, (1, y, x), at their mean wavelength; without derivatives.
+
+        shares: (wavelength,) of each in the light; they sum to 1.
+
+        Raises:
+            ValueError: shares has another shape or sum.
+        """
+        parts = reals("shares", shares)
+        if parts.shape != self.wavelengths.shape or not math.isclose(float(parts.sum()), 1, rel_tol=1e-6):
+            raise ValueError(f"shares = {shown(shares)}: must be {self.wavelengths.size} that sum to 1")
+        image = np.tensordot(parts, self.psf.astype(np.float64), axes=1)[None]
+        wavelength, asked = np.array([parts @ self.wavelengths]), self.requests if self.can_be_seen_anew else ()
+        return replace(self, tensor=image, wavelengths=wavelength, plans=(self.plan,), requests=asked, shares=parts)
 
     def through(self, window: Grid, what: str, waves: slice = slice(None)) -> PSFResult:
         """The same light through another window, to the same tolerance, of some of the wavelengths.
@@ -145,6 +173,8 @@ class PSFResult:
         if not self.can_be_seen_anew or max(window.shape) > MOST_AGAIN:
             raise AccuracyError(f"{needs}: ask for dx={window.dx:.3g}, shape=({height}, {width})")
         try:
+            if self.shares is not None:
+                return spread([_through(request, window) for request in self.requests]).mean(self.shares)
             return spread([_through(request, window) for request in self.requests[waves]])
         except AccuracyError as error:
             raise AccuracyError(f"{needs}; those are refused: {error}") from None
@@ -168,7 +198,7 @@ class PSFResult:
     @cached_property
     def _resolved(self) -> PSFResult:
         """With samples that can be added up."""
-        return self.with_pitch(0.5 / float(self.cutoff.max()), "power")
+        return self.with_pitch(0.5 / self.highest_cutoff, "power")
 
 
 def _through(request: Request, window: Grid) -> Request:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 import optics
 from validation import reference
@@ -27,11 +28,13 @@ def aberrated(wavefront, **changes):
 
 
 def on_axis(pupil, distance=FOCAL_LENGTH):
-    """Strehl ratio at the reference point, wherever the peak is (`strehl_ratio` follows it)."""
-    ideal = replace(pupil, height=None, thin_lens_focal_length=distance)
-    one = {"sensor_distance": distance, "shape": (1, 1), "tolerance": 1e-5, "dtype": "float64"}
-    here, there = (optics.psf(each, [WAVELENGTH], **one).psf[0, 0, 0] for each in (pupil, ideal))
-    return float(here / there)
+    """The PSF at the reference point over an unaberrated one: aberrated light may be brighter elsewhere."""
+    result = optics.psf(pupil, [WAVELENGTH], distance, dx=1e-6, shape=(1, 1), tolerance=1e-5, dtype="float64")
+    return float(result.psf[0, 0, 0]) * pupil.area / abs(converging(pupil.aperture_radius, distance)) ** 2
+
+
+def converging(radius, distance):
+    return reference.converging_wave_at_focus(radius, distance, WAVELENGTH)
 
 
 RHO, THETA = disk()
@@ -65,6 +68,22 @@ class TestStrehlRatio:
         # the same with an RMS off by a tenth, or a wave taken for a radian, is told apart
         assert abs(law(1.1 * w) - expected) > 0.015
         assert abs(law(w / (2 * np.pi)) - expected) > 0.09
+
+    @pytest.mark.parametrize("sigma", [0.05, 0.15])
+    def test_peak_of_coma_lies_where_a_tilt_balances_it(self, sigma):
+        """`strehl_ratio` is that of the brightest place, wherever samples lie: the greatest of the closed form over all
+        tilts. On the axis there is less, and a window that ends there is refused."""
+        w = sigma / reference.RMS_PER_WAVE["coma"]
+        best = minimize_scalar(lambda tilt: -reference.strehl_coma(w, tilt), bounds=(-w, 0), options={"xatol": 1e-6})
+        pupil = aberrated(WAVEFRONTS["coma"][0](w))
+        result = optics.psf(pupil, [WAVELENGTH], FOCAL_LENGTH, dx=5e-6, shape=(21, 21), tolerance=1e-4, dtype="float64")
+        (got,), (error,) = optics.strehl_ratio(result, with_error=True)
+        assert got == pytest.approx(-best.fun, abs=1e-3)
+        assert error < 1e-3
+        assert reference.strehl_coma(w) < 0.93 * got
+        one = optics.psf(pupil, [WAVELENGTH], FOCAL_LENGTH, dx=1e-6, shape=(1, 1))
+        with pytest.raises(optics.AccuracyError, match="grows towards"):
+            optics.strehl_ratio(one)
 
     @pytest.mark.parametrize("j", range(4, 16))
     def test_zernikes_cost_by_their_rms_alone(self, j):

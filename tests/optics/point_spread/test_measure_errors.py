@@ -73,6 +73,25 @@ def test_a_mean_over_wavelengths_is_not_mistaken_for_one_of_them():
     assert not white.can_be_seen_anew
 
 
+def test_a_mean_over_wavelengths_is_looked_at_again():
+    """As the mean of what its wavelengths are when each is looked at: coarse samples measure what fine ones do."""
+    share = np.array([0.3, 0.7])
+    coarse, fine = (
+        optics.psf(LENS, [450e-9, 600e-9], FOCUS + 2e-5, dx=dx, shape=(n, n)).mean(share)
+        for dx, n in ((3e-6, 21), (0.2e-6, 315))
+    )
+    assert coarse.wavelengths == pytest.approx([555e-9])
+    assert coarse.highest_cutoff == pytest.approx(coarse.cutoff[0] * 555 / 450)
+    assert coarse.held[0] > 1.05 > 1 > coarse.power[0] == pytest.approx(fine.power[0], abs=2e-3)
+    assert optics.strehl_ratio(coarse)[0] == pytest.approx(optics.strehl_ratio(fine)[0], rel=2e-3)
+    f = np.array([0.1, 0.3, 0.6]) * fine.cutoff[0]
+    assert optics.mtf(coarse).profile(f)[0] == pytest.approx(optics.mtf(fine).profile(f)[0], abs=0.02)
+    each = optics.psf(LENS, [450e-9, 600e-9], FOCUS, dx=0.2e-6, shape=(51, 51))
+    assert optics.strehl_ratio(each.mean(share))[0] == pytest.approx(1, abs=2e-3)
+    with pytest.raises(ValueError, match=r"shares = .* must be 2 that sum to 1"):
+        each.mean(np.array([0.3, 0.3]))
+
+
 def test_a_window_without_the_peak_has_no_strehl_ratio():
     beside = focus(0.3e-6, 9, centre=(2e-6, 0.0))  # the first dark ring is at 1.3 µm
     with pytest.raises(optics.AccuracyError, match="needs a window that holds the peak"):
