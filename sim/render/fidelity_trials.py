@@ -133,14 +133,18 @@ class FidelityTrials:
         return _rms(all_ - twice)
 
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
-        """Root mean square of what light that is reflected twice adds to the signals, and of direct light's signals.
+        """Root mean square of what light that is reflected twice adds to the signals, and of direct light's signals, of
+        the population that it adds more to.
 
         Raises:
             ValueError: it cannot be followed.
         """
         trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
-        direct, both = (self._signals(trial, sampling.depth, light) for light in lighting.LEVELS[:2])
-        return _rms(both - direct), _rms(direct)
+        found = []
+        for p in self._populations(sampling):
+            direct, both = (self._signals(trial, sampling.depth, light, p.views) for light in lighting.LEVELS[:2])
+            found.append((p.rms(both - direct), p.rms(direct)))
+        return max(found)
 
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
         """Root mean square difference to the signals with the finest layers, all with the same rays; the nodes of each

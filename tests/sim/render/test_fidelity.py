@@ -10,6 +10,7 @@ import pytest
 import optics
 import sim
 from sim.envs.simulation import Simulation
+from sim.render.fidelity_choice import SHARE_OF_LIGHT
 from sim.render.sample_choice import AREA_WORTH, PERFECT_LENS_RAYS, PUPIL_RAYS
 from tests.sim.tracing.area_views import ROW, sees_object, views
 
@@ -23,6 +24,7 @@ def behind_lens(eyes, a):
     return replace(eyes, optics=optics.Pupil(a * eyes.sensor_width / 2, thin_lens_focal_length=focal_length))
 
 
+LIGHTS = ("direct", "bounce")
 FINER = 4  # times as many rays as the pick's are the truth: its own error lifts what is measured by 3 to 9 %
 CASES = {
     "detection, a = 1/4": ("detection", behind_lens(DETECTION, 0.25)),
@@ -157,6 +159,18 @@ def test_light_is_followed_as_far_as_it_matters():
     assert missing / 1.5 < narrow.levels[2].predicted_error < missing * 1.5
     assert wide.levels[2].predicted_error < wide.tolerance / 2
     assert "light that is reflected twice is worth" in wide.why
+
+
+def test_light_is_followed_where_objects_alone_need_it():
+    """An object's own light is mostly reflected: what direct light lacks would pass over all receptors, and does not
+    over those that see an object."""
+    world, eyes = sim.build_world("tracking"), behind_lens(DETECTION, 0.5)
+    chosen = sim.choose_fidelity(world, eyes, bands="own")
+    assert chosen.light == "bounce"
+    state, seen = near_objects(world, eyes)
+    direct, both = (signals(world, eyes, state, sim.Fidelity(1, eyes.bands, light=light), 64) for light in LIGHTS)
+    without, missing = (np.sqrt(np.mean((both - direct)[which] ** 2)) for which in (~seen, seen))
+    assert without < SHARE_OF_LIGHT * chosen.tolerance < missing
 
 
 def test_the_same_pick_every_time_whatever_the_number_of_worlds():
