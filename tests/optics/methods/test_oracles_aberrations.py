@@ -3,7 +3,6 @@
 f/20: the exact integral's weights differ from the paraxial ones by NA², 6e-4.
 """
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
