@@ -3,7 +3,6 @@
 f/20: the exact integral's weights differ from the paraxial ones by NA², 6e-4.
 """
 
-
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
