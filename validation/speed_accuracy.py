@@ -159,7 +159,7 @@ def table(charts: Sequence[Chart]) -> str:
         if auto.fidelity and auto.fidelity.predicted_error:
             predicted = auto.fidelity.predicted_error / SIGMA
             lines.append(f"auto predicted {predicted:.2f} σ; {auto.speed / rival.speed:.2f} of the front's speed")
-        verdict = ", ".join(f"{error:.2f} σ {where}" for where, error in chart.missed)
+        verdict = ", ".join(f"{error:.3f} σ {where}" for where, error in chart.missed)
         lines.append(f"auto promised {PROMISED} σ: {'it errs by ' + verdict if verdict else 'kept'}")
         if auto.warning:
             lines.append(f"auto warned: {auto.warning}")

@@ -38,13 +38,13 @@ def message(charts: Sequence[Chart]) -> str:
     """What the figure shows, in words."""
     worst = max(chart.auto.error.worst for chart in charts)
     if not any(chart.missed for chart in charts):
-        return f'"auto" keeps its promise of σ/2 everywhere, also on objects: its worst error is {worst:.2f} σ'
+        return f'"auto" keeps its promise of σ/2, also on objects: its worst error is {worst:.2f} σ'
     missed = sum(bool(chart.missed) for chart in charts)
-    return f'"auto" misses its promise of σ/2 in {missed} of {len(charts)} charts: its worst error is {worst:.2f} σ'
+    return f'"auto" misses its promise of σ/2 in {missed} of {len(charts)} charts: its worst error is {worst:.3f} σ'
 
 
 def draw(charts: Sequence[Chart], path: Path) -> None:
-    """Error over speed, fronts as lines, auto as a star. Panels without objects give their room to the legend."""
+    """Error over speed, fronts as lines, auto as a star. Worlds without objects have no second panel."""
     from matplotlib.figure import Figure
 
     columns = min(PER_ROW, len(charts))

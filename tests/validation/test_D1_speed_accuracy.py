@@ -85,8 +85,8 @@ def test_what_is_good_over_all_receptors_alone_is_not_on_the_front(chart):
     ("spoil", "complaint"),
     [
         (lambda c: with_auto(c, speed=100), "auto makes 100 steps/s"),
-        (lambda c: with_auto(c, error=Errors(0.6, 0.4)), "auto errs by 0.60 σ over all receptors"),
-        (lambda c: with_auto(c, error=Errors(0.4, 0.6)), "auto errs by 0.60 σ over those that see an object"),
+        (lambda c: with_auto(c, error=Errors(0.6, 0.4)), "auto errs by 0.600 σ over all receptors"),
+        (lambda c: with_auto(c, error=Errors(0.4, 0.6)), "auto errs by 0.600 σ over those that see an object"),
         (lambda c: replace(c, reference_error=Errors(0.3)), "good to 0.30 σ only"),
         (lambda c: replace(c, reference_error=Errors(0.1, 0.3)), "good to 0.10 (0.30) σ only"),
         (lambda c: flat(c, "direct"), "direct light do not fall"),
@@ -105,8 +105,8 @@ def test_a_promise_that_was_taken_back_by_a_warning_is_shown_and_no_broken_bound
     assert D1.broken_bounds([broken])
     assert not D1.broken_bounds([warned])
     for shown in (broken, warned):
-        assert "it errs by 0.60 σ over those that see an object" in table([shown])
-        assert "misses its promise of σ/2 in 1 of 2 charts: its worst error is 0.60 σ" in message([chart, shown])
+        assert "it errs by 0.600 σ over those that see an object" in table([shown])
+        assert "misses its promise of σ/2 in 1 of 2 charts: its worst error is 0.600 σ" in message([chart, shown])
     assert "auto warned: 1.3 times what is allowed" in table([warned])
     assert "kept" in table([chart])
     assert "keeps its promise" in message([chart])
