@@ -207,7 +207,7 @@ def help_of(program):
 
 def test_readme_keeps_its_two_commands():
     found = [" ".join(words) for words in commands(ROOT / "README.md")]
-    assert found[:2] == ["evolve run detection --preset quick", "pytest"]
+    assert found[:2] == ["evolve run detection --preset quick", "pytest -n auto"]
     assert {"run", "status", "resume", "replay", "export", "genes"} <= {
         line.split()[1] for line in found if "evolve " in line
     }

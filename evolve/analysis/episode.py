@@ -17,6 +17,7 @@ from evolve.config.run_config import EyeConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.genome.plain_values import parsed
 from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
+from evolve.store import regular_files
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run, RunError
 from evolve.store.policies import require_policy
@@ -25,6 +26,7 @@ from sim.worlds.state import WorldState, concatenate
 __all__ = ["Episode", "record"]
 
 FINE_PIXELS = 60  # least pixels along the longer side of the radiance pictures
+MOST_BYTES = 2**31  # of an episode; those of 256 steps take some megabytes
 FINE = {"rays": 16, "areas": 4}  # samples per pixel of them
 
 
@@ -97,8 +99,7 @@ class Episode:
             ValueError: one line, naming the file, if it holds no episode.
         """
         try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = dict(file)
+            arrays = _arrays(path)
             rest = parsed(str(arrays.pop("rest")))
             rest |= {"phenotype": Phenotype.from_json(rest["phenotype"]), "eye": EyeConfig(**rest["eye"])}
             if "course" not in rest.setdefault("world", {}):
@@ -108,6 +109,18 @@ class Episode:
             return cls(**rest, reward_terms=terms, **arrays)
         except (OSError, EOFError, KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile) as error:
             raise ValueError(f"{path} holds no episode: {error}") from error
+
+
+def _arrays(path: Path | str) -> dict[str, Any]:
+    """What an archive holds, unless it is no file, or would unpack to more than an episode ever takes."""
+    with regular_files.opened(Path(path)) as content:
+        with zipfile.ZipFile(content) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > MOST_BYTES:
+            raise ValueError(f"it would unpack to {size:,} bytes: must be at most {MOST_BYTES:,}")
+        content.seek(0)
+        with np.load(content, allow_pickle=False) as file:
+            return dict(file)
 
 
 def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_every: int = 8) -> Episode:

@@ -1,18 +1,19 @@
 """Models that would fill the memory, or stand nowhere: found before they are built, and named.
 
 A few lines of MJCF can ask for a million copies. What the text asks for is counted before MuJoCo compiles it, what a
-compiled model holds before Mitsuba gets it. Files that a text includes are counted after compilation only.
+compiled model holds before Mitsuba gets it. Files that a file includes are counted, too.
 """
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
-__all__ = ["require_finite", "require_modest"]
+__all__ = ["require_finite", "require_modest", "require_modest_file"]
 
 MOST_COPIES = 20_000  # bodies, geoms and sites; the largest model that was mirrored has some hundred
 MOST_CELLS = 4096**2  # of a height field
@@ -27,6 +28,7 @@ PLACES = (
     "light_pos",
     "light_dir",
 )
+FOLDERS = ("assetdir", "meshdir", "texturedir")  # of a compiler element
 OWNERS = {"geom": "geom", "body": "body", "mat": "material", "light": "light"}
 
 
@@ -48,6 +50,30 @@ def require_modest(text: str, name: str) -> None:
         if cells > MOST_CELLS:
             label = field.get("name", "")
             raise ValueError(f"mirror: {name}: hfield {label!r} has {cells:,} cells: must be at most {MOST_CELLS:,}")
+
+
+def require_modest_file(path: Path, name: str, seen: frozenset[Path] = frozenset()) -> None:
+    """The same of a file and of all that it includes; every file that it names has to be one, where it is there at
+    all: MuJoCo would wait for a pipe for ever.
+
+    Raises:
+        ValueError: one line that names what there is too much of, or what is no file.
+    """
+    text = path.read_text(encoding="utf-8", errors="replace")
+    require_modest(text, name)
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError:
+        return
+    folders = {path.parent / compiler.get(key, "") for compiler in root.iter("compiler") for key in FOLDERS}
+    for element in root.iter():
+        for file in sorted(
+            folder / element.get("file", "") for folder in {path.parent, *folders} if element.get("file")
+        ):
+            if file.exists() and not file.is_file():
+                raise ValueError(f"mirror: {name}: {element.tag} {str(file)!r}: must be a regular file")
+            if element.tag == "include" and file.is_file() and file not in seen:
+                require_modest_file(file, repr(str(file)), seen | {path, file})
 
 
 def require_finite(model: mujoco.MjModel, name: str) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import mujoco
 
-from sim.scene.bombs import require_finite, require_modest
+from sim.scene.bombs import require_finite, require_modest, require_modest_file
 
 
 def load(source: mujoco.MjModel | mujoco.MjSpec | str | Path) -> mujoco.MjModel:
@@ -32,7 +32,7 @@ def load(source: mujoco.MjModel | mujoco.MjSpec | str | Path) -> mujoco.MjModel:
         raise ValueError(f"mirror: no file {str(source)!r}; give the path of an MJCF, URDF or MJB file")
     if Path(source).suffix == ".mjb":
         return _compiled(lambda: mujoco.MjModel.from_binary_path(str(source)), repr(str(source)))
-    require_modest(Path(source).read_text(encoding="utf-8", errors="replace"), repr(str(source)))
+    require_modest_file(Path(source), repr(str(source)))
     return _compiled(lambda: mujoco.MjModel.from_xml_path(str(source)), repr(str(source)))
 
 

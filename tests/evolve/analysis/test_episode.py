@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import os
 import pickle
 
 import numpy as np
@@ -11,6 +12,7 @@ import torch
 
 import evolve
 import sim
+from evolve.analysis import episode as episode_module
 from evolve.analysis.episode import Episode, _perfect_views, record
 from evolve.config.run_config import WorldConfig
 from evolve.learning.policy import PolicyConfig, build_policy, load_policy, save_policy
@@ -187,3 +189,15 @@ def test_a_maze_is_that_which_was_walked_through(episode, tmp_path):
     del rest["world"]
     np.savez(tmp_path / "old.npz", rest=np.array(json.dumps(rest)), **columns)
     assert Episode.load(tmp_path / "old.npz").world == WorldConfig()
+
+
+def test_archives_that_would_fill_the_memory_are_refused(tmp_path, monkeypatch):
+    """By their directory, before anything is unpacked; and what is no file at all."""
+    bomb = tmp_path / "bomb.npz"
+    np.savez_compressed(bomb, returns=np.zeros(2**22))
+    monkeypatch.setattr(episode_module, "MOST_BYTES", 2**20)
+    with pytest.raises(ValueError, match=r"bomb.npz holds no episode: it would unpack to 33,554,\d+ bytes"):
+        Episode.load(bomb)
+    os.mkfifo(tmp_path / "pipe.npz")
+    with pytest.raises(ValueError, match=r"pipe.npz holds no episode"):
+        Episode.load(tmp_path / "pipe.npz")

@@ -1,5 +1,7 @@
 """Models too large to build, or standing nowhere, are refused by name before anything of their size is built."""
 
+import os
+
 import mujoco
 import pytest
 
@@ -54,3 +56,27 @@ def test_models_that_fit_are_as_they_were():
     )
     assert load(text).ngeom == 50
     assert load(mujoco.MjSpec.from_string(text)).ngeom == 50
+
+
+def test_what_a_file_includes_is_counted_too(tmp_path):
+    (tmp_path / "bomb.xml").write_text(BOMBS["copies of copies"][0])
+    (tmp_path / "between.xml").write_text("<mujoco><include file='bomb.xml'/><include file='between.xml'/></mujoco>")
+    main = tmp_path / "main.xml"
+    main.write_text("<mujoco><include file='between.xml'/></mujoco>")
+    with pytest.raises(ValueError, match=r"bomb.xml' replicates to .* elements: must be at most 20,000"):
+        load(main)
+
+
+@pytest.mark.parametrize("element", ["<include file='pipe'/>", "<asset><mesh name='a' file='pipe'/></asset>"])
+def test_pipes_in_the_place_of_files_are_refused(tmp_path, element):
+    """MuJoCo would wait for them for ever."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "main.xml").write_text(f"<mujoco><compiler meshdir='.'/>{element}</mujoco>")
+    with pytest.raises(ValueError, match=r"main.xml': (include|mesh) '.*pipe': must be a regular file"):
+        load(tmp_path / "main.xml")
+
+
+def test_a_file_that_includes_itself_is_mujocos_to_refuse(tmp_path):
+    (tmp_path / "main.xml").write_text("<mujoco><include file='main.xml'/></mujoco>")
+    with pytest.raises(ValueError, match="already included"):
+        load(tmp_path / "main.xml")
