@@ -59,12 +59,18 @@ class FidelityTrials:
         self._views = random_views(scene.world, scene.eyes, VIEWS[1])
         receptors = np.random.default_rng(0).permutation(int(np.prod(scene.eyes.resolution)))
         self._receptors = np.sort(receptors[:RECEPTORS])
+        self._known: dict[DepthLayers, list[Population]] = {}
 
     @cached_property
     def _everywhere(self) -> Population:
         return Population(self._views, np.ones((len(self._views), len(self._receptors)), bool))
 
     def _populations(self, sampling: EyeSampling) -> list[Population]:
+        if sampling.depth not in self._known:
+            self._known[sampling.depth] = self._drawn(sampling)
+        return self._known[sampling.depth]
+
+    def _drawn(self, sampling: EyeSampling) -> list[Population]:
         if not len(self._scene.static.spheres):
             return [self._everywhere]
         near = near_views(self._scene.world, self._eyes, VIEWS[1])

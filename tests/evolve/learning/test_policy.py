@@ -4,7 +4,6 @@ import json
 import os
 import pickle
 from dataclasses import asdict
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from evolve.config.assemble import assemble
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning import policy as policy_module
-from evolve.learning.eye_features import CONTRAST, UNITS, EyeFeatures
+from evolve.learning.eye_features import CONTRAST, UNITS
 from evolve.learning.policy import EyePolicy, PolicyConfig, build_policy, learnt, load_policy, save_policy
 from evolve.store.regular_files import StrangeFileError
 
@@ -279,23 +278,6 @@ def test_a_policy_that_is_a_link_or_a_fifo_is_refused(policy, tmp_path):
     for name in ("link", "fifo"):
         with pytest.raises(StrangeFileError, match="must be a regular file"):
             load_policy(tmp_path / name)
-
-
-@pytest.mark.parametrize("memory", [1, 2, 4])
-def test_windows_remember_no_frame_from_before_the_episode(memory):
-    """Slot by slot: so many steps back, but never further than the episode's first frame, `age` steps back."""
-    torch.manual_seed(0)
-    segments, steps = 3, 6
-    codes = torch.rand(2, 5, segments, memory - 1 + steps)
-    age = torch.tensor([[0, 1, 2, 3, 4, 5], [9, 9, 9, 0, 1, 2], [2, 3, 0, 0, 1, 2]])
-    windows = EyeFeatures._windows(SimpleNamespace(memory=memory), codes, age)
-    assert windows.shape == (2, 5, memory, segments, steps)
-    for slot in range(memory):
-        for segment in range(segments):
-            for step in range(steps):
-                back = min(memory - 1 - slot, int(age[segment, step]))
-                expected = codes[:, :, segment, memory - 1 + step - back]
-                assert torch.equal(windows[:, :, slot, segment, step], expected)
 
 
 def test_one_number_that_is_none_spoils_a_policy(policy, tmp_path):

@@ -3,7 +3,7 @@
 band_choice: spectra/test_bands.py
 eye: test_eye.py, test_eye_derivatives.py, test_eye_robustness.py
 kernel_bank: test_kernel_bank.py
-kernel_interpolation: test_kernel_bank.py
+kernel_interpolation: test_kernel_interpolation.py, test_kernel_bank.py
 photoreceptor: test_photoreceptor.py
 receptive_field: test_eye.py, test_eye_robustness.py
 retinal_image: test_retinal_image.py

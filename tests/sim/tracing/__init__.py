@@ -17,7 +17,7 @@ areas.cell_grid: test_light_table.py
 areas.branches: test_areas.py
 areas.columns: test_areas.py
 areas.half_planes: test_areas.py
-areas.illumination: test_areas.py
+areas.illumination: test_illumination.py, test_areas.py
 areas.patch: test_areas.py
 areas.shadows: test_areas.py
 areas.sphere_areas: test_areas.py

@@ -1,7 +1,6 @@
 """Areas in closed form against what very many rays see of the same worlds, and its integrals against sums."""
 
 import dataclasses
-from types import SimpleNamespace
 
 import drjit as dr
 import mitsuba as mi
@@ -14,7 +13,6 @@ import sim
 from sim.eyes.sensor import eye_sampling
 from sim.scene.variant import variant
 from sim.tracing.areas import columns, half_planes, illumination, shadows, sphere_areas, stripes
-from sim.tracing.areas.illumination import Illumination
 from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
 from tests.sim.tracing.area_views import BEE, EYES, ROW, SIGMA, sees_object, stairs, views
@@ -267,19 +265,3 @@ def test_the_kernel_is_recorded_once(cases):
     assert renderer.recordings == 1
     assert np.abs(first - other).max() > 0.1
     np.testing.assert_array_equal(renderer.signals(case.state), first)
-
-
-def test_a_body_shines_as_lamberts_sphere():
-    """Its disk seen from where the light comes from is 2/3 as bright as a matt disk, from behind it is dark, and from
-    the side 2/(3π) (its phase function is sin α + (π - α) cos α, over π). From close by only the nearest point is
-    seen, which is as bright as the light falls on it."""
-    straight = SimpleNamespace(_levels=np.array([[0.8]]), _directions=[[0.0, 0.0, 1.0]], _colours=[[0.5]], _radii=[0.2])
-    with variant():
-        straight._reaching = lambda k, disk, now: [mi.Float(1.0)]
-        now = SimpleNamespace(bodies=[mi.Point3f(0, 0, 1)])
-        ways = ((0, 0, 1), (1, 0, 0), (0, 0, -1), (0.6, 0, 0.8))
-        for nearness, expected in ((0.0, (2 / 3, 2 / (3 * np.pi), 0.0, None)), (1.0, (1.0, 0.0, 0.0, 0.8))):
-            for towards, share in zip(ways, expected, strict=True):
-                if share is not None:
-                    (sent,) = Illumination._sent(straight, mi.UInt32(0), mi.Vector3f(*towards), nearness, now)
-                    assert sent.numpy() == pytest.approx(0.8 * 0.5 * share, abs=1e-6)
