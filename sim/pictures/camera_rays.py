@@ -19,7 +19,7 @@ from optics.numerics.autodiff import Array
 from sim.pictures.merged_mirror import MergedMirror
 from sim.render.frozen_kernels import garbage_kept
 from sim.scene.cameras import Viewpoint
-from sim.scene.device_arrays import aligned
+from sim.scene.device_arrays import aligned, floats, whole_numbers
 from sim.scene.variant import MitsubaObject, variant
 
 # Four wavelengths are one mi.Spectrum. Of all sets of them, 5 nm apart and at least 25 nm from each other, these come
@@ -69,9 +69,9 @@ class CameraRays:
             )
             samples = np.pad(SAMPLES, ((0, CODES - len(SAMPLES)), (0, 0)))
             self._inputs: dict[str, Any] = {
-                "samples": mi.Float(samples.astype(np.float32).ravel()),
-                "weights": mi.Float(np.append(weights, np.zeros(4)).astype(np.float32)),
-                "closed": mi.UInt32(_closed(mirror)),
+                "samples": floats(samples),
+                "weights": floats(np.append(weights, np.zeros(4))),
+                "closed": whole_numbers(_closed(mirror)),
                 # BSDFs among the inputs make the recording collect their textures.
                 "bsdfs": mi.BSDFPtr([shape.bsdf() for shape in scene.shapes()]),
             }

@@ -16,7 +16,6 @@ import numpy as np
 from optics.spectra.spectrum import Spectrum
 from sim.scene import lights, shapes, surfaces, tessellation
 from sim.scene.cameras import Viewpoint
-from sim.scene.device_arrays import aligned
 from sim.scene.mirror import VISIBLE_GROUPS, Mirror
 from sim.scene.shapes import Part
 from sim.scene.tessellation import Triangles
@@ -76,16 +75,6 @@ class MergedMirror(Mirror):
         box = self.model.geom_aabb[self.geoms]
         inside = (np.abs(local - box[:, :3]) <= box[:, 3:] + self.near).all(axis=1)
         return bool((inside & bounded & (sizes > 0)).any())
-
-    def _move(self, geom: int, parts: list[Part], pose: np.ndarray) -> None:
-        """As the mirror does, but arrays are aligned: a kernel is recorded anew for every alignment."""
-        for k, part in enumerate(parts):
-            for key, value in part.placement(pose).items():
-                if isinstance(value, np.ndarray):
-                    rows = aligned(len(value), np.float32)
-                    rows[:] = value
-                    value = rows
-                self._params[f"geom_{geom}_{k}.{key}"] = value
 
     def _build(self) -> MitsubaObject:
         description: Description = {"type": "scene"}

@@ -1,4 +1,8 @@
-"""NumPy's numbers where kernels read them, aligned: Dr.Jit compiles a kernel anew for every alignment of its inputs."""
+"""NumPy's numbers where kernels read them, aligned.
+
+Dr.Jit compiles a kernel anew for every alignment of its inputs, and records a frozen one anew for the alignment of
+every shape that exists, in whichever scene it is.
+"""
 
 from __future__ import annotations
 
@@ -25,9 +29,14 @@ def aligned(n: int, dtype: type) -> np.ndarray:
 
 def floats(values: np.ndarray) -> Array:
     """A copy of them, flat, float32."""
+    return mi.Float(as_floats(values))
+
+
+def as_floats(values: np.ndarray) -> np.ndarray:
+    """The same, still NumPy's."""
     found = aligned(np.size(values), np.float32)
     found[:] = np.ravel(values)
-    return mi.Float(found)
+    return found
 
 
 def whole_numbers(values: Any) -> Array:

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from sim.scene import bsdfs, cube, surfaces, tessellation
+from sim.scene.device_arrays import as_floats
 from sim.scene.tessellation import Triangles
 from sim.scene.variant import Description, MitsubaObject
 
@@ -56,12 +57,12 @@ class Part:
     def vertices(self, pose: np.ndarray) -> np.ndarray:
         """Vertices in the world, flat float32."""
         assert self.triangles is not None
-        return (self.triangles.vertices @ pose[:3, :3].T + pose[:3, 3]).astype(np.float32).ravel()
+        return as_floats(self.triangles.vertices @ pose[:3, :3].T + pose[:3, 3])
 
     def normals(self, pose: np.ndarray) -> np.ndarray:
         assert self.triangles is not None
         assert self.triangles.normals is not None
-        return (self.triangles.normals @ pose[:3, :3].T).astype(np.float32).ravel()
+        return as_floats(self.triangles.normals @ pose[:3, :3].T)
 
 
 def pose(data: mujoco.MjData, geom: int) -> np.ndarray:
