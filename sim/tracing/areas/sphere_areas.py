@@ -66,9 +66,8 @@ class SphereView:
         def slope(side: Array) -> Array:
             return dr.abs(dr.dot(way, ahead) * dr.dot(way, side) - tangent * dr.dot(ahead, side))
 
-        self._upright = upright = slope(right) <= slope(
-            up
-        )  # lines run towards the outline, so that they cut it steeply
+        # Lines run towards the outline, so that they cut it steeply.
+        self._upright = upright = slope(right) <= slope(up)
         self._along, self._across = dr.select(upright, up, right), dr.select(upright, right, up)
         self._outline = _outline(way, radius, ahead, self._along, self._across)
 
