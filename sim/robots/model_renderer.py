@@ -120,13 +120,13 @@ class ModelRenderer:
         directions[:, :3] = self.sensor.directions
         self._inputs = {
             "directions": floats(directions),
-            "sizes": whole_numbers([n_rays, n_eyes, len(self._scene.movers), len(self._scene.lights)]),
+            "sizes": whole_numbers([n_rays, n_eyes, self._scene.movers.n_rows, len(self._scene.lights)]),
             "lanes": dr.arange(mi.UInt32, self._lanes),
             **self._tracer.inputs,
         }
         dr.eval(self._inputs["lanes"])
-        movers, lights = max(len(self._scene.movers), 1), max(len(self._scene.lights), 1)
-        shapes = {"eyes": (n_eyes, 16), "movers": (movers, 12), "lights": (lights, 8)}
+        lights = max(len(self._scene.lights), 1)
+        shapes = {"eyes": (n_eyes, 16), "movers": (4 * self._scene.movers.n_rows,), "lights": (lights, 8)}
         self._buffers = {
             name: aligned(self.n_envs * int(np.prod(shape)), np.float32).reshape(self.n_envs, *shape)
             for name, shape in shapes.items()
@@ -137,7 +137,7 @@ class ModelRenderer:
         origins, rotations = self.eye_frames(poses)
         eyes = self._buffers["eyes"].reshape(self.n_envs, -1, 4, 4)
         eyes[..., 0, :3], eyes[..., 1:, :3] = origins, np.swapaxes(rotations, -1, -2)
-        self._buffers["movers"][:, : len(self._scene.movers)] = self._scene.movers.rows(poses)
+        self._buffers["movers"][:] = self._scene.movers.rows(poses)
         self._buffers["lights"][:, : len(self._scene.lights)] = self._scene.lights.rows(poses)
         with in_variant(self._scene.variant), garbage_kept():
             poses_ = {name: mi.Float(buffer.reshape(-1)) for name, buffer in self._buffers.items()}
@@ -149,13 +149,13 @@ class ModelRenderer:
     ) -> Array:
         lane = inputs["lanes"]
         # Lanes that only fill up a packet read 0, and to divide by that ends the process.
-        n_rays, n_eyes, n_movers, n_lights = (dr.maximum(dr.gather(mi.UInt32, inputs["sizes"], i), 1) for i in range(4))
+        n_rays, n_eyes, n_rows, n_lights = (dr.maximum(dr.gather(mi.UInt32, inputs["sizes"], i), 1) for i in range(4))
         view = lane // n_rays
         env = view // n_eyes
         place = [mi.Vector3f(dr.gather(mi.Vector4f, poses["eyes"], view * 4 + i).xyz) for i in range(4)]
         local = dr.gather(mi.Vector4f, inputs["directions"], lane - view * n_rays)
         direction = place[1] * local.x + place[2] * local.y + place[3] * local.z
-        world = World(poses["movers"], env * n_movers * 3, poses["lights"], env * n_lights * 2)
+        world = World(poses["movers"], env * n_rows, poses["lights"], env * n_lights * 2)
         ray = mi.Ray3f(mi.Point3f(place[0]), direction)
         components, distance = self._tracer.radiance(still, ray, place[3], world, inputs)
         shares = self.sensor.depth.shares(dr.rcp(distance * local.z))

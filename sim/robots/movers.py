@@ -29,7 +29,9 @@ _KINDS = {
     _TYPES.mjGEOM_CYLINDER: "cylinder",
     _TYPES.mjGEOM_BOX: "box",
 }
-ROWS = 3  # of four floats for each mover: an axis of its frame in the world, and a coordinate of its origin
+# Of four floats for each mover: a sphere around it; then an axis of its frame in the world and a coordinate of its
+# origin, three times.
+ROWS = 4
 MESHES = 32  # scenes in one kernel, at most
 
 
@@ -81,27 +83,54 @@ class Movers:
         sizes[: len(self.geoms), :3] = model.geom_size[self.geoms]
         round_ = [i for i, g in enumerate(primitives) if model.geom_type[g] == _TYPES.mjGEOM_SPHERE]
         sizes[round_, :3] = sizes[round_, :1]
+        self._reach = model.geom_rbound[self.geoms]  # of each from its origin [m]
         self._ends = np.cumsum([0, *(len(group) for group in by_kind.values())])
         self.inputs = {"mover_sizes": floats(sizes), "mover_ends": whole_numbers(self._ends)}
 
     def __len__(self) -> int:
         return len(self.geoms)
 
+    @property
+    def n_rows(self) -> int:
+        """Of four floats each, in one world."""
+        return 1 + ROWS * len(self)
+
     def rows(self, poses: Poses) -> np.ndarray:
-        """What the kernel reads of them, (world, mover, 4 ROWS) float32."""
-        rows = np.empty((poses.n, len(self), ROWS, 4), np.float32)
-        rows[..., :3] = np.swapaxes(poses.geom_xmat[:, self.geoms], -1, -2)
-        rows[..., 3] = poses.geom_xpos[:, self.geoms]
-        return rows.reshape(poses.n, len(self), -1)
+        """What the kernel reads of a world: a sphere around all movers, then each, (world, 4 n_rows) float32."""
+        rows = np.zeros((poses.n, self.n_rows, 4), np.float32)
+        if len(self):
+            places = poses.geom_xpos[:, self.geoms]
+            rows[:, 0, :3] = centre = places.mean(axis=1)
+            rows[:, 0, 3] = (np.linalg.norm(places - centre[:, None], axis=-1) + self._reach).max(axis=1)
+            each = rows[:, 1:].reshape(poses.n, len(self), ROWS, 4)
+            each[:, :, 0, :3], each[:, :, 0, 3] = places, self._reach
+            each[:, :, 1:, :3] = np.swapaxes(poses.geom_xmat[:, self.geoms], -1, -2)
+            each[:, :, 1:, 3] = places
+        return rows.reshape(poses.n, -1)
 
     def nearest(self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Hit:
-        """The one that a ray meets first, nearer than `farthest`; first: row of the world's first mover."""
+        """The one that a ray meets first, nearer than `farthest`; first: of the world's rows."""
+        none = farthest, mi.UInt32(len(self)), mi.Vector3f(0, 0, 1), mi.Point2f(0)
+        if not len(self):
+            return Hit(*none)
+        near = _may_meet(ray, rows, first)
+        found = dr.if_stmt((), near, lambda: self._nearest(ray, farthest, rows, first + 1, inputs), lambda: none)
+        return Hit(*found)
+
+    def block(self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Array:
+        """Whether any lies on a ray, nearer than `farthest`."""
+        near = _may_meet(ray, rows, first) & (farthest > 0)
+        return dr.if_stmt((), near, lambda: self._block(ray, farthest, rows, first + 1, inputs), lambda: mi.Bool(False))
+
+    def _nearest(
+        self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]
+    ) -> tuple[Array, ...]:
+        """first: row of the first mover"""
         t, which = farthest, mi.UInt32(len(self))
         for i, primitive in self._kinds():
 
             def step(k: Array, t: Array, which: Array, hit: Callable[..., Array] = primitive.hit) -> tuple[Array, ...]:
-                frame, size = _frame(rows, first, k), _size(inputs, k)
-                found = hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), size)
+                found = _met(hit, ray, rows, first, k, inputs)
                 nearer = found < t
                 return k + 1, dr.select(nearer, found, t), dr.select(nearer, k, which)
 
@@ -116,17 +145,14 @@ class Movers:
             t, which = dr.select(nearer, si.t, t), dr.select(nearer, k, which)
             normal = dr.select(nearer, frame.given(mi.Vector3f(si.n)), normal)
             uv = dr.select(nearer, si.uv, uv)
-        return Hit(t, which, normal, uv)
+        return t, which, normal, uv
 
-    def block(self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Array:
-        """Whether any lies on a ray, nearer than `farthest`."""
+    def _block(self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Array:
         blocked = mi.Bool(False)
         for i, primitive in self._kinds():
 
             def step(k: Array, blocked: Array, hit: Callable[..., Array] = primitive.hit) -> tuple[Array, ...]:
-                frame, size = _frame(rows, first, k), _size(inputs, k)
-                found = hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), size)
-                return k + 1, blocked | (found < farthest)
+                return k + 1, blocked | (_met(hit, ray, rows, first, k, inputs) < farthest)
 
             _, blocked = _loop(i, inputs, step, blocked)
         for m, scene in enumerate(self.meshes):
@@ -158,9 +184,31 @@ def kind_of(model: mujoco.MjModel, geom: int) -> str | None:
     return None if shapes.is_textured(model, geom) else _KINDS.get(surfaces.geom_type(model, geom))
 
 
+def _met(
+    hit: Callable[..., Array], ray: Array, rows: Array, first: Array, k: Array, inputs: dict[str, Array]
+) -> Array:
+    """Where a ray meets mover k [m]. Most rays miss the sphere around it, and their neighbours do, too."""
+
+    def within() -> Array:
+        frame = _frame(rows, first, k)
+        return hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), _size(inputs, k))
+
+    found: Array = dr.if_stmt((), _may_meet(ray, rows, first + k * ROWS), within, lambda: mi.Float(dr.inf))
+    return found
+
+
 def _frame(rows: Array, first: Array, k: Array) -> _Frame:
-    a, b, c = (dr.gather(mi.Vector4f, rows, first + k * ROWS + i) for i in range(ROWS))
+    a, b, c = (dr.gather(mi.Vector4f, rows, first + k * ROWS + i) for i in range(1, ROWS))
     return _Frame((mi.Vector3f(a.xyz), mi.Vector3f(b.xyz), mi.Vector3f(c.xyz)), mi.Vector3f(a.w, b.w, c.w))
+
+
+def _may_meet(ray: Array, rows: Array, first: Array) -> Array:
+    """Whether a ray meets the sphere of this row."""
+    whole = dr.gather(mi.Vector4f, rows, first)
+    way, square = mi.Vector3f(whole.xyz) - ray.o, whole.w * whole.w
+    along = dr.dot(way, ray.d)
+    away = dr.squared_norm(way)
+    return (away < square) | ((along > 0) & (away - along * along < square))
 
 
 def _size(inputs: dict[str, Array], k: Array) -> Array:
