@@ -4,6 +4,7 @@ model_renderer      ModelRenderer: eyes mounted on any MuJoCo model, in many wor
 mounts              Mount: where an eye is, on a body, a site or a camera
 inside              eyes that are inside of a geom
 poses               Poses: where everything is, in all worlds
+model_wavefront     its kernels
 model_scene         what stands still, as a Mitsuba scene, and what moves
 model_lights        lights, that may move
 model_tracer        direct light along rays

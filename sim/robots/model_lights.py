@@ -14,10 +14,11 @@ import mujoco
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from optics.spectra.spectrum import Spectrum
 from sim.robots.poses import Poses
 from sim.scene import lights
-from sim.scene.spectra import HEADLIGHT
+from sim.scene.device_arrays import three
+from sim.scene.spectra import Spectra
+from sim.scene.variant import Description
 from sim.tracing import lighting
 
 ROWS = 2  # of four floats for each light: where it is, and where it shines
@@ -40,7 +41,7 @@ class ModelLight:
 
 
 def model_lights(
-    model: mujoco.MjModel, spectra: dict[str, Spectrum], wavelengths: np.ndarray
+    model: mujoco.MjModel, spectra: Spectra, wavelengths: np.ndarray
 ) -> tuple[list[ModelLight], list[str]]:
     """A model's lights at these wavelengths [m] in the variant in force, and what of them has no counterpart here."""
     data = mujoco.MjData(model)
@@ -61,7 +62,7 @@ def model_lights(
     return found, left_out
 
 
-def _level(description: dict, wavelengths: np.ndarray) -> np.ndarray:
+def _level(description: Description, wavelengths: np.ndarray) -> np.ndarray:
     """Irradiance of a directional light, or intensity."""
     emitter, found = mi.load_dict(description), []
     for spectrum in lighting.spectra(wavelengths):
@@ -85,11 +86,13 @@ class Lights:
 
     def rows(self, poses: Poses) -> np.ndarray:
         """Where they are and shine, (world, light, 4 ROWS) float32; the headlights' are not read."""
-        ids = [light.light for light in self.found]
-        rows = np.zeros((poses.n, len(ids), ROWS, 4), np.float32)
-        rows[..., 0, :3], rows[..., 1, :3] = poses.light_xpos[:, ids], poses.light_xdir[:, ids]
-        rows[..., 1, :3] /= np.linalg.norm(rows[..., 1, :3], axis=-1, keepdims=True)
-        return rows.reshape(poses.n, len(ids), -1)
+        rows = np.zeros((poses.n, len(self), ROWS, 4), np.float32)
+        for k, light in enumerate(self.found):
+            if light.light >= 0:
+                aim = poses.light_xdir[:, light.light]
+                rows[:, k, 0, :3] = poses.light_xpos[:, light.light]
+                rows[:, k, 1, :3] = aim / np.linalg.norm(aim, axis=-1, keepdims=True)
+        return rows.reshape(poses.n, len(self), -1)
 
     def towards(self, k: int, point: Array, axis: Array, rows: Array, first: Array) -> tuple[Array, Array, Array]:
         """Unit vector from a point to a light, how far that is [m], and how much of its level arrives on what faces it;
@@ -97,7 +100,7 @@ class Lights:
         light = self.found[k]
         if light.light < 0:
             return -axis, mi.Float(FAR), mi.Float(1)
-        place, aim = (mi.Vector3f(dr.gather(mi.Vector4f, rows, first + k * ROWS + i).xyz) for i in range(ROWS))
+        place, aim = (three(rows, first + k * ROWS + i) for i in range(ROWS))
         if light.kind == _DIRECTIONAL:
             return -aim, mi.Float(FAR), mi.Float(1)
         way = place - mi.Vector3f(point)
@@ -106,9 +109,6 @@ class Lights:
         towards, share = way / distance, dr.rcp(square)
         if light.kind == _SPOT:
             cosine = -dr.dot(towards, aim)
-            profile = dr.power(dr.maximum(cosine, 1e-6), light.exponent)
+            profile: Array = dr.power(dr.maximum(cosine, 1e-6), light.exponent)
             share = dr.select(cosine > light.cutoff, share * profile, 0)
         return towards, distance, share
-
-
-__all__ = ["HEADLIGHT", "Lights", "ModelLight", "model_lights"]

@@ -4,34 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
-import drjit as dr
-import mitsuba as mi
 import mujoco
 import numpy as np
 
 import optics
 from optics.numerics.arguments import of_kind, whole
-from optics.numerics.autodiff import Array
 from optics.spectra.spectrum import Spectrum
-from sim.eyes.sensor import eye_sampling
+from sim.eyes.sensor import directions_of, eye_sampling
 from sim.render.fidelity import Fidelity
-from sim.render.frozen_kernels import garbage_kept
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.robots.inside import depth_inside
 from sim.robots.model_scene import ModelScene
-from sim.robots.model_tracer import ModelTracer, World
+from sim.robots.model_tracer import ModelTracer
+from sim.robots.model_wavefront import ModelWavefront
 from sim.robots.mounts import Mount
 from sim.robots.poses import Poses
 from sim.scene import source
-from sim.scene.device_arrays import aligned, floats, whole_numbers
 from sim.scene.mirror import VISIBLE_GROUPS
-from sim.scene.variant import MitsubaObject
 from sim.scene.variant import variant as in_variant
 from sim.tracing import lighting
 
 MOST_ENVS = 2**31 - 1
+SIXTEEN_RAYS = Fidelity(16, bands=4)
 
 
 class ModelRenderer:
@@ -59,7 +54,7 @@ class ModelRenderer:
         eye: optics.Eye,
         mounts: Sequence[Mount],
         n_envs: int = 1,
-        fidelity: Fidelity = Fidelity(16, bands=4),
+        fidelity: Fidelity = SIXTEEN_RAYS,
         *,
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
@@ -83,7 +78,10 @@ class ModelRenderer:
             suns = [light.level for light in self._scene.lights.found if light.kind == "directional"]
             self.brightest = float((mixing @ np.sum(suns, axis=0)).max() / np.pi) if suns else 0.0
             self._sums = self.sensor.receptor_sums(mixing, self._tracer.basis)
-            self._prepare()
+            self._wavefront = ModelWavefront(self._scene, self._tracer, self.sensor, self.n_envs, len(self.mounts))
+            along = {"light": self.sensor.directions, "depth": _centres(self.eye)}
+            self._looks = {what: self._wavefront.look(directions) for what, directions in along.items()}
+        self._slot = FrameSlot()
 
     def signals(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
         """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32.
@@ -97,9 +95,13 @@ class ModelRenderer:
 
     def begin(self, poses: Poses | Sequence[mujoco.MjData]) -> PendingFrame:
         """Begin to see; it runs beside whatever comes next, until the signals are waited for."""
-        placed = poses if isinstance(poses, Poses) else Poses.of(poses)
-        self._check_poses(placed)
-        return self._slot.begin(lambda: self._launch(placed)).then(self._signals)
+        return self._begin(poses, "light").then(self._signals)
+
+    def depth(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+        """How far what each receptor's centre looks at is, along the eye's axis [m], (env, eye, height, width) float32;
+        infinite where there is nothing."""
+        found = self._begin(poses, "depth").wait()
+        return found.reshape(self.n_envs, len(self.mounts), *self.eye.resolution)
 
     def eye_frames(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
         """Pupils [m] (world, eye, 3) and eyes' frames (world, eye, 3, 3), columns (right, up, ahead)."""
@@ -109,61 +111,16 @@ class ModelRenderer:
 
     @property
     def recordings(self) -> int:
-        """How often the kernel was recorded."""
-        return int(self._frozen.n_recordings)
+        """How often the kernels were recorded: once per kernel in use, up to three times where meshes move."""
+        return int(self._wavefront.light.n_recordings + self._wavefront.depth.n_recordings)
 
-    def _prepare(self) -> None:
-        self._slot = FrameSlot()
-        n_eyes, n_rays = len(self.mounts), len(self.sensor.directions)
-        self._lanes = self.n_envs * n_eyes * n_rays
-        directions = np.zeros((n_rays, 4), np.float32)
-        directions[:, :3] = self.sensor.directions
-        self._inputs = {
-            "directions": floats(directions),
-            "sizes": whole_numbers([n_rays, n_eyes, self._scene.movers.n_rows, len(self._scene.lights)]),
-            "lanes": dr.arange(mi.UInt32, self._lanes),
-            **self._tracer.inputs,
-        }
-        dr.eval(self._inputs["lanes"])
-        lights = max(len(self._scene.lights), 1)
-        shapes = {"eyes": (n_eyes, 16), "movers": (4 * self._scene.movers.n_rows,), "lights": (lights, 8)}
-        self._buffers = {
-            name: aligned(self.n_envs * int(np.prod(shape)), np.float32).reshape(self.n_envs, *shape)
-            for name, shape in shapes.items()
-        }
-        self._frozen: Any = dr.freeze(self._kernel)
-
-    def _launch(self, poses: Poses) -> Any:
-        origins, rotations = self.eye_frames(poses)
-        eyes = self._buffers["eyes"].reshape(self.n_envs, -1, 4, 4)
-        eyes[..., 0, :3], eyes[..., 1:, :3] = origins, np.swapaxes(rotations, -1, -2)
-        self._buffers["movers"][:] = self._scene.movers.rows(poses)
-        self._buffers["lights"][:, : len(self._scene.lights)] = self._scene.lights.rows(poses)
-        with in_variant(self._scene.variant), garbage_kept():
-            poses_ = {name: mi.Float(buffer.reshape(-1)) for name, buffer in self._buffers.items()}
-            light = self._frozen(self._scene.scene, self._scene.movers.meshes, poses_, self._inputs)
-        return lambda: _read(light)
-
-    def _kernel(
-        self, still: MitsubaObject, meshes: list[MitsubaObject], poses: dict[str, Array], inputs: dict[str, Array]
-    ) -> Array:
-        lane = inputs["lanes"]
-        # Lanes that only fill up a packet read 0, and to divide by that ends the process.
-        n_rays, n_eyes, n_rows, n_lights = (dr.maximum(dr.gather(mi.UInt32, inputs["sizes"], i), 1) for i in range(4))
-        view = lane // n_rays
-        env = view // n_eyes
-        place = [mi.Vector3f(dr.gather(mi.Vector4f, poses["eyes"], view * 4 + i).xyz) for i in range(4)]
-        local = dr.gather(mi.Vector4f, inputs["directions"], lane - view * n_rays)
-        direction = place[1] * local.x + place[2] * local.y + place[3] * local.z
-        world = World(poses["movers"], env * n_rows, poses["lights"], env * n_lights * 2)
-        ray = mi.Ray3f(mi.Point3f(place[0]), direction)
-        components, distance = self._tracer.radiance(still, ray, place[3], world, inputs)
-        shares = self.sensor.depth.shares(dr.rcp(distance * local.z))
-        layers = [component * share for share in shares for component in components]
-        out = dr.zeros(mi.Float, self._lanes * len(layers))
-        for k, value in enumerate(layers):
-            dr.scatter(out, value, lane + k * self._lanes, mode=dr.ReduceMode.Permute)
-        return dr.block_reduce(dr.ReduceOp.Add, out, self.sensor.rays_per_receptor)
+    def _begin(self, poses: Poses | Sequence[mujoco.MjData], what: str) -> PendingFrame:
+        placed = poses if isinstance(poses, Poses) else Poses.of(poses)
+        self._check_poses(placed)
+        pupils, rotations = self.eye_frames(placed)
+        eyes = np.concatenate([pupils[:, :, None], np.swapaxes(rotations, -1, -2)], axis=2)
+        kernel = getattr(self._wavefront, what)
+        return self._slot.begin(lambda: self._wavefront.launch(kernel, self._looks[what], placed, eyes))
 
     def _signals(self, light: np.ndarray) -> np.ndarray:
         planes, n_eyes = self.sensor.depth.count * len(self._tracer.basis), len(self.mounts)
@@ -185,10 +142,10 @@ class ModelRenderer:
     def _refuse_eyes_inside(self) -> None:
         data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, data)
-        origins, rotations = self.eye_frames(Poses.of([data]))
-        for mount, origin, rotation in zip(self.mounts, origins[0], rotations[0], strict=True):
+        pupils, _ = self.eye_frames(Poses.of([data]))
+        for mount, pupil in zip(self.mounts, pupils[0], strict=True):
             for geom in self._scene.geoms:
-                if (depth := depth_inside(self.model, data, geom, origin)) > 0:
+                if (depth := depth_inside(self.model, data, geom, pupil)) > 0:
                     name = self.model.geom(geom).name or f"{geom}"
                     raise ValueError(
                         f"Mount on {mount.on!r}: the eye is inside geom {name!r}, {depth:.2g} m below its surface: "
@@ -208,10 +165,11 @@ class _Place:
         return origins + rotations @ self._origin, rotations @ self._rotation
 
 
-def _read(light: Array) -> np.ndarray:
-    """Waits for the kernel."""
-    with garbage_kept():
-        return np.array(light.numpy())
+def _centres(eye: optics.Eye) -> np.ndarray:
+    """Directions of the receptors' centres, (ray, 3)."""
+    height, width = eye.resolution
+    row, column = (index.ravel() for index in np.indices((height, width)))
+    return directions_of(eye, np.stack([column + 0.5 - width / 2, row + 0.5 - height / 2], axis=-1))
 
 
 def _check(fidelity: Fidelity) -> None:

@@ -15,7 +15,7 @@ from sim.tracing import lighting
 
 
 @dataclass(frozen=True)
-class World:
+class Rows:
     """Where the kernel finds one world's movers and lights: their rows, and which is its first."""
 
     movers: Array
@@ -35,18 +35,21 @@ class ModelTracer:
         self.basis = np.eye(len(wavelengths))
         self._sky = scene.scene.environment() is not None
         shapes = scene.scene.shapes()
+        self._any_still = len(shapes) > 0
         # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.
         known = [*scene.bsdfs, *(shape.bsdf() for shape in shapes[:1])]
         self.inputs = {"bsdfs": mi.BSDFPtr(known), **scene.movers.inputs}
+        if self._sky:
+            self.inputs["sky"] = mi.EmitterPtr([scene.scene.environment()])
 
     def radiance(
-        self, still: MitsubaObject, ray: Array, axis: Array, world: World, inputs: dict[str, Array]
+        self, still: MitsubaObject, ray: Array, axis: Array, rows: Rows, inputs: dict[str, Array]
     ) -> tuple[list[Array], Array]:
         """What comes along each ray, per band, and from how far [m]; axis: of the eye that looks."""
         movers = self._scene.movers
         ray.wavelengths = self._bands[0]
-        si = still.ray_intersect(ray)
-        hit = movers.nearest(ray, si.t, world.movers, world.first_mover, inputs)
+        si = still.ray_intersect(ray) if self._any_still else _nothing()
+        hit = movers.nearest(ray, si.t, rows.movers, rows.first_mover, inputs)
         on_mover = hit.which < len(movers)
         seen = si.is_valid() | on_mover
         point = dr.select(seen, ray(dr.select(seen, hit.t, 0)), mi.Point3f(0))
@@ -57,12 +60,18 @@ class ModelTracer:
         si.sh_frame = mi.Frame3f(si.n)
         si.wi = si.to_local(-ray.d)
         mine = dr.gather(mi.BSDFPtr, inputs["bsdfs"], dr.minimum(hit.which, len(inputs["bsdfs"]) - 1), on_mover)
-        bsdf = dr.select(on_mover, mine, si.bsdf())
-        arrives = self._irradiance(still, point, normal, seen, axis, world, inputs)
+        bsdf = dr.select(on_mover, mine, si.bsdf()) if self._any_still else mine
+        arrives = self._irradiance(still, point, normal, seen, axis, rows, inputs)
         spectra = self._sent_on(si, bsdf, seen, arrives)
         if self._sky:
             spectra = [s + self._heaven(still, ray, ~seen, band) for s, band in zip(spectra, self._bands, strict=True)]
         return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], hit.t
+
+    def distance(self, still: MitsubaObject, ray: Array, rows: Rows, inputs: dict[str, Array]) -> Array:
+        """How far what each ray meets is [m]."""
+        si = still.ray_intersect_preliminary(ray) if self._any_still else _nothing()
+        far = dr.select(si.is_valid(), si.t, dr.inf)
+        return self._scene.movers.nearest(ray, far, rows.movers, rows.first_mover, inputs).t
 
     def _irradiance(
         self,
@@ -71,29 +80,29 @@ class ModelTracer:
         normal: Array,
         seen: Array,
         axis: Array,
-        world: World,
+        rows: Rows,
         inputs: dict[str, Array],
     ) -> list[Array]:
         """Of a surface, as spectra of so many bands each."""
         start = lighting.clear_of(point, normal)
         total = [mi.Spectrum(0) for _ in self._bands]
         for k, light in enumerate(self._scene.lights.found):
-            towards, far, share = self._scene.lights.towards(k, point, axis, world.lights, world.first_light)
+            towards, far, share = self._scene.lights.towards(k, point, axis, rows.lights, rows.first_light)
             cosine = dr.dot(normal, towards)
             shines = seen & (cosine > 0) & (share > 0)
             if light.light >= 0:  # an eye's own headlight throws no shadow that it could see
-                shines &= ~self._shadowed(still, mi.Ray3f(start, towards), far, shines, world, inputs)
+                shines &= ~self._shadowed(still, mi.Ray3f(start, towards), far, shines, rows, inputs)
             arrives = dr.select(shines, cosine * share, 0)
             chunks = np.pad(light.level, (0, -len(light.level) % lighting.LANES)).reshape(-1, lighting.LANES)
             total = [e + arrives * mi.Spectrum(*map(float, chunk)) for e, chunk in zip(total, chunks, strict=True)]
         return total
 
     def _shadowed(
-        self, still: MitsubaObject, ray: Array, far: Array, active: Array, world: World, inputs: dict[str, Array]
+        self, still: MitsubaObject, ray: Array, far: Array, active: Array, rows: Rows, inputs: dict[str, Array]
     ) -> Array:
         ray.maxt = far
-        blocked = self._scene.movers.block(ray, dr.select(active, far, 0), world.movers, world.first_mover, inputs)
-        return blocked | still.ray_test(ray, active & ~blocked)
+        blocked = self._scene.movers.block(ray, dr.select(active, far, 0), rows.movers, rows.first_mover, inputs)
+        return blocked | still.ray_test(ray, active & ~blocked) if self._any_still else blocked
 
     def _sent_on(self, si: Array, bsdf: MitsubaObject, seen: Array, arrives: list[Array]) -> list[Array]:
         found = []
@@ -110,4 +119,8 @@ class ModelTracer:
         return dr.select(active, still.environment().eval(si, active), 0)
 
 
-__all__ = ["ModelTracer", "World"]
+def _nothing() -> Array:
+    """Where a ray meets nothing."""
+    si: Array = dr.zeros(mi.SurfaceInteraction3f)
+    si.t = mi.Float(dr.inf)
+    return si

@@ -18,7 +18,7 @@ from optics.numerics.autodiff import Array
 from sim.robots.poses import Poses
 from sim.robots.primitives import PRIMITIVES, Primitive
 from sim.scene import shapes, surfaces
-from sim.scene.device_arrays import floats, whole_numbers
+from sim.scene.device_arrays import floats, three, whole_numbers
 from sim.scene.variant import MitsubaObject
 
 _TYPES = mujoco.mjtGeom
@@ -184,9 +184,7 @@ def kind_of(model: mujoco.MjModel, geom: int) -> str | None:
     return None if shapes.is_textured(model, geom) else _KINDS.get(surfaces.geom_type(model, geom))
 
 
-def _met(
-    hit: Callable[..., Array], ray: Array, rows: Array, first: Array, k: Array, inputs: dict[str, Array]
-) -> Array:
+def _met(hit: Callable[..., Array], ray: Array, rows: Array, first: Array, k: Array, inputs: dict[str, Array]) -> Array:
     """Where a ray meets mover k [m]. Most rays miss the sphere around it, and their neighbours do, too."""
 
     def within() -> Array:
@@ -198,21 +196,22 @@ def _met(
 
 
 def _frame(rows: Array, first: Array, k: Array) -> _Frame:
-    a, b, c = (dr.gather(mi.Vector4f, rows, first + k * ROWS + i) for i in range(1, ROWS))
-    return _Frame((mi.Vector3f(a.xyz), mi.Vector3f(b.xyz), mi.Vector3f(c.xyz)), mi.Vector3f(a.w, b.w, c.w))
+    fours = [list(dr.gather(mi.Vector4f, rows, first + k * ROWS + i)) for i in range(1, ROWS)]
+    a, b, c = (mi.Vector3f(*four[:3]) for four in fours)
+    return _Frame((a, b, c), mi.Vector3f(*(four[3] for four in fours)))
 
 
 def _may_meet(ray: Array, rows: Array, first: Array) -> Array:
     """Whether a ray meets the sphere of this row."""
-    whole = dr.gather(mi.Vector4f, rows, first)
-    way, square = mi.Vector3f(whole.xyz) - ray.o, whole.w * whole.w
+    x, y, z, radius = dr.gather(mi.Vector4f, rows, first)
+    way, square = mi.Vector3f(x, y, z) - ray.o, radius * radius
     along = dr.dot(way, ray.d)
     away = dr.squared_norm(way)
     return (away < square) | ((along > 0) & (away - along * along < square))
 
 
 def _size(inputs: dict[str, Array], k: Array) -> Array:
-    return mi.Vector3f(dr.gather(mi.Vector4f, inputs["mover_sizes"], k).xyz)
+    return three(inputs["mover_sizes"], k)
 
 
 def _loop(kind: int, inputs: dict[str, Array], step: Callable[..., Any], *state: Array) -> tuple[Array, ...]:

@@ -76,22 +76,24 @@ def _cylinder_hit(o: Array, d: Array, size: Array) -> Array:
     radius, half = size.x, size.y
     side = _into_side(o, d, radius)
     side = dr.select(dr.abs(dr.fma(d.z, side, o.z)) <= half, side, dr.inf)
-    end = -dr.fma(dr.copysign(half, d.z), 1, o.z) / dr.select(dr.abs(d.z) < PARALLEL, PARALLEL, d.z)
+    end = -(dr.copysign(half, d.z) + o.z) / dr.select(dr.abs(d.z) < PARALLEL, PARALLEL, d.z)
     x, y = dr.fma(d.x, end, o.x), dr.fma(d.y, end, o.y)
     on_end = (end > 0) & (x * x + y * y <= radius * radius) & (dr.abs(d.z) >= PARALLEL)
     return dr.minimum(side, dr.select(on_end, end, dr.inf))
 
 
 def _cylinder_normal(p: Array, size: Array) -> Array:
-    beside = dr.sqrt(p.x * p.x + p.y * p.y) / size.x
-    on_end = dr.abs(p.z) / size.y > beside
+    beside: Array = dr.sqrt(p.x * p.x + p.y * p.y)
+    on_end: Array = size.x * dr.abs(p.z) - size.y * beside > 0
     return dr.select(on_end, mi.Vector3f(0, 0, p.z), mi.Vector3f(p.x, p.y, 0))
 
 
 def _box_hit(o: Array, d: Array, size: Array) -> Array:
-    d = dr.select(dr.abs(d) < TINY, TINY, d)
-    middle, reach = -o / d, size / dr.abs(d)
-    enters, leaves = dr.max(middle - reach), dr.min(middle + reach)
+    length: Array = dr.abs(d)
+    steep: Array = dr.select(length < TINY, TINY, d)
+    middle, reach = -o / steep, size / dr.abs(steep)
+    enters: Array = dr.max(middle - reach)
+    leaves: Array = dr.min(middle + reach)
     return dr.select((enters < leaves) & (enters > 0), enters, dr.inf)
 
 
@@ -99,8 +101,8 @@ def _box_normal(p: Array, size: Array) -> Array:
     q = p / size
     away = dr.abs(q)
     most = dr.max(away)
-    x = away.x == most
-    y = ~x & (away.y == most)
+    x: Array = away.x == most
+    y: Array = ~x & (away.y == most)
     return mi.Vector3f(dr.select(x, q.x, 0), dr.select(y, q.y, 0), dr.select(x | y, 0, q.z))
 
 
