@@ -1,5 +1,6 @@
 """Eyes on any robot: models that are not one of our worlds.
 
+task                Task: what a robot has to do
 model_renderer      ModelRenderer: eyes mounted on any MuJoCo model, in many worlds at once
 mounts              Mount: where an eye is, on a body, a site or a camera
 inside              eyes that are inside of a geom

@@ -110,6 +110,16 @@ class ModelRenderer:
         return np.stack(origins, axis=1), np.stack(rotations, axis=1)
 
     @property
+    def only_directional(self) -> bool:
+        """Whether nothing is lit by points, which are brighter the nearer they are, or by the sky."""
+        return all(light.kind == "directional" for light in self._scene.lights.found) and not self._scene.has_sky
+
+    @property
+    def spectra(self) -> Mapping[str, Spectrum]:
+        """Measured ones of materials and lights, by name."""
+        return self._scene.spectra
+
+    @property
     def recordings(self) -> int:
         """How often the kernels were recorded: once per kernel in use, up to three times where meshes move."""
         return int(self._wavefront.light.n_recordings + self._wavefront.depth.n_recordings)

@@ -28,6 +28,7 @@ class ModelScene:
 
     model · variant: of Mitsuba · geoms: ids of all that are seen
     scene: mi.Scene of what stands still, and the sky · movers: what moves · lights: all of them
+    spectra: measured ones of materials and lights, by name · has_sky: whether there is something to see at infinity
     bsdfs: of every mover, in their order; kept here, since a BSDFPtr does not keep its objects alive
 
     Warns (`sim.MirrorWarning`) once of what has no counterpart.
@@ -44,7 +45,7 @@ class ModelScene:
         spectra: Mapping[str, Spectrum | str] | None = None,
     ) -> None:
         self.model, self.variant = model, default_variant()
-        self._spectra: Spectra = resolve(model, spectra)
+        self.spectra: Spectra = resolve(model, spectra)
         seen = [g for g in range(model.ngeom) if model.geom_group[g] in groups and surfaces.rgba(model, g)[3] > 0]
         self.geoms = [g for g in seen if shapes.has_shape(model, g)]
         if not self.geoms:
@@ -55,16 +56,17 @@ class ModelScene:
             meshes = {g: self._mesh(g, matt[g]) for g in moving if kind_of(model, g) is None}
             self.movers = Movers(model, moving, meshes)
             self.bsdfs = [matt[int(g)] for g in self.movers.geoms]
-            found, left_out = model_lights(model, self._spectra, wavelengths)
+            found, left_out = model_lights(model, self.spectra, wavelengths)
             self.lights = Lights(found)
             self.scene = self._still({g: matt[g] for g in self.geoms if g not in moving})
+            self.has_sky = self.scene.environment() is not None
         left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, self.geoms)]
         if left_out:
             warnings.warn(f"eyes do not see: {'; '.join(left_out)}", MirrorWarning, stacklevel=4)
 
     def _matt(self, geom: int) -> MitsubaObject:
         to_uv = shapes.uv_transform(self.model, geom)
-        return bsdfs.matt(self.model, geom, to_uv, of_geom(self.model, geom, self._spectra))
+        return bsdfs.matt(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
 
     def _mesh(self, geom: int, bsdf: MitsubaObject) -> MitsubaObject:
         """A geom in its own frame."""

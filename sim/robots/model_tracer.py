@@ -33,7 +33,7 @@ class ModelTracer:
     def __init__(self, scene: ModelScene, wavelengths: np.ndarray) -> None:
         self._scene, self._bands = scene, lighting.spectra(wavelengths)
         self.basis = np.eye(len(wavelengths))
-        self._sky = scene.scene.environment() is not None
+        self._sky = scene.has_sky
         shapes = scene.scene.shapes()
         self._any_still = len(shapes) > 0
         # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.

@@ -3,6 +3,7 @@
 model_renderer: test_model_renderer.py
 model_wavefront: test_model_renderer.py
 mounts: test_mounts.py
+task: envs/test_task_vec_env.py
 inside: test_mounts.py
 poses: test_model_renderer.py
 model_scene: test_model_renderer.py
