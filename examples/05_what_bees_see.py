@@ -1,6 +1,6 @@
 """Two flowers that no camera tells apart, as receptors of a camera, of people, of goldfish and of bees report them.
 
-python examples/04_what_bees_see.py [--out eyes.png]   (--out: the task `foraging` through the eyes of each)
+python examples/05_what_bees_see.py [--out eyes.png]   (--out: the task `foraging` through the eyes of each)
 """
 
 import argparse
