@@ -78,7 +78,7 @@ def poses(model: mujoco.MjModel, rng: np.random.Generator) -> Iterator[Shot]:
     for i in range(POSES):
         mujoco.mj_resetData(model, data)
         for joint in range(model.njnt):
-            _move(model, data.qpos, joint, rng)
+            move(model, data.qpos, joint, rng)
         data.mocap_pos += rng.normal(0, 0.1 * model.stat.extent, data.mocap_pos.shape)
         if model.nmocap:
             data.mocap_quat[:] = [_quat(rng) for _ in range(model.nmocap)]
@@ -97,7 +97,8 @@ def _quat(rng: np.random.Generator) -> np.ndarray:
     return quat / np.linalg.norm(quat)
 
 
-def _move(model: mujoco.MjModel, qpos: np.ndarray, joint: int, rng: np.random.Generator) -> None:
+def move(model: mujoco.MjModel, qpos: np.ndarray, joint: int, rng: np.random.Generator) -> None:
+    """A joint to anywhere in its range."""
     kind, at = mujoco.mjtJoint(int(model.jnt_type[joint])), model.jnt_qposadr[joint]
     if kind == mujoco.mjtJoint.mjJNT_FREE:
         qpos[at : at + 3] += rng.uniform(-0.1, 0.1, 3) * model.stat.extent

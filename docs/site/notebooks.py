@@ -13,7 +13,7 @@ from pathlib import Path
 import nbformat
 
 DOCS = Path(__file__).resolve().parents[1]
-TUTORIALS = ("optics", "rl", "evolution", "python")
+TUTORIALS = ("optics", "rl", "evolution", "own_world", "python")
 CODE = re.compile(r"```python\n(.*?)```(?:\n+```text\n.*?```)?\n*", re.DOTALL)
 LINK = re.compile(r"\]\((?!https?:|#)([^)]+?)\)")
 REFERENCE = re.compile(r"\[(`[^`]+`)\]\[\]")

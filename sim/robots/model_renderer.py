@@ -110,6 +110,11 @@ class ModelRenderer:
         return np.stack(origins, axis=1), np.stack(rotations, axis=1)
 
     @property
+    def moving(self) -> int:
+        """How many geoms move."""
+        return len(self._scene.movers)
+
+    @property
     def only_directional(self) -> bool:
         """Whether nothing is lit by points, which are brighter the nearer they are, or by the sky."""
         return all(light.kind == "directional" for light in self._scene.lights.found) and not self._scene.has_sky

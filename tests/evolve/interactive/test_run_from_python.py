@@ -121,7 +121,7 @@ def maker():
     return module
 
 
-@pytest.mark.parametrize("name", ["optics", "rl", "evolution", "python"])
+@pytest.mark.parametrize("name", ["optics", "rl", "evolution", "own_world", "python"])
 def test_notebooks_are_the_tutorials(maker, name):
     """The pages' code is run by other tests, so that of the notebooks is too. (Else: python docs/site/notebooks.py.)"""
     page = (ROOT / "docs" / "tutorial" / f"{name}.md").read_text()
