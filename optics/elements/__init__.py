@@ -5,6 +5,7 @@ pupil             Pupil: aperture, relief, ideal lens
 relief            Relief, HeightMap, BSplineRelief
 pixel_relief      PixelRelief: steps
 wavefront         Zernike, WavefrontMap
+transmittance     GaussianMask, MaskMap
 refractive_index  RefractiveIndex: constant, or after Cauchy
 wavefront_slopes  where the rays of a wavefront go
 beam              light of one wavelength on its way to a plane

@@ -44,4 +44,7 @@ class Beam:
         """Field just behind the pupil, aperture softened."""
         x, y = grid.coordinates(types)
         scale = 1 / opaque(types, self.radius)
-        return Field.from_waves(soft.transmittance(x * scale, y * scale, types), self.waves(x, y, types), grid, types)
+        size = soft.transmittance(x * scale, y * scale, types)
+        if self.pupil.mask is not None:
+            size *= self.pupil.amplitude(x * scale, y * scale, types)
+        return Field.from_waves(size, self.waves(x, y, types), grid, types)

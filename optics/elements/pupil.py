@@ -1,4 +1,4 @@
-"""The pupil: an aperture with a relief, a wavefront, and an ideal lens."""
+"""The pupil: an aperture with a relief, a wavefront, a mask, and an ideal lens."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from optics.elements.pixel_relief import PixelRelief
 from optics.elements.refractive_index import RefractiveIndex
 from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
+from optics.elements.transmittance import Mask
 from optics.elements.wavefront import Aberration
 from optics.elements.wavefront_slopes import Slopes, _derivative
 from optics.numerics.arguments import finite, in_range, of_kind, positive, reals, without_derivative
@@ -25,12 +26,13 @@ __all__ = ["Pupil"]
 
 TALLEST = 100.0  # choice, radii: a relief as high as one is no thin element any more
 ANY_HEIGHT = 1e-3  # choice [m]: not too tall for any pupil
+LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: of a mask's spectrum, and of the light that it lets through
 SENSOR_DISTANCE = 240e-6  # choice [m]: of a pupil without a lens, where nobody says
 
 
 @dataclass(frozen=True, eq=False)
 class Pupil:
-    """Transmittance A(x, y) exp(ik [(n - medium_n) h(x, y) - W(x, y)]), thin-element model.
+    """Transmittance A(x, y) M(x, y) exp(ik [(n - medium_n) h(x, y) - W(x, y)]), thin-element model.
 
     aperture_radius: R [m].
     height: None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (see HeightMap); or a Relief, such
@@ -38,10 +40,14 @@ class Pupil:
     n: refractive index of the relief, constant or dispersive.
     medium_n: index of what surrounds the pupil, on both sides.
     thin_lens_focal_length: adds an ideal lens exp(-ik(√(r² + f²) - f)) [m]; negative diverges.
-    aperture: its shape within the circle of radius R: Circle (default), Annulus, Polygon, Slit.
+    aperture: its shape within the circle of radius R: Circle (default), Annulus, Rings, Polygon, Slit, or what `union`,
+        `difference` and `intersection` make of such.
     wavefront: W [m], in vacuum at every wavelength: Zernike, or WavefrontMap, over a circle no smaller than the pupil.
 
-    Radius, height, n, focal length and W's numbers may be Dr.Jit arrays (a height map: a tensor): derivatives flow
+    mask: M, the amplitude that is let through: GaussianMask, or MaskMap. A PSF stays relative to the light that falls
+        on the open aperture, so that what a mask takes away is missing from it.
+
+    Radius, height, n, focal length and the numbers of W and M may be Dr.Jit arrays (maps: tensors): derivatives flow
     through them.
 
     Raises:
@@ -55,6 +61,7 @@ class Pupil:
     thin_lens_focal_length: Scalar | None = None
     aperture: Aperture = field(default_factory=Circle)
     wavefront: Aberration | None = None
+    mask: Mask | None = None
 
     def __post_init__(self) -> None:
         positive("aperture_radius", self.aperture_radius)
@@ -63,6 +70,8 @@ class Pupil:
             in_range("n", self.n, 1.0, 10.0)
             object.__setattr__(self, "n", RefractiveIndex(self.n))
         of_kind("aperture", self.aperture, Aperture, "Circle()")
+        if self.mask is not None:
+            self._check_reach("mask", of_kind("mask", self.mask, Mask, "GaussianMask(20e-6)").radius)
         if self.height is not None and not isinstance(self.height, Relief):
             height = self.height if is_differentiable(self.height) else reals("height", self.height)
             object.__setattr__(self, "height", HeightMap(height))
@@ -78,16 +87,19 @@ class Pupil:
             positive("abs(thin_lens_focal_length)", abs(finite("thin_lens_focal_length", self.thin_lens_focal_length)))
 
     def _check_wavefront(self, wavefront: Aberration) -> None:
-        radius, most = number(self.aperture_radius), max(TALLEST * number(self.aperture_radius), ANY_HEIGHT)
-        if wavefront.radius is not None and wavefront.radius < radius * (1 - 1e-9):
-            raise ValueError(
-                f"wavefront is known over a radius of {wavefront.radius:.3g} m: must be the pupil's, {radius:.3g} m, "
-                "or more"
-            )
+        self._check_reach("wavefront", wavefront.radius)
+        most = max(TALLEST * number(self.aperture_radius), ANY_HEIGHT)
         if wavefront.span > most:
             raise ValueError(
                 f"wavefront spans {wavefront.span:.3g} m: must be at most {most:.3g} m "
                 "(Zernike's coefficients are in µm, a map's samples in m)"
+            )
+
+    def _check_reach(self, name: str, known: float | None) -> None:
+        if known is not None and known < number(self.aperture_radius) * (1 - 1e-9):
+            raise ValueError(
+                f"{name} is known over a radius of {known:.3g} m: must be the pupil's, "
+                f"{number(self.aperture_radius):.3g} m, or more"
             )
 
     @cached_property
@@ -99,6 +111,26 @@ class Pupil:
     def area(self) -> float:
         """[m²]"""
         return self.aperture.area * self.radius**2
+
+    @cached_property
+    def transmission(self) -> Scalar:
+        """Share of the light on the open aperture that the mask lets through, with derivatives; 1 without a mask."""
+        if self.mask is None:
+            return 1.0
+        import drjit as dr
+
+        types = precision("float64")
+        nodes = self.aperture.nodes(2 * self.mask.bandwidth(LEVEL, self.radius) * self.radius, TRANSMISSION_DIGITS)
+        amplitude = self.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types)
+        found = dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
+        return found if dr.grad_enabled(found) else number(found)
+
+    def amplitude(self, x: Array, y: Array, types: Precision) -> Array:
+        """The mask's, at points in units of R."""
+        if self.mask is None:
+            return types.Float64(1)
+        radius = opaque(types, self.aperture_radius)
+        return self.mask.amplitude(x * radius, y * radius, self.aperture_radius, types)
 
     @property
     def pixels(self) -> int:
@@ -138,7 +170,8 @@ class Pupil:
     def rotationally_symmetric(self, wavelength: float) -> bool:
         relief_is = not self.bends(wavelength) or self.height.rotationally_symmetric
         wavefront_is = self.wavefront is None or self.wavefront.rotationally_symmetric
-        return self.aperture.rotationally_symmetric and relief_is and wavefront_is
+        mask_is = self.mask is None or self.mask.rotationally_symmetric
+        return self.aperture.rotationally_symmetric and relief_is and wavefront_is and mask_is
 
     def path(self, x: Array, y: Array, wavelength: float, source: PointSource, types: Precision) -> Array:
         """Optical path [m] through source and pupil at points (x, y) [m], flat float64 arrays."""
@@ -173,13 +206,16 @@ class Pupil:
         return self.height.scatter(turns, self.aperture, share) / self.radius
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
-        """Spatial frequency [1/m] above which relief and wavefront change the phase by less than `tolerance` rad.
-        Jumps between pixels count for nothing: they are sampled for themselves."""
+        """Spatial frequency [1/m] above which relief and wavefront change the phase by less than `tolerance` rad,
+        and the mask the amplitude by as much. Jumps between pixels count for nothing: they are sampled for
+        themselves."""
         level, step = tolerance * wavelength / (2 * np.pi), abs(number(self.index_step(wavelength)))
         found = 0.0
         if self.height is not None and step != 0 and not self.pixels:
             found = self.height.bandwidth(level / step) / self.radius
-        return found if self.wavefront is None else max(found, self.wavefront.bandwidth(level) / self.radius)
+        if self.wavefront is not None:
+            found = max(found, self.wavefront.bandwidth(level) / self.radius)
+        return found if self.mask is None else found + self.mask.bandwidth(min(tolerance, 0.1), self.radius)
 
 
 @lru_cache(maxsize=64)

@@ -108,8 +108,10 @@ class Eye:
 
     @property
     def throughput(self) -> Scalar:
-        """a², times the open share of the aperture's disk."""
-        return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
+        """a², times the share of the aperture's disk that is open, and of that light what a mask lets through."""
+        if self.pupil is None:
+            return throughput(self.relative_aperture, 1.0)
+        return throughput(self.relative_aperture, self.pupil.aperture.area / math.pi) * self.pupil.transmission
 
     @property
     def channels(self) -> int:

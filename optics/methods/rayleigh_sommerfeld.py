@@ -149,6 +149,8 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
     nodes_x, nodes_y = types.Float64(found.x) * radius, types.Float64(found.y) * radius
     z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.pupil.medium_n)
     weight = types.Float64(found.weight) * dr.square(radius) * z / (2 * math.pi)
+    if beam.pupil.mask is not None:
+        weight *= beam.pupil.amplitude(types.Float64(found.x), types.Float64(found.y), types)
     waves = beam.waves(nodes_x, nodes_y, types)
     dr.eval(nodes_x, nodes_y, weight, waves, x, y)
     count = dr.opaque(types.Index, len(found.weight))

@@ -55,7 +55,7 @@ class Member:
 
     @property
     def plain(self) -> bool:
-        """Whether it has a smooth relief of 4 x 4 points at most, and asks for no derivative."""
+        """Whether it has a smooth relief of 4 x 4 points at most and no more, and asks for no derivative."""
         pupil = self.pupil
         numbers = (
             pupil.aperture_radius,
@@ -65,7 +65,7 @@ class Member:
             pupil.n.b,
             pupil.thin_lens_focal_length,
         )
-        if pupil.wavefront is not None or any(is_differentiable(value) for value in numbers):
+        if pupil.wavefront is not None or pupil.mask is not None or any(is_differentiable(value) for value in numbers):
             return False
         relief = pupil.height
         return relief is None or (isinstance(relief, BSplineRelief) and not is_differentiable(relief.control_points))

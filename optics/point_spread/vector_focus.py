@@ -71,7 +71,7 @@ def vector_focus(
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
     lambda_ = vacuum_wavelength(wavelength)
     one_of("apodization", apodization, ("flat", "aplanatic"))
-    if not pupil.rotationally_symmetric(lambda_):
+    if not pupil.rotationally_symmetric(lambda_) or len(pupil.aperture.rings) > 1:
         raise ValueError(f"pupil = {shown(pupil)}: must be the same all around, a circle or ring with such a relief")
     z = pupil.image_distance(math.inf) if sensor_distance is None else positive("sensor_distance", sensor_distance)
     zones = pupil.radius**2 * pupil.medium_n / (lambda_ * z)
@@ -89,7 +89,7 @@ def vector_focus(
 def _flat(pupil: Pupil, wavelength: float, z: float) -> tuple[tuple[float, float], Light]:
     """r = z tan θ; W is what the path through the pupil and on to the axis has more than the axial one."""
     types = precision("float64")
-    inner = pupil.aperture.inner_radius * pupil.radius
+    inner = pupil.aperture.rings[0][0] * pupil.radius
     r = np.linspace(inner, pupil.radius, PATH_SAMPLES)
 
     def waves(r: np.ndarray) -> np.ndarray:
@@ -97,8 +97,12 @@ def _flat(pupil: Pupil, wavelength: float, z: float) -> tuple[tuple[float, float
         found: np.ndarray = (path + pupil.medium_n * r * r / (np.sqrt(r * r + z * z) + z)) / wavelength
         return found
 
+    def passed(r: np.ndarray) -> np.ndarray:
+        found: np.ndarray = pupil.amplitude(types.Float64(r / pupil.radius), types.Float64(0 * r), types).numpy()
+        return found
+
     def at(theta: np.ndarray) -> np.ndarray:
-        found: np.ndarray = np.exp(2j * np.pi * waves(z * np.tan(theta))) / np.cos(theta)
+        found: np.ndarray = passed(z * np.tan(theta)) * np.exp(2j * np.pi * waves(z * np.tan(theta))) / np.cos(theta)
         return found
 
     turns = float(np.abs(np.diff(waves(r))).max()) * (PATH_SAMPLES - 1)
@@ -107,13 +111,13 @@ def _flat(pupil: Pupil, wavelength: float, z: float) -> tuple[tuple[float, float
 
 def _aplanatic(pupil: Pupil, z: float) -> tuple[tuple[float, float], Light]:
     """r = z sin θ, all rays in phase."""
-    bare = pupil.height is None and pupil.wavefront is None
+    bare = pupil.height is None and pupil.wavefront is None and pupil.mask is None
     if not bare or pupil.thin_lens_focal_length is None or pupil.radius >= z:
         raise ValueError(
-            f"apodization = 'aplanatic': must be an ideal lens without relief or wavefront, its radius "
+            f"apodization = 'aplanatic': must be an ideal lens without relief or wavefront or mask, its radius "
             f"{pupil.radius:.3g} m below the distance {z:.3g} m"
         )
-    inner = pupil.aperture.inner_radius * pupil.radius
+    inner = pupil.aperture.rings[0][0] * pupil.radius
     return (math.asin(inner / z), math.asin(pupil.radius / z)), Light(lambda theta: np.sqrt(np.cos(theta)))
 
 

@@ -6,6 +6,7 @@ pupil: test_pupil.py
 refractive_index: test_refractive_index.py
 relief: test_relief.py
 source: test_source.py
+transmittance: test_transmittance.py
 wavefront: test_wavefront.py
 wavefront_slopes: test_pupil.py
 """
