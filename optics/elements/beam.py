@@ -36,6 +36,11 @@ class Beam:
         """[m]"""
         return self.pupil.aperture_radius
 
+    @property
+    def index(self) -> float:
+        """Of the medium behind the pupil."""
+        return self.pupil.index_behind(self.wavelength)
+
     def waves(self, x: Array, y: Array, types: Precision) -> Array:
         """Optical path in wavelengths at the pupil's points, float64."""
         return self.pupil.path(x, y, self.wavelength, self.source, types) * opaque(types, 1 / self.wavelength)

@@ -39,6 +39,9 @@ class DescribedEye(Protocol):
     def sensor_distance(self) -> Scalar: ...
 
     @property
+    def retina_distance(self) -> Scalar: ...
+
+    @property
     def receptor_pitch(self) -> float: ...
 
     @property
@@ -148,7 +151,7 @@ def describe(eye: DescribedEye, z: Scalar) -> Description:
     return Description(
         relative_aperture=number(eye.relative_aperture),
         throughput=light,
-        f_number=distance / (2 * result.pupil.radius),
+        f_number=number(eye.retina_distance) / (2 * result.pupil.radius),
         wavelength=wavelength,
         diffraction_cpd=diffraction * per_degree,
         sampling_cpd=per_degree / (2 * eye.receptor_pitch),

@@ -134,7 +134,7 @@ def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, 
     import drjit as dr
 
     step = opaque(types, STEP * beam.pupil.radius)
-    scale = opaque(types, beam.wavelength / beam.pupil.medium_n) / (2 * step)
+    scale = opaque(types, beam.wavelength / beam.index) / (2 * step)
     px = (beam.waves(x + step, y, types) - beam.waves(x - step, y, types)) * scale
     py = (beam.waves(x, y + step, types) - beam.waves(x, y - step, types)) * scale
     squared = px * px + py * py

@@ -147,7 +147,7 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
     found = cached_nodes(*rule)
     radius = opaque(types, beam.radius)
     nodes_x, nodes_y = types.Float64(found.x) * radius, types.Float64(found.y) * radius
-    z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.pupil.medium_n)
+    z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.index)
     weight = types.Float64(found.weight) * dr.square(radius) * z / (2 * math.pi)
     if beam.pupil.mask is not None:
         weight *= beam.pupil.amplitude(types.Float64(found.x), types.Float64(found.y), types)

@@ -77,7 +77,9 @@ def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
     weight = types.Float(nodes.weight)
     slant = dr.sqrt(z * z + radius * radius * types.Float(nodes.x**2 + nodes.y**2))
     size = weight * z / (2 * np.pi * slant * slant)
-    wavenumber = types.Float(2 * np.pi * result.pupil.medium_n / wavelengths)
+    wavenumber = types.Float(
+        np.array([2 * np.pi * result.pupil.index_behind(at) / at for at in map(float, wavelengths)])
+    )
     if mask is not None:
         size = size * dr.abs(result.pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types))
     near, far = dr.sum(size / slant), dr.sum(size) * wavenumber

@@ -190,7 +190,7 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     import drjit as dr
 
     pupil, outline, types = result.pupil, result.pupil.aperture.outline, precision("float64")
-    wavelength = types.Float(result.wavelengths / pupil.medium_n)
+    wavelength = types.Float(np.array([at / pupil.index_behind(at) for at in map(float, result.wavelengths)]))
     ratio = outline.length / (2 * math.pi**2 * pupil.aperture.area)
     light, rim = pupil.transmission, 1.0
     if pupil.mask is not None:
@@ -207,7 +207,7 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
 def _bent_beyond_grazing(request: Request) -> float:
     """Share of the pupil's light."""
     pupil = request.beam.pupil
-    x, _ = pupil.slopes(request.beam.wavelength, request.beam.source).rays(1.0, pupil.medium_n)
+    x, _ = pupil.slopes(request.beam.wavelength, request.beam.source).rays(1.0, request.beam.index)
     return float(np.mean(~np.isfinite(x)))
 
 

@@ -100,7 +100,8 @@ class PSFResult:
     def cutoff(self) -> np.ndarray:
         """Frequency [1/m] beyond which the intensity has none, 2R/√(R² + z²) n/λ, (wavelength,)."""
         radius, distance = self.pupil.radius, number(self.sensor_distance)
-        found: np.ndarray = 2 * radius / math.hypot(radius, distance) * self.pupil.medium_n / self.wavelengths
+        index = np.array([self.pupil.index_behind(float(wavelength)) for wavelength in self.wavelengths])
+        found: np.ndarray = 2 * radius / math.hypot(radius, distance) * index / self.wavelengths
         return found
 
     @property

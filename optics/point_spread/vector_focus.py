@@ -74,14 +74,15 @@ def vector_focus(
     if not pupil.rotationally_symmetric(lambda_) or len(pupil.aperture.rings) > 1:
         raise ValueError(f"pupil = {shown(pupil)}: must be the same all around, a circle or ring with such a relief")
     z = pupil.image_distance(math.inf) if sensor_distance is None else positive("sensor_distance", sensor_distance)
-    zones = pupil.radius**2 * pupil.medium_n / (lambda_ * z)
+    index = pupil.index_behind(lambda_)
+    zones = pupil.radius**2 * index / (lambda_ * z)
     if zones < FEWEST_ZONES:
         raise AccuracyError(f"Fresnel number {zones:.3g}: must be at least {FEWEST_ZONES:g} for rays to meet; use psf")
     ends, light = _aplanatic(pupil, z) if apodization == "aplanatic" else _flat(pupil, lambda_, z)
     window = Grid(shape, dx)
     x, y = window.x[None, :], window.y[:, None]
     radii, back = np.unique(np.round(np.hypot(x, y) / dx, 9), return_inverse=True)
-    found = focal_integrals(radii * dx, 2 * math.pi * pupil.medium_n / lambda_, z, ends, light)
+    found = focal_integrals(radii * dx, 2 * math.pi * index / lambda_, z, ends, light)
     found = found[:, back.reshape(window.shape)] / math.sqrt(pupil.area)
     return _components(found, np.arctan2(y, x), polarization, window.dx)
 
@@ -94,7 +95,7 @@ def _flat(pupil: Pupil, wavelength: float, z: float) -> tuple[tuple[float, float
 
     def waves(r: np.ndarray) -> np.ndarray:
         path = pupil.path(types.Float64(r), types.Float64(0 * r), wavelength, PointSource(), types).numpy()
-        found: np.ndarray = (path + pupil.medium_n * r * r / (np.sqrt(r * r + z * z) + z)) / wavelength
+        found: np.ndarray = (path + pupil.index_behind(wavelength) * r * r / (np.sqrt(r * r + z * z) + z)) / wavelength
         return found
 
     def passed(r: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ from optics import (
     Rings,
     Spider,
     difference,
+    medium,
     union,
 )
 from optics.apertures.polygonal import Polygon, Slit
@@ -105,7 +106,8 @@ def requests(draw, radius=(3e-7, 5e-5)):
         "aperture_radius": draw(logarithmic(*radius)),
         "height": draw(reliefs()),
         "n": draw(st.one_of(st.floats(1, 2.5), st.floats(20, 80).map(lambda v: RefractiveIndex.from_abbe(1.5, v)))),
-        "medium_n": draw(st.sampled_from([1.0, 1.0, 1.33])),
+        "medium_n": draw(st.sampled_from([1.0, 1.0, 1.33, medium("water")])),
+        "object_n": draw(st.sampled_from([None, None, 1.0, medium("aqueous")])),
         "thin_lens_focal_length": draw(st.one_of(st.none(), logarithmic(2e-5, 1e-2))),
         "aperture": draw(apertures()),
         "mask": draw(masks()),
