@@ -17,6 +17,10 @@ def asking(value):
     return found
 
 
+def seen_by_a_rhabdom(pupil):
+    return optics.Ommatidium(pupil, optics.Waveguide(2e-6)).sensitivity(0.0, 0.0)
+
+
 def corners():
     found = TensorXf64(np.array([[0.5, 0], [0, 0.5], [-0.5, 0]]))
     dr.enable_grad(found)
@@ -34,6 +38,14 @@ DROPPED = {
     "c of a curve": lambda: optics.RefractiveIndex(1.3, 0.0, asking(1e-28)),
     "strengths of a curve": lambda: optics.Sellmeier((asking(0.5),), (0.1,)),
     "b_um of a curve": lambda: optics.Cornu(1.3, asking(0.005), 0.2),
+    "diameter of a rhabdom": lambda: optics.Waveguide(asking(2e-6)),
+    "diameter of a facet": lambda: optics.FacetLens(asking(2e-6), 1e-5),
+    "radius_front of a facet": lambda: optics.FacetLens(2e-5, asking(1e-5)),
+    "lens": lambda: seen_by_a_rhabdom(optics.Pupil(1e-5, thin_lens_focal_length=asking(5e-5))),
+    "lens.mask": lambda: seen_by_a_rhabdom(
+        optics.Pupil(1e-5, thin_lens_focal_length=5e-5, mask=optics.GaussianMask(asking(1e-5)))
+    ),
+    "aperture_radius": lambda: seen_by_a_rhabdom(optics.Pupil(asking(1e-5), thin_lens_focal_length=5e-5)),
     "full_aperture": lambda: optics.Eye(full_aperture=asking(1e-3)),
     "eccentricity_deg": lambda: optics.Eye(eccentricity_deg=(asking(1.0), 0.0)),
     "medium_n": lambda: optics.Pupil(10e-6, medium_n=asking(1.3)),
