@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from optics.elements.beam import Beam
+from optics.methods.carrier import on_line
 from optics.methods.problem import Problem
 from optics.methods.spectral_taper import Taper, tapers
 from optics.numerics.autodiff import Array
@@ -50,6 +51,10 @@ class HankelSampling:
         types = precision(problem.dtype)
         profile = _hankel(beam, problem, self, types).intensity
         return self.line.onto(profile, problem.window, types)
+
+    def field(self, beam: Beam, problem: Problem) -> Field:
+        """U over the window, less the carrier e^{ikz}."""
+        return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
         """Width [m] over which rounding spreads the pupil's light."""
@@ -96,7 +101,7 @@ def _round_up(n: int) -> int:
 
 
 def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision) -> Field:
-    """The field on the line's radii, up to a phase that intensity forgets."""
+    """The field on the line's radii, less the carrier e^{ikz}."""
     import drjit as dr
 
     nodes, weights = _on_rings(problem.aperture.rings, how.radii)

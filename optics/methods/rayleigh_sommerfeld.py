@@ -10,6 +10,7 @@ import numpy as np
 
 from optics.apertures.aperture import Aperture, Nodes
 from optics.elements.beam import Beam
+from optics.methods.carrier import on_line
 from optics.methods.problem import Problem
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import CALL, NODE, PAIRS_PER_SECOND
@@ -63,6 +64,16 @@ class NodeSampling:
             return direct_sum(beam, self.rule, x, y, types).intensity
         r = types.Float64(self.line.positions)
         return self.line.onto(direct_sum(beam, self.rule, r, 0 * r, types).intensity, problem.window, types)
+
+    def field(self, beam: Beam, problem: Problem) -> Field:
+        """U over the window, less the carrier e^{ikz}."""
+        types = precision(problem.dtype)
+        if self.line is None:
+            x, y = problem.window.coordinates(types)
+            found = direct_sum(beam, self.rule, x, y, types)
+            return Field(found.re, found.im, problem.window, types)
+        r = types.Float64(self.line.positions)
+        return on_line(direct_sum(beam, self.rule, r, 0 * r, types), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
         """Width [m] over which rounding spreads the pupil's light: the focus, times the root of the summands."""
