@@ -18,15 +18,15 @@ from optics.numerics.precision import opaque, precision
 from optics.point_spread.request import Request
 from optics.point_spread.spot_check import spot_check
 
-__all__ = ["Picture", "pictures"]
+__all__ = ["PSFPicture", "pictures"]
 
 TRIES = 3  # choice: pictures that are computed before a tolerance is given up
 # Choice: after an error f times too large, ask for a tolerance f / 0.3 times smaller, so that one more try is enough.
 NEXT_TOLERANCE = 0.3
 
 
-class Picture(NamedTuple):
-    """A PSF, flat; its plan; and the field whose square it is, carrier included, where that was wanted."""
+class PSFPicture(NamedTuple):
+    """A PSF, flat; its plan; the field whose square it is, carrier included, where that was wanted."""
 
     image: Array
     plan: Plan
@@ -68,9 +68,9 @@ class _Attempt:
         """Whether the method errs however many samples it takes."""
         return self.sampling.model_error > 0
 
-    def stated(self, error: float) -> Picture:
+    def stated(self, error: float) -> PSFPicture:
         """The picture, and the plan with the error that is now known."""
-        return Picture(self.image, replace(self.plan, predicted_error=error), self.field)
+        return PSFPicture(self.image, replace(self.plan, predicted_error=error), self.field)
 
     def repeated(self, error: float, tolerance: float) -> _Attempt | None:
         """What to try after the check saw an error above the tolerance: an exact method, or else a smaller tolerance,
@@ -89,7 +89,7 @@ class _Attempt:
         return _Attempt.at(request, request.planned())
 
 
-def pictures(requests: Sequence[Request]) -> list[Picture]:
+def pictures(requests: Sequence[Request]) -> list[PSFPicture]:
     """PSFs, flat, and their plans. All are planned before any is computed, so that one that cannot be had is refused at
     once; and all are started before any is waited for.
 
@@ -107,7 +107,7 @@ def pictures(requests: Sequence[Request]) -> list[Picture]:
     return [_checked(attempt, attempt.request, TRIES) for attempt in started]
 
 
-def _checked(attempt: _Attempt, asked: Request, tries: int) -> Picture:
+def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
     """The picture, or a better one, and its plan with the error that a spot check tells.
 
     asked: the request in its first form; an approximation that it names stays, however wrong it is seen to be.
