@@ -9,10 +9,10 @@ from optics.methods.problem import Problem
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 
-__all__ = ["FieldSampling", "Sampling"]
+__all__ = ["Sampling", "WithField"]
 
 
-class FieldSampling(Protocol):
+class WithField(Protocol):
     """What exact methods but "far_field" give besides."""
 
     def field(self, beam: Beam, problem: Problem) -> Field:

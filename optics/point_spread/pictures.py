@@ -10,7 +10,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from optics.methods.problem import Problem
-from optics.methods.sampling import FieldSampling, Sampling
+from optics.methods.sampling import Sampling, WithField
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
@@ -58,7 +58,7 @@ class _Attempt:
         area = types.Float(beam.pupil.aperture.area * radius * radius)
         if not request.keeps_field:
             return cls(request, plan, sampling, sampling.intensity(beam, problem) / area)
-        whole = cast(FieldSampling, sampling).field(beam, problem)
+        whole = cast(WithField, sampling).field(beam, problem)
         waves = opaque(types, beam.distance) * opaque(types, 1 / problem.wavelength)
         field = whole * Field.from_waves(dr.rsqrt(area), waves, whole.grid, types)
         return cls(request, plan, sampling, field.intensity, field)
