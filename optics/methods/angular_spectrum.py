@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from optics.elements.beam import Beam
 from optics.methods.fresnel import paraxial_integral
@@ -45,11 +46,11 @@ class SpectrumSampling:
         """Whether no paraxial part is split off."""
         return self.method == "angular_spectrum"
 
-    @property
+    @cached_property
     def spectrum(self) -> Grid:
         return Grid.square(2 * math.ceil(self.taper.end * self.period) + 1, 1 / self.period)
 
-    @property
+    @cached_property
     def relay(self) -> Grid:
         return Grid.square(self.output_period, self.period / self.output_period)
 
@@ -87,7 +88,7 @@ class GridSampling(SpectrumSampling):
     seconds: float = 0.0
     model_error: float = 0.0
 
-    @property
+    @cached_property
     def pupil(self) -> Grid:
         """The samples that hold the soft disk."""
         pitch = self.period / self.pupil_period
