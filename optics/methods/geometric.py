@@ -182,7 +182,7 @@ def _ray_error(problem: Problem) -> float:
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None
     blurred = mismatch(1 / (rays.image_area + SPLAT_CELLS * cell), _brightness(problem))
-    if len(rays) == 0 or rays.folded:
+    if len(rays) == 0 or rays.folded or problem.masked:
         return blurred
     stretch = float(np.mean(1 / np.maximum(rays.least, 1e-12)))
     zone = math.sqrt(problem.wavelength * problem.distance * stretch) + problem.window.dx * stretch
