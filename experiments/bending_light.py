@@ -166,7 +166,7 @@ def draw_reliefs(store: Store, path: Path) -> None:
             title = f"{run[0]}, seed {run[1]}\n{what}: a = {row.relative_aperture:.2f}, n = {row.refractive_index:.2f}"
             axes[i, column].set_title(title, fontsize=7)
     if maps:
-        figure.colorbar(shown, ax=axes, shrink=0.7)
+        figure.colorbar(shown, ax=axes, shrink=0.7, label="optical path through the relief [µm]")
     save(figure, path)
 
 

@@ -143,6 +143,9 @@ def draw(store: Store, path: Path) -> None:
     for place in axes[-1]:
         place.set_xlabel("generation")
     lines = [Line2D([], [], color=COLORS.get(group, "#777777"), label=group) for group in store.groups]
+    lines.append(
+        Line2D([], [], color="#444444", marker="o", ms=4, lw=0, label=f"mean of the last {LAST} generations, 95 %")
+    )
     lines.append(Patch(color="#777777", alpha=0.25, label="null model: selection by luck"))
     figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), frameon=False)
     figure.suptitle("What each task makes of one photoreceptor, generation by generation")

@@ -128,6 +128,8 @@ def by_width(store: Store) -> str:
 
 def draw(store: Store, path: Path) -> None:
     """Success over the pupil's width."""
+    from matplotlib.lines import Line2D
+
     figure, axes = new_figure(6.4, 4.0)
     place = axes[0, 0]
     for group, color in store.colors.items():
@@ -138,10 +140,15 @@ def draw(store: Store, path: Path) -> None:
             for width in best_pupil.predicted(store.noise_sigma(group), (measure,)):
                 if width != "-":
                     place.axvline(float(width), color=color, ls=style, lw=1, alpha=0.6)
-    place.axhline(CHANCE, color="#999999", lw=0.8, ls=":")
+    place.axhline(CHANCE, color="#999999", lw=0.8, ls="-.")
     ticks = [0.05, 0.1, 0.2, 0.3, 0.5]
     place.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     place.minorticks_off()
+    lines = [Line2D([], [], color=color, marker="o", ms=4, label=f"σ = {g}") for g, color in store.colors.items()]
+    named = {"contrast": "best by contrast", "stripes_2": "best by stripes of two receptors"}
+    lines += [Line2D([], [], color="#444444", lw=1, ls=style, label=named[m]) for m, style in DRAWN.items()]
+    lines.append(Line2D([], [], color="#999999", lw=0.8, ls="-.", label="chance"))
+    figure.legend(handles=lines, frameon=False, fontsize=8, loc="outside lower center", ncols=3)
     place.set(xlabel="relative aperture a", ylabel="goal reached before any adversary", ylim=(0, 1))
     save(figure, path)
 

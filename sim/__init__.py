@@ -8,6 +8,8 @@ BatchedRenderer                     all eyes of all worlds as one wavefront
 choose_fidelity, Fidelity           how finely: as the receptors' noise allows
 FidelityWarning                     where nothing is fine enough
 ReferenceRenderer                   the same, slowly: Mitsuba's integrators and optics' convolution
+ModelRenderer, Mount, Poses         eyes on any model of one's own; ring, both_sides: of several
+Task                                what a robot of one's own has to do: for make_vec_env
 make_vec_env, make_env              the environments, natively batched or single
                                     (also gymnasium.make("rhabdom/Detection-v0"), Foraging, Maze ...)
 View, write_exr, read_exr           what was seen, on disk
@@ -31,6 +33,10 @@ if TYPE_CHECKING:
     from sim.render.fidelity import Fidelity
     from sim.render.fidelity_choice import FidelityWarning, choose_fidelity
     from sim.render.reference_renderer import ReferenceRenderer
+    from sim.robots.model_renderer import ModelRenderer
+    from sim.robots.mounts import Mount, both_sides, ring
+    from sim.robots.poses import Poses
+    from sim.robots.task import Task
     from sim.scene.mirror import Mirror, MirrorWarning, mirror
     from sim.worlds.course import Course
     from sim.worlds.world import World, build_world
@@ -45,6 +51,12 @@ _HOME = {
     "mirror": "sim.scene.mirror",
     "BatchedRenderer": "sim.render.batched_renderer",
     "ReferenceRenderer": "sim.render.reference_renderer",
+    "ModelRenderer": "sim.robots.model_renderer",
+    "Mount": "sim.robots.mounts",
+    "both_sides": "sim.robots.mounts",
+    "ring": "sim.robots.mounts",
+    "Poses": "sim.robots.poses",
+    "Task": "sim.robots.task",
     "Fidelity": "sim.render.fidelity",
     "FidelityWarning": "sim.render.fidelity_choice",
     "choose_fidelity": "sim.render.fidelity_choice",
@@ -64,15 +76,21 @@ __all__ = [
     "FidelityWarning",
     "Mirror",
     "MirrorWarning",
+    "ModelRenderer",
+    "Mount",
+    "Poses",
     "ReferenceRenderer",
+    "Task",
     "View",
     "World",
+    "both_sides",
     "build_world",
     "choose_fidelity",
     "make_env",
     "make_vec_env",
     "mirror",
     "read_exr",
+    "ring",
     "write_exr",
 ]
 

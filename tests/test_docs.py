@@ -144,7 +144,7 @@ def test_paths_and_names_exist(document):
         ("`eye.in_bands(x)`, `eye.noise_sigma`, `eye.out_of_bands(x)`", ["eye.out_of_bands"]),
         ("`NodeChoice`, `linear_weights`, `choose_fidelity(world, eyes)`", []),
         ("`Sight`, `lit_in_bands`, `STEEPEST_SINE`", ["STEEPEST_SINE", "Sight", "lit_in_bands"]),
-        ("`mirror(model)`, `mirrored(model)`", ["mirrored"]),
+        ("`mirror(model)`, `mirrord(model)`", ["mirrord"]),
         ("`mujoco.Renderer`, `MjData.timer`, `config.toml`, `evolve genes`", []),
         ("[B9](validation/B9.md), https://host/optics/none.py", []),  # links: see above
     ],

@@ -39,6 +39,7 @@ SMALL = (
     "evaluation.episodes=1",
     "search.population=3",
     "search.generations=2",
+    "genome.placement_range_deg.start=60",
 )
 OBLONG = ("genome.resolution_height.start=4", "genome.resolution_width.start=4")  # genes that square eyes have not
 PERFECT = ("eye.optics=false",)
@@ -151,8 +152,8 @@ FIELDS = {
     "eye.bands": Case("eye.bands=3", sight),
     "eye.relief_height": Case("eye.relief_height=80e-6", point_image, ()),
     "eye.rays_per_receptor": Case("eye.rays_per_receptor=2", life),
-    "eye.relief_points": Case("eye.relief_points=5", history, ()),
-    "eye.relief_symmetric": Case("eye.relief_symmetric=true", history, ()),
+    "eye.relief_points": Case("eye.relief_points=5", history, ("genome.doe.open=true",)),
+    "eye.relief_symmetric": Case("eye.relief_symmetric=true", history, ("genome.doe.open=true",)),
     "eye.square": Case("eye.square=true", history, ("eye.square=false", *PERFECT)),
     "eye.receptor_pitch": Case("eye.receptor_pitch=40e-6", point_image, ()),
     "eye.head_radius": Case("eye.head_radius=100e-6", sight),
@@ -262,8 +263,7 @@ def test_every_gene_moves_its_output(name):
     task = "foraging" if spectral else "detection"  # of the tasks, foraging alone is not grey
     given = FOUR_TYPES if spectral else SQUARE if name == SIDE else () if output is point_image else PERFECT
     before = _settled(output, task, given)
-    opened = () if ALL_GENES[name].default.open else (f"genome.{name}.open=true",)
-    config = small(task, (*given, *opened))
+    config = small(task, (*given, f"genome.{name}.open=true"))
     genotype = Genotype(config.genome)
     genome = genotype.start
     place = [gene.name for gene in genotype.open_genes].index(name)

@@ -45,6 +45,14 @@ SETTINGS = (
     "learning.eval_interval=128",
     "evaluation.episodes=2",
     "eye.rays_per_receptor=1",
+    # Animals of all kinds: the preset's own genome is narrower.
+    *("genome.placement_range_deg.low=0", "genome.placement_range_deg.high=180"),
+    *("genome.fov_deg.low=1", "genome.fov_deg.high=100"),
+    *(f"genome.resolution_{side}.{end}" for side in ("height", "width") for end in ("low=1", "high=16")),
+    *("genome.relative_aperture.low=0.1", "genome.relative_aperture.high=1"),
+    *("genome.refractive_index.low=1", "genome.refractive_index.high=2"),
+    *("genome.doe.open=true", "genome.memory_frames.open=true", "genome.memory_frames.high=5"),
+    *("genome.neurons.open=true", "genome.neurons.low=16", "genome.neurons.high=128"),
 )
 MOST_GROWTH = 1.25  # of memory, from the second quarter to the last
 MB = 1e6

@@ -16,6 +16,7 @@ SHELLS = ("bash", "zsh", "tcsh")
 FIRST = """\
 begin here:
   evolve doctor                              does it work here?
+  evolve demo --open                         a finished run, to look at
   evolve run detection --preset quick        evolve eyes, a few minutes
   evolve list                                the runs under runs/
   evolve report runs/detection-quick-1 --open
@@ -28,6 +29,7 @@ EXAMPLES = {
   evolve run detection --set search.generations=10 --out runs/first
   evolve run foraging --from runs/first:12                  from an animal of another run
 """,
+    "demo": "  evolve demo --open\n  evolve demo --out elsewhere\n",
     "resume": "  evolve resume runs/first --open\n",
     "status": "  evolve status runs/first --watch\n",
     "compare": "  evolve compare runs/first runs/second --html both.html\n",
@@ -201,9 +203,21 @@ def _add_products(commands: Commands) -> None:
         if name != "export":
             product.add_argument("--open", action="store_true", help="open the page in a browser")
         product.add_argument("--out", type=Path, metavar=out, help="where to write (default: in the run directory)")
-        told = product.add_mutually_exclusive_group()
-        told.add_argument("--json", action="store_true", help="print JSON")
-        told.add_argument("--quiet", action="store_true", help="print nothing but errors")
+        _add_voice(product)
+    demo = _command(
+        commands, "demo", "demo.demo", "look at a finished run that ships with rhabdom: report, replay, EXR"
+    )
+    demo.add_argument(
+        "--out", type=Path, metavar="DIR", default=Path("runs/demo"), help="where to (default: runs/demo)"
+    )
+    demo.add_argument("--open", action="store_true", help="open the report in a browser")
+    _add_voice(demo)
+
+
+def _add_voice(command: argparse.ArgumentParser) -> None:
+    told = command.add_mutually_exclusive_group()
+    told.add_argument("--json", action="store_true", help="print JSON")
+    told.add_argument("--quiet", action="store_true", help="print nothing but errors")
 
 
 def _add_tables(commands: Commands) -> None:

@@ -11,6 +11,7 @@ ground_plan      where an episode plays
 views            one moment, through a perfect lens and through the evolved one
 player           an episode to play
 picture          signals as pictures
+hints            what its words mean
 svg              figures that follow the page's theme
 theme            its colours
 markup           pieces of HTML

@@ -72,7 +72,7 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
     drawn = figure(comparison_figure({name: rows for name, rows in curves.items() if rows}), caption)
     found = table(["", *(column["run"] for column in columns)], rows, "comparison")
     body = html("<header><h1>{} runs</h1></header>\n", len(runs)) + section(
-        "runs", "Side by side", html('<div class="figures">{}</div>\n{}', drawn, found)
+        "runs", "Side by side", html('<div class="wide">{}</div>\n{}', drawn, found)
     )
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, document("runs side by side", body))

@@ -15,6 +15,7 @@ import optics
 from evolve.analysis.statistics import polychromatic
 from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
+from evolve.report.hints import hint
 from evolve.report.markup import Html, figure, html, joined, key, rounded
 from evolve.report.svg import drawing, inline
 from evolve.report.theme import ACCENT, INK, LINES, MUTED, VERMILLION
@@ -99,9 +100,9 @@ def _pupil(eye: optics.Eye, phenotype: Phenotype) -> Html:
     index = phenotype.refractive_index or 1.0
     waves = (index - 1) * (high - low) / 0.55
     caption = html(
-        "<b>Pupil.</b> Height of its relief, {} to {} µm within a radius of {} µm (a = {}). With n = {} the relief "
+        "<b>Pupil.</b> Height of its {}, {} to {} µm within a radius of {} µm (a = {}). With n = {} the relief "
         "delays green light (550 nm) by up to {} waves from place to place.",
-        *(rounded(low), rounded(high), rounded(radius), rounded(eye.relative_aperture)),
+        *(hint("relief"), rounded(low), rounded(high), rounded(radius), rounded(eye.relative_aperture)),
         *(rounded(index, 4), rounded(waves)),
     )
     return figure(svg, caption)
@@ -146,9 +147,10 @@ def _psf(light: WhiteLight) -> Html:
         svg = inline(drawn, "psf", f"Point spread function over {2 * edge:.3g} µm, peak {peak / 1e12:.3g} per µm².")
     plan = light.psf.plan
     caption = html(
-        "<b>Point spread function</b> of a distant point, all bands as white daylight weighs them; logarithmic, "
-        "{} decades. White square: one receptor, {} µm wide. Least accurate band: {}, predicted error {}.",
-        *(DECADES, rounded(pitch), plan.method.replace("_", " "), f"{plan.predicted_error:.1g}"),
+        "<b>{}</b> of a distant point, all {} as white daylight weighs them; logarithmic, "
+        "{} decades. White square: one {}, {} µm wide. Least accurate band: {}, predicted error {}.",
+        *(hint("psf", "Point spread function"), hint("bands"), DECADES, hint("receptor"), rounded(pitch)),
+        *(plan.method.replace("_", " "), f"{plan.predicted_error:.1g}"),
     )
     return figure(svg, caption)
 
@@ -187,7 +189,7 @@ def _cuts(light: WhiteLight) -> Html:
         axes.legend(frameon=False, loc="best", handlelength=1.2, labelcolor=MUTED)
         _degrees(axes, light.eye, 1e6 * half)
         svg = inline(drawn, "psf-bands", "Cuts through the point spread function, one per spectral band.")
-    caption = html("<b>PSF per band</b>: cuts along x through the optical axis; dark lines are short wavelengths.")
+    caption = html("<b>PSF per band</b>: cuts along x through the optical axis.")
     return figure(svg, caption)
 
 
@@ -214,11 +216,17 @@ def _mtf(light: WhiteLight) -> Html:
     of_whom = "" if _is_round(eye.pupil) else " of a circle as wide"
     quality = optics.image_quality(light.white, nyquist, eye.throughput, noise_of(eye))[0]
     caption = html(
-        "<b>Modulation transfer function</b> in white daylight, mean of all orientations ({}), and the diffraction "
-        "limit{} (dashed). Dotted: the receptors' Nyquist frequency, {} cycles per degree; contrast there {}. Strehl "
-        "ratio {} at {} nm; image quality {} (in 0 to 1: contrast above the noise, times throughput).",
-        *(key("accent"), of_whom, rounded(nyquist * scale), rounded(at_nyquist)),
-        *(rounded(strehl), f"{1e9 * light.psf.wavelengths[green]:.0f}", rounded(quality)),
+        "<b>{}</b> in white daylight, mean of all orientations ({}), and the diffraction "
+        "limit{} (dashed). Dotted: the receptors' Nyquist frequency, {} cycles per degree; contrast there {}. {} "
+        "{} at {} nm; image quality {} (in 0 to 1: contrast above the noise, times throughput).",
+        *(hint("mtf", "Modulation transfer function"), key("accent"), of_whom, rounded(nyquist * scale)),
+        *(
+            rounded(at_nyquist),
+            hint("Strehl ratio"),
+            rounded(strehl),
+            f"{1e9 * light.psf.wavelengths[green]:.0f}",
+            rounded(quality),
+        ),
     )
     return figure(svg, caption)
 

@@ -50,7 +50,7 @@ def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Ca
 
 def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> Html:
     """Best fitness so far of several runs, each under its name."""
-    with drawing(740, 320) as figure:
+    with drawing(460, 300) as figure:
         axes = figure.subplots()
         for place, (name, rows) in enumerate(curves.items()):
             colour, dashes = LINES[place % len(LINES)], DASHES[place // len(LINES) % len(DASHES)]

@@ -22,6 +22,7 @@ from evolve.report.figures import (
     vision_figure,
 )
 from evolve.report.ground_plan import GroundPlan
+from evolve.report.hints import hint
 from evolve.report.lineup import lineup
 from evolve.report.markup import Html, contents, document, figure, html, joined, key, rounded, section
 from evolve.report.player import episode_sentence, player
@@ -55,8 +56,9 @@ def _best_in_a_sentence(run: Run) -> Html:
     if (best := run.best) is None:
         return Html()
     animal = best.phenotype
-    eyes = (
-        f"{animal.n_eyes} eye{'s' * (animal.n_eyes > 1)} of {animal.resolution[0]} × {animal.resolution[1]} receptors"
+    eyes = html(
+        "{} eye{} of {} × {} {}",
+        *(animal.n_eyes, "s" * (animal.n_eyes > 1), *animal.resolution, hint("receptor", "receptors")),
     )
     return html(
         '<a href="#candidate-{}">Candidate {}</a>, the best of {}, has {}, and solved {} of its {} evaluation '
@@ -81,11 +83,11 @@ def fitness_section(run: Run) -> Html:
         return section("fitness", "Fitness", html("<p>No candidate has been evaluated yet.</p>\n"))
     rows = generation_statistics(run.candidates)
     caption = html(
-        "<b>Fitness over generations.</b> {} best so far and, pale, the 95 % bootstrap interval of its mean return; "
+        "<b>{} over generations.</b> {} best so far and, pale, the 95 % bootstrap interval of its mean return; "
         '{}; a dot per candidate, <span class="vermillion">×</span> failed. Fitness is the mean return of {} '
         "evaluation episodes after training. The best of many candidates is partly best by chance (selection bias); "
         "the interval does not include that.",
-        *(key("accent"), POPULATION, run.config.evaluation.episodes),
+        *(hint("fitness", "Fitness"), key("accent"), POPULATION, run.config.evaluation.episodes),
     )
     figures = figure(fitness_figure(rows, run.candidates), caption)
     caption = html(
@@ -115,9 +117,9 @@ def genes_section(run: Run) -> Html:
         return Html()
     parts = [
         html(
-            "<p>{} value in the best candidate so far, {}. The vertical axes span the range that evolution may "
-            "search.</p>\n",
-            *(key("accent"), POPULATION),
+            "<p>What the open {} came to: {} value in the best candidate so far, {}. The vertical axes span the "
+            "range that evolution may search.</p>\n",
+            *(hint("genome", "genes"), key("accent"), POPULATION),
         )
     ]
     shown, table = gene_values(run.candidates[0].phenotype), run.config.eye.genes.values()
@@ -149,7 +151,8 @@ def _dimensionless(gene: Gene) -> str:
 def _acuity(run: Run) -> Html:
     path = trajectory(run.candidates, acuity_cpd)
     caption = html(
-        "<b>acuity</b>: finest grating that the sampling allows, 1 / (2 min(placement range / (eyes − 1), fov / width))"
+        "<b>{}</b>: finest grating that the sampling allows, 1 / (2 min(placement range / (eyes − 1), fov / width))",
+        hint("acuity"),
     )
     return figure(gene_figure("acuity", "cycles / degree", path, None), caption)
 
@@ -158,9 +161,9 @@ def _relief(run: Run, genes: list[Gene]) -> Html:
     paths = {g.name: trajectory(run.candidates, lambda p, name=g.name: gene_values(p)[name]) for g in genes}  # type: ignore[misc]
     left_out = "Frozen genes" + (", and genes that mirror others," if run.config.eye.relief_symmetric else "")
     caption = html(
-        "<b>{} … {}</b>: the relief, with each panel where its gene lies over the pupil (x to the right, y up). {} are "
+        "<b>{} … {}</b>: the {}, with each panel where its gene lies over the pupil (x to the right, y up). {} are "
         "left out.",
-        *(genes[0].name, genes[-1].name, left_out),
+        *(genes[0].name, genes[-1].name, hint("relief"), left_out),
     )
     return html('<div class="wide">{}</div>\n', figure(relief_figure(paths), caption))
 
@@ -200,8 +203,9 @@ def facts_section(run: Run) -> Html:
 def best_section(run: Run, best: Candidate, episode: Episode) -> Html:
     """The best candidate: its eye, what it sees, and its genes."""
     content = html(
-        "<p>Candidate {} of generation {}, fitness {}.</p>\n{}<h3>What it sees</h3>\n{}<h3>Its genes</h3>\n{}",
-        *(best.id, best.generation, rounded(best.fitness, 4), eye_figures(best.phenotype, run.config.eye)),
+        "<p>{} {} of {} {}, {} {}.</p>\n{}<h3>What it sees</h3>\n{}<h3>Its genes</h3>\n{}",
+        *(hint("candidate", "Candidate"), best.id, hint("generation"), best.generation),
+        *(hint("fitness"), rounded(best.fitness, 4), eye_figures(best.phenotype, run.config.eye)),
         *(what_it_sees(episode, GroundPlan.of(episode)), tables.best_genes(run, best)),
     )
     return section("best", "The best eye", content)

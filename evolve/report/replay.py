@@ -11,7 +11,7 @@ from evolve.report.player import write_player
 from evolve.report.rerun_recording import require_rerun, write_recording
 from evolve.store.directory import Run
 
-__all__ = ["episode_facts", "episode_table", "write_replay"]
+__all__ = ["episode_facts", "episode_table", "write_page", "write_replay"]
 
 
 def write_replay(
@@ -35,13 +35,18 @@ def write_replay(
     if rrd:
         require_rerun()
     episode = record(run, candidate_id, seed)
-    path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{seed}.html"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    page = write_player(episode, path)
+    page = write_page(run, episode, out)
     paths = [page]
-    paths += [write_recording(episode, path.with_suffix(".rrd"))] if rrd else []
-    paths += [write_gif(episode, path.with_suffix(".gif"))] if gif else []
+    paths += [write_recording(episode, page.with_suffix(".rrd"))] if rrd else []
+    paths += [write_gif(episode, page.with_suffix(".gif"))] if gif else []
     return episode, paths
+
+
+def write_page(run: Run, episode: Episode, out: Path | None = None) -> Path:
+    """Write the page that plays an episode of a run, to `out` or into the run directory; returns its path."""
+    path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{episode.seed}.html"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return write_player(episode, path)
 
 
 def episode_facts(episode: Episode) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, gene_valu
 from evolve.config.assemble import to_toml
 from evolve.genome.genes import ALL_GENES
 from evolve.genome.phenotype import Phenotype
+from evolve.report.hints import hint
 from evolve.report.markup import Html, duration, exact, html, joined, rounded, table
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
@@ -20,7 +21,7 @@ def headline(run: Run) -> Html:
     generations = len({c.generation for c in run.candidates})
     seconds = sum(c.seconds for c in run.candidates)
     steps = sum(c.steps for c in run.candidates)
-    tiles = [
+    tiles: list[tuple[str | Html, str, str]] = [
         (
             "Candidates evaluated",
             f"{len(run.candidates)}",
@@ -36,16 +37,20 @@ def headline(run: Run) -> Html:
     return html('<dl class="tiles">{}</dl>\n', items)
 
 
-def _best_tiles(best: Candidate) -> list[tuple[str, str, str]]:
+def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
     low, high = bootstrap_interval(best.returns)
     spread = "a single episode"
     if len(best.returns) > 1:
         spread = f"mean of {len(best.returns)} episodes; 95 % interval {rounded(low)} to {rounded(high)}"
     return [
-        ("Best fitness", rounded(best.fitness, 4), spread),
+        (html("Best {}", hint("fitness")), rounded(best.fitness, 4), spread),
         ("Best candidate", f"no. {best.id}", f"generation {best.generation}"),
         ("Episodes solved by the best", f"{rounded(100 * best.success_rate)} %", f"of {len(best.returns)}"),
-        ("Its acuity", f"{rounded(acuity_cpd(best.phenotype))} cpd", "cycles per degree, by sampling alone"),
+        (
+            html("Its {}", hint("acuity")),
+            f"{rounded(acuity_cpd(best.phenotype))} cpd",
+            "cycles per degree, by sampling alone",
+        ),
     ]
 
 

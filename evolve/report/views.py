@@ -8,6 +8,7 @@ import optics
 from evolve.analysis.episode import Episode
 from evolve.analysis.statistics import psnr
 from evolve.report.ground_plan import GroundPlan
+from evolve.report.hints import hint
 from evolve.report.markup import Html, html, joined, look, rounded
 from evolve.report.picture import data_uri, display
 
@@ -29,11 +30,12 @@ def what_it_sees(episode: Episode, stage: GroundPlan) -> Html:
     rest = f" The first {MOST_EYES} of {len(names)} eyes." if len(names) > MOST_EYES else ""
     quality = psnr(episode.signals, episode.perfect_signals, stage.gain)
     caption = html(
-        "<b>What it sees</b> at {} s of the episode below, left to right: the scene, finely sampled; what its "
-        "receptors would signal behind a perfect lens; what its own optics make of it{}; and the same with the "
+        "<b>What it sees</b> at {} s of the episode above, left to right: the scene's {}, finely sampled; what its "
+        "{} would {} behind a perfect lens; what its own optics make of it{}; and the same with the "
         "receptors' noise, as the brain gets it.{} Over the whole episode the signals have a PSNR of {} dB against "
         "the perfect lens.",
-        *(rounded(time * stage.seconds), brighter, rest, rounded(quality)),
+        *(rounded(time * stage.seconds), hint("radiance"), hint("receptor", "receptors"), hint("signal")),
+        *(brighter, rest, rounded(quality)),
     )
     return html('<figure class="views"><div class="eyes">{}</div><figcaption>{}</figcaption></figure>\n', rows, caption)
 

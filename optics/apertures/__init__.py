@@ -4,7 +4,7 @@ aperture       Aperture: what every shape offers
 circular       Circle, Annulus
 rings          Rings: zone plates
 polygonal      Polygon, Slit
-shapes         Disk, Rectangle, Spider: what openings are cut from
+shapes         Disk, Oblong, Spider: what openings are cut from
 combined       union, difference, intersection; hexagonal segments
 boundary       the edge of a combination
 pixelated      any shape, tiled by square pixels

@@ -36,7 +36,7 @@ RULES: dict[str, Callable[[list[np.ndarray]], np.ndarray]] = {
 class Combined(Aperture):
     """What `union`, `difference` and `intersection` make of shapes, as far as it lies within the pupil's circle.
 
-    rule: one of these names. shapes: apertures, or `Disk`, `Rectangle` and `Spider`, which may lie anywhere.
+    rule: one of these names. shapes: apertures, or `Disk`, `Oblong` and `Spider`, which may lie anywhere.
 
     Raises:
         ValueError: no such rule, a shape that is none, or nothing is open.
@@ -53,7 +53,7 @@ class Combined(Aperture):
             raise ValueError(f"{len(self.shapes)} shapes: a {self.rule} must have {least} or more")
         for shape in self.shapes:
             if not (hasattr(shape, "outline") and hasattr(shape, "contains")):
-                raise ValueError(f"shape = {shown(shape)}: must be an aperture, a Disk, a Rectangle or a Spider")
+                raise ValueError(f"shape = {shown(shape)}: must be an aperture, a Disk, a Oblong or a Spider")
         if self.area < SMALLEST:
             raise ValueError(f"{self.rule} of {len(self.shapes)} shapes: must leave something open within the pupil")
 

@@ -10,7 +10,7 @@ import numpy as np
 from optics.apertures.outline import Outline
 from optics.numerics.arguments import finite, in_range, point_2d, positive, whole, without_derivative
 
-__all__ = ["Disk", "Rectangle", "Shape", "Spider"]
+__all__ = ["Disk", "Oblong", "Shape", "Spider"]
 
 BEYOND = 1.5  # choice, radii: how far out a spider's vanes end, beyond any opening
 MOST_VANES = 64
@@ -53,7 +53,7 @@ class Disk:
 
 
 @dataclass(frozen=True)
-class Rectangle:
+class Oblong:
     """A rectangle of full `width` and `height` about a centre (x, y), turned by an angle, in units of R.
 
     Raises:
@@ -105,11 +105,11 @@ class Spider:
         finite("rotation_deg", without_derivative("rotation_deg", self.rotation_deg))
 
     @property
-    def rectangles(self) -> list[Rectangle]:
+    def rectangles(self) -> list[Oblong]:
         angles = self.rotation_deg + 360 / self.vanes * np.arange(self.vanes)
         middles = BEYOND / 2 * np.exp(1j * np.deg2rad(angles))
         return [
-            Rectangle(BEYOND, self.width, (float(at.real), float(at.imag)), float(angle))
+            Oblong(BEYOND, self.width, (float(at.real), float(at.imag)), float(angle))
             for at, angle in zip(middles, angles, strict=True)
         ]
 

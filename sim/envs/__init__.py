@@ -2,6 +2,9 @@
 
 assembly               make_vec_env: world, task, physics and eyes put together
 vec_env                EyesVecEnv: stable-baselines3
+task_vec_env           TaskVecEnv: the same for tasks of one's own
+task_worlds            their worlds
+one_environment        what both answer stable-baselines3 alike
 env                    make_env, EyesEnv: Gymnasium
 registration           Gymnasium's ids
 simulation             worlds in motion, unseen

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -12,19 +13,21 @@ import numpy as np
 from optics.spectra.spectrum import Spectrum
 from sim.envs.follow_camera import check_render_mode
 from sim.envs.simulation import Simulation, check_least_return
+from sim.envs.task_vec_env import TaskVecEnv
 from sim.envs.vec_env import EyesVecEnv
 from sim.eyes.eyes import Eyes
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.fidelity import Fidelity, fidelity_asked
 from sim.render.fidelity_choice import chosen_fidelity
 from sim.render.prepared_scene import PreparedScene
+from sim.robots.task import Task
 from sim.tasks.reward import check_mode
 from sim.worlds.course import Course
 from sim.worlds.world import build_world
 
 
 def make_vec_env(
-    task: str,
+    task: str | Task,
     eyes: Eyes | None = None,
     n_envs: int = 64,
     seed: int | None = 0,
@@ -39,10 +42,11 @@ def make_vec_env(
     least_return: float | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
     render_mode: str | None = None,
-) -> EyesVecEnv:
+) -> EyesVecEnv | TaskVecEnv:
     """A batched environment of one task.
 
-    task: one of `sim.TASKS`
+    task: one of `sim.TASKS`, or a `sim.Task` of one's own, which says all but n_envs, seed, memory and render_mode
+        itself
     eyes: of every agent; default Eyes()
     n_envs: number of worlds
     seed: of episodes and noise; None draws one
@@ -62,6 +66,10 @@ def make_vec_env(
     Raises:
         ValueError: a bad argument.
     """
+    if isinstance(task, Task):
+        _refuse_for_tasks(locals())
+        _check(n_envs, seed, memory, mode, render_mode)
+        return TaskVecEnv(task, n_envs, seed, memory, render_mode)
     eyes = Eyes() if eyes is None else eyes
     if not isinstance(eyes, Eyes):
         raise ValueError(f"eyes = {eyes!r}: must be sim.Eyes or None, the default ones")
@@ -109,6 +117,14 @@ def vec_env_in(
     threads = min(dr.thread_count(), n_envs)
     simulation = Simulation(scene.world, n_envs, seed, mode, threads, least_return)
     return EyesVecEnv(simulation, BatchedRenderer.of(scene, n_envs, fidelity), memory, render_mode)
+
+
+def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
+    """What a task of one's own says itself."""
+    defaults = {name: p.default for name, p in inspect.signature(make_vec_env).parameters.items()}
+    for name in set(defaults) - {"task", "n_envs", "seed", "memory", "render_mode"}:
+        if given[name] != defaults[name]:
+            raise ValueError(f"{name} = {given[name]!r}: must be left out, a sim.Task says it itself")
 
 
 def _fidelity_of(rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | None, eyes: Eyes) -> Fidelity | None:

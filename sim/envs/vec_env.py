@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
 from sim.envs.follow_camera import FollowCamera
 from sim.envs.info import first_infos, infos_of
 from sim.envs.observation import STANDING, Memory, action_space, observation_space
+from sim.envs.one_environment import OneEnvironment
 from sim.envs.retina_images import side_by_side
 from sim.envs.simulation import LEAST_RETURN, NOWHERE, Simulation, Step
 from sim.render.batched_renderer import BatchedRenderer
@@ -22,7 +21,7 @@ from sim.worlds.state import WorldState
 _STANDING = np.array(STANDING, np.float32)
 
 
-class EyesVecEnv(VecEnv):
+class EyesVecEnv(OneEnvironment):
     """Many agents with eyes, each in its own world.
 
     Observations, rewards, endings and `info` are in docs/tasks.md. Worlds start anew by themselves; the
@@ -59,11 +58,6 @@ class EyesVecEnv(VecEnv):
         self.reset_infos = first_infos(self.state)
         untouched = np.zeros(self.num_envs, bool)
         return self._observation(self._signals.begin(self.state).wait(), np.arange(self.num_envs), untouched)
-
-    def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Seed all random streams at the next reset. World i draws from streams derived from (seed, i)."""
-        self._seeds = [seed] * self.num_envs
-        return self._seeds
 
     def step_async(self, actions: np.ndarray) -> None:
         actions = np.asarray(actions, np.float32)
@@ -175,24 +169,3 @@ class EyesVecEnv(VecEnv):
         for index, reason in step.failure.items():
             infos[index]["failure"] = reason
         return infos
-
-    # --- the rest of the VecEnv contract: there is one environment behind all indices
-
-    def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
-        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
-
-    def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:
-        if len(list(self._get_indices(indices))) != self.num_envs:
-            raise ValueError("set_attr: the worlds share one environment; set an attribute for all of them")
-        setattr(self, attr_name, value)
-
-    def env_method(
-        self, method_name: str, *args: Any, indices: int | Iterable[int] | None = None, **kwargs: Any
-    ) -> list[Any]:
-        if len(list(self._get_indices(indices))) != self.num_envs:
-            raise ValueError("env_method: the worlds share one environment; call a method for all of them")
-        result = getattr(self, method_name)(*args, **kwargs)
-        return [result] * self.num_envs
-
-    def env_is_wrapped(self, wrapper_class: type, indices: int | Iterable[int] | None = None) -> list[bool]:
-        return [False for _ in self._get_indices(indices)]

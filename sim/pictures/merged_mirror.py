@@ -7,18 +7,16 @@ told.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import mitsuba as mi
 import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum
-from sim.scene import lights, shapes, surfaces, tessellation
+from sim.scene import lights, shapes, surfaces
 from sim.scene.cameras import Viewpoint
+from sim.scene.merged_parts import merged
 from sim.scene.mirror import VISIBLE_GROUPS, Mirror
-from sim.scene.shapes import Part
-from sim.scene.tessellation import Triangles
 from sim.scene.variant import Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
 
@@ -77,21 +75,16 @@ class MergedMirror(Mirror):
         return bool((inside & bounded & (sizes > 0)).any())
 
     def _build(self) -> MitsubaObject:
-        description: Description = {"type": "scene"}
-        still: dict[tuple[int, bool, bool], tuple[MitsubaObject, list[Triangles]]] = {}
+        moving, still = {}, []
         for geom, parts in self._parts.items():
             glow = self._glow(geom)
             for k, part in enumerate(parts):
                 name, bsdf = f"geom_{geom}_{k}", self._bsdf(geom, part.mirrors)
-                if part.triangles is None or glow is not None or _moves(self.model, geom):
-                    description[name] = shapes.build(part, self._poses[geom], name, bsdf, glow)
-                    continue
-                placed = _placed(part.triangles, self._poses[geom])
-                key = id(bsdf), placed.uv is None, placed.normals is None
-                still.setdefault(key, (bsdf, []))[1].append(placed)
-        for i, (bsdf, triangles) in enumerate(still.values()):
-            whole = Part(triangles=tessellation.join(triangles))
-            description[f"still_{i}"] = shapes.build(whole, np.eye(4), f"still_{i}", bsdf, None)
+                if glow is not None or _moves(self.model, geom):
+                    moving[name] = shapes.build(part, self._poses[geom], name, bsdf, glow)
+                else:
+                    still.append((name, part, self._poses[geom], bsdf))
+        description: Description = {"type": "scene", **moving, **merged(still, "still")}
         for emitter in self._emitters:
             description[emitter.name] = emitter.description
         return mi.load_dict(description, optimize=False)
@@ -100,9 +93,3 @@ class MergedMirror(Mirror):
 def _moves(model: mujoco.MjModel, geom: int) -> bool:
     body = model.geom_bodyid[geom]
     return bool(model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0)
-
-
-def _placed(triangles: Triangles, pose: np.ndarray) -> Triangles:
-    """Triangles of a geom's frame in the world's."""
-    normals = None if triangles.normals is None else triangles.normals @ pose[:3, :3].T
-    return replace(triangles, vertices=triangles.vertices @ pose[:3, :3].T + pose[:3, 3], normals=normals)

@@ -4,6 +4,7 @@ mirror         Mirror: build, sync, render
 source         a file, a spec or text -> the model
 bombs          models too large to build, or standing nowhere
 shapes         geoms -> Mitsuba shapes, and their poses
+merged_parts   shapes that share a material as one
 tessellation   geoms -> triangles with MuJoCo's texture coordinates
 cube           triangles under cube textures
 surfaces       colours and textures

@@ -9,6 +9,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import mitsuba as mi
 import mujoco
 import numpy as np
@@ -54,7 +56,7 @@ def bsdf(
     if measured is None:
         description = _matter(model, geom, surfaces.reflectance_texture(model, geom, to_uv))
     else:
-        description = _measured(model, geom, to_uv, measured)
+        description = _measured(model, geom, to_uv, measured, _matter)
     share = mirror_share(model, geom) if mirrors else 0.0
     if share > 0:
         silver = {"type": "roughconductor", "material": "none", "alpha": _SILVER}
@@ -67,18 +69,40 @@ def bsdf(
     return mi.load_dict(description)
 
 
+def matt(
+    model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None, measured: Spectrum | None = None
+) -> MitsubaObject:
+    """The Lambertian, opaque part of it, of both sides."""
+    if measured is None:
+        color = surfaces.reflectance_texture(model, geom, to_uv)
+        description: Description = {"type": "diffuse", "reflectance": color}
+    else:
+        description = _measured(model, geom, to_uv, measured, _diffuse)
+    return mi.load_dict({"type": "twosided", "inside": description})
+
+
+def has_gloss(model: mujoco.MjModel, material: int) -> bool:
+    """Whether a material asks for more than a Lambertian surface."""
+    if model.mat_metallic[material] >= 0 or model.mat_roughness[material] >= 0:
+        return True
+    specular, shininess = float(model.mat_specular[material]), float(model.mat_shininess[material])
+    return specular > 0 and (specular, shininess) != _UNSET_GLOSS
+
+
+def _diffuse(model: mujoco.MjModel, geom: int, color: Description) -> Description:
+    return {"type": "diffuse", "reflectance": color}
+
+
 def _matter(model: mujoco.MjModel, geom: int, color: Description) -> Description:
     """Mitsuba BSDF of a geom's material in a colour (a Mitsuba texture)."""
     material = model.geom_matid[geom]
-    if material < 0:
-        return {"type": "diffuse", "reflectance": color}
+    if material < 0 or not has_gloss(model, material):
+        return _diffuse(model, geom, color)
     metallic, roughness = float(model.mat_metallic[material]), float(model.mat_roughness[material])
     if metallic >= 0 or roughness >= 0:
         parameters = {"metallic": max(metallic, 0.0), "roughness": roughness if roughness >= 0 else 1.0}
         return {"type": "principled", "base_color": color, **parameters}
     specular, shininess = float(model.mat_specular[material]), float(model.mat_shininess[material])
-    if specular <= 0 or (specular, shininess) == _UNSET_GLOSS:
-        return {"type": "diffuse", "reflectance": color}
     root = np.sqrt(0.08 * min(specular, 1.0))
     return {
         "type": "roughplastic",
@@ -90,9 +114,15 @@ def _matter(model: mujoco.MjModel, geom: int, color: Description) -> Description
     }
 
 
-def _measured(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, spectrum: Spectrum) -> Description:
+def _measured(
+    model: mujoco.MjModel,
+    geom: int,
+    to_uv: np.ndarray | None,
+    spectrum: Spectrum,
+    matter: Callable[[mujoco.MjModel, int, Description], Description],
+) -> Description:
     """Mitsuba BSDF of a measured reflectance, multiplied by the geom's texture if it has one."""
-    whole = _matter(model, geom, spectra.described(spectrum))
+    whole = matter(model, geom, spectra.described(spectrum))
     texture = surfaces.texture_id(model, geom)
     if texture < 0 or not surfaces.is_mirrored(model, geom, texture):
         return whole
@@ -103,6 +133,6 @@ def _measured(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, spectr
     is_linear = model.tex_colorspace[texture] == mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
     share = pixels[..., :1] if is_linear else decode_srgb(pixels[..., :1])
     # Mitsuba multiplies no textures: black and the whole reflectance are mixed instead, pixel by pixel.
-    black = _matter(model, geom, {"type": "uniform", "value": 0.0})
+    black = matter(model, geom, {"type": "uniform", "value": 0.0})
     weight = surfaces.bitmap(share, to_uv) | {"raw": True}
     return {"type": "blendbsdf", "weight": weight, "bsdf_0": black, "bsdf_1": whole}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 
@@ -41,6 +42,17 @@ def as_floats(values: np.ndarray) -> np.ndarray:
 
 def whole_numbers(values: Any) -> Array:
     """The same as uint32."""
+    return mi.UInt32(as_whole_numbers(values))
+
+
+def as_whole_numbers(values: Any) -> np.ndarray:
+    """The same, still NumPy's."""
     found = aligned(np.size(values), np.uint32)
     found[:] = np.ravel(values)
-    return mi.UInt32(found)
+    return found
+
+
+def three(fours: Array, row: Array) -> Array:
+    """The first three of a row of four floats; aligned, they are gathered at once."""
+    x, y, z, _ = dr.gather(mi.Vector4f, fours, row)
+    return mi.Vector3f(x, y, z)

@@ -85,6 +85,16 @@ def _alpha(model: mujoco.MjModel, rgba: np.ndarray, material: np.ndarray) -> np.
     return np.where(unset, model.mat_rgba[material, 3] if model.nmat else 1.0, rgba[:, 3])
 
 
+def listed_geoms(model: mujoco.MjModel, geoms: Iterable[int]) -> str:
+    """In words."""
+    return _listed("geom", (_name(model, g) for g in geoms))
+
+
+def listed_materials(model: mujoco.MjModel, materials: Iterable[int]) -> str:
+    """In words."""
+    return _listed("material", (_material(model, m) for m in materials))
+
+
 def _name(model: mujoco.MjModel, geom: int) -> str:
     return model.geom(geom).name or str(geom)
 

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from sim.scene import bsdfs, cube, surfaces, tessellation
-from sim.scene.device_arrays import as_floats
+from sim.scene.device_arrays import as_floats, as_whole_numbers
 from sim.scene.tessellation import Triangles
 from sim.scene.variant import Description, MitsubaObject
 
@@ -217,10 +217,10 @@ def build(part: Part, pose: np.ndarray, name: str, bsdf: MitsubaObject, radiance
         has_vertex_texcoords=triangles.uv is not None,
     )
     params = mi.traverse(shape)
-    params["faces"] = triangles.faces.astype(np.uint32).ravel()
+    params["faces"] = as_whole_numbers(triangles.faces)
     for key, value in part.placement(pose).items():
         params[key] = value
     if triangles.uv is not None:
-        params["vertex_texcoords"] = triangles.uv.astype(np.float32).ravel()
+        params["vertex_texcoords"] = as_floats(triangles.uv)
     params.update()
     return shape

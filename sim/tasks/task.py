@@ -62,7 +62,7 @@ class Beginning:
     heading: float
 
 
-class Task(Protocol):
+class Rules(Protocol):
     """The rules of a game on a World; pure functions of states, all worlds at once."""
 
     @property
@@ -181,7 +181,7 @@ class FindWay:
         )
 
 
-def task_of(world: World) -> Task:
+def task_of(world: World) -> Rules:
     """The rules that go with a world.
 
     Raises:
@@ -226,7 +226,7 @@ def _on_the_ground(objects: np.ndarray) -> np.ndarray:
     return objects.T[:2].copy()[:, None]
 
 
-def respawned(task: Task, state: WorldState, which: np.ndarray, rngs: list[np.random.Generator]) -> WorldState:
+def respawned(task: Rules, state: WorldState, which: np.ndarray, rngs: list[np.random.Generator]) -> WorldState:
     """The state with the objects `which` (n, k) put on free spots of their world.
 
     Raises:

@@ -8,16 +8,15 @@ shape costs time in every launch of the kernel.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import mitsuba as mi
 import mujoco
 import numpy as np
 
-from sim.scene import lights, shapes, tessellation
+from sim.scene import lights, shapes
+from sim.scene.merged_parts import merged
 from sim.scene.mirror import Mirror, mirror
-from sim.scene.shapes import Part
-from sim.scene.tessellation import Triangles
 from sim.scene.variant import Description, MitsubaObject
 from sim.scene.variant import variant as in_variant
 from sim.tracing.spheres import Spheres
@@ -79,30 +78,15 @@ def _static_scene(static: Mirror) -> MitsubaObject:
     model = static.model
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    description: Description = {"type": "scene"}
-    meshes: dict[tuple[int, bool, bool], tuple[MitsubaObject, list[Triangles]]] = {}
+    parts = []
     for geom in map(int, static.geoms):
         _refuse_glow(model, geom)
         bsdf, pose = static.bsdf(geom), shapes.pose(data, geom)
-        for k, part in enumerate(shapes.parts(model, geom)):
-            if part.triangles is None:
-                description[f"geom_{geom}_{k}"] = shapes.build(part, pose, f"geom_{geom}_{k}", bsdf, None)
-                continue
-            placed = _placed(part.triangles, pose)
-            key = id(bsdf), placed.uv is None, placed.normals is None
-            meshes.setdefault(key, (bsdf, []))[1].append(placed)
-    for i, (bsdf, triangles) in enumerate(meshes.values()):
-        whole = Part(triangles=tessellation.join(triangles))
-        description[f"mesh_{i}"] = shapes.build(whole, np.eye(4), f"mesh_{i}", bsdf, None)
+        parts += [(f"geom_{geom}_{k}", part, pose, bsdf) for k, part in enumerate(shapes.parts(model, geom))]
+    description: Description = {"type": "scene", **merged(parts, "mesh")}
     for emitter in lights.emitters(model, data, static.spectra)[0]:
         description[emitter.name] = emitter.description
     return mi.load_dict(description, optimize=False)
-
-
-def _placed(triangles: Triangles, pose: np.ndarray) -> Triangles:
-    """Triangles of a geom's frame in the world's."""
-    normals = None if triangles.normals is None else triangles.normals @ pose[:3, :3].T
-    return replace(triangles, vertices=triangles.vertices @ pose[:3, :3].T + pose[:3, 3], normals=normals)
 
 
 def _refuse_glow(model: mujoco.MjModel, geom: int) -> None:

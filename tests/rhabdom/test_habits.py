@@ -65,3 +65,8 @@ def test_containers_and_hooks_are_in_their_forms():
     hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"][0]["hooks"]
     assert {"ruff-format", "ruff"} <= {hook["id"] for hook in hooks}
     assert 'ENTRYPOINT ["evolve"]' in (ROOT / "Dockerfile").read_text()
+
+
+def test_examples_are_numbered_once():
+    numbers = [path.name[:2] for path in (ROOT / "examples").glob("*.py")]
+    assert len(set(numbers)) == len(numbers) > 3

@@ -68,6 +68,7 @@ def test_the_wheel_touches_no_folder_that_others_may_have(built):
         about = archive.read(next(name for name in names if name.endswith("METADATA"))).decode()
     assert {name.split("/")[0].partition("-")[0] for name in names} == {"rhabdom", "rhabdom.pth"}
     assert sum(name.endswith((".toml", ".js", ".css", ".csv")) for name in names) > 15
+    assert any(name.endswith("evolve/demo/candidates.jsonl") for name in names), "the run that evolve demo shows"
     text = about.partition("\n\n")[2]
     relative = [line for line in text.splitlines() if "](docs/" in line or "](CHANGELOG" in line]
     assert relative == [], "relative links lead nowhere on the package index"

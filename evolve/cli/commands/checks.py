@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from argparse import Namespace
 from pathlib import Path
 
@@ -27,10 +28,13 @@ def validate(arguments: Namespace) -> int:
     if not scripts:
         print("evolve: error: validate needs a checkout of rhabdom: its scripts are not installed", file=sys.stderr)
         return 2
+    from evolve.cli.progress import clock  # not at the top: the doctor works on every system
+
     backend.require()
-    failed = []
+    print(f"{len(scripts)} scripts, most of which take seconds and some minutes", flush=True)
+    failed, began = [], time.monotonic()
     for number, script in enumerate(scripts, start=1):
-        print(f"{number}/{len(scripts)} {script.stem}", flush=True)
+        print(f"{number}/{len(scripts)} {script.stem}, after {clock(time.monotonic() - began)}", flush=True)
         child = subprocess.run([sys.executable, "-m", f"validation.{script.stem}"], cwd=CHECKOUT, check=False)
         failed += [script.stem] if child.returncode else []
     print(f"failed: {', '.join(failed)}" if failed else f"all {len(scripts)} passed")

@@ -1,18 +1,64 @@
-"""`evolve replay`, `report` and `export`: what can be made from a run."""
+"""`evolve replay`, `report` and `export`: what can be made from a run; and all of it at once."""
 
 from __future__ import annotations
 
 import json
 import webbrowser
 from argparse import Namespace
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from evolve.cli.waiting import Waiting
 from evolve.report.write import FILE as REPORT
 from evolve.store.directory import Run
 from optics.numerics import device
 
-__all__ = ["REPORT", "export", "open_page", "replay", "report"]
+__all__ = ["REPORT", "Products", "export", "finished_products", "open_page", "replay", "report"]
+
+
+@dataclass(frozen=True)
+class Products:
+    """What has been made of a finished run; a replay where one was asked for."""
+
+    report: Path
+    frames: list[Path]
+    replay: Path | None = None
+
+    def record(self, run: Run) -> dict[str, Any]:
+        """As plain values."""
+        replay = {} if self.replay is None else {"replay": str(self.replay)}
+        exr = [str(frame) for frame in self.frames]
+        return {"directory": str(run.path), "report": str(self.report), **replay, "exr": exr}
+
+    def lines(self, run: Run) -> list[str]:
+        """For people."""
+        return [
+            f"run directory: {run.path}",
+            f"report: {self.report}",
+            *([] if self.replay is None else [f"replay: {self.replay}"]),
+            f"EXR files: {len(self.frames)} in {self.frames[0].parent}, the first: {self.frames[0].name}",
+        ]
+
+
+def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
+    """The best animal's episode as report and EXR files, and, if asked for, as a page that plays it; a bar meanwhile,
+    if `shown`."""
+    with Waiting(3 + replay, shown) as wait:
+        wait.step("the best agent plays an episode")
+        from evolve.analysis import episode
+        from evolve.report import exr_export
+        from evolve.report.replay import write_page
+        from evolve.report.write import write
+
+        best, played = episode.record(run), None
+        if replay:
+            wait.step("writing the replay")
+            played = write_page(run, best)
+        wait.step("writing the report")
+        page = write(run, best)
+        wait.step("writing EXR files")
+        return Products(page, exr_export.export_episode(best, run.path / "exr"), played)
 
 
 def replay(arguments: Namespace) -> int:

@@ -6,16 +6,14 @@ import json
 import sys
 from argparse import Namespace
 from contextlib import nullcontext
-from pathlib import Path
 from typing import Any
 
 from evolve.cli.commands import INTERRUPTED
-from evolve.cli.commands.products import REPORT, open_page
+from evolve.cli.commands.products import REPORT, Products, finished_products, open_page
 from evolve.cli.progress import Bar, Events, Lines, Silent, Watchers, watcher
 from evolve.cli.run_plan import RunPlan, steps_each
 from evolve.cli.start_from import starts_from
 from evolve.cli.tensorboard import TensorBoardWriter
-from evolve.cli.waiting import Waiting
 from evolve.config.assemble import assemble
 from evolve.config.lint import lint
 from evolve.config.run_config import ConfigError, RunConfig
@@ -123,7 +121,7 @@ def _already_finished(run: Run, arguments: Namespace) -> int:
     if not arguments.json:
         print(f"nothing is left to do; report: {page}")
     elif run.best is not None:
-        print(json.dumps(_finished_event(run, run.best, page, frames)))
+        print(json.dumps(_finished_event(run, run.best, Products(page, frames))))
     open_page(page, arguments)
     return 0
 
@@ -163,30 +161,14 @@ def _finish(run: Run, arguments: Namespace) -> int:
     if not arguments.json:
         print("\n".join(_outcome(run, run.best, failures)))
         print("writing report and EXR files ...", flush=True)
-    with Waiting(3, shown=not (arguments.json or arguments.quiet)) as wait:
-        wait.step("the best agent plays an episode")
-        from evolve.analysis import episode
-        from evolve.report import exr_export
-        from evolve.report.write import write
-
-        best = episode.record(run)
-        wait.step("writing the report")
-        page = write(run, best)
-        wait.step("writing EXR files")
-        frames = exr_export.export_episode(best, run.path / "exr")
-    if arguments.json:
-        print(json.dumps(_finished_event(run, run.best, page, frames)))
-    else:
-        print(f"run directory: {run.path}")
-        print(f"report: {page}")
-        print(f"EXR files: {len(frames)} in {frames[0].parent}, the first: {frames[0].name}")
-    open_page(page, arguments)
+    made = finished_products(run, shown=not (arguments.json or arguments.quiet))
+    print(json.dumps(_finished_event(run, run.best, made)) if arguments.json else "\n".join(made.lines(run)))
+    open_page(made.report, arguments)
     return 0
 
 
-def _finished_event(run: Run, best: Candidate, page: Path, frames: list[Path]) -> dict[str, Any]:
-    products = {"directory": str(run.path), "report": str(page), "exr": [str(frame) for frame in frames]}
-    return {"event": "finished", "best": best.id, "fitness": best.fitness, **products}
+def _finished_event(run: Run, best: Candidate, made: Products) -> dict[str, Any]:
+    return {"event": "finished", "best": best.id, "fitness": best.fitness, **made.record(run)}
 
 
 def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:

@@ -17,7 +17,7 @@ from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.lock import holder
 
-__all__ = ["listing", "standing", "status"]
+__all__ = ["listing", "standing", "standing_lines", "status"]
 
 WATCH_S = 2.0  # between two looks
 SHOWN = 12  # generations, the latest
@@ -79,7 +79,7 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
         print(f"note: {now['notice']}", file=sys.stderr)
     if arguments.watch and sys.stdout.isatty():
         print("\x1b[H\x1b[2J", end="", file=as_it_is(sys.stdout))
-    print("\n".join(_lines(now)), flush=True)
+    print("\n".join(standing_lines(now)), flush=True)
 
 
 def standing(run: Run) -> dict[str, Any]:
@@ -123,7 +123,8 @@ def _generation(members: Sequence[Candidate]) -> dict[str, Any]:
     }
 
 
-def _lines(now: dict[str, Any]) -> list[str]:
+def standing_lines(now: dict[str, Any]) -> list[str]:
+    """What `standing` has found, for people."""
     count, best = now["candidates"], now["best"]
     by = f" by process {now['process']}" if now["process"] else ""
     failed = f", {count['failed']} failed" if count["failed"] else ""

@@ -22,7 +22,7 @@ from sim.tracing.areas.columns import RIM, Columns, Piece
 from sim.tracing.areas.illumination import Illumination, Moment
 from sim.tracing.areas.light_table import LightTable, sum_of
 from sim.tracing.areas.patch import Area, Patch
-from sim.tracing.areas.sphere_areas import SphereTexture
+from sim.tracing.areas.sphere_areas import Slice, SphereTexture, SphereView
 from sim.tracing.areas.stripes import Stripes, Texture
 from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.spheres import Spheres
@@ -89,13 +89,13 @@ class AreaTracer:
         spheres = []
         for k, centre in enumerate(centres):
             in_view = sphere_areas.may_see(area, centre, self._radii[k])
-            spheres.append(only_where(in_view, partial(self._sphere, area, k, now), [0.0, *nothing]))
-        distances = [dr.squared_norm(centre - area.origin) for centre in centres]
-        visible, behind = sphere_areas.hidden_behind([share for share, *_ in spheres], distances)
-        total = [behind * sum(parts[1:], parts[0]) for parts in zip(*seen, strict=True)]
-        for share, (_, *light) in zip(visible, spheres, strict=True):
-            total = [dr.fma(share, own, rest) for own, rest in zip(light, total, strict=True)]
-        return total
+            spheres.append(only_where(in_view, partial(self._sphere, area, k, pieces, now), [0.0] * 3 + nothing))
+        parts = pieces[0].beside, pieces[1].beside, pieces[0].below + pieces[1].below
+        total = [mi.Float(0) for _ in nothing]
+        for part, light, *hidden in zip(parts, seen, *(sphere[:3] for sphere in spheres), strict=True):
+            left = dr.clip(1 - sum(hidden, mi.Float(0)) / dr.maximum(part, LEAST_DIP), 0, 1)
+            total = [dr.fma(left, own, sum_) for own, sum_ in zip(light, total, strict=True)]
+        return [sum(own, rest) for rest, *own in zip(total, *(sphere[3:] for sphere in spheres), strict=True)]
 
     def _wall(self, area: Area, piece: Piece, now: Moment) -> list[Array]:
         patch = piece.patch(area, self._walls.floor, self._columns.top)
@@ -148,14 +148,18 @@ class AreaTracer:
         along, across = (per_x * side.x + per_y * side.y for side in (patch.along, patch.across))
         return self._stripes.mean_over(self._floor_texture, column, (along, across), now.inputs)
 
-    def _sphere(self, area: Area, k: int, now: Moment) -> list[Array]:
-        """Its share of the area, and the light that comes from there per component."""
+    def _sphere(self, area: Area, k: int, pieces: tuple[Piece, Piece], now: Moment) -> list[Array]:
+        """Shares of the area in which it hides either wall and the floor, and light that comes from it, per component,
+        times its share; without what is hidden by nearer spheres."""
         texture, radius = self._sphere_textures[k], self._radii[k]
         around = self._reflected.on_body(k, now.bodies[k], now.inputs) if self._reflected else None
-        view = sphere_areas.SphereView(area, now.bodies[k], radius)
+        view = SphereView(area, now.bodies[k], radius)
 
-        def add(index: Array, share: Array, total: list[Array]) -> tuple[Array, Array, list[Array]]:
+        def add(index: Array, hidden: list[Array], total: list[Array]) -> tuple[Array, ...]:
             slice_ = view.slice(index)
+            bare = self._not_hidden(area, k, slice_, now)
+            behind = [self._columns.behind(area, piece, slice_.part) for piece in pieces]
+            found = behind[0].beside, behind[1].beside, behind[0].below + behind[1].below
             column, sides = sphere_areas.columns_of(texture, slice_.patch, radius)
             reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs)
             light = self._illumination.irradiance(slice_.patch, now, k)
@@ -163,12 +167,27 @@ class AreaTracer:
                 arriving = [sum_of(fours, slice_.patch.normal) for fours in around]
                 light = _sum(light, self._illumination.past_bodies(slice_.patch, arriving, now, k))
             sent_on = zip(reflectance, light, strict=True)
-            total = [dr.fma(slice_.share, r * e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
-            return index + 1, share + slice_.share, total
+            total = [dr.fma(slice_.share * bare, r * e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
+            hidden = [dr.fma(own, bare, sum_) for own, sum_ in zip(found, hidden, strict=True)]
+            return index + 1, hidden, total
 
-        start = mi.UInt32(0), mi.Float(0), [mi.Float(0) for _ in self.basis]
-        _, share, total = dr.while_loop(start, lambda index, share, total: index < view.count, add, label="slices")
-        return [share, *(sum_ / dr.maximum(share, LEAST_DIP) for sum_ in total)]
+        start = mi.UInt32(0), [mi.Float(0)] * 3, [mi.Float(0) for _ in self.basis]
+        _, hidden, total = dr.while_loop(start, lambda index, *_: index < view.count, add, label="slices")
+        return [*hidden, *total]
+
+    def _not_hidden(self, area: Area, k: int, slice_: Slice, now: Moment) -> Array:
+        """Share of a slice before which no other sphere stands; as if others hid it at random, where several do."""
+        way = now.bodies[k] - area.origin
+        bare = mi.Float(1)
+        for j, other in enumerate(self._seen_bodies(now)):
+            if j != k:
+                towards = other - area.origin
+                nearer = dr.squared_norm(towards) < dr.squared_norm(way)
+                bare *= 1 - dr.select(nearer, sphere_areas.hidden_by(towards, self._radii[j], slice_), 0)
+        return bare
+
+    def _seen_bodies(self, now: Moment) -> list[Array]:
+        return now.bodies[: len(self._sphere_textures)]
 
 
 def _in_eights(rows: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ forms. Where the ends of the area see two walls, a corner or an edge lies betwee
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -15,11 +15,12 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.tracing.areas.half_planes import mean_clamped
-from sim.tracing.areas.patch import Area, Patch
+from sim.tracing.areas.patch import Area, Patch, Rectangle
 from sim.tracing.wall_intersection import Footprints
 from sim.tracing.walls import SIDES, Walls
 
 LEAST_NEARNESS = 1e-6  # [1/m] of what is seen in a stretch of no width
+NOTHING = 1e-12  # height of parts that are empty
 RIM = 4  # sides of the floor, at which worlds without a wall end
 
 
@@ -134,15 +135,21 @@ class Columns:
         return dr.clip(dr.select(begins >= ends, middle, edge), -0.5, 0.5)
 
     def _piece(self, area: Area, face: Face, start: Array, end: Array) -> Piece:
-        value, slope = _nearness(area, face)
-        near = [dr.maximum(dr.fma(slope, a, value), LEAST_NEARNESS) for a in (start, end)]
-        bottom, ceiling = (area.up + sign * area.height / 2 for sign in (-1, 1))
+        none = mi.Float(0)
+        piece = Piece(face, start, end, _nearness(area, face), none, none, none)
+        return self.behind(area, piece, Rectangle(mi.Float(0), mi.Float(0), mi.Float(1), mi.Float(1)))
+
+    def behind(self, area: Area, piece: Piece, part: Rectangle) -> Piece:
+        """What a part of the area sees of a piece."""
+        start, end = (dr.clip(part.a + sign * part.width / 2, piece.start, piece.end) for sign in (-1, 1))
+        near = [piece.nearness_at(a) for a in (start, end)]
+        bottom, ceiling = (area.up + (part.b + sign * part.height / 2) * area.height for sign in (-1, 1))
         depth, climb = self._floor - area.origin.z, self.top - area.origin.z
-        width, per = end - start, dr.rcp(area.height)
-        below = width * mean_clamped(*((depth * n - bottom) * per for n in near))
-        above = width * mean_clamped(*((ceiling - climb * n) * per for n in near))
-        beside = dr.select(face.index < self._rim, dr.maximum(width - below - above, 0), 0)
-        return Piece(face, start, end, (value, slope), below, beside, above)
+        share, per = (end - start) * part.height, dr.rcp(dr.maximum(area.height * part.height, NOTHING))
+        below = share * mean_clamped(*((depth * n - bottom) * per for n in near))
+        above = share * mean_clamped(*((ceiling - climb * n) * per for n in near))
+        beside = dr.select(piece.face.index < self._rim, dr.maximum(share - below - above, 0), 0)
+        return replace(piece, start=start, end=end, below=below, beside=beside, above=above)
 
 
 def _nearness(area: Area, face: Face) -> tuple[Array, Array]:

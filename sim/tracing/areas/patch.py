@@ -1,4 +1,4 @@
-"""The two kinds of area: a rectangle of the visual field, and the patch of a surface that is seen in it."""
+"""The two kinds of area, a rectangle of the visual field and the patch of a surface that is seen in it, and parts."""
 
 from __future__ import annotations
 
@@ -42,6 +42,16 @@ class Area:
         """At (a, b), as long as it comes."""
         level = self.level(a)
         return mi.Vector3f(level.x, level.y, self.up + self.height * b)
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """A part of an area, in its sides. a, b: its middle · width, height"""
+
+    a: Array
+    b: Array
+    width: Array
+    height: Array
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,16 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.tracing.areas.patch import Area, Patch
+from sim.tracing.areas.half_planes import share_above
+from sim.tracing.areas.patch import Area, Patch, Rectangle
 from sim.tracing.areas.stripes import Texture
 
-STRIPS, PARTS = 2, 2  # chosen: cut with the outline
+STRIPS, PARTS = 3, 3  # chosen: of what is seen of a sphere
 # Cosine below which a surface does not slope further away from the eye: beyond, its patch would be longer than the
 # sphere.
 GRAZING = 0.15
 TINY = 1e-12
+NEARLY_OPEN = 1e-4  # chosen: outlines that are longer than some 100 times their width are cut as if they were open
 
 
 @dataclass(frozen=True)
@@ -34,22 +36,22 @@ class SphereTexture:
 
 @dataclass(frozen=True)
 class Slice:
-    """A sphere as an area sees it. share: of the area that it fills · patch: what is seen of it."""
+    """A sphere as an area sees it.
+
+    share: of the area that it fills · part: which that is, nearly
+    seen, along, across: direction of its middle, and its sides on the area's plane · patch: what is seen there
+    """
 
     share: Array
+    part: Rectangle
+    seen: Array
+    along: Array
+    across: Array
     patch: Patch
 
 
-@dataclass(frozen=True)
-class _Chord:
-    """Of the outline on one line across the area: its length and middle, in sides of the area."""
-
-    length: Array
-    middle: Array
-
-
 class SphereView:
-    """What an area sees of a sphere, in slices: STRIPS across it, cut to PARTS each."""
+    """What an area sees of a sphere, in slices: STRIPS across what it fills, cut to PARTS each."""
 
     count = STRIPS * PARTS
 
@@ -64,20 +66,92 @@ class SphereView:
         def slope(side: Array) -> Array:
             return dr.abs(dr.dot(way, ahead) * dr.dot(way, side) - tangent * dr.dot(ahead, side))
 
-        upright = slope(right) <= slope(up)  # lines run towards the outline, so that they cut it steeply
+        # Lines run towards the outline, so that they cut it steeply.
+        self._upright = upright = slope(right) <= slope(up)
         self._along, self._across = dr.select(upright, up, right), dr.select(upright, right, up)
+        self._outline = _outline(way, radius, ahead, self._along, self._across)
 
     def slice(self, index: Array) -> Slice:
         """One of them."""
-        strip = index // PARTS
-        place: Array = (mi.Float(strip) + 0.5) / STRIPS - 0.5
-        start = self._ahead + self._across * place
-        chord = _chord(self._way, self._tangent, start, self._along)
-        place = (mi.Float(index - strip * PARTS) + 0.5) / PARTS - 0.5
-        seen = start + self._along * (chord.middle + chord.length * place)
-        sides = self._along * (chord.length / PARTS), self._across / STRIPS
+        strip = mi.UInt32(index // PARTS)
+        outline, number = self._outline, mi.Float(strip)
+        one, other = outline.edge(number), outline.edge(number + 1)
+        place, width = (one.place + other.place) / 2, other.place - one.place
+        cut = _chord(self._way, self._tangent, self._ahead + self._across * place, self._along)
+        chord = outline.mean_chord(one, other)
+        length, middle = (dr.select(outline.closed, mean, open_) for mean, open_ in zip(chord, cut, strict=True))
+        middle = middle + length * ((mi.Float(index - strip * PARTS) + 0.5) / PARTS - 0.5)
+        length = length / PARTS
+        seen = self._ahead + self._across * place + self._along * middle
+        sides = self._along * length, self._across * width
         patch = _patch(self._way, self._tangent, seen, *sides, self._area.origin, self._centre)
-        return Slice(chord.length / self.count, patch)
+        upright = Rectangle(place, middle, width, length), Rectangle(middle, place, length, width)
+        return Slice(length * width, dr.select(self._upright, *upright), seen, *sides, patch)
+
+
+@dataclass(frozen=True)
+class _Edge:
+    """Of a strip. place: across the area, -1/2 to 1/2 · angle, sine: place = outline.middle + outline.half · sine"""
+
+    place: Array
+    angle: Array
+    sine: Array
+
+
+@dataclass(frozen=True)
+class _Outline:
+    """A sphere's outline on an area's tangent plane, in sides of the area.
+
+    closed: an ellipse, which is what the rest is about · middle: of it, across and along the area
+    half: how far it reaches to either side of it across the area, and half of the chord through it along the area
+    slant: how far chords move along the area from one side to the other, by place
+    low, high: angles at which the area cuts it off
+    """
+
+    closed: Array
+    middle: tuple[Array, Array]
+    half: tuple[Array, Array]
+    slant: Array
+    low: Array
+    high: Array
+
+    def edge(self, number: Array) -> _Edge:
+        """Where a strip begins."""
+        angle = dr.fma((self.high - self.low) / STRIPS, number, self.low)
+        sine = dr.sin(angle)
+        place = dr.select(self.closed, dr.fma(self.half[0], sine, self.middle[0]), number / STRIPS - 0.5)
+        return _Edge(dr.clip(place, -0.5, 0.5), angle, sine)
+
+    def mean_chord(self, one: _Edge, other: _Edge) -> tuple[Array, Array]:
+        """Length and middle of what the area leaves of the chord that is as long as those between two edges are on
+        average: areas of ellipses are exact."""
+        double = other.sine * dr.cos(other.angle) - one.sine * dr.cos(one.angle)
+        mean = (other.angle - one.angle + double) / (2 * dr.maximum(other.sine - one.sine, TINY))
+        middle = self.middle[1] + self.slant * ((one.place + other.place) / 2 - self.middle[0])
+        low, high = (dr.clip(middle + sign * mean * self.half[1], -0.5, 0.5) for sign in (-1, 1))
+        return high - low, (low + high) / 2
+
+
+def _outline(way: Array, radius: float, ahead: Array, along: Array, across: Array) -> _Outline:
+    """Of v = ahead + x across + y along, those with |way × v|² < radius² |v|² meet the sphere."""
+    x, y, z = (dr.cross(way, v) for v in (across, along, ahead))
+    square = radius * radius
+
+    def form(a: Array, b: Array, v: Array, w: Array) -> Array:
+        return dr.dot(a, b) - square * dr.dot(v, w)
+
+    xx, xy, yy = form(x, x, across, across), form(x, y, across, along), form(y, y, along, along)
+    xz, yz = form(x, z, across, ahead), form(y, z, along, ahead)
+    det = xx * yy - xy * xy
+    per = dr.rcp(dr.select(dr.abs(det) < TINY * TINY, TINY * TINY, det))
+    middle = (xy * yz - yy * xz) * per, (xy * xz - xx * yz) * per
+    inside = -(form(z, z, ahead, ahead) + xz * middle[0] + yz * middle[1])
+    half = dr.safe_sqrt(yy * inside * per), dr.safe_sqrt(inside / yy)
+    closed = (yy > 0) & (det > NEARLY_OPEN * xx * yy) & (inside > 0)
+    low, high = (dr.asin(dr.clip((end - middle[0]) / dr.maximum(half[0], TINY), -1, 1)) for end in (-0.5, 0.5))
+    ahead_of_it = dr.dot(way, ahead + across * middle[0] + along * middle[1]) > 0
+    half = dr.select(ahead_of_it, half[0], 0), dr.select(ahead_of_it, half[1], 0)
+    return _Outline(closed, middle, half, -xy / yy, low, high)
 
 
 def may_see(area: Area, centre: Array, radius: float) -> Array:
@@ -111,20 +185,18 @@ def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Arr
     return column, (slopes[0], slopes[1])
 
 
-def hidden_behind(shares: list[Array], distances: list[Array]) -> tuple[list[Array], Array]:
-    """Share of the area in which each is seen before all others, and what is left for what stands behind them."""
-    visible = []
-    for k, (own, distance) in enumerate(zip(shares, distances, strict=True)):
-        share = own
-        for j, other in enumerate(shares):
-            if j != k:
-                share = share * dr.select(distances[j] < distance, 1 - other, 1)
-        visible.append(share)
-    return visible, 1 - sum(visible, mi.Float(0))
+def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
+    """Share of a slice that another sphere hides, whose outline is taken as straight there; way: to its centre."""
+    seen, sides = slice_.seen, (slice_.along, slice_.across)
+    length, moment = dr.norm(seen), dr.cross(way, seen)
+    beside = dr.maximum(dr.norm(moment), TINY)
+    slopes = (radius * dr.dot(seen, side) / length - dr.dot(moment, dr.cross(way, side)) / beside for side in sides)
+    return dr.select(dr.dot(way, seen) > 0, share_above(radius * length - beside, *slopes), 0)
 
 
-def _chord(way: Array, tangent: Array, start: Array, side: Array) -> _Chord:
-    """Directions start + x side, |x| up to 1/2, meet the sphere where q2 x² + 2 q1 x + q0 > 0, ahead of the eye."""
+def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array, Array]:
+    """Length and middle, in sides, of where start + x side meets the sphere, |x| up to 1/2: where
+    q2 x² + 2 q1 x + q0 > 0, ahead of the eye."""
     a, b = dr.dot(way, start), dr.dot(way, side)
     q2 = b * b - dr.squared_norm(side) * tangent
     q1 = a * b - dr.dot(start, side) * tangent
@@ -142,7 +214,7 @@ def _chord(way: Array, tangent: Array, start: Array, side: Array) -> _Chord:
     low, high = dr.clip(low, -0.5, 0.5), dr.clip(high, -0.5, 0.5)
     middle = (low + high) / 2
     ahead = (under > 0) & (dr.fma(b, middle, a) > 0)
-    return _Chord(dr.select(ahead, high - low, 0), middle)
+    return dr.select(ahead, high - low, 0), middle
 
 
 def _patch(way: Array, tangent: Array, seen: Array, along: Array, across: Array, origin: Array, centre: Array) -> Patch:

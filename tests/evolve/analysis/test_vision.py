@@ -12,7 +12,8 @@ from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from optics.numerics import backend
 
-CONFIG = assemble("detection", "quick")
+EIGHT = [f"genome.resolution_{side}.start=8" for side in ("height", "width")]
+CONFIG = assemble("detection", "quick", assignments=EIGHT)
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ commands.status: test_main.py, test_status_and_compare.py, test_commands.py, tes
 commands.tables: test_main.py
 commands.products: test_products.py, test_commands.py, test_main.py
 commands.settings: test_main.py
+commands.demo: test_demo.py
 commands.completion: test_main.py
 commands.checks: test_checks.py
 commands.compare: test_status_and_compare.py

@@ -1,5 +1,6 @@
 """`evolve validate` runs every validation script of the checkout, and tells which failed."""
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -26,6 +27,7 @@ def test_validate_runs_every_script_and_names_those_that_fail(call, monkeypatch,
     assert set(ran) == scripts
     assert len(scripts) > 10
     assert code == bool(failing)
+    assert all(re.search(rf"\d+/{len(scripts)} {name.partition('.')[2]}, after \d+:\d\d\n", out) for name in scripts)
     assert out.splitlines()[-1] == ("failed: B1_aliasing" if failing else f"all {len(scripts)} passed")
 
 

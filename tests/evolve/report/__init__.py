@@ -7,6 +7,7 @@ tables: test_report_page.py
 lineup: test_lineup.py
 agent_figure: test_lineup.py
 figures: test_report_page.py
+hints: test_hints.py
 svg: test_theme.py, test_markup.py, test_report_page.py
 theme: test_theme.py
 eye_figures: test_eye_figures.py

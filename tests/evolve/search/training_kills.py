@@ -42,6 +42,8 @@ SMALL = (
     "eye.rays_per_receptor=1",
     "genome.morphological.open=false",
     "genome.optical.open=false",
+    *("genome.memory_frames.open=true", "genome.memory_frames.high=5"),
+    *("genome.neurons.open=true", "genome.neurons.low=16", "genome.neurons.high=128"),
 )
 KINDS = ((), ("search.rungs=2",))
 

@@ -4,6 +4,7 @@ directory: test_directory.py
 record: test_record.py
 candidate: test_record.py
 evaluation: test_record.py
+shipped_run: cli/test_demo.py
 policies: test_policies.py
 lock: test_lock.py, test_regular_files.py
 regular_files: test_regular_files.py

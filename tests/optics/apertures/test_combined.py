@@ -10,8 +10,8 @@ from optics import (
     Circle,
     Combined,
     Disk,
+    Oblong,
     Polygon,
-    Rectangle,
     Rings,
     Slit,
     Spider,
@@ -140,13 +140,13 @@ def test_segments_without_gaps_are_one_opening():
 
 def test_an_edge_is_counted_once_where_shapes_share_it():
     square = Slit(1.0, 1.0)
-    right = Rectangle(0.5, 1.0, (0.25, 0.0))
+    right = Oblong(0.5, 1.0, (0.25, 0.0))
     assert difference(square, right).area == pytest.approx(0.5)
-    assert union(right, Rectangle(0.5, 1.0, (-0.25, 0.0))).area == pytest.approx(1.0)
-    assert len(union(right, Rectangle(0.5, 1.0, (-0.25, 0.0))).outline.segments) <= 6
+    assert union(right, Oblong(0.5, 1.0, (-0.25, 0.0))).area == pytest.approx(1.0)
+    assert len(union(right, Oblong(0.5, 1.0, (-0.25, 0.0))).outline.segments) <= 6
     assert union(Disk(0.5), Disk(0.5)).area == pytest.approx(math.pi / 4)
     assert union(Disk(2.0)).area == pytest.approx(math.pi)
-    turned = Rectangle(0.5, 1.0, (0.25, 0.0), rotation_deg=90)
+    turned = Oblong(0.5, 1.0, (0.25, 0.0), rotation_deg=90)
     assert turned.contains(np.array([0.7, 0.25]), np.array([0.0, 0.4])).tolist() == [True, False]
 
 
@@ -169,8 +169,8 @@ def test_zones_of_a_zone_plate_end_where_paths_are_half_waves_longer():
         (lambda: Combined("xor", (Circle(),)), "rule = 'xor'"),
         (lambda: Disk(-1), "radius = -1"),
         (lambda: Disk(0.1, (np.nan, 0)), "centre = nan"),
-        (lambda: Rectangle(0, 1), "width = 0"),
-        (lambda: Rectangle(1, 1, rotation_deg=math.inf), "rotation_deg = inf"),
+        (lambda: Oblong(0, 1), "width = 0"),
+        (lambda: Oblong(1, 1, rotation_deg=math.inf), "rotation_deg = inf"),
         (lambda: Spider(0, 0.1), "vanes = 0"),
         (lambda: Spider(3, 2.0), "width = 2.0"),
         (lambda: Rings([0.1]), "even number of radii"),

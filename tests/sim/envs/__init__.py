@@ -1,6 +1,9 @@
 """What tests hold of environments, module by module.
 
 assembly: test_env.py, test_vec_env.py, test_tasks_page.py
+task_vec_env: test_task_vec_env.py
+task_worlds: test_task_vec_env.py
+one_environment: test_vec_env.py
 env: test_env.py
 vec_env: test_vec_env.py, test_env.py
 registration: test_env.py, worlds/test_catalog.py

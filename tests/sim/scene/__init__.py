@@ -8,6 +8,7 @@ rays: test_mirror.py
 cameras: test_mirror.py
 variant: test_mirror.py
 shapes: test_mirror.py, test_textures.py
+merged_parts: test_mirror.py
 tessellation: test_mirror.py, test_cube_textures.py
 cube: test_cube_textures.py
 surfaces: test_textures.py, test_mirror_light.py

@@ -16,6 +16,7 @@ from sim.worlds.world import build_world
 VIEWS = 32
 SIGMA = 0.01  # the default eye's noise, in which errors are told
 EYES = sim.Eyes()
+COARSE = sim.Eyes(n_eyes=7, resolution=(3, 3), placement_range_deg=180.0)
 BEE = sim.Eyes(receptors="honeybee", bands=6)
 ROW = sim.Eyes(n_eyes=10, resolution=(1, 4))
 

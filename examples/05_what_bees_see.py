@@ -1,6 +1,6 @@
 """Two flowers that no camera tells apart, as receptors of a camera, of people, of goldfish and of bees report them.
 
-python examples/03_what_bees_see.py [--out eyes.png]   (--out: the task `foraging` through the eyes of each)
+python examples/05_what_bees_see.py [--out eyes.png]   (--out: the task `foraging` through the eyes of each)
 """
 
 import argparse
@@ -11,7 +11,7 @@ import optics
 import sim
 from sim.worlds.foraging import ULTRAVIOLET, petal
 
-SHOWN = ("rgb", "lms", "goldfish", "honeybee")
+SHOWN = {"rgb": "camera", "lms": "human", "goldfish": "goldfish", "honeybee": "bee"}
 
 for name in SHOWN:
     eye = optics.Eye(resolution=(1, 1), bands=16, receptors=name)
@@ -28,13 +28,16 @@ parser = argparse.ArgumentParser()
 parser.add_argument("--out", help="draw what the eyes see into this file")
 out = parser.parse_args().out
 if out:
-    from matplotlib.image import imsave
+    from matplotlib import pyplot
 
-    pictures = []
-    for name in SHOWN:
+    figure, rows = pyplot.subplots(len(SHOWN), figsize=(4.4, 8.4), layout="constrained")
+    for row, (name, who) in zip(rows, SHOWN.items(), strict=True):
         eyes = sim.Eyes(n_eyes=1, resolution=(30, 60), fov_deg=45, receptors=name, bands=8)
         world = sim.make_env("foraging", eyes, render_mode="eyes")
         world.reset(seed=2429)  # goal and adversary ahead
-        pictures.append(world.render())
-    imsave(out, np.concatenate(pictures))
+        row.imshow(world.render(), interpolation="nearest")
+        row.set(xticks=[], yticks=[])
+        row.set_ylabel(who, fontsize=13)
+        row.spines[:].set_visible(False)
+    figure.savefig(out, dpi=110)
     print(f"drawn to  {out}")

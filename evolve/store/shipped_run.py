@@ -1,0 +1,45 @@
+"""The run that ships with rhabdom, evolved by the quick preset: its whole record, and the policy of its best animal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from evolve.store.atomic_files import write_whole
+from evolve.store.directory import Run
+from evolve.store.record import RunError
+from evolve.store.regular_files import read
+
+__all__ = ["copy_shipped_run"]
+
+FOLDER = "demo"  # in evolve/, as a run directory
+
+
+def copy_shipped_run(directory: Path) -> Run:
+    """The shipped run in a directory, copied there unless it is there already.
+
+    Raises:
+        RunError: the directory holds something else.
+        OSError: it cannot be written.
+    """
+    files = dict(_files(resources.files("evolve") / FOLDER))
+    there = [name for name in files if (directory / name).exists()]
+    same = all(read(directory / name) == files[name] for name in there)
+    if not same or (not there and directory.exists() and any(directory.iterdir())):
+        raise RunError(f"{directory} holds something else: choose another directory with --out")
+    directory.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        if name not in there:
+            write_whole(directory / name, content)
+    return Run.open(directory)
+
+
+def _files(folder: Traversable, within: str = "") -> Iterator[tuple[str, bytes]]:
+    """Names below the folder, and what is in these files."""
+    for entry in folder.iterdir():
+        if entry.is_dir():
+            yield from _files(entry, f"{within}{entry.name}/")
+        else:
+            yield f"{within}{entry.name}", entry.read_bytes()

@@ -1,0 +1,53 @@
+"""Make the run that `evolve demo` shows of a finished run of the quick preset:
+
+    evolve run detection --preset quick --seed N --out runs/shipped
+    python -m experiments.shipped_run runs/shipped
+
+Its record is kept whole, and its best animal's policy, which replay, report and EXR files need. The others would take
+megabytes; the record then says that none was kept.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import evolve
+from evolve.config.assemble import to_toml
+from evolve.search.successive_halving import finished
+from evolve.store.directory import Run
+
+FOLDER = Path(evolve.__file__).parent / "demo"
+
+
+def ship(source: Path, folder: Path = FOLDER) -> Run:
+    """Write a finished run, without the policies of all but the best, as the one that ships.
+
+    Raises:
+        ValueError: it has not been finished, or nobody in it has succeeded.
+    """
+    run = Run.open(source)
+    if not finished(run) or run.best is None:
+        raise ValueError(f"{source}: must be a finished run with a candidate that has not failed")
+    best = run.best.id
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "policies").mkdir(parents=True)
+    (folder / "config.toml").write_text(to_toml(replace(run.config, workers=0)), encoding="utf-8")
+    shutil.copyfile(source / "versions.json", folder / "versions.json")
+    kept = [one if one.id == best else replace(one, policy=None) for one in run.in_order_of_finish]
+    (folder / "candidates.jsonl").write_text("".join(one.to_line() for one in kept), encoding="utf-8")
+    shutil.copyfile(run.policy_path(best), folder / "policies" / run.policy_path(best).name)
+    return Run.open(folder)
+
+
+def main() -> None:
+    """Ship the run that the command line names."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("run", type=Path, help="directory of a finished run of the quick preset")
+    print(ship(parser.parse_args().run))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,36 @@
+"""What stable-baselines3 asks of a VecEnv, answered where one environment stands behind all indices."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from stable_baselines3.common.vec_env import VecEnv
+
+
+class OneEnvironment(VecEnv):
+    """Worlds that share one environment: attributes and methods are everybody's."""
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seed all random streams at the next reset. World i draws from streams derived from (seed, i)."""
+        self._seeds = [seed] * self.num_envs
+        return self._seeds
+
+    def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
+        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:
+        if len(list(self._get_indices(indices))) != self.num_envs:
+            raise ValueError("set_attr: the worlds share one environment; set an attribute for all of them")
+        setattr(self, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *args: Any, indices: int | Iterable[int] | None = None, **kwargs: Any
+    ) -> list[Any]:
+        if len(list(self._get_indices(indices))) != self.num_envs:
+            raise ValueError("env_method: the worlds share one environment; call a method for all of them")
+        result = getattr(self, method_name)(*args, **kwargs)
+        return [result] * self.num_envs
+
+    def env_is_wrapped(self, wrapper_class: type, indices: int | Iterable[int] | None = None) -> list[bool]:
+        return [False for _ in self._get_indices(indices)]

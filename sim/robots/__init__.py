@@ -1,0 +1,14 @@
+"""Eyes on any robot: models that are not one of our worlds.
+
+task                Task: what a robot has to do
+model_renderer      ModelRenderer: eyes mounted on any MuJoCo model, in many worlds at once
+mounts              Mount: where an eye is, on a body, a site or a camera
+inside              eyes that are inside of a geom
+poses               Poses: where everything is, in all worlds
+model_wavefront     its kernels
+model_scene         what stands still, as a Mitsuba scene, and what moves
+model_lights        lights, that may move
+model_tracer        direct light along rays
+primitives          rays that meet ellipsoids, capsules, cylinders and boxes
+movers              the same, for all that move in a world
+"""

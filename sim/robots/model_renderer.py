@@ -1,0 +1,191 @@
+"""Eyes mounted on any MuJoCo model, seen through in many worlds at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+import optics
+from optics.numerics.arguments import of_kind, whole
+from optics.spectra.spectrum import Spectrum
+from sim.eyes.sensor import directions_of, eye_sampling
+from sim.render.fidelity import Fidelity
+from sim.render.pending_frame import FrameSlot, PendingFrame
+from sim.robots.inside import depth_inside
+from sim.robots.model_scene import ModelScene
+from sim.robots.model_tracer import ModelTracer
+from sim.robots.model_wavefront import ModelWavefront
+from sim.robots.mounts import Mount
+from sim.robots.poses import Poses
+from sim.scene import source
+from sim.scene.mirror import VISIBLE_GROUPS
+from sim.scene.variant import variant as in_variant
+from sim.tracing import lighting
+
+MOST_ENVS = 2**31 - 1
+SIXTEEN_RAYS = Fidelity(16, bands=4)
+
+
+class ModelRenderer:
+    """Sees many worlds of one model with eyes of one kind, wherever they are mounted on it.
+
+    model: an MjModel, or what compiles to one (`sim.mirror`)
+    eye: its optics and retina; with the fidelity's bands
+    mounts: where on the model the eyes are
+    n_envs: number of worlds
+    fidelity: rays per receptor and bands: `Fidelity(16, bands=4)`; light is direct
+    groups, spectra: see `sim.mirror`
+    brightest: signal of a white surface that faced all directional lights at once
+
+    Warns (`sim.MirrorWarning`) once of what eyes do not see of the model.
+
+    Raises:
+        ValueError: a bad argument, a mount on what the model does not have, an eye inside a geom, or a fidelity that
+            wants areas or light that was reflected twice.
+        optics.AccuracyError: a pupil whose light spreads too far.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel | mujoco.MjSpec | str,
+        eye: optics.Eye,
+        mounts: Sequence[Mount],
+        n_envs: int = 1,
+        fidelity: Fidelity = SIXTEEN_RAYS,
+        *,
+        groups: Sequence[int] = VISIBLE_GROUPS,
+        spectra: Mapping[str, Spectrum | str] | None = None,
+    ) -> None:
+        self.n_envs = whole("n_envs", n_envs, 1, MOST_ENVS)
+        of_kind("eye", eye, optics.Eye, "optics.Eye(resolution=(15, 15))")
+        _check(fidelity)
+        self.model, self.mounts, self.fidelity = source.load(model), tuple(mounts), fidelity
+        self.eye = replace(eye, bands=fidelity.bands)
+        self._places = [_Place(mount, self.model) for mount in self.mounts]
+        if not self._places:
+            raise ValueError("mounts = []: must be one sim.Mount at least")
+        wavelengths = self.eye.spectral_bands.wavelengths
+        self._scene = ModelScene(self.model, wavelengths, groups, spectra)
+        self._refuse_eyes_inside()
+        sampling = eye_sampling(self.eye, fidelity.depth)
+        self.sensor = sampling.sensor(fidelity.rays_per_receptor)
+        mixing = self.eye.throughput * self.eye.spectral_bands.weights
+        with in_variant(self._scene.variant):
+            self._tracer = ModelTracer(self._scene, wavelengths)
+            suns = [light.level for light in self._scene.lights.found if light.kind == "directional"]
+            self.brightest = float((mixing @ np.sum(suns, axis=0)).max() / np.pi) if suns else 0.0
+            self._sums = self.sensor.receptor_sums(mixing, self._tracer.basis)
+            self._wavefront = ModelWavefront(self._scene, self._tracer, self.sensor, self.n_envs, len(self.mounts))
+            along = {"light": self.sensor.directions, "depth": _centres(self.eye)}
+            self._looks = {what: self._wavefront.look(directions) for what, directions in along.items()}
+        self._slot = FrameSlot()
+
+    def signals(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+        """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32.
+
+        poses: of every world, after mj_forward or mj_step: its data, or arrays stacked over worlds
+
+        Raises:
+            ValueError: another number of worlds, another model's data, or poses that are not finite.
+        """
+        return self.begin(poses).wait()
+
+    def begin(self, poses: Poses | Sequence[mujoco.MjData]) -> PendingFrame:
+        """Begin to see; it runs beside whatever comes next, until the signals are waited for."""
+        return self._begin(poses, "light").then(self._signals)
+
+    def depth(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+        """How far what each receptor's centre looks at is, along the eye's axis [m], (env, eye, height, width) float32;
+        infinite where there is nothing."""
+        found = self._begin(poses, "depth").wait()
+        return found.reshape(self.n_envs, len(self.mounts), *self.eye.resolution)
+
+    def eye_frames(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+        """Pupils [m] (world, eye, 3) and eyes' frames (world, eye, 3, 3), columns (right, up, ahead)."""
+        frames = [place.frames(poses) for place in self._places]
+        origins, rotations = zip(*frames, strict=True)
+        return np.stack(origins, axis=1), np.stack(rotations, axis=1)
+
+    @property
+    def only_directional(self) -> bool:
+        """Whether nothing is lit by points, which are brighter the nearer they are, or by the sky."""
+        return all(light.kind == "directional" for light in self._scene.lights.found) and not self._scene.has_sky
+
+    @property
+    def spectra(self) -> Mapping[str, Spectrum]:
+        """Measured ones of materials and lights, by name."""
+        return self._scene.spectra
+
+    @property
+    def recordings(self) -> int:
+        """How often the kernels were recorded: once per kernel in use, up to three times where meshes move."""
+        return int(self._wavefront.light.n_recordings + self._wavefront.depth.n_recordings)
+
+    def _begin(self, poses: Poses | Sequence[mujoco.MjData], what: str) -> PendingFrame:
+        placed = poses if isinstance(poses, Poses) else Poses.of(poses)
+        self._check_poses(placed)
+        pupils, rotations = self.eye_frames(placed)
+        eyes = np.concatenate([pupils[:, :, None], np.swapaxes(rotations, -1, -2)], axis=2)
+        kernel = getattr(self._wavefront, what)
+        return self._slot.begin(lambda: self._wavefront.launch(kernel, self._looks[what], placed, eyes))
+
+    def _signals(self, light: np.ndarray) -> np.ndarray:
+        planes, n_eyes = self.sensor.depth.count * len(self._tracer.basis), len(self.mounts)
+        signals = self._sums(light.reshape(planes, self.n_envs * n_eyes, -1))
+        bands = self.eye.spectral_bands
+        signals = signals.reshape(self.n_envs, n_eyes, len(bands.weights), *self.eye.resolution)
+        mosaic = self.eye.mosaic
+        return signals if mosaic is None else np.take_along_axis(signals, mosaic[None, None, None], axis=2)
+
+    def _check_poses(self, poses: Poses) -> None:
+        if poses.n != self.n_envs:
+            raise ValueError(f"poses of {poses.n} worlds, this renderer was built for n_envs = {self.n_envs}")
+        if poses.geom_xpos.shape[1] != self.model.ngeom or poses.xpos.shape[1] != self.model.nbody:
+            raise ValueError("poses of another model")
+        if not np.isfinite(poses.geom_xpos).all():
+            world = int(np.flatnonzero(~np.isfinite(poses.geom_xpos).all(axis=(1, 2)))[0])
+            raise ValueError(f"poses of world {world} are not finite")
+
+    def _refuse_eyes_inside(self) -> None:
+        data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, data)
+        pupils, _ = self.eye_frames(Poses.of([data]))
+        for mount, pupil in zip(self.mounts, pupils[0], strict=True):
+            for geom in self._scene.geoms:
+                if (depth := depth_inside(self.model, data, geom, pupil)) > 0:
+                    name = self.model.geom(geom).name or f"{geom}"
+                    raise ValueError(
+                        f"Mount on {mount.on!r}: the eye is inside geom {name!r}, {depth:.2g} m below its surface: "
+                        f"offset must lead out of it"
+                    )
+
+
+class _Place:
+    """Where an eye is on a model."""
+
+    def __init__(self, mount: Mount, model: mujoco.MjModel) -> None:
+        self._kind, self._index = mount.found_in(model)
+        self._origin, self._rotation = mount.local(self._kind)
+
+    def frames(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+        origins, rotations = poses.frames(self._kind, self._index)
+        return origins + rotations @ self._origin, rotations @ self._rotation
+
+
+def _centres(eye: optics.Eye) -> np.ndarray:
+    """Directions of the receptors' centres, (ray, 3)."""
+    height, width = eye.resolution
+    row, column = (index.ravel() for index in np.indices((height, width)))
+    return directions_of(eye, np.stack([column + 0.5 - width / 2, row + 0.5 - height / 2], axis=-1))
+
+
+def _check(fidelity: Fidelity) -> None:
+    of_kind("fidelity", fidelity, Fidelity, "Fidelity(16, bands=4)")
+    if fidelity.light != lighting.DIRECT or fidelity.samples != "rays":
+        raise ValueError(
+            f"fidelity: light = {fidelity.light!r}, samples = {fidelity.samples!r}: models of one's own are seen by "
+            "rays in direct light"
+        )

@@ -1,0 +1,109 @@
+"""A model taken apart: what stands still becomes one Mitsuba scene, and what moves is met by itself.
+
+Surfaces are matt here, and opaque: what of a material is gloss, mirror, glow or glass is left out, and said so.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from optics.spectra.spectrum import Spectrum
+from sim.robots.model_lights import Lights, model_lights
+from sim.robots.movers import Movers, kind_of
+from sim.scene import bsdfs, inventory, lights, shapes, sky, surfaces
+from sim.scene.merged_parts import merged
+from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
+from sim.scene.spectra import Spectra, of_geom, resolve
+from sim.scene.variant import Description, MitsubaObject, default_variant
+from sim.scene.variant import variant as in_variant
+
+
+class ModelScene:
+    """What a renderer needs of a model.
+
+    model · variant: of Mitsuba · geoms: ids of all that are seen
+    scene: mi.Scene of what stands still, and the sky · movers: what moves · lights: all of them
+    spectra: measured ones of materials and lights, by name · has_sky: whether there is something to see at infinity
+    bsdfs: of every mover, in their order; kept here, since a BSDFPtr does not keep its objects alive
+
+    Warns (`sim.MirrorWarning`) once of what has no counterpart.
+
+    Raises:
+        ValueError: a model without visible geoms, and spectra of what it does not have.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        wavelengths: np.ndarray,
+        groups: Sequence[int] = VISIBLE_GROUPS,
+        spectra: Mapping[str, Spectrum | str] | None = None,
+    ) -> None:
+        self.model, self.variant = model, default_variant()
+        self.spectra: Spectra = resolve(model, spectra)
+        seen = [g for g in range(model.ngeom) if model.geom_group[g] in groups and surfaces.rgba(model, g)[3] > 0]
+        self.geoms = [g for g in seen if shapes.has_shape(model, g)]
+        if not self.geoms:
+            raise ValueError("the model has no visible geom of a kind that can be mirrored")
+        with in_variant(self.variant):
+            matt = {g: self._matt(g) for g in self.geoms}
+            moving = [g for g in self.geoms if _moves(model, g)]
+            meshes = {g: self._mesh(g, matt[g]) for g in moving if kind_of(model, g) is None}
+            self.movers = Movers(model, moving, meshes)
+            self.bsdfs = [matt[int(g)] for g in self.movers.geoms]
+            found, left_out = model_lights(model, self.spectra, wavelengths)
+            self.lights = Lights(found)
+            self.scene = self._still({g: matt[g] for g in self.geoms if g not in moving})
+            self.has_sky = self.scene.environment() is not None
+        left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, self.geoms)]
+        if left_out:
+            warnings.warn(f"eyes do not see: {'; '.join(left_out)}", MirrorWarning, stacklevel=4)
+
+    def _matt(self, geom: int) -> MitsubaObject:
+        to_uv = shapes.uv_transform(self.model, geom)
+        return bsdfs.matt(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
+
+    def _mesh(self, geom: int, bsdf: MitsubaObject) -> MitsubaObject:
+        """A geom in its own frame."""
+        parts = enumerate(shapes.parts(self.model, geom))
+        built = {f"part_{k}": shapes.build(part, np.eye(4), f"part_{k}", bsdf, None) for k, part in parts}
+        return mi.load_dict({"type": "scene", **built}, optimize=False)
+
+    def _still(self, matt: Mapping[int, MitsubaObject]) -> MitsubaObject:
+        data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, data)
+        parts = [
+            (f"geom_{g}_{k}", part, shapes.pose(data, g), bsdf)
+            for g, bsdf in matt.items()
+            for k, part in enumerate(shapes.parts(self.model, g))
+        ]
+        description: Description = {"type": "scene", **merged(parts, "still")}
+        heaven = sky.description(self.model, lights.white())
+        if heaven is not None:
+            description["sky"] = heaven
+        return mi.load_dict(description, optimize=False)
+
+
+def _moves(model: mujoco.MjModel, geom: int) -> bool:
+    body = model.geom_bodyid[geom]
+    return bool(model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0)
+
+
+def _not_matt(model: mujoco.MjModel, geoms: Iterable[int]) -> list[str]:
+    """What surfaces do that is left out, in words."""
+    materials = sorted({int(model.geom_matid[g]) for g in geoms if model.geom_matid[g] >= 0})
+    geoms = list(geoms)
+    kinds = {
+        "gloss": [m for m in materials if bsdfs.has_gloss(model, m)],
+        "glow": [m for m in materials if model.mat_emission[m] > 0],
+    }
+    words = [f"{what} of {inventory.listed_materials(model, found)}" for what, found in kinds.items() if found]
+    mirrors = [g for g in geoms if bsdfs.mirror_share(model, g) > 0]
+    glass = [g for g in geoms if surfaces.rgba(model, g)[3] < 1]
+    words += [f"reflections in {inventory.listed_geoms(model, mirrors)}"] if mirrors else []
+    return words + ([f"what is behind the transparent {inventory.listed_geoms(model, glass)}"] if glass else [])

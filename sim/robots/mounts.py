@@ -1,0 +1,110 @@
+"""Where eyes are on a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from optics.numerics.arguments import did_you_mean
+
+KINDS = ("site", "camera", "body")  # what a name is looked for among, in this order
+# Axes (ahead, left, up) in the frame of what an eye is on, as rows: x ahead and z up, but for MuJoCo's cameras, which
+# look along -z with x to the right.
+_AXES = {
+    "site": np.eye(3),
+    "body": np.eye(3),
+    "camera": np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]]),
+}
+
+
+@dataclass(frozen=True)
+class Mount:
+    """An eye's place: it looks along +x of a body or site, or as a camera looks, turned by these angles.
+
+    on: name of a site, a camera or a body of the model
+    azimuth_deg: to the left, about the frame's z axis (a camera's up) · elevation_deg: up, after that
+    roll_deg: about the eye's own axis, its top towards its left, last of all
+    offset: of the pupil from the frame's origin [m], (ahead, left, up) before the eye is turned
+    kind: "site", "camera" or "body", where several have that name; None: the first of these
+
+    Raises:
+        ValueError: angles or offsets that are not finite, and an unknown kind.
+    """
+
+    on: str
+    azimuth_deg: float = 0.0
+    elevation_deg: float = 0.0
+    roll_deg: float = 0.0
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    kind: str | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("azimuth_deg", "elevation_deg", "roll_deg"):
+            if not np.isfinite(getattr(self, name)):
+                raise ValueError(f"Mount: {name} = {getattr(self, name)!r}: must be finite")
+        offset = np.asarray(self.offset, float)
+        if offset.shape != (3,) or not np.isfinite(offset).all():
+            raise ValueError(f"Mount: offset = {self.offset!r}: must be three lengths (ahead, left, up) [m]")
+        object.__setattr__(self, "offset", tuple(map(float, offset)))
+        if self.kind is not None and self.kind not in KINDS:
+            raise ValueError(f"Mount: kind = {self.kind!r}: must be one of {', '.join(map(repr, KINDS))}, or None")
+
+    def mirrored(self) -> Mount:
+        """The eye on the other side of the body: left and right exchanged."""
+        ahead, left, up = self.offset
+        return replace(self, azimuth_deg=-self.azimuth_deg, roll_deg=-self.roll_deg, offset=(ahead, -left, up))
+
+    def found_in(self, model: mujoco.MjModel) -> tuple[str, int]:
+        """Of which kind the thing is that it is on, and its id.
+
+        Raises:
+            ValueError: there is none of that name.
+        """
+        for kind in KINDS if self.kind is None else (self.kind,):
+            index = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), self.on)
+            if index >= 0:
+                return kind, index
+        names = _names(model, KINDS if self.kind is None else (self.kind,))
+        what = " or ".join(KINDS) if self.kind is None else self.kind
+        raise ValueError(f"Mount: no {what} {self.on!r} in the model{did_you_mean(self.on, names)}")
+
+    def local(self, kind: str) -> tuple[np.ndarray, np.ndarray]:
+        """Pupil [m] (3,) and eye's frame (3, 3) in the frame of what it is on; columns (right, up, ahead)."""
+        ahead, left, up = _AXES[kind]
+        azimuth, elevation, roll = np.radians([self.azimuth_deg, self.elevation_deg, self.roll_deg])
+        level = np.cos(azimuth) * ahead + np.sin(azimuth) * left
+        beside = -np.sin(azimuth) * ahead + np.cos(azimuth) * left
+        axis = np.cos(elevation) * level + np.sin(elevation) * up
+        top = -np.sin(elevation) * level + np.cos(elevation) * up
+        upwards = np.cos(roll) * top + np.sin(roll) * beside
+        rightwards = np.sin(roll) * top - np.cos(roll) * beside
+        return np.asarray(self.offset) @ _AXES[kind], np.column_stack([rightwards, upwards, axis])
+
+
+def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
+    """Each of them and its mirror image: left, right, left, right ..."""
+    return tuple(one for mount in mounts for one in (mount, mount.mirrored()))
+
+
+def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
+    """Eyes in a circle around a body's z axis that look outwards, left to right, as `Eyes` has them on our agent.
+
+    Raises:
+        ValueError: less than one eye.
+    """
+    if n_eyes < 1:
+        raise ValueError(f"ring: n_eyes = {n_eyes!r}: must be at least 1")
+    half = placement_range_deg / 2
+    azimuths = np.linspace(half, -half, n_eyes) if n_eyes > 1 else np.zeros(1)
+    return tuple(
+        Mount(on, azimuth_deg=float(a), offset=(radius * np.cos(np.radians(a)), radius * np.sin(np.radians(a)), 0.0))
+        for a in azimuths
+    )
+
+
+def _names(model: mujoco.MjModel, kinds: Iterable[str]) -> list[str]:
+    counts = {"site": model.nsite, "camera": model.ncam, "body": model.nbody}
+    return [name for kind in kinds for i in range(counts[kind]) if (name := getattr(model, kind)(i).name)]

@@ -1,0 +1,104 @@
+"""A task of one's own: a robot with eyes, how an episode begins, and what a step is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+import optics
+from optics.numerics.arguments import whole
+from optics.spectra.spectrum import Spectrum
+from sim.render.fidelity import Fidelity
+from sim.robots.model_renderer import SIXTEEN_RAYS
+from sim.robots.mounts import Mount
+from sim.scene import source
+
+MOST_STEPS = 10**9
+
+
+class Task:
+    """What a subclass says about itself; only `model`, `mounts` and `rewards` have no default.
+
+    model: an MjModel, or what compiles to one (`sim.mirror`)
+    eye: optics and retina of every eye · mounts: where the eyes are
+    fidelity: how finely they see, see `sim.ModelRenderer`
+    substeps: of physics in one action · episode_steps: actions, then an episode is truncated
+    spectra: of materials and lights, by name, in the place of their colours
+    camera: name of the camera that pictures for people are taken with; None: one that looks at the whole model
+
+    Methods are called for one world at a time, with its mjData after mj_forward.
+    """
+
+    model: mujoco.MjModel | mujoco.MjSpec | str | Path
+    eye: optics.Eye = optics.Eye()
+    mounts: Sequence[Mount] = ()
+    fidelity: Fidelity = SIXTEEN_RAYS
+    substeps: int = 5
+    episode_steps: int = 256
+    spectra: Mapping[str, Spectrum | str] | None = None
+    camera: str | None = None
+
+    def reset(self, data: mujoco.MjData, rng: np.random.Generator) -> None:
+        """Begin an episode: change what mj_resetData has left."""
+
+    def act(self, data: mujoco.MjData, action: np.ndarray) -> None:
+        """Take an action in [-1, 1], (n_actions,); here: every actuator over the whole of its range."""
+        limited = data.model.actuator_ctrllimited.astype(bool)
+        low, high = np.where(limited[:, None], data.model.actuator_ctrlrange, [-1.0, 1.0]).T
+        data.ctrl[:] = low + (high - low) * (action + 1) / 2
+
+    def rewards(self, data: mujoco.MjData) -> Mapping[str, float]:
+        """What the step that led here is worth, by named terms; the reward is their sum."""
+        raise NotImplementedError
+
+    def terminated(self, data: mujoco.MjData) -> bool:
+        """Whether the episode ends here."""
+        return False
+
+    def succeeded(self, data: mujoco.MjData) -> bool:
+        """Whether what was to be done is done: `info["is_success"]`."""
+        return False
+
+    def feels(self, data: mujoco.MjData) -> np.ndarray:
+        """What the animal knows beside what it sees, (k,); here: nothing."""
+        return np.zeros(0)
+
+    def n_actions(self, model: mujoco.MjModel) -> int:
+        """Numbers in an action; here: as many as there are actuators."""
+        return int(model.nu)
+
+
+def compiled(task: Task) -> mujoco.MjModel:
+    """The model of a task whose other settings are right.
+
+    Raises:
+        ValueError: something is missing, or wrong.
+    """
+    name = type(task).__name__
+    if not hasattr(task, "model"):
+        raise ValueError(f"{name}: model: must be set, to an MjModel, a path or MJCF text")
+    whole(f"{name}: substeps", task.substeps, 1, MOST_STEPS)
+    whole(f"{name}: episode_steps", task.episode_steps, 1, MOST_STEPS)
+    model = source.load(task.model)
+    if task.n_actions(model) < 1:
+        raise ValueError(f"{name}: its model has no actuators: n_actions and act must say what an action is")
+    return model
+
+
+def named_terms(task: Task, data: mujoco.MjData) -> dict[str, float]:
+    """Its rewards.
+
+    Raises:
+        ValueError: they are no finite numbers by name.
+    """
+    terms: Any = task.rewards(data)
+    if not isinstance(terms, Mapping):
+        raise ValueError(f"rewards returned {terms!r}: must be numbers by name, such as {{'progress': 0.1}}")
+    for name, value in terms.items():
+        if not np.isscalar(value) or not np.isfinite(value):
+            raise ValueError(f"rewards: {name!r} is {value!r}: must be one finite number")
+    return {str(name): float(value) for name, value in terms.items()}

@@ -1,0 +1,39 @@
+"""Shapes that share a material as one: every shape of a Mitsuba scene costs time in every launch of a kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from sim.scene import shapes, tessellation
+from sim.scene.shapes import Part
+from sim.scene.tessellation import Triangles
+from sim.scene.variant import Description, MitsubaObject
+
+PlacedPart = tuple[str, Part, np.ndarray, MitsubaObject]  # name, part, pose (4, 4) and BSDF
+
+
+def merged(parts: Iterable[PlacedPart], prefix: str) -> Description:
+    """Mitsuba shapes by name (of the variant in force): triangles of one material together, as "<prefix>_<n>"; what is
+    no mesh by itself, under its own name."""
+    description: Description = {}
+    meshes: dict[tuple[int, bool, bool], tuple[MitsubaObject, list[Triangles]]] = {}
+    for name, part, pose, bsdf in parts:
+        if part.triangles is None:
+            description[name] = shapes.build(part, pose, name, bsdf, None)
+            continue
+        placed = _placed(part.triangles, pose)
+        key = id(bsdf), placed.uv is None, placed.normals is None
+        meshes.setdefault(key, (bsdf, []))[1].append(placed)
+    for i, (bsdf, triangles) in enumerate(meshes.values()):
+        whole = Part(triangles=tessellation.join(triangles))
+        description[f"{prefix}_{i}"] = shapes.build(whole, np.eye(4), f"{prefix}_{i}", bsdf, None)
+    return description
+
+
+def _placed(triangles: Triangles, pose: np.ndarray) -> Triangles:
+    """Triangles of a geom's frame in the world's."""
+    normals = None if triangles.normals is None else triangles.normals @ pose[:3, :3].T
+    return replace(triangles, vertices=triangles.vertices @ pose[:3, :3].T + pose[:3, 3], normals=normals)

@@ -1,0 +1,214 @@
+"""Tasks of one's own: a cart on a rail that moves to where it sees a ball, and what goes wrong in others' code."""
+
+import mujoco
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from stable_baselines3 import PPO
+
+import optics
+import sim
+
+CART = """
+<mujoco>
+  <visual><headlight active="0"/></visual>
+  <option timestep=".02"/>
+  <worldbody>
+    <light type="directional" dir="-.3 -.4 -1" diffuse=".9 .9 .9"/>
+    <geom type="plane" size="6 3 .1" rgba=".3 .3 .3 1"/>
+    <body name="cart" pos="0 0 .2">
+      <joint name="rail" type="slide" axis="0 1 0" damping="1"/>
+      <geom type="box" size=".15 .2 .1" rgba=".2 .4 .8 1" mass="1"/>
+    </body>
+    <body name="ball" mocap="true" pos="2 0 .3"><geom size=".3" rgba=".9 .2 .1 1" contype="0" conaffinity="0"/></body>
+  </worldbody>
+  <actuator><velocity joint="rail" kv="10" ctrlrange="-2 2"/></actuator>
+</mujoco>"""
+
+
+class Face(sim.Task):
+    """A cart on a rail moves to where a ball is before it."""
+
+    model = CART
+    eye = optics.Eye(resolution=(2, 16), fov_deg=120, bands=4)
+    mounts = (sim.Mount("cart", offset=(0.2, 0, 0.1)),)
+    fidelity = sim.Fidelity(2, bands=4)
+    episode_steps = 40
+
+    def reset(self, data, rng):
+        data.mocap_pos[0, 1] = rng.uniform(-2, 2)
+
+    def rewards(self, data):
+        return {"near": -abs(data.mocap_pos[0, 1] - data.qpos[0]) / 10}
+
+    def succeeded(self, data):
+        return abs(data.mocap_pos[0, 1] - data.qpos[0]) < 0.3
+
+
+def test_ppo_learns_to_go_by_sight():
+    """Success of a third of the episodes by chance; a blind cart's best is to stay in the middle, at a sixth."""
+    env = sim.make_vec_env(Face(), n_envs=32)
+    learner = PPO(
+        "MultiInputPolicy", env, n_steps=64, batch_size=512, learning_rate=1e-3, n_epochs=8, gamma=0.9, seed=0
+    )
+    learner.learn(16_000)
+    observation = env.reset()
+    for _ in range(Face.episode_steps - 1):
+        observation, _, _, infos = env.step(learner.predict(observation, deterministic=True)[0])
+    assert np.mean([info["is_success"] for info in infos]) > 0.9
+    blind = {**observation, "eyes": np.zeros_like(observation["eyes"])}
+    env.reset()
+    for _ in range(Face.episode_steps - 1):
+        _, _, _, infos = env.step(learner.predict(blind, deterministic=True)[0])
+    assert np.mean([info["is_success"] for info in infos]) < 0.5
+
+
+def test_worlds_depend_on_seed_and_number_alone():
+    def episode(n, seed):
+        env = sim.make_vec_env(Face(), n_envs=n, seed=seed)
+        seen = [env.reset()["eyes"][0]]
+        for k in range(45):  # past the end of an episode
+            seen.append(env.step(np.full((n, 1), np.sin(k), np.float32))[0]["eyes"][0])
+        return np.array(seen)
+
+    np.testing.assert_array_equal(episode(1, 3), episode(5, 3))
+    assert np.abs(episode(1, 3) - episode(1, 4)).max() > 0.1
+
+
+def test_episodes_end_and_begin_as_stable_baselines_has_it():
+    env = sim.make_vec_env(Face(), n_envs=2, memory=3)
+    first = env.reset()
+    assert first["eyes"].shape == (2, 3, 1, 3, 2, 16)
+    returns = np.zeros(2)
+    for k in range(Face.episode_steps):
+        observation, reward, done, infos = env.step(np.zeros((2, 1)))
+        returns += reward
+        assert done.all() == (k == Face.episode_steps - 1)
+    for world, info in enumerate(infos):
+        assert info["TimeLimit.truncated"]
+        assert info["episode"]["r"] == pytest.approx(returns[world], rel=1e-5)
+        assert info["episode"]["l"] == Face.episode_steps
+        last, new = info["terminal_observation"]["eyes"], observation["eyes"][world]
+        assert np.ptp(last[-1] - last[0]) > 0  # noise differs from frame to frame
+        np.testing.assert_array_equal(new[0], new[2])  # a new episode has always seen what it sees first
+        assert np.abs(new[2] - last[2]).max() > 0.05
+
+
+def test_one_world_is_a_gymnasium_environment():
+    env = sim.make_env(Face(), render_mode="rgb_array")
+    check_env(env, skip_render_check=True)
+    env.reset(seed=1)
+    picture = env.render()
+    assert picture.shape == (360, 480, 3)
+    env.step(np.ones(1))
+    assert np.abs(env.render().astype(int) - picture).max() > 30
+    assert sim.make_env(Face(), render_mode="eyes").render_mode == "eyes"
+
+
+class Feeling(Face):
+    def feels(self, data):
+        return data.qvel
+
+
+def test_what_is_felt_is_observed():
+    env = sim.make_vec_env(Feeling(), n_envs=2)
+    env.reset()
+    observation = env.step(np.array([[1.0], [-1.0]]))[0]
+    assert env.observation_space["feels"].shape == (1,)
+    assert observation["feels"][0, 0] > 0 > observation["feels"][1, 0]
+    np.testing.assert_array_equal(observation["previous_action"], [[1], [-1]])
+
+
+class Failing(Face):
+    def rewards(self, data):
+        return {"near": 1 / int(data.mocap_pos[0, 1] > 0)}
+
+
+class Unpaid(Face):
+    def rewards(self, data):
+        return 0.5
+
+
+class NotFinite(Face):
+    def rewards(self, data):
+        return {"near": np.nan}
+
+
+@pytest.mark.parametrize(
+    ("task", "words"),
+    [
+        (Failing, "rewards, line .* of test_task_vec_env.py: ZeroDivisionError: division by zero"),
+        (Unpaid, "rewards returned 0.5: must be numbers by name"),
+        (NotFinite, "rewards: 'near' is nan: must be one finite number"),
+    ],
+)
+def test_a_failing_method_ends_its_world_and_the_others_go_on(task, words):
+    env = sim.make_vec_env(task(), n_envs=8)
+    env.reset()
+    fails = np.array([data.mocap_pos[0, 1] <= 0 for data in env.worlds.datas]) if task is Failing else np.ones(8, bool)
+    with pytest.warns(UserWarning, match=words):
+        _, reward, done, infos = env.step(np.zeros((8, 1)))
+    np.testing.assert_array_equal(done, fails)
+    for failed, info, r in zip(fails, infos, reward, strict=True):
+        assert ("failure" in info) == failed
+        assert r == (0 if failed else 1)
+
+
+def test_actions_and_physics_that_are_not_finite():
+    env = sim.make_vec_env(Face(), n_envs=3)
+    env.reset()
+    with pytest.warns(UserWarning, match="action is not finite"):
+        _, _, done, infos = env.step(np.array([[0], [np.nan], [0]]))
+    np.testing.assert_array_equal(done, [False, True, False])
+    env.worlds.datas[2].qvel[:] = np.nan
+    with pytest.warns(UserWarning, match="physics is unstable"):
+        observation, _, done, infos = env.step(np.zeros((3, 1)))
+    assert "failure" in infos[2]
+    assert np.isfinite(observation["eyes"]).all()
+
+
+class NoModel(sim.Task):
+    pass
+
+
+class NoActuators(Face):
+    model = '<mujoco><worldbody><body name="cart"><joint/><geom size=".1"/></body></worldbody></mujoco>'
+
+
+class NoMounts(Face):
+    mounts = ()
+
+
+class NoSubsteps(Face):
+    substeps = 0
+
+
+class FailingReset(Face):
+    def reset(self, data, rng):
+        raise KeyError("nothing")
+
+
+@pytest.mark.parametrize(
+    ("task", "options", "error", "words"),
+    [
+        (NoModel, {}, ValueError, "NoModel: model: must be set"),
+        (NoActuators, {}, ValueError, "NoActuators: its model has no actuators"),
+        (NoMounts, {}, ValueError, "mounts = .*must be one sim.Mount at least"),
+        (NoSubsteps, {}, ValueError, "NoSubsteps: substeps = 0: must be a whole number"),
+        (FailingReset, {}, RuntimeError, "reset, line .* of test_task_vec_env.py: KeyError: 'nothing'"),
+        (Face, {"eyes": sim.Eyes()}, ValueError, "eyes = .*: must be left out, a sim.Task says it itself"),
+        (Face, {"n_envs": 0}, ValueError, "n_envs = 0: must be a whole number"),
+        (Face, {"render_mode": "ascii"}, ValueError, "render_mode = 'ascii': must be one of"),
+    ],
+)
+def test_bad_tasks_are_named(task, options, error, words):
+    with pytest.raises(error, match=words):
+        sim.make_vec_env(task(), **{"n_envs": 2, **options})
+
+
+def test_actuators_are_driven_over_their_range():
+    task, model = Face(), mujoco.MjModel.from_xml_string(CART)
+    data = mujoco.MjData(model)
+    for action, control in ((-1, -2), (0, 0), (0.5, 1)):
+        task.act(data, np.array([action]))
+        assert data.ctrl[0] == pytest.approx(control)

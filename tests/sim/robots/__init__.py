@@ -1,0 +1,14 @@
+"""Who tests what of sim/robots.
+
+model_renderer: test_model_renderer.py
+model_wavefront: test_model_renderer.py
+mounts: test_mounts.py
+task: envs/test_task_vec_env.py
+inside: test_mounts.py
+poses: test_model_renderer.py
+model_scene: test_model_renderer.py
+model_lights: test_model_renderer.py
+model_tracer: test_model_renderer.py
+primitives: test_movers.py
+movers: test_movers.py
+"""

@@ -1,0 +1,112 @@
+"""Rays that meet movers, against MuJoCo's own ray caster."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import sim
+from optics import Eye
+from sim.robots import primitives
+
+SHAPES = {
+    "sphere": '<geom type="sphere" size=".3"/>',
+    "ellipsoid": '<geom type="ellipsoid" size=".4 .15 .25"/>',
+    "capsule": '<geom type="capsule" size=".15 .3"/>',
+    "cylinder": '<geom type="cylinder" size=".25 .2"/>',
+    "box": '<geom type="box" size=".3 .15 .2"/>',
+    "mesh": '<geom type="mesh" mesh="wedge"/>',
+}
+WEDGE = '<asset><mesh name="wedge" vertex="-.3 -.3 -.2  .4 -.3 -.2  0 .4 -.2  0 0 .4"/></asset>'
+EYE = Eye(resolution=(24, 24), fov_deg=40, bands=1)
+WORLDS = 6
+
+
+def model_of(*shapes):
+    bodies = "".join(
+        f'<body name="b{i}" pos="{i * 0.5} 0 0"><freejoint/>{shape}</body>' for i, shape in enumerate(shapes)
+    )
+    return mujoco.MjModel.from_xml_string(
+        f"""<mujoco><visual><headlight active="0"/></visual>{WEDGE}<worldbody>
+        <light type="directional" dir=".3 .2 -1"/><geom type="plane" size="9 9 .1" pos="0 0 -3"/>
+        <camera name="eye" pos="0 -2.5 .4" xyaxes="1 0 0 0 .1 1"/>{bodies}</worldbody></mujoco>"""
+    )
+
+
+def posed(model, seed, spread=0.4):
+    rng = np.random.default_rng(seed)
+    data = mujoco.MjData(model)
+    for k in range(model.nq // 7):
+        data.qpos[7 * k : 7 * k + 3] += rng.uniform(-spread, spread, 3)
+        quaternion = rng.normal(size=4)
+        data.qpos[7 * k + 3 : 7 * k + 7] = quaternion / np.linalg.norm(quaternion)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def cast(model, data, pupil, directions):
+    """Depth along the axis of what MuJoCo's rays meet."""
+    found, geom = np.empty(len(directions)), np.zeros(1, np.int32)
+    for i, direction in enumerate(directions):
+        found[i] = mujoco.mj_ray(model, data, pupil, direction, None, 1, -1, geom, None)
+    return np.where(found < 0, np.inf, found)
+
+
+def depths(model, datas):
+    renderer = sim.ModelRenderer(model, EYE, [sim.Mount("eye")], len(datas), sim.Fidelity(1, bands=1))
+    pupils, frames = renderer.eye_frames(sim.Poses.of(datas))
+    side = 2 * np.tan(np.radians(EYE.fov_deg) / 2) / EYE.resolution[1]
+    row, column = np.indices(EYE.resolution)
+    plane = np.stack([(column - 11.5) * side, (11.5 - row) * side, np.ones(row.shape)], axis=-1).reshape(-1, 3)
+    expected = [
+        cast(model, data, pupil[0], plane @ frame[0].T).reshape(EYE.resolution)
+        for data, pupil, frame in zip(datas, pupils, frames, strict=True)
+    ]
+    return renderer.depth(datas)[:, 0], np.array(expected)
+
+
+def agreement(found, expected):
+    """Share of rays that meet the same thing: to 1e-4, ten times float32's rounding of what is 3 m away."""
+    return np.mean(np.isclose(found, expected, rtol=1e-4, atol=0))
+
+
+@pytest.mark.parametrize("name", list(SHAPES))
+def test_each_kind_is_met_where_mujoco_meets_it(name):
+    """But for single rays at a limb, where rounding decides."""
+    model = model_of(SHAPES[name])
+    datas = [posed(model, seed) for seed in range(WORLDS)]
+    found, expected = depths(model, datas)
+    assert 0.02 < np.mean(expected < 3.2) < 0.6
+    assert agreement(found, expected) > 0.998
+
+
+def test_all_kinds_together():
+    model = model_of(*SHAPES.values(), *SHAPES.values())
+    datas = [posed(model, seed, 0.8) for seed in range(WORLDS)]
+    found, expected = depths(model, datas)
+    assert agreement(found, expected) > 0.998
+
+
+@pytest.mark.parametrize("name", ["ellipsoid", "capsule", "cylinder", "box"])
+def test_other_shapes_do_not_agree(name, monkeypatch):
+    """A capsule without its ends, a cylinder without its lids, an ellipsoid and a box of other sizes."""
+    right = primitives.PRIMITIVES[name]
+
+    def wrong(o, d, size):
+        if name in ("capsule", "cylinder"):
+            return primitives._into_side(o, d, size.x)
+        return right.hit(o, d, size * 1.05)
+
+    monkeypatch.setitem(primitives.PRIMITIVES, name, primitives.Primitive(wrong, right.normal))
+    model = model_of(SHAPES[name])
+    found, expected = depths(model, [posed(model, seed) for seed in range(WORLDS)])
+    assert agreement(found, expected) < 0.99
+
+
+def test_what_stands_still_hides_what_moves():
+    model = mujoco.MjModel.from_xml_string("""<mujoco><visual><headlight ambient="0 0 0"/></visual><worldbody>
+        <camera name="eye" pos="0 -2 0" xyaxes="1 0 0 0 0 1"/><geom type="box" size=".5 .1 .5" pos="0 -1 0"/>
+        <body><freejoint/><geom size=".4"/></body>
+        </worldbody></mujoco>""")
+    found, expected = depths(model, [posed(model, 0, 0.1)])
+    assert agreement(found, expected) > 0.998
+    assert found[0, 12, 12] == pytest.approx(0.9, abs=1e-5)
