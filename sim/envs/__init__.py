@@ -6,6 +6,7 @@ task_vec_env           TaskVecEnv: the same for tasks of one's own
 task_worlds            their worlds
 one_environment        what both answer stable-baselines3 alike
 env                    make_env, EyesEnv: Gymnasium
+vector_env             EyesVectorEnv: Gymnasium's vector environment
 registration           Gymnasium's ids
 simulation             worlds in motion, unseen
 observation            what an agent knows

@@ -40,6 +40,8 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         super().reset(seed=seed)
+        if options:
+            raise ValueError(f"reset: options = {options!r}: must be left out, nothing can be set here")
         if seed is not None:
             self._batch.seed(seed)
         observation = self._batch.reset()

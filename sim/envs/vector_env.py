@@ -1,0 +1,77 @@
+"""All worlds as one Gymnasium vector environment: `gymnasium.make_vec("rhabdom/Detection-v0", num_envs=64)`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from sim.envs.assembly import make_vec_env
+from sim.envs.follow_camera import RENDER_MODES
+from sim.eyes.eyes import Eyes
+from sim.robots.task import Task
+
+
+class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
+    """The batched environment behind Gymnasium's own face.
+
+    Worlds start anew in the step that ends them (`AutoresetMode.SAME_STEP`): what is returned is then the first
+    observation of the new episode, and info["final_obs"] has the last of the old one.
+
+    task, eyes, memory, mode ...: as in `sim.make_vec_env`
+
+    Raises:
+        ValueError: a bad argument.
+    """
+
+    metadata = {  # noqa: RUF012 (Gymnasium's own declaration)
+        "render_modes": [*RENDER_MODES],
+        "render_fps": 5,
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(self, num_envs: int = 1, *, task: str | Task, eyes: Eyes | None = None, **options: Any) -> None:
+        self._batch = make_vec_env(task, eyes, n_envs=num_envs, seed=None, **options)
+        self.num_envs, self.render_mode = num_envs, self._batch.render_mode
+        self.single_observation_space = self._batch.observation_space
+        self.single_action_space = self._batch.action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        if options:
+            raise ValueError(f"reset: options = {options!r}: must be left out, nothing can be set here")
+        if isinstance(seed, list):
+            raise ValueError("reset: seed: must be one number; world i draws from streams of its own, derived from it")
+        if seed is not None:
+            self._batch.seed(seed)
+        return self._batch.reset(), self._together(self._batch.reset_infos)
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        observation, reward, done, infos = self._batch.step(actions)
+        truncated = np.array([info.pop("TimeLimit.truncated", False) for info in infos])
+        for info in infos:
+            info.pop("episode", None)  # stable-baselines3's; Gymnasium leaves that name to its wrappers
+            if (last := info.pop("terminal_observation", None)) is not None:
+                info["final_obs"] = last
+        return observation, reward, done & ~truncated, done & truncated, self._together(infos)
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """A picture (y, x, 3) uint8 of every world as `render_mode` asks."""
+        return None if self.render_mode is None else tuple(self._batch.get_images())
+
+    def close_extras(self, **kwargs: Any) -> None:
+        self._batch.close()
+
+    def _together(self, infos: list[dict[str, Any]]) -> dict[str, Any]:
+        """One array for each key, and which worlds have it."""
+        found: dict[str, Any] = {}
+        for world, info in enumerate(infos):
+            found = self._add_info(found, info, world)
+        return found
