@@ -11,6 +11,7 @@ methods       the diffraction integral, evaluated in ten ways (methods/textbook.
 point_spread  psf and plan: which method, and whether it was right
 propagation   sampled fields from plane to plane
 eye           Eye: what its receptors see
+ommatidia     Ommatidium: facets before rhabdoms that are waveguides
 torch         psf inside a PyTorch graph
 """
 
@@ -19,14 +20,24 @@ from typing import Any
 
 _CONTENTS = {
     "AccuracyError": "numerics.accuracy",
+    "Annulus": "apertures.circular",
+    "AppositionEye": "ommatidia.mosaic",
     "BSplineRelief": "elements.relief",
     "BackendError": "numerics.backend",
-    "Annulus": "apertures.circular",
     "Circle": "apertures.circular",
+    "Combined": "apertures.combined",
+    "Cornu": "elements.refractive_index",
+    "Disk": "apertures.shapes",
     "Eye": "eye.eye",
+    "FacetLens": "ommatidia.facet",
     "FreeSpace": "propagation.system",
+    "GaussianMask": "elements.transmittance",
     "Grid": "numerics.grid",
     "HeightMap": "elements.relief",
+    "MaskMap": "elements.transmittance",
+    "Mode": "ommatidia.waveguide",
+    "Oblong": "apertures.shapes",
+    "Ommatidium": "ommatidia.ommatidium",
     "PSFBatch": "point_spread.batch",
     "PSFResult": "point_spread.psf_result",
     "PhotonBudget": "spectra.photon_budget",
@@ -40,17 +51,26 @@ _CONTENTS = {
     "Receptors": "spectra.receptors",
     "RefractiveIndex": "elements.refractive_index",
     "Relief": "elements.relief",
+    "Rings": "apertures.rings",
+    "Sellmeier": "elements.refractive_index",
     "Slit": "apertures.polygonal",
     "SpectralBands": "spectra.bands",
     "Spectrum": "spectra.spectrum",
+    "Spider": "apertures.shapes",
     "StackResult": "propagation.system",
     "VectorFocus": "point_spread.vector_focus",
     "WavefrontMap": "elements.wavefront",
+    "Waveguide": "ommatidia.waveguide",
     "WhitePSF": "point_spread.white",
     "Zernike": "elements.wavefront",
+    "difference": "apertures.combined",
     "encircled_energy": "point_spread.concentration",
+    "hexagonal_directions": "ommatidia.mosaic",
+    "hexagonal_segments": "apertures.combined",
     "illuminant": "spectra.spectrum",
     "image_quality": "point_spread.contrast",
+    "intersection": "apertures.combined",
+    "medium": "elements.refractive_index",
     "mtf": "point_spread.contrast",
     "plan": "point_spread.psf",
     "propagate": "propagation.propagate",
@@ -60,7 +80,9 @@ _CONTENTS = {
     "receptors_of": "spectra.receptors",
     "reflectance": "spectra.spectrum",
     "require": "numerics.backend",
+    "snyder_acceptance": "ommatidia.ommatidium",
     "strehl_ratio": "point_spread.concentration",
+    "union": "apertures.combined",
     "vector_focus": "point_spread.vector_focus",
     "white_psf": "point_spread.white",
 }

@@ -52,7 +52,7 @@ NAMED = (
     *_mutants("optics/eye/kernel_interpolation.py", ("too dark counts as too bright", "in (1, -1)))", "in (1, 1)))")),
     *_mutants(
         "optics/point_spread/psf_result.py",
-        ("the cutoff knows the medium", "* self.pupil.medium_n / self.wavelengths\n", "/ self.wavelengths\n"),
+        ("the cutoff knows the medium", "* index / self.wavelengths\n", "/ self.wavelengths\n"),
     ),
     *_mutants(
         "optics/numerics/backend.py",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,9 +55,27 @@ def eye_figures(phenotype: Phenotype, config: EyeConfig) -> Html:
     eye = phenotype.eyes(config).eye()
     if eye.pupil is None:
         return html("<p>Optics are off in this run: every eye has a perfect lens, which neither blurs nor dims.</p>\n")
-    light = WhiteLight.through(eye)
-    parts = [_pupil(eye, phenotype), _psf(light), _cuts(light), _mtf(light)]
+    pupil = _pupil(eye, phenotype)
+    try:
+        light = WhiteLight.through(eye)
+    except optics.AccuracyError as error:
+        parts = [pupil, _unknown("Point spread function", error)]
+    else:
+        measured = (("Point spread function", _psf), ("Cuts", _cuts), ("Contrast", _mtf))
+        parts = [pupil, *(_or_why_not(name, draw, light) for name, draw in measured)]
     return html('<div class="figures pairs">{}</div>\n', joined(parts))
+
+
+def _or_why_not(name: str, draw: Callable[[WhiteLight], Html], light: WhiteLight) -> Html:
+    """A figure, or one line where the light cannot be known well enough for it."""
+    try:
+        return draw(light)
+    except optics.AccuracyError as error:
+        return _unknown(name, error)
+
+
+def _unknown(name: str, error: optics.AccuracyError) -> Html:
+    return html("<p><b>{}.</b> It is not known: {}.</p>", name, str(error))
 
 
 def _pupil(eye: optics.Eye, phenotype: Phenotype) -> Html:

@@ -18,7 +18,7 @@ from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.arguments import LARGEST, in_range, positive
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import SOFT_EDGE_SAMPLE
-from optics.numerics.precision import Precision
+from optics.numerics.precision import Precision, padded_for_packets
 
 __all__ = ["EDGE_REACH", "Aperture", "Nodes", "SoftAperture"]
 
@@ -63,11 +63,15 @@ class SoftAperture(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Quadrature nodes x, y and weights over an aperture: flat float64 arrays, in units of R and R²."""
+    """Quadrature nodes x, y and weights over an aperture: flat float64 arrays, in units of R and R², fit for Dr.Jit."""
 
     x: np.ndarray
     y: np.ndarray
     weight: np.ndarray
+
+    def __post_init__(self) -> None:
+        for name in ("x", "y", "weight"):
+            object.__setattr__(self, name, padded_for_packets(getattr(self, name)))
 
     def __len__(self) -> int:
         return len(self.weight)
@@ -87,9 +91,9 @@ class Aperture(ABC):
         """Whether the aperture is the same seen from every side."""
 
     @property
-    def inner_radius(self) -> float:
-        """Of a rotationally symmetric aperture: the radius of the disk about the axis that is closed, in R."""
-        return 0.0
+    def rings(self) -> tuple[tuple[float, float], ...]:
+        """Of a rotationally symmetric aperture: inner and outer radii of the rings that are open, in R."""
+        return ((0.0, 1.0),)
 
     @property
     @abstractmethod

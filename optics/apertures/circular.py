@@ -17,7 +17,7 @@ from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
 
-__all__ = ["Annulus", "Circle"]
+__all__ = ["Annulus", "Circle", "disk_table", "ring_nodes"]
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ class Circle(Aperture):
 
     @property
     def outline(self) -> Outline:
-        return Outline((1.0,))
+        return Outline.circles((1.0,))
 
     def _nodes(self, cycles: float, digits: float) -> Nodes:
-        return _ring_nodes(0.0, cycles, digits)
+        return ring_nodes(0.0, 1.0, cycles, digits)
 
     def _softened(self, edge: SoftEdge) -> SoftAperture:
         return SoftAnnulus(edge, 0.0)
@@ -75,8 +75,8 @@ class Annulus(Aperture):
         return True
 
     @property
-    def inner_radius(self) -> float:
-        return self.inner
+    def rings(self) -> tuple[tuple[float, float], ...]:
+        return ((self.inner, 1.0),)
 
     @property
     def half_widths(self) -> tuple[float, float]:
@@ -88,10 +88,10 @@ class Annulus(Aperture):
 
     @property
     def outline(self) -> Outline:
-        return Outline((self.inner, 1.0))
+        return Outline.circles((self.inner, 1.0))
 
     def _nodes(self, cycles: float, digits: float) -> Nodes:
-        return _ring_nodes(self.inner, cycles, digits)
+        return ring_nodes(self.inner, 1.0, cycles, digits)
 
     def _softened(self, edge: SoftEdge) -> SoftAperture:
         return SoftAnnulus(edge, self.inner)
@@ -108,12 +108,12 @@ class SoftAnnulus(SoftAperture):
         import drjit as dr
 
         distance = dr.sqrt(x * x + y * y + 1e-40)  # differentiable on the axis
-        disk = _disk_table(self.edge, 1.0).at(distance, types)
-        return disk if self.inner == 0 else disk - _disk_table(self.edge, self.inner).at(distance, types)
+        disk = disk_table(self.edge, 1.0).at(distance, types)
+        return disk if self.inner == 0 else disk - disk_table(self.edge, self.inner).at(distance, types)
 
 
-@lru_cache(maxsize=64)
-def _disk_table(edge: SoftEdge, radius: float) -> Interpolant:
+@lru_cache(maxsize=512)
+def disk_table(edge: SoftEdge, radius: float) -> Interpolant:
     """Profile of a soft disk across its edge."""
     ends = radius - edge.reach, radius + edge.reach
     return Interpolant.of(lambda rho: disk_profile(edge, radius, rho), ends, 2 * edge.cycles, edge.ripple / 4)
@@ -138,18 +138,19 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
     return np.asarray(partly + np.sum(weight * within * edge.ring(within * u), axis=1))
 
 
-def _ring_nodes(inner: float, cycles: float, digits: float) -> Nodes:
+def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Nodes:
     """Gauss-Legendre in radius, trapezoid in angle with fewer nodes on smaller rings: exact edge, spectral convergence.
 
-    Over the full disk the mean around a ring is a smooth function of r², which pays for few cycles.
+    Over a full disk the mean around a ring is a smooth function of r², which pays for few cycles.
     """
     digits += 0.3  # log10 2: half the error to each of the two rules
-    u, weight = gauss_legendre(gauss_legendre_count(cycles * (1 - inner), digits))
-    rings = [(inner + (1 - inner) * u, (1 - inner) * weight)]
+    span = outer - inner
+    u, weight = gauss_legendre(gauss_legendre_count(cycles * span, digits))
+    rings = [(inner + span * u, span * weight)]
     if inner == 0:
         # Along a diameter, of which r² sees half the nodes.
-        u, weight = gauss_legendre(ceil(gauss_legendre_count(2 * cycles, digits) / 2))
-        rings.append((np.sqrt(u), weight / (2 * np.sqrt(u))))
+        u, weight = gauss_legendre(ceil(gauss_legendre_count(2 * cycles * outer, digits) / 2))
+        rings.append((outer * np.sqrt(u), outer * weight / (2 * np.sqrt(u))))
     counts = [harmonics(2 * pi * cycles * r, digits) for r, _ in rings]
     best = min(range(len(rings)), key=lambda i: int(counts[i].sum()))
     (r, weight), count = rings[best], counts[best]

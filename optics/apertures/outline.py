@@ -2,74 +2,127 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 __all__ = ["Outline"]
 
+TURN = 2 * np.pi
+
+
+def _none(*shape: int) -> np.ndarray:
+    return np.zeros((0, *shape))
+
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """Circles about the axis and the sides of one polygon, by the even-odd rule: a point is inside if a ray from it
-    crosses an odd number of them.
+    """Straight pieces and arcs, by the even-odd rule: a point is inside if a ray from it crosses an odd number of them.
 
-    radii: of the circles. vertices: of the polygon, (n, 2), none if empty.
+    segments: (n, 2, 2), their ends (x, y). arcs: (n, 5), of circles: centre x and y, radius, and the angles [rad]
+        between which they lie, from < to <= from + 2π.
     """
 
-    radii: tuple[float, ...] = ()
-    vertices: np.ndarray | None = None
+    segments: np.ndarray = field(default_factory=lambda: _none(2, 2))
+    arcs: np.ndarray = field(default_factory=lambda: _none(5))
+
+    @classmethod
+    def circles(cls, radii: tuple[float, ...], centre: tuple[float, float] = (0.0, 0.0)) -> Outline:
+        return cls(arcs=np.array([(*centre, radius, 0.0, TURN) for radius in radii], dtype=np.float64))
+
+    @classmethod
+    def polygon(cls, vertices: np.ndarray) -> Outline:
+        """vertices: (n, 2)."""
+        return cls(np.stack([vertices, np.roll(vertices, -1, axis=0)], axis=1))
+
+    @classmethod
+    def joined(cls, outlines: list[Outline]) -> Outline:
+        """All pieces of several."""
+        segments, arcs = ([getattr(each, name) for each in outlines] for name in ("segments", "arcs"))
+        return cls(np.concatenate([_none(2, 2), *segments]), np.concatenate([_none(5), *arcs]))
+
+    @property
+    def length(self) -> float:
+        _, _, radius, begin, end = self.arcs.T
+        return float(np.hypot(*(self.segments[:, 1] - self.segments[:, 0]).T).sum() + (radius * (end - begin)).sum())
+
+    def points(self, apart: float = 0.01) -> np.ndarray:
+        """(n, 2) along it, evenly, about this far apart."""
+        found = []
+        for start, end in self.segments:
+            n = max(1, round(float(np.hypot(*(end - start))) / apart))
+            found.append(start + (end - start) * ((np.arange(n) + 0.5) / n)[:, None])
+        for cx, cy, radius, begin, end in self.arcs:
+            n = max(1, round(radius * (end - begin) / apart))
+            angle = begin + (end - begin) * (np.arange(n) + 0.5) / n
+            found.append(np.column_stack([cx + radius * np.cos(angle), cy + radius * np.sin(angle)]))
+        return np.concatenate(found)
 
     def crossings(self, y: np.ndarray) -> np.ndarray:
         """x where the edge crosses the horizontal lines at `y`, ascending: (line, crossing). As many for all lines:
         no `turning` height may lie between them."""
         y = np.asarray(y, dtype=np.float64)
+        middle = float(y.mean())
         found = []
-        for radius in self.radii:
-            if abs(y).max() < radius:
-                half = np.sqrt(radius**2 - y**2)
-                found += [-half, half]
-        for start, end in self._sides:
-            if min(start[1], end[1]) < y.mean() < max(start[1], end[1]):
-                found.append(start[0] + (y - start[1]) * (end[0] - start[0]) / (end[1] - start[1]))
+        for cx, cy, radius, begin, end in self.arcs:
+            if abs(y - cy).max() < radius:
+                half = np.sqrt(radius**2 - (y - cy) ** 2)
+                reach = np.sqrt(radius**2 - (middle - cy) ** 2)
+                sides = [side for side in (-1, 1) if _within(np.arctan2(middle - cy, side * reach), begin, end)]
+                found += [cx + side * half for side in sides]
+        (x0, y0), (x1, y1) = (self.segments[:, k].T for k in (0, 1))
+        for i in np.flatnonzero((np.minimum(y0, y1) < middle) & (middle < np.maximum(y0, y1))):
+            found.append(x0[i] + (y - y0[i]) * (x1[i] - x0[i]) / (y1[i] - y0[i]))
         return np.sort(np.array(found).reshape(-1, len(y)).T, axis=1)
 
     def heights(self, x: float) -> np.ndarray:
         """y where the edge crosses the vertical line at x."""
-        found = [side * np.sqrt(r**2 - x**2) for r in self.radii if abs(x) < r for side in (-1, 1)]
-        for start, end in self._sides:
+        found = []
+        for cx, cy, radius, begin, end in self.arcs:
+            if abs(x - cx) < radius:
+                half = np.sqrt(radius**2 - (x - cx) ** 2)
+                sides = [side for side in (-1, 1) if _within(np.arctan2(side * half, x - cx), begin, end)]
+                found += [cy + side * half for side in sides]
+        for start, end in self.segments:
             if min(start[0], end[0]) < x < max(start[0], end[0]):
                 found.append(start[1] + (x - start[0]) * (end[1] - start[1]) / (end[0] - start[0]))
         return np.array(found, dtype=np.float64)
 
-    @property
+    @cached_property
     def turning(self) -> np.ndarray:
         """Heights at which crossings begin and end, or turn a corner."""
-        circles = [side * radius for radius in self.radii for side in (-1, 1)]
-        return np.array([*circles, *(() if self.vertices is None else self.vertices[:, 1])], dtype=np.float64)
+        _, cy, radius, begin, end = self.arcs.T
+        corners = [cy + radius * np.sin(begin), cy + radius * np.sin(end)]
+        tops = [
+            (cy + side * radius)[[_within(side * np.pi / 2, *ends) for ends in zip(begin, end, strict=True)]]
+            for side in (-1, 1)
+            if len(cy)
+        ]
+        return np.concatenate([self.segments[:, :, 1].ravel(), *corners, *tops])
 
-    @property
+    @cached_property
     def tangent(self) -> np.ndarray:
-        """Those of them at which crossings set off like a square root."""
-        return np.array([side * radius for radius in self.radii for side in (-1, 1)], dtype=np.float64)
+        """Tops and bottoms of circles, at which crossings set off like a square root, on the arcs or near to them."""
+        _, cy, radius, _, _ = self.arcs.T
+        return np.unique(np.concatenate([cy - radius, cy + radius]))
 
     def near(self, x: np.ndarray, y: np.ndarray, half: float) -> np.ndarray:
         """Whether squares of half a side `half` about points (x, y) may be cut by the edge: all that are, and few that
         are not."""
         cut = np.zeros(np.broadcast(x, y).shape, dtype=bool)
-        nearest = np.hypot(np.maximum(np.abs(x) - half, 0), np.maximum(np.abs(y) - half, 0))
-        farthest = np.hypot(np.abs(x) + half, np.abs(y) + half)
-        for radius in self.radii:
-            cut |= (nearest < radius) & (radius < farthest)
-        for start, end in self._sides:
+        for cx, cy, radius, _, _ in self.arcs:
+            across, along = np.abs(x - cx), np.abs(y - cy)
+            nearest = np.hypot(np.maximum(across - half, 0), np.maximum(along - half, 0))
+            cut |= (nearest < radius) & (radius < np.hypot(across + half, along + half))
+        for start, end in self.segments:
             along = end - start
             place = np.clip(((x - start[0]) * along[0] + (y - start[1]) * along[1]) / (along @ along), 0, 1)
             off = np.hypot(x - start[0] - place * along[0], y - start[1] - place * along[1])
             cut |= off < 1.5 * half  # its diagonal is 1.42 long
         return cut
 
-    @property
-    def _sides(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        if self.vertices is None:
-            return []
-        return list(zip(self.vertices, np.roll(self.vertices, -1, axis=0), strict=True))
+
+def _within(angle: float, begin: float, end: float) -> bool:
+    """Whether an angle [rad] lies on an arc."""
+    return bool((angle - begin) % TURN < end - begin or end - begin >= TURN)

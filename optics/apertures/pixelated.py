@@ -1,7 +1,7 @@
 """Quadrature over an opening that square pixels tile, for integrands that jump from one pixel to the next.
 
 Whole pixels have Gauss-Legendre nodes. Those that the opening's edge cuts are divided where the edge enters and leaves
-them, into panels with smooth ends: exact edge, spectral convergence (`PixelatedAperture.nodes`). Where nodes must lie
+them, into panels with smooth ends (`strips`; `PixelatedAperture.nodes`). Where nodes must lie
 on a grid of rows and columns, cut pixels have the nodes of whole ones, with the weights that integrate the
 interpolating polynomial over what is left of them (`PixelatedAperture.weights`).
 """
@@ -11,22 +11,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import pairwise
-from math import ceil, log10, pi
+from math import log10, pi
 
 import numpy as np
 
 from optics.apertures.aperture import Aperture, Nodes, SoftAperture
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
+from optics.apertures.strips import strips
 from optics.numerics.interpolation import lagrange_basis
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
 
 __all__ = ["PixelatedAperture"]
 
-EDGE_DEGREE = 4  # choice: more than the digits asked for: of the polynomials that a curved edge is to these digits
-ROUNDING = 1e-12
-STEEPNESS = 3.0  # choice: of panels' lengths beside a square root
 MOMENT_DIGITS = 8.0  # choice: of what is left of a cut pixel
 # Choice, along a pixel: beyond, what is left of pixels that the edge cuts is a matter of too many moments.
 MOST_NODES = 32
@@ -121,62 +118,13 @@ class PixelatedAperture(Aperture):
     def _pieces(
         self, at: np.ndarray, cycles: float, digits: float, degree: int = 0
     ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """x, y and weights over each panel of the part of a cut pixel that is inside, for a wave times a polynomial of
-        this degree in either direction."""
+        """x, y and weights over each panel of the part of a cut pixel that is inside: see `strips`."""
         bottom, left = self._centres[at] - self._pitch / 2
-        top, right = bottom + self._pitch, left + self._pitch
-        outline = self.outline
-        within = np.concatenate([outline.turning, outline.heights(left), outline.heights(right)])
-        ends = np.unique([bottom, top, *within[(within > bottom) & (within < top)]])
-        for low, high in pairwise(_graded(ends, outline.tangent)):
-            if high - low < ROUNDING:
-                continue
-            # Where the edge slants, nodes slide along it, and the wave turns by as much more.
-            inner = low + (high - low) * np.array([1e-6, 1 - 1e-6])
-            slide = np.abs(np.diff(np.clip(outline.crossings(inner), left, right), axis=0)).max(initial=0.0)
-            turns = cycles * float(np.hypot(slide, high - low))
-            y, weight = _panel(low, high, outline.tangent, turns, digits, 2 * degree + EDGE_DEGREE + ceil(digits))
-            sides = np.clip(outline.crossings(y), left, right)
-            u, share = gauss_legendre(gauss_legendre_count(cycles * self._pitch, digits + 0.3, degree))
-            for start, end in zip(sides.T[::2], sides.T[1::2], strict=True):
-                if not (end > start).any():
-                    continue
-                x = start[:, None] + (end - start)[:, None] * u
-                size = (weight * (end - start))[:, None] * share
-                yield x.ravel(), np.broadcast_to(y[:, None], x.shape).ravel(), size.ravel()
+        box = float(left), float(left + self._pitch), float(bottom), float(bottom + self._pitch)
+        return strips(self.outline, box, cycles, digits, degree)
 
     def _softened(self, edge: SoftEdge) -> SoftAperture:
         raise TypeError("jumps between pixels have no band limit: a soft edge does not make them fit for a grid")
-
-
-def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """Ends of panels, with more of them where a circle's top or bottom is nearer to a panel than the panel is long:
-    polynomials do not follow the square root beside it."""
-    more = []
-    for at in tangent:
-        for low, high in pairwise(ends):
-            gap = max(low - at, at - high)
-            if ROUNDING < gap < high - low:
-                distances = gap * STEEPNESS ** np.arange(
-                    1, 1 + ceil(np.log((gap + high - low) / gap) / np.log(STEEPNESS))
-                )
-                places = at + distances if at < low else at - distances
-                more.append(places[(places > low) & (places < high)])
-    return np.unique(np.concatenate([ends, *more]))
-
-
-def _panel(
-    low: float, high: float, tangent: np.ndarray, cycles: float, digits: float, degree: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Heights and weights between two ends, for a wave of so many cycles between them. Where one is a circle's top or
-    bottom, whose chord begins there like a square root, y goes there like sin²."""
-    span = high - low
-    touching = any(abs(end - at) < ROUNDING for at in tangent for end in (low, high))
-    slower = pi / 2 if touching else 1.0
-    u, weight = gauss_legendre(gauss_legendre_count(slower * cycles, digits + 0.3, ceil(slower * degree)))
-    if not touching:
-        return low + span * u, span * weight
-    return low + span * np.sin(pi * u / 2) ** 2, span * weight * np.sin(pi * u) * pi / 2
 
 
 @lru_cache(maxsize=4)

@@ -76,7 +76,7 @@ class Polygon(Aperture):
 
     @property
     def outline(self) -> Outline:
-        return Outline(vertices=self.vertices)
+        return Outline.polygon(self.vertices)
 
     def _nodes(self, cycles: float, digits: float) -> Nodes:
         centre = kernel_point(self.vertices)
@@ -130,7 +130,7 @@ class Slit(Aperture):
 
     @property
     def outline(self) -> Outline:
-        return Outline(vertices=self._corners)
+        return Outline.polygon(self._corners)
 
     @property
     def _corners(self) -> np.ndarray:

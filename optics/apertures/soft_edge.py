@@ -17,6 +17,8 @@ from optics.numerics.quadrature import gauss_legendre
 
 __all__ = ["SoftEdge", "kaiser_beta"]
 
+MOST_STEPS = 60
+
 
 @dataclass(frozen=True)
 class SoftEdge:
@@ -37,8 +39,9 @@ class SoftEdge:
         """
         b = _beta(ripple) / pi
         (h_x, h_y), s = half_widths, sum(half_widths)
-        roots = np.roots([2 * h_x * h_y, b * s, -2 * b * s * passband, -4 * b * b * passband])
-        transition = max(float(np.max(roots.real[np.abs(roots.imag) <= 1e-9 * np.abs(roots)])), b / widest_reach)
+        transition = max(
+            _positive_root(2 * h_x * h_y, b * s, -2 * b * s * passband, -4 * b * b * passband), b / widest_reach
+        )
         return cls(passband, passband + transition, ripple)
 
     @property
@@ -69,6 +72,19 @@ class SoftEdge:
 
         cutoff = (self.passband + self.stopband) / 2
         return j1(2 * pi * cutoff * r) * i0(self.beta * np.sqrt(np.maximum(1 - (r / self.reach) ** 2, 0)))
+
+
+def _positive_root(a: float, b: float, c: float, d: float) -> float:
+    """Of at³ + bt² + ct + d with a, b > 0 >= c, d: from above Newton's steps come down to it, one by one."""
+    t = max(-2 * c / b, (-4 * c / a) ** 0.5, (-4 * d / a) ** (1 / 3))  # each of the two falling terms is outweighed
+    if t == 0:
+        return 0.0
+    for _ in range(MOST_STEPS):
+        step = (((a * t + b) * t + c) * t + d) / ((3 * a * t + 2 * b) * t + c)
+        t -= step
+        if step <= 1e-12 * t:
+            break
+    return t
 
 
 def _beta(ripple: float) -> float:

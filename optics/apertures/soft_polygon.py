@@ -22,7 +22,7 @@ from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision, opaque
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
-__all__ = ["SoftPolygon"]
+__all__ = ["TINY", "SoftPolygon", "radial_table", "sides_share"]
 
 # Squared length far below any that counts: keeps roots and angles differentiable on an edge or a corner.
 TINY = 1e-40
@@ -40,24 +40,29 @@ class SoftPolygon(SoftAperture):
         return len(self.vertices) * SOFT_EDGE_SAMPLE * (1 + self.edge.cycles)
 
     def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
-        import drjit as dr
+        return sides_share(self.edge, self.vertices, np.roll(self.vertices, -1, axis=0), x, y, types)
 
-        along = np.roll(self.vertices, -1, axis=0) - self.vertices
-        length = np.hypot(*along.T)
-        columns = (*self.vertices.T, *(along / length[:, None]).T, length)
-        sides = [types.Float64(np.ascontiguousarray(column)) for column in columns]
-        count = dr.opaque(types.Index, len(length))
-        line = _Line(self.edge, types)
 
-        def add(i: Array, total: Array, x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
-            x0, y0, tx, ty, length = (dr.gather(types.Float64, side, i) for side in sides)
-            d = tx * (y - y0) - ty * (x - x0)
-            start = -(tx * (x - x0) + ty * (y - y0))
-            return i + 1, total + line.between(d, start, start + length), x, y
+def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, y: Array, types: Precision) -> Array:
+    """What straight pieces of an edge add, (n, 2) each, with the opening on their left."""
+    import drjit as dr
 
-        width = max(dr.width(x), dr.width(y))
-        state = dr.zeros(types.Index, width), dr.zeros(types.Float64, width), types.Float64(x), types.Float64(y)
-        return dr.while_loop(state, lambda i, total, x, y: i < count, add, max_iterations=-1)[1]
+    along = ends - starts
+    length = np.hypot(*along.T)
+    columns = (*starts.T, *(along / length[:, None]).T, length)
+    sides = [types.Float64(np.ascontiguousarray(column)) for column in columns]
+    count = dr.opaque(types.Index, len(length))
+    line = _Line(edge, types)
+
+    def add(i: Array, total: Array, x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+        x0, y0, tx, ty, length = (dr.gather(types.Float64, side, i) for side in sides)
+        d = tx * (y - y0) - ty * (x - x0)
+        start = -(tx * (x - x0) + ty * (y - y0))
+        return i + 1, total + line.between(d, start, start + length), x, y
+
+    width = max(dr.width(x), dr.width(y))
+    state = dr.zeros(types.Index, width), dr.zeros(types.Float64, width), types.Float64(x), types.Float64(y)
+    return dr.while_loop(state, lambda i, total, x, y: i < count, add, max_iterations=-1)[1]
 
 
 class _Line:
@@ -72,7 +77,7 @@ class _Line:
 
         self.types = types
         self.reach = opaque(types, edge.reach)
-        self.radial, self.straight = _radial_table(edge), _straight_table(edge)
+        self.radial, self.straight = radial_table(edge), _straight_table(edge)
         # H is even in t, so that half the nodes of an even rule from -s to s are enough.
         nodes, weights = gauss_legendre(2 * ceil(gauss_legendre_count(2 * edge.cycles, -log10(edge.ripple)) / 2))
         half = len(nodes) // 2
@@ -120,7 +125,7 @@ def _nothing(*arguments: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _radial_table(edge: SoftEdge) -> Interpolant:
+def radial_table(edge: SoftEdge) -> Interpolant:
     """H(r) = G(r)/r², G = ∫₀^r g(r') r' dr'."""
     u, weight = gauss_legendre(int(24 + 4 * edge.cycles + edge.beta))
 

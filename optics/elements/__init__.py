@@ -5,7 +5,8 @@ pupil             Pupil: aperture, relief, ideal lens
 relief            Relief, HeightMap, BSplineRelief
 pixel_relief      PixelRelief: steps
 wavefront         Zernike, WavefrontMap
-refractive_index  RefractiveIndex: constant, or after Cauchy
+transmittance     GaussianMask, MaskMap
+refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
 wavefront_slopes  where the rays of a wavefront go
 beam              light of one wavelength on its way to a plane
 """

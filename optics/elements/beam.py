@@ -36,6 +36,11 @@ class Beam:
         """[m]"""
         return self.pupil.aperture_radius
 
+    @property
+    def index(self) -> float:
+        """Of the medium behind the pupil."""
+        return self.pupil.index_behind(self.wavelength)
+
     def waves(self, x: Array, y: Array, types: Precision) -> Array:
         """Optical path in wavelengths at the pupil's points, float64."""
         return self.pupil.path(x, y, self.wavelength, self.source, types) * opaque(types, 1 / self.wavelength)
@@ -44,4 +49,7 @@ class Beam:
         """Field just behind the pupil, aperture softened."""
         x, y = grid.coordinates(types)
         scale = 1 / opaque(types, self.radius)
-        return Field.from_waves(soft.transmittance(x * scale, y * scale, types), self.waves(x, y, types), grid, types)
+        size = soft.transmittance(x * scale, y * scale, types)
+        if self.pupil.mask is not None:
+            size *= self.pupil.amplitude(x * scale, y * scale, types)
+        return Field.from_waves(size, self.waves(x, y, types), grid, types)

@@ -1,4 +1,4 @@
-"""The pupil: an aperture with a relief, a wavefront, and an ideal lens."""
+"""The pupil: an aperture with a relief, a wavefront, a mask, and an ideal lens."""
 
 from __future__ import annotations
 
@@ -11,37 +11,46 @@ import numpy as np
 from optics.apertures.aperture import EDGE_REACH, Aperture
 from optics.apertures.circular import Circle
 from optics.elements.pixel_relief import PixelRelief
-from optics.elements.refractive_index import RefractiveIndex
+from optics.elements.refractive_index import Dispersion, RefractiveIndex, index_of
 from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
+from optics.elements.transmittance import Mask
 from optics.elements.wavefront import Aberration
 from optics.elements.wavefront_slopes import Slopes, _derivative
-from optics.numerics.arguments import finite, in_range, of_kind, positive, reals, without_derivative
+from optics.numerics.arguments import finite, in_range, of_kind, positive, reals
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
 
-__all__ = ["Pupil"]
+__all__ = ["MIDDLE", "Pupil"]
 
 TALLEST = 100.0  # choice, radii: a relief as high as one is no thin element any more
 ANY_HEIGHT = 1e-3  # choice [m]: not too tall for any pupil
+LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: of a mask's spectrum, and of the light that it lets through
+MIDDLE = 550e-9  # choice [m]: wavelength of an image's place
 SENSOR_DISTANCE = 240e-6  # choice [m]: of a pupil without a lens, where nobody says
 
 
 @dataclass(frozen=True, eq=False)
 class Pupil:
-    """Transmittance A(x, y) exp(ik [(n - medium_n) h(x, y) - W(x, y)]), thin-element model.
+    """Transmittance A(x, y) M(x, y) exp(ik [(n - object_n) h(x, y) - W(x, y)]), thin-element model.
 
     aperture_radius: R [m].
     height: None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (see HeightMap); or a Relief, such
         as PixelRelief for one of steps.
     n: refractive index of the relief, constant or dispersive.
-    medium_n: index of what surrounds the pupil, on both sides.
-    thin_lens_focal_length: adds an ideal lens exp(-ik(√(r² + f²) - f)) [m]; negative diverges.
-    aperture: its shape within the circle of radius R: Circle (default), Annulus, Polygon, Slit.
+    medium_n: index of what lies behind the pupil, a number, or dispersive (`optics.medium`).
+    object_n: of what lies before it, in which the relief stands; None: the same.
+    thin_lens_focal_length: adds an ideal lens exp(-ik medium_n (√(r² + f²) - f)) [m], which brings parallel light of
+        every wavelength to a point f behind it; negative diverges.
+    aperture: its shape within the circle of radius R: Circle (default), Annulus, Rings, Polygon, Slit, or what `union`,
+        `difference` and `intersection` make of such.
     wavefront: W [m], in vacuum at every wavelength: Zernike, or WavefrontMap, over a circle no smaller than the pupil.
 
-    Radius, height, n, focal length and W's numbers may be Dr.Jit arrays (a height map: a tensor): derivatives flow
+    mask: M, the amplitude that is let through: GaussianMask, or MaskMap. A PSF stays relative to the light that falls
+        on the open aperture, so that what a mask takes away is missing from it.
+
+    Radius, height, n, focal length and the numbers of W and M may be Dr.Jit arrays (maps: tensors): derivatives flow
     through them.
 
     Raises:
@@ -50,19 +59,25 @@ class Pupil:
 
     aperture_radius: Scalar
     height: Any = None
-    n: Scalar | RefractiveIndex = 1.5
-    medium_n: float = 1.0
+    n: Scalar | Dispersion = 1.5
+    medium_n: float | Dispersion = 1.0
     thin_lens_focal_length: Scalar | None = None
     aperture: Aperture = field(default_factory=Circle)
     wavefront: Aberration | None = None
+    mask: Mask | None = None
+    object_n: float | Dispersion | None = None
 
     def __post_init__(self) -> None:
         positive("aperture_radius", self.aperture_radius)
-        in_range("medium_n", without_derivative("medium_n", self.medium_n), 1.0, 10.0)
-        if not isinstance(self.n, RefractiveIndex):
+        index_of("medium_n", self.medium_n)
+        if self.object_n is not None:
+            index_of("object_n", self.object_n)
+        if not isinstance(self.n, Dispersion):
             in_range("n", self.n, 1.0, 10.0)
             object.__setattr__(self, "n", RefractiveIndex(self.n))
         of_kind("aperture", self.aperture, Aperture, "Circle()")
+        if self.mask is not None:
+            self._check_reach("mask", of_kind("mask", self.mask, Mask, "GaussianMask(20e-6)").radius)
         if self.height is not None and not isinstance(self.height, Relief):
             height = self.height if is_differentiable(self.height) else reals("height", self.height)
             object.__setattr__(self, "height", HeightMap(height))
@@ -70,7 +85,7 @@ class Pupil:
             raise ValueError(
                 f"height spans {self.height.span:.3g} m over a pupil of radius {number(self.aperture_radius):.3g} m: "
                 f"must be in metres, at most {TALLEST:g} radii or {ANY_HEIGHT:g} m "
-                "(a phase φ [rad] is a height φ λ / (2π (n - medium_n)))"
+                "(a phase φ [rad] is a height φ λ / (2π (n - object_n)))"
             )
         if self.wavefront is not None:
             self._check_wavefront(of_kind("wavefront", self.wavefront, Aberration, "Zernike({(2, 0): 0.1})"))
@@ -78,16 +93,19 @@ class Pupil:
             positive("abs(thin_lens_focal_length)", abs(finite("thin_lens_focal_length", self.thin_lens_focal_length)))
 
     def _check_wavefront(self, wavefront: Aberration) -> None:
-        radius, most = number(self.aperture_radius), max(TALLEST * number(self.aperture_radius), ANY_HEIGHT)
-        if wavefront.radius is not None and wavefront.radius < radius * (1 - 1e-9):
-            raise ValueError(
-                f"wavefront is known over a radius of {wavefront.radius:.3g} m: must be the pupil's, {radius:.3g} m, "
-                "or more"
-            )
+        self._check_reach("wavefront", wavefront.radius)
+        most = max(TALLEST * number(self.aperture_radius), ANY_HEIGHT)
         if wavefront.span > most:
             raise ValueError(
                 f"wavefront spans {wavefront.span:.3g} m: must be at most {most:.3g} m "
                 "(Zernike's coefficients are in µm, a map's samples in m)"
+            )
+
+    def _check_reach(self, name: str, known: float | None) -> None:
+        if known is not None and known < number(self.aperture_radius) * (1 - 1e-9):
+            raise ValueError(
+                f"{name} is known over a radius of {known:.3g} m: must be the pupil's, "
+                f"{number(self.aperture_radius):.3g} m, or more"
             )
 
     @cached_property
@@ -100,6 +118,26 @@ class Pupil:
         """[m²]"""
         return self.aperture.area * self.radius**2
 
+    @cached_property
+    def transmission(self) -> Scalar:
+        """Share of the light on the open aperture that the mask lets through, with derivatives; 1 without a mask."""
+        if self.mask is None:
+            return 1.0
+        import drjit as dr
+
+        types = precision("float64")
+        nodes = self.aperture.nodes(2 * self.mask.bandwidth(LEVEL, self.radius) * self.radius, TRANSMISSION_DIGITS)
+        amplitude = self.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types)
+        found = dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
+        return found if dr.grad_enabled(found) else number(found)
+
+    def amplitude(self, x: Array, y: Array, types: Precision) -> Array:
+        """The mask's, at points in units of R."""
+        if self.mask is None:
+            return types.Float64(1)
+        radius = opaque(types, self.aperture_radius)
+        return self.mask.amplitude(x * radius, y * radius, self.aperture_radius, types)
+
     @property
     def pixels(self) -> int:
         """Squares across the pupil between which its relief jumps; 0: it is smooth."""
@@ -107,14 +145,16 @@ class Pupil:
 
     def image_distance(self, source_distance: float) -> float:
         """Where [m] behind the pupil a sensor is that nobody has placed: in the image of a source at this distance [m]
-        if there is an ideal lens, 1/z = 1/f - 1/s, and at 240 µm otherwise. It stays there: no derivative moves it.
+        if there is an ideal lens, 1/z = 1/f - n₀/(n s) at 550 nm, and at 240 µm otherwise. It stays there: no
+        derivative moves it.
 
         Raises:
             ValueError: the lens makes no real image.
         """
         if self.thin_lens_focal_length is None:
             return SENSOR_DISTANCE
-        power = 1 / number(self.thin_lens_focal_length) - 1 / source_distance
+        before = self.index_before(MIDDLE) / self.index_behind(MIDDLE)
+        power = 1 / number(self.thin_lens_focal_length) - before / source_distance
         if power <= 0:
             raise ValueError(
                 f"sensor_distance is missing: a lens of focal length {number(self.thin_lens_focal_length):.3g} m "
@@ -122,13 +162,23 @@ class Pupil:
             )
         return 1 / power
 
+    def index_behind(self, wavelength: float) -> float:
+        """Of the medium between pupil and sensor at a vacuum wavelength [m]."""
+        return number(index_of("medium_n", self.medium_n).at(wavelength))
+
+    def index_before(self, wavelength: float) -> float:
+        """Of the medium between source and pupil."""
+        if self.object_n is None:
+            return self.index_behind(wavelength)
+        return number(index_of("object_n", self.object_n).at(wavelength))
+
     @cached_property
     def _level(self) -> Pupil:
         return replace(self, height=None)
 
     def index_step(self, wavelength: float) -> Scalar:
-        """n(λ) - medium_n."""
-        return self.n.at(wavelength) - self.medium_n
+        """n(λ) less the index before the pupil, in which the relief stands."""
+        return self.n.at(wavelength) - self.index_before(wavelength)
 
     def bends(self, wavelength: float) -> bool:
         """Whether the relief does anything, or is asked what it would do."""
@@ -138,18 +188,19 @@ class Pupil:
     def rotationally_symmetric(self, wavelength: float) -> bool:
         relief_is = not self.bends(wavelength) or self.height.rotationally_symmetric
         wavefront_is = self.wavefront is None or self.wavefront.rotationally_symmetric
-        return self.aperture.rotationally_symmetric and relief_is and wavefront_is
+        mask_is = self.mask is None or self.mask.rotationally_symmetric
+        return self.aperture.rotationally_symmetric and relief_is and wavefront_is and mask_is
 
     def path(self, x: Array, y: Array, wavelength: float, source: PointSource, types: Precision) -> Array:
         """Optical path [m] through source and pupil at points (x, y) [m], flat float64 arrays."""
         import drjit as dr
 
-        total = source.path(x, y, types)
+        total = source.path(x, y, types) * opaque(types, self.index_before(wavelength))
         if self.thin_lens_focal_length is not None:
             f = opaque(types, self.thin_lens_focal_length)
             r2 = x * x + y * y
-            total -= r2 / (dr.sqrt(r2 + f * f) + dr.abs(f)) * dr.sign(f)
-        total *= opaque(types, self.medium_n)
+            bent = r2 / (dr.sqrt(r2 + f * f) + dr.abs(f)) * dr.sign(f)
+            total -= bent * opaque(types, self.index_behind(wavelength))
         if self.bends(wavelength):
             scale = 1 / opaque(types, self.aperture_radius)
             total += opaque(types, self.index_step(wavelength)) * self.height.height(x * scale, y * scale, types)
@@ -173,13 +224,16 @@ class Pupil:
         return self.height.scatter(turns, self.aperture, share) / self.radius
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
-        """Spatial frequency [1/m] above which relief and wavefront change the phase by less than `tolerance` rad.
-        Jumps between pixels count for nothing: they are sampled for themselves."""
+        """Spatial frequency [1/m] above which relief and wavefront change the phase by less than `tolerance` rad,
+        and the mask the amplitude by as much. Jumps between pixels count for nothing: they are sampled for
+        themselves."""
         level, step = tolerance * wavelength / (2 * np.pi), abs(number(self.index_step(wavelength)))
         found = 0.0
         if self.height is not None and step != 0 and not self.pixels:
             found = self.height.bandwidth(level / step) / self.radius
-        return found if self.wavefront is None else max(found, self.wavefront.bandwidth(level) / self.radius)
+        if self.wavefront is not None:
+            found = max(found, self.wavefront.bandwidth(level) / self.radius)
+        return found if self.mask is None else found + self.mask.bandwidth(min(tolerance, 0.1), self.radius)
 
 
 @lru_cache(maxsize=64)

@@ -1,33 +1,68 @@
-"""Refractive index of the pupil's material: constant, or dispersive after Cauchy."""
+"""Refractive index of materials: constant, or dispersive after Cauchy, Sellmeier or Cornu."""
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Any
 
-from optics.numerics.arguments import finite, in_range, positive, vacuum_wavelength, without_derivative
-from optics.numerics.autodiff import Scalar, number
+from optics.numerics.arguments import finite, in_range, one_of, positive, shown, vacuum_wavelength, without_derivative
+from optics.numerics.autodiff import Scalar, is_differentiable, number
 
-__all__ = ["RefractiveIndex"]
+__all__ = ["MEDIA", "Cornu", "Dispersion", "RefractiveIndex", "Sellmeier", "index_of", "medium"]
 
 LARGEST = 10.0
 # Fraunhofer lines of the Abbe number V_d = (n_d - 1) / (n_F - n_C) [m].
 LINE_F, LINE_D, LINE_C = 486.134e-9, 587.562e-9, 656.281e-9
+UM = 1e-6
+
+
+class Dispersion(ABC):
+    """A material's refractive index over wavelength, between 1 (vacuum) and 10."""
+
+    def at(self, wavelength: float) -> Scalar:
+        """n at a vacuum wavelength [m]; a Dr.Jit array if the coefficients are.
+
+        Raises:
+            ValueError: the curve leaves [1, 10] there.
+        """
+        n = self._n(vacuum_wavelength(wavelength))
+        value = number(n)
+        if not value >= 1:
+            raise ValueError(f"n = {value:g} at wavelength {wavelength:g} m: must be at least 1")
+        if value > LARGEST:
+            hint = "b is in m²: 4.2e-3 µm² are 4.2e-15"
+            raise ValueError(f"n = {value:g} at wavelength {wavelength:g} m: must be at most {LARGEST:g} ({hint})")
+        return n
+
+    @property
+    def is_differentiable(self) -> bool:
+        """Whether it carries derivatives."""
+        return False
+
+    @abstractmethod
+    def _n(self, wavelength: float) -> Scalar:
+        """At a vacuum wavelength [m], unchecked."""
 
 
 @dataclass(frozen=True)
-class RefractiveIndex:
-    """n(λ) = A + B/λ² (Cauchy's equation; Born & Wolf, Principles of Optics, §2.3.3), λ in vacuum.
+class RefractiveIndex(Dispersion):
+    """n(λ) = A + B/λ² + C/λ⁴ + D/λ⁶ (Cauchy's equation; Born & Wolf, Principles of Optics, §2.3.3), λ in vacuum.
 
-    a: A, at least 1 (vacuum): this package's media neither amplify nor have negative index.
-    b: B [m²]; 0 is a material without dispersion.
+    a: A, at least 1 (vacuum). b, c, d: [m²], [m⁴], [m⁶]; 0 is a material without dispersion.
     """
 
     a: Scalar
     b: Scalar = 0.0
+    c: float = 0.0
+    d: float = 0.0
 
     def __post_init__(self) -> None:
         in_range("n", self.a, 1.0, 10.0)
         finite("b", self.b)
+        for name in ("c", "d"):
+            finite(name, without_derivative(name, getattr(self, name)))
 
     @classmethod
     def from_abbe(cls, n_d: float, abbe_number: float) -> RefractiveIndex:
@@ -37,17 +72,104 @@ class RefractiveIndex:
         b = (n_d - 1) / number / (LINE_F**-2 - LINE_C**-2)
         return cls(n_d - b / LINE_D**2, b)
 
-    def at(self, wavelength: float) -> Scalar:
-        """n at a vacuum wavelength [m]; a Dr.Jit array if the coefficients are.
+    @property
+    def is_differentiable(self) -> bool:
+        return is_differentiable(self.a) or is_differentiable(self.b)
 
-        Raises:
-            ValueError: the curve leaves [1, 10] there.
-        """
-        n = self.a + self.b / vacuum_wavelength(wavelength) ** 2
-        value = number(n)
-        if not value >= 1:
-            raise ValueError(f"n = {value:g} at wavelength {wavelength:g} m: must be at least 1")
-        if value > LARGEST:
-            hint = "b is in m²: 4.2e-3 µm² are 4.2e-15"
-            raise ValueError(f"n = {value:g} at wavelength {wavelength:g} m: must be at most {LARGEST:g} ({hint})")
-        return n
+    def _n(self, wavelength: float) -> Scalar:
+        square = wavelength**2
+        higher = self.c / square**2 + self.d / square**3
+        found = self.a + self.b / square
+        return found if higher == 0 else found + higher
+
+
+@dataclass(frozen=True)
+class Sellmeier(Dispersion):
+    """n²(λ) = 1 + Σ B λ²/(λ² - C), λ in vacuum.
+
+    strengths: B. poles_um2: C [µm²]; as many of each.
+
+    Raises:
+        ValueError: no terms, not as many of each, or numbers that are not finite.
+    """
+
+    strengths: tuple[float, ...]
+    poles_um2: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("strengths", "poles_um2"):
+            values = without_derivative(name, getattr(self, name))
+            if not isinstance(values, (tuple, list)) or not values:
+                raise ValueError(f"{name} = {shown(values)}: must be a row of numbers")
+            object.__setattr__(self, name, tuple(finite(name, value) for value in values))
+        if len(self.strengths) != len(self.poles_um2):
+            raise ValueError(f"{len(self.poles_um2)} poles_um2: must be as many as strengths, {len(self.strengths)}")
+
+    def _n(self, wavelength: float) -> float:
+        square = (wavelength / UM) ** 2
+        if any(square == pole for pole in self.poles_um2):
+            return math.inf
+        total = 1 + sum(b * square / (square - c) for b, c in zip(self.strengths, self.poles_um2, strict=True))
+        return math.sqrt(max(total, 0.0))
+
+
+@dataclass(frozen=True)
+class Cornu(Dispersion):
+    """n(λ) = a + b/(λ - c), λ in vacuum; b and c in µm."""
+
+    a: float
+    b_um: float
+    c_um: float
+
+    def __post_init__(self) -> None:
+        for name in ("a", "b_um", "c_um"):
+            finite(name, without_derivative(name, getattr(self, name)))
+
+    def _n(self, wavelength: float) -> float:
+        beyond = wavelength / UM - self.c_um
+        return self.a + self.b_um / beyond if beyond > 0 else math.inf
+
+
+def _cauchy(a: float, b: float, c: float, d: float) -> RefractiveIndex:
+    """Of coefficients for nm."""
+    return RefractiveIndex(a, b * 1e-18, c * 1e-36, d * 1e-54)
+
+
+MEDIA: dict[str, Dispersion] = {
+    # Daimon & Masumura, Appl. Opt. 46, 3811 (2007): distilled water at 20 °C, 182 to 1129 nm.
+    "water": Sellmeier(
+        (5.684027565e-1, 1.726177391e-1, 2.086189578e-2, 1.130748688e-1),
+        (5.101829712e-3, 1.821153936e-2, 2.620722293e-2, 1.069792721e1),
+    ),
+    # Atchison & Smith, J. Opt. Soc. Am. A 22, 29 (2005), table 2: human media after Le Grand, 400 to 900 nm.
+    "cornea": _cauchy(1.361594, 6009.687, -6.760760e8, 5.908450e13),
+    "aqueous": _cauchy(1.321631, 6070.796, -7.062305e8, 6.147861e13),
+    "vitreous": _cauchy(1.322357, 5560.240, -5.817391e8, 5.036810e13),
+    # Thibos, Ye, Zhang & Bradley, Appl. Opt. 31, 3594 (1992): one medium that has a whole human eye's dispersion.
+    "chromatic_eye": Cornu(1.320535, 0.004685, 0.214102),
+}
+
+
+def medium(name: str) -> Dispersion:
+    """The index of a medium of eyes over wavelength: "water", "cornea", "aqueous", "vitreous", or "chromatic_eye", the
+    one medium of Thibos' reduced human eye.
+
+    Raises:
+        ValueError: no such medium.
+    """
+    return MEDIA[one_of("medium", name, MEDIA)]
+
+
+def index_of(name: str, value: Any) -> Dispersion:
+    """A number, or a curve, as a curve; numbers must lie in [1, 10] and carry no derivative.
+
+    Raises:
+        ValueError: it is neither.
+    """
+    if isinstance(value, Dispersion):
+        if value.is_differentiable:
+            raise ValueError(
+                f"{name} asks for a derivative, which it does not carry to the picture: give plain numbers"
+            )
+        return value
+    return RefractiveIndex(in_range(name, without_derivative(name, value), 1.0, 10.0))

@@ -1,6 +1,7 @@
 """Eyes: a pupil before a retina of photoreceptors.
 
 eye                   Eye
+geometry              lengths and directions, and how wide the pupil may be
 receptive_field       which directions a receptor sees: the kernel
 kernel_interpolation  how few kernels stand for a range of distances and directions
 kernel_bank           the kernels of an eye for a scene

@@ -10,13 +10,21 @@ import numpy as np
 
 from optics.elements.pupil import Pupil
 from optics.eye.band_choice import choose_bands
+from optics.eye.geometry import behind_pupil, check_pupil, direction, etendue, focal_length, tangents
 from optics.eye.kernel_bank import KernelBank, prepare
 from optics.eye.photoreceptor import gaussian_noise, own_type, photon_noise, quantum_catch, throughput
 from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
 from optics.eye.retinal_image import blur, centred, receptor_average
 from optics.eye.summary import Description, describe
-from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
-from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, plain, to_user
+from optics.numerics.arguments import (
+    in_range,
+    of_kind,
+    positive,
+    radiance_cube,
+    shape_2d,
+    whole,
+)
+from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.precision import precision
 from optics.point_spread.psf_result import PSFResult
 from optics.spectra.bands import SpectralBands
@@ -35,8 +43,11 @@ class Eye:
 
     pupil: None is the perfect lens: no blur, full throughput.
     resolution: receptors (height, width); square, pitch = sensor_width / width.
-    fov_deg: horizontal field of view, in [1e-3, 170]; the retina lies at f = L / (2 tan(fov/2)).
-    sensor_width: L [m].
+    fov_deg: horizontal field of view, in [1e-3, 170], before the eye; the retina lies at f = L / (2 tan(fov/2)), and
+        n/n₀ times as far behind a pupil between two media.
+    sensor_width: L [m], of the retina, or of a patch of it.
+    full_aperture: diameter [m] of the pupil that gathers a throughput of 1; None: L.
+    eccentricity_deg: (right, up), the direction in the visual field that the middle of the patch looks in.
     bands: spectral bands, 1 to 64, or "auto": as few as keep a receptor's predicted error within the tolerance; that
         takes PSFs of many bands, so it is for an eye that will be used often. The field then holds what was chosen.
     noise_sigma: standard deviation of a receptor's Gaussian noise, in signal units.
@@ -63,38 +74,42 @@ class Eye:
     dtype: str = "float32"
     photon_budget: PhotonBudget | None = None
     receptors: Any = "rgb"
+    full_aperture: float | None = None
+    eccentricity_deg: tuple[float, float] = (0.0, 0.0)
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "resolution", shape_2d("resolution", self.resolution))
         in_range("fov_deg", self.fov_deg, 1e-3, 170)
         positive("sensor_width", self.sensor_width)
+        object.__setattr__(self, "eccentricity_deg", direction("eccentricity_deg", self.eccentricity_deg))
         in_range("noise_sigma", self.noise_sigma, 0, 1e6)
         in_range("tolerance", self.tolerance, 1e-6, 0.5)
         if self.dtype not in ("float32", "float64"):
             raise ValueError(f"dtype = {self.dtype!r}: must be 'float32' or 'float64'")
-        if self.pupil is not None:
-            of_kind("pupil", self.pupil, Pupil, "Pupil(25e-6), or None for the perfect lens")
+        check_pupil(self.pupil, self.sensor_width, self.full_aperture)
         if self.photon_budget is not None:
             of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
-        if self.pupil is not None and number(self.relative_aperture) > 1 + 1e-9:
-            raise ValueError(
-                f"pupil.aperture_radius = {self.pupil.radius:g}: must be at most sensor_width / 2 = "
-                f"{self.sensor_width / 2:g} m"
-            )
         spectral = self._chosen_bands() if self.bands == "auto" else SpectralBands.uniform(self.bands, self.receptors)
         object.__setattr__(self, "spectral_bands", spectral)
         object.__setattr__(self, "bands", len(spectral.wavelengths))
 
     @property
     def sensor_distance(self) -> Scalar:
-        """f [m], from pupil to retina."""
-        if is_differentiable(self.fov_deg):
-            import drjit as dr
+        """f [m], by which receptors see angles: a distance x on the retina is x/f. From pupil to retina, where the
+        media before and behind the pupil are the same."""
+        return focal_length(self.sensor_width, self.fov_deg)
 
-            return self.sensor_width / (2 * dr.tan(dr.deg2rad(self.fov_deg) / 2))
-        return self.sensor_width / (2 * math.tan(math.radians(self.fov_deg) / 2))
+    @property
+    def retina_distance(self) -> Scalar:
+        """[m] from pupil to retina: f n/n₀, at 550 nm."""
+        return behind_pupil(self.pupil, self.sensor_distance)
+
+    @property
+    def widest_pupil(self) -> float:
+        """Diameter [m] that gathers a throughput of 1."""
+        return self.sensor_width if self.full_aperture is None else self.full_aperture
 
     @property
     def receptor_pitch(self) -> float:
@@ -103,13 +118,15 @@ class Eye:
 
     @property
     def relative_aperture(self) -> Scalar:
-        """a = 2 R / L; 1 for the perfect lens."""
-        return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.sensor_width
+        """a = 2 R / L, or over `full_aperture`; 1 for the perfect lens."""
+        return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.widest_pupil
 
     @property
     def throughput(self) -> Scalar:
-        """a², times the open share of the aperture's disk."""
-        return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
+        """a², times the share of the aperture's disk that is open, and of that light what a mask lets through."""
+        if self.pupil is None:
+            return throughput(self.relative_aperture, 1.0)
+        return throughput(self.relative_aperture, self.pupil.aperture.area / math.pi) * self.pupil.transmission
 
     @property
     def channels(self) -> int:
@@ -126,11 +143,12 @@ class Eye:
         """Photons that a signal of 1 stands for, per type of receptor (type,); None without a photon budget."""
         if self.photon_budget is None:
             return None
-        etendue = math.pi / 4 * (self.sensor_width * self.receptor_pitch / number(self.sensor_distance)) ** 2
-        return self.photon_budget.photons(self.spectral_bands, etendue)
+        light = etendue(self.widest_pupil, self.receptor_pitch, number(self.sensor_distance))
+        return self.photon_budget.photons(self.spectral_bands, light)
 
     def psf(self, z: Scalar = math.inf) -> PSFResult:
-        """PSF on the retina (sensor orientation) of a point on the axis at distance z [m], over the kernel's window.
+        """PSF on the retina (sensor orientation) of a point at distance z [m] along the axis, in the direction that the
+        patch looks in, over the kernel's window.
 
         The perfect lens has one sample that holds all power.
 
@@ -139,27 +157,28 @@ class Eye:
         """
         positive("z", z, infinite=True)
         if self.pupil is None:
-            return perfect_psf(self._retina(1), self.sensor_width / 2)
-        return retinal_psf(self.pupil, self._retina(4), z)
+            return perfect_psf(self._retina(1), self.widest_pupil / 2)
+        return retinal_psf(self.pupil, self._retina(4), z, tangents(self.eccentricity_deg))
 
     def kernel(
-        self, samples_per_receptor: int, z: Scalar = math.inf, direction_deg: tuple[float, float] = (0.0, 0.0)
+        self, samples_per_receptor: int, z: Scalar = math.inf, direction_deg: tuple[float, float] | None = None
     ) -> np.ndarray | Array:
         """Receptive kernel (band, ky, kx): the PSF integrated over square cells of pitch / samples_per_receptor, in
         visual-field orientation (the PSF turned by 180°), ky and kx odd.
 
         z: the scene's distance along the axis [m]. direction_deg: (right, up) from the axis where the light comes
-        from; the centre cell is its geometric image. The sum is the fraction of the pupil's power that lands inside;
-        the window is as wide as it must be to lose less than the tolerance (limits: see `receptive_field`). The
-        perfect lens has the 1 x 1 kernel 1. Of light from cells' centres, signals are a² Σ_b weights[c, b]
-        (kernel_b ⊗ radiance_b), averaged over receptors; `see` takes it from all over the cells (see `sight`).
+        from (None: the patch's eccentricity); the centre cell is its geometric image. The sum is the fraction of the
+        pupil's power that lands inside; the window is as wide as it must be to lose less than the tolerance (limits:
+        see `receptive_field`). The perfect lens has the 1 x 1 kernel 1. Of light from cells' centres, signals are
+        a² Σ_b weights[c, b] (kernel_b ⊗ radiance_b), averaged over receptors; `see` takes it from all over the cells
+        (see `sight`).
 
         Raises:
             AccuracyError: see `optics.psf`.
         """
         positive("z", z, infinite=True)
-        right, up = (math.tan(math.radians(in_range("direction_deg", at, -80, 80))) for at in direction_deg)
-        return to_user(self._kernel(_whole(samples_per_receptor), z, (right, -up)))
+        asked = self.eccentricity_deg if direction_deg is None else direction("direction_deg", direction_deg)
+        return to_user(self._kernel(_whole(samples_per_receptor), z, tangents(asked)))
 
     def _kernel(
         self, samples_per_receptor: int, z: Scalar, direction: tuple[float, float], from_cell: bool = False
@@ -171,7 +190,7 @@ class Eye:
 
     def _retina(self, samples_per_receptor: int) -> Retina:
         cell = self.receptor_pitch / samples_per_receptor
-        return Retina(self.sensor_distance, self.spectral_bands.wavelengths, cell, self.tolerance, self.dtype)
+        return Retina(self.retina_distance, self.spectral_bands.wavelengths, cell, self.tolerance, self.dtype)
 
     def _chosen_bands(self) -> SpectralBands:
         pupil, cell = self.pupil, self.receptor_pitch / CELLS_FOR_BANDS
@@ -179,8 +198,8 @@ class Eye:
             return choose_bands(self.tolerance, self.receptors)
 
         def kernels(wavelengths: np.ndarray) -> np.ndarray:
-            retina = Retina(self.sensor_distance, wavelengths, cell, self.tolerance, self.dtype)
-            return plain(visual_kernel(pupil, retina, math.inf))
+            retina = Retina(self.retina_distance, wavelengths, cell, self.tolerance, self.dtype)
+            return plain(visual_kernel(pupil, retina, math.inf, tangents(self.eccentricity_deg)))
 
         return choose_bands(self.tolerance, self.receptors, kernels, CELLS_FOR_BANDS)
 
@@ -212,10 +231,13 @@ class Eye:
         if light_from not in LIGHT_FROM:
             raise ValueError(f"light_from = {light_from!r}: must be {' or '.join(map(repr, LIGHT_FROM))}")
         half = self.sensor_width / (2 * number(self.sensor_distance))
-        tangents = (half, half * self.resolution[0] / self.resolution[1])
+        half_field = (half, half * self.resolution[0] / self.resolution[1])
+
+        aside, below = tangents(self.eccentricity_deg)
 
         def kernel_at(distance: Scalar, right: float, down: float) -> Array:
-            return self._kernel(s, distance, (right * tangents[0], down * tangents[1]), from_cell)
+            place = aside + right * half_field[0], below + down * half_field[1]
+            return self._kernel(s, distance, place, from_cell)
 
         return prepare(kernel_at, self.resolution, s, z, (depth_layers, field_zones), within)
 

@@ -64,9 +64,9 @@ class _Spot:
 
     @property
     def window(self) -> Grid:
-        """Samples around the axis that hold the square."""
-        nx, ny = (2 * math.ceil((self.half + abs(at)) / self.pitch) + 1 for at in self.centre)
-        return Grid((ny, nx), self.pitch)
+        """Samples around the geometric image that hold the square."""
+        side = 2 * math.ceil(self.half / self.pitch) + 1
+        return Grid((side, side), self.pitch, self.centre)
 
     def cells(self, cell: float) -> int:
         return _cells_within((math.ceil(self.half / self.pitch) + 0.5) * self.pitch, cell)
@@ -89,19 +89,19 @@ def visual_kernel(
     result = _spread(beams, spot, retina)
     tiles, types = _Tiles(spot.cells(retina.cell) + 2 * from_cell, retina.cell, from_cell), precision(retina.dtype)
     across, along = (
-        types.Tensor(_cell_integrals(n, result.dx, tiles, at)[::-1].copy())
-        for n, at in zip(result.tensor.shape[:0:-1], spot.centre, strict=True)
+        types.Tensor(_cell_integrals(n, result.dx, tiles)[::-1].copy()) for n in result.tensor.shape[:0:-1]
     )
     return dr.maximum(matmul(along, matmul(result.tensor, across, transposed=True)), 0)
 
 
-def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar) -> PSFResult:
-    """PSF of an axial point at distance z on the window that loses less than the tolerance at every wavelength.
+def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0)) -> PSFResult:
+    """PSF of a point at distance z, see `visual_kernel`, on the window that loses less than the tolerance at every
+    wavelength.
 
     Raises:
         AccuracyError: no method meets the tolerance within the limits on memory and time.
     """
-    beams = _beams(pupil, retina, z, (0.0, 0.0))
+    beams = _beams(pupil, retina, z, (-direction[0], -direction[1]))
     return _spread(beams, _spot(beams, retina), retina)
 
 
@@ -112,7 +112,7 @@ def _beams(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, float
 
 def _spot(beams: list[Beam], retina: Retina) -> _Spot:
     distance = number(retina.distance)
-    centre_x, centre_y = (distance * math.tan(angle) for angle in beams[0].source.angle)
+    centre_x, centre_y = _image(beams[len(beams) // 2], distance)
     needs = tuple(_needs(beam, retina, (centre_x, centre_y)) for beam in beams)
     half, pitch = max(need.half_window for need in needs), min(need.pitch for need in needs)
     if _cells_within(half, retina.cell) > MOST_CELLS:
@@ -122,6 +122,16 @@ def _spot(beams: list[Beam], retina: Retina) -> _Spot:
         )
     half = retina.cell * (_cells_within(half, retina.cell) + 1) / 2
     return _Spot((centre_x, centre_y), half, pitch, needs)
+
+
+def _image(beam: Beam, distance: float) -> tuple[float, float]:
+    """Where (x, y) [m] the ray through the pupil's centre lands, refracted there between two media (Snell's law)."""
+    x, y = (math.tan(angle) for angle in beam.source.angle)
+    if beam.pupil.object_n is None:
+        return distance * x, distance * y
+    bent = beam.pupil.index_before(beam.wavelength) / beam.index / math.hypot(1, x, y)
+    axial = math.sqrt(max(1 - bent**2 * (x * x + y * y), 1e-6))
+    return distance * bent * x / axial, distance * bent * y / axial
 
 
 def _spread(beams: list[Beam], spot: _Spot, retina: Retina) -> PSFResult:
@@ -150,7 +160,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
     the sine goes on by λ times the edge's frequencies, and z tan θ says where that lands.
     """
     pupil, z, radius = beam.pupil, number(retina.distance), beam.pupil.radius
-    wavelength = beam.wavelength / pupil.medium_n
+    wavelength = beam.wavelength / beam.index
     # Pixels send light off its direction, too, and lose as much beyond what is counted.
     diffracted = _beyond_edge(radius, retina.tolerance / 2) + pupil.scatter(beam.wavelength, retina.tolerance / 4)
     half = WIDEST_TANGENT * z + radius
@@ -170,7 +180,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
 
 def _shadow(beam: Beam, retina: Retina, centre: tuple[float, float]) -> float:
     """Half side [m] of the square about `centre` in which all rays end, but for half the tolerance."""
-    x, y = beam.pupil.slopes(beam.wavelength, beam.source).rays(number(retina.distance), beam.pupil.medium_n)
+    x, y = beam.pupil.slopes(beam.wavelength, beam.source).rays(number(retina.distance), beam.index)
     farthest = np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1]))
     return float(np.quantile(farthest, 1 - retina.tolerance / 2, method="higher"))
 
@@ -199,8 +209,8 @@ class _Tiles:
 
 
 @lru_cache(maxsize=8)
-def _cell_integrals(samples: int, pitch: float, tiles: _Tiles, centre: float) -> np.ndarray:
-    """(cell, sample): integrals over tiles around `centre` of the spline through the samples, one axis. From a cell:
+def _cell_integrals(samples: int, pitch: float, tiles: _Tiles) -> np.ndarray:
+    """(cell, sample): integrals over tiles around the middle of the spline through the samples, one axis. From a cell:
     means over sources all over it, PSF ⊗ cell ⊗ cell. At three samples per cycle a cubic errs by 4e-4, degree seven by
     4e-6."""
     from scipy.interpolate import make_interp_spline
@@ -209,7 +219,7 @@ def _cell_integrals(samples: int, pitch: float, tiles: _Tiles, centre: float) ->
     degree = min(7, (samples - 2) // 2 * 2 + 1)
     primitive = make_interp_spline(grid.x, np.eye(samples), k=degree).antiderivative()
     count = tiles.count + tiles.from_cell
-    edges = centre + (np.arange(count + 1) - count / 2) * tiles.size
+    edges = (np.arange(count + 1) - count / 2) * tiles.size
     inside = np.clip(edges, grid.x[0], grid.x[-1])
     if not tiles.from_cell:
         return np.diff(primitive(inside), axis=0)

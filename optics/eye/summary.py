@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from optics.elements.pupil import Pupil
-from optics.numerics.accuracy import Plan
+from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import Scalar, number, plain
 from optics.point_spread.concentration import strehl_ratio
 from optics.point_spread.contrast import image_quality, mtf
@@ -39,6 +40,9 @@ class DescribedEye(Protocol):
     def sensor_distance(self) -> Scalar: ...
 
     @property
+    def retina_distance(self) -> Scalar: ...
+
+    @property
     def receptor_pitch(self) -> float: ...
 
     @property
@@ -66,6 +70,7 @@ class Description:
     photons: absorbed by it per integration time, mean of the channels (None: no photon budget).
     acceptance_angle_deg: full width at half height of a receptor's angular sensitivity, horizontally;
         interommatidial_angle_deg: Δφ between neighbours. plan: of the least accurate band's PSF.
+    unknown: what the light cannot tell well enough, a line each with the reason; its number is NaN.
     """
 
     relative_aperture: float
@@ -82,10 +87,12 @@ class Description:
     acceptance_angle_deg: float
     interommatidial_angle_deg: float
     plan: Plan
+    unknown: tuple[str, ...] = ()
 
     @property
     def _limits(self) -> dict[str, float]:
-        return {"diffraction": self.diffraction_cpd, "sampling": self.sampling_cpd, "noise": self.noise_cpd}
+        limits = {"diffraction": self.diffraction_cpd, "sampling": self.sampling_cpd, "noise": self.noise_cpd}
+        return {name: limit for name, limit in limits.items() if not math.isnan(limit)}
 
     @property
     def binding(self) -> str:
@@ -107,6 +114,7 @@ class Description:
             "receptors": f"{self.interommatidial_angle_deg:.3g}° apart",
             "PSF": f"{self.plan.method}, {self.plan.samples[0]} x {self.plan.samples[1]} samples, "
             f"{self.plan.dtype}, predicted error {self.plan.predicted_error:.1e}",
+            **{f"not known ({number})": line for number, line in enumerate(self.unknown, start=1)},
         }
         return "\n".join(f"{name:<20}{value}" for name, value in rows.items())
 
@@ -127,13 +135,15 @@ def noise_of(eye: DescribedEye) -> float:
 
 
 def describe(eye: DescribedEye, z: Scalar) -> Description:
-    """The eye's limits for a scene at distance z [m].
+    """The eye's limits for a scene at distance z [m]. A measure that the light cannot tell well enough is NaN and has a
+    line in `Description.unknown`.
 
     Raises:
-        AccuracyError: see `optics.psf`.
+        AccuracyError: the PSF cannot be computed: see `optics.psf`.
     """
     distance, light, result = number(eye.sensor_distance), number(eye.throughput), eye.psf(z)
     white, wavelength = _white(eye, result)
+    unknown: list[str] = []
     photons, noise = None if eye.photons is None else float(eye.photons.mean()) * light, noise_of(eye)
     if eye.pupil is None:
         diffraction, strehl, quality = math.inf, 1.0, max(1 - noise, 0.0)
@@ -141,14 +151,17 @@ def describe(eye: DescribedEye, z: Scalar) -> Description:
     else:
         diffraction = float(white.cutoff[0])
         nearest = int(np.argmin(np.abs(result.wavelengths - wavelength)))
-        strehl = float(plain(strehl_ratio(result))[nearest])
-        quality = float(plain(image_quality(white, 1 / (2 * eye.receptor_pitch), light, noise))[0])
-        noise_limit = _noise_limit(white, diffraction, noise / light)
+        measures: dict[str, Callable[[], float]] = {
+            "Strehl ratio": lambda: float(plain(strehl_ratio(result))[nearest]),
+            "image quality": lambda: float(plain(image_quality(white, 1 / (2 * eye.receptor_pitch), light, noise))[0]),
+            "limit by noise": lambda: _noise_limit(white, diffraction, noise / light),
+        }
+        strehl, quality, noise_limit = (_known(name, measure, unknown) for name, measure in measures.items())
     per_degree = math.radians(distance)
     return Description(
         relative_aperture=number(eye.relative_aperture),
         throughput=light,
-        f_number=distance / (2 * result.pupil.radius),
+        f_number=number(eye.retina_distance) / (2 * result.pupil.radius),
         wavelength=wavelength,
         diffraction_cpd=diffraction * per_degree,
         sampling_cpd=per_degree / (2 * eye.receptor_pitch),
@@ -160,7 +173,17 @@ def describe(eye: DescribedEye, z: Scalar) -> Description:
         acceptance_angle_deg=_acceptance(eye, white) / per_degree,
         interommatidial_angle_deg=eye.receptor_pitch / per_degree,
         plan=result.plan,
+        unknown=tuple(unknown),
     )
+
+
+def _known(name: str, measure: Callable[[], float], unknown: list[str]) -> float:
+    """What is measured, or NaN and a line about it."""
+    try:
+        return measure()
+    except AccuracyError as error:
+        unknown.append(f"{name}: {error}")
+        return math.nan
 
 
 def _white(eye: DescribedEye, result: PSFResult) -> tuple[PSFResult, float]:

@@ -4,6 +4,7 @@ All but the textbook's take a `Problem` and give `Sampling`s: how they would sam
 expect, and the picture if asked. `optics.point_spread.planner` chooses.
 
 textbook             the angular spectrum in plain NumPy: start here
+carrier              the phase of a sphere, split off fields and put back
 problem              Problem: what is to be computed, in numbers
 sampling             Sampling: what every method offers
 rayleigh_sommerfeld  the direct sum: the reference

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from optics.elements.beam import Beam
 from optics.methods.fresnel import paraxial_integral
@@ -45,11 +46,11 @@ class SpectrumSampling:
         """Whether no paraxial part is split off."""
         return self.method == "angular_spectrum"
 
-    @property
+    @cached_property
     def spectrum(self) -> Grid:
         return Grid.square(2 * math.ceil(self.taper.end * self.period) + 1, 1 / self.period)
 
-    @property
+    @cached_property
     def relay(self) -> Grid:
         return Grid.square(self.output_period, self.period / self.output_period)
 
@@ -59,6 +60,15 @@ class SpectrumSampling:
             return predicted_seconds(self.spectrum.shape, self.output_period, window.shape)
         to_relay = predicted_seconds(self.spectrum.shape, self.output_period, self.relay.shape)
         return to_relay + predicted_seconds(self.relay.shape, 0.5, window.shape)  # no whole period: a matrix
+
+    def whole_phase(self, field: Field, beam: Beam, problem: Problem) -> Field:
+        """What `arrived` leaves out of a split spectrum's field: e^{iπr²/λz}/i."""
+        if self.is_whole:
+            return field
+        types = precision(problem.dtype)
+        x, y = problem.window.coordinates(types)
+        waves = (x * x + y * y) * (0.5 / opaque(types, problem.wavelength)) / opaque(types, beam.distance) - 0.25
+        return field * Field.from_waves(1.0, waves, problem.window, types)
 
     def plane(self, problem: Problem) -> float:
         """Width [m] over which rounding spreads the pupil's light."""
@@ -78,12 +88,16 @@ class GridSampling(SpectrumSampling):
     seconds: float = 0.0
     model_error: float = 0.0
 
-    @property
+    @cached_property
     def pupil(self) -> Grid:
         """The samples that hold the soft disk."""
         pitch = self.period / self.pupil_period
         across = 2 * math.ceil(self.edge.outermost / pitch) + 1
         return Grid.square(min(self.pupil_period, across), pitch)
+
+    def field(self, beam: Beam, problem: Problem) -> Field:
+        """U over the window, less the carrier e^{ikz}."""
+        return self.whole_phase(_angular_spectrum(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
@@ -152,7 +166,8 @@ def _timed(sampling: GridSampling, problem: Problem) -> GridSampling:
 
 
 def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
-    """U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10), up to a phase that intensity forgets."""
+    """U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10), up to a phase of the split one that
+    intensity forgets."""
     u = beam.behind(how.edge.aperture, how.pupil, types)
     spectrum = dft2(u, how.pupil_period, how.spectrum.shape, -1, how.spectrum.dx)
     return arrived(spectrum, beam, problem, how).scaled((how.pupil.dx / how.period) ** 2)

@@ -161,7 +161,7 @@ def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Prec
     import drjit as dr
 
     px, py = grid.coordinates(types)
-    wavelength = beam.wavelength / beam.pupil.medium_n
+    wavelength = beam.wavelength / beam.index
     slant = math.sqrt(1 + tan_x**2 + tan_y**2)
     far = opaque(types, beam.distance) * opaque(types, slant)
     along = px * opaque(types, tan_x / slant) + py * opaque(types, tan_y / slant)

@@ -97,7 +97,7 @@ def model_error(problem: Problem, curved: bool) -> float:
     Fresnel zone, or from the whole aperture where several rays meet. A phase common to all of it is no error.
     """
     rays = problem.rays
-    if rays is None or len(rays) == 0:
+    if rays is None or len(rays) == 0 or problem.masked:
         return 1.0
     some, ends = rays.some(RAYS), rays.some(ENDS)
     x, y = _places(problem, ends)

@@ -12,7 +12,7 @@ from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import cached_nodes, node_count
 from optics.methods.rays import brightness, mismatch
-from optics.numerics.autodiff import Array, is_differentiable
+from optics.numerics.autodiff import Array, is_differentiable, number
 from optics.numerics.cost import CALL, RAY
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
@@ -46,6 +46,8 @@ class RaySampling:
         radius, nodes = opaque(types, beam.radius), cached_nodes(*self.rule)
         x, y = types.Float64(nodes.x) * radius, types.Float64(nodes.y) * radius
         weight = types.Float64(nodes.weight) * dr.square(radius)
+        if beam.pupil.mask is not None:
+            weight *= dr.square(beam.pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types))
         x, y, propagates = _landings(beam, x, y, types)
         return _splat(x, y, dr.select(propagates, weight, 0), problem, types)
 
@@ -91,7 +93,7 @@ class PinholeSampling:
         column, row = (round((float(at[0]) - first) / window.dx) for at, first in ((x, window.x[0]), (y, window.y[0])))
         image = np.zeros(window.shape, dtype=types.dtype)
         if 0 <= row < window.shape[0] and 0 <= column < window.shape[1] and bool(propagates[0]):
-            image[row, column] = beam.pupil.area / window.dx**2
+            image[row, column] = beam.pupil.area * number(beam.pupil.transmission) / window.dx**2
         return types.Float(padded_for_packets(image))
 
     def plane(self, problem: Problem) -> float:
@@ -132,7 +134,7 @@ def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, 
     import drjit as dr
 
     step = opaque(types, STEP * beam.pupil.radius)
-    scale = opaque(types, beam.wavelength / beam.pupil.medium_n) / (2 * step)
+    scale = opaque(types, beam.wavelength / beam.index) / (2 * step)
     px = (beam.waves(x + step, y, types) - beam.waves(x - step, y, types)) * scale
     py = (beam.waves(x, y + step, types) - beam.waves(x, y - step, types)) * scale
     squared = px * px + py * py
@@ -180,11 +182,13 @@ def _ray_error(problem: Problem) -> float:
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None
     blurred = mismatch(1 / (rays.image_area + SPLAT_CELLS * cell), _brightness(problem))
-    if len(rays) == 0 or rays.folded:
+    if len(rays) == 0 or rays.folded or problem.masked:
         return blurred
     stretch = float(np.mean(1 / np.maximum(rays.least, 1e-12)))
     zone = math.sqrt(problem.wavelength * problem.distance * stretch) + problem.window.dx * stretch
-    size = problem.radius * math.sqrt(problem.aperture.area / math.pi)
+    # Of a disk R; of narrow or cut openings, twice the area for each length of edge.
+    narrow = 2 * problem.aperture.area / problem.aperture.outline.length
+    size = problem.radius * min(math.sqrt(problem.aperture.area / math.pi), narrow)
     return FRINGES * math.sqrt(zone / size) if zone < size else blurred
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from optics.elements.beam import Beam
+from optics.methods.carrier import on_line
 from optics.methods.problem import Problem
 from optics.methods.spectral_taper import Taper, tapers
 from optics.numerics.autodiff import Array
@@ -34,10 +35,10 @@ LOOSE = 1e-8
 
 @dataclass(frozen=True)
 class HankelSampling:
-    """Gauss-Legendre nodes in r and in θ, and the radii of the picture."""
+    """Gauss-Legendre nodes in r, for each open ring, and in θ, and the radii of the picture."""
 
     taper: Taper
-    radii: int
+    radii: tuple[int, ...]
     angles: int
     line: RadialProfile
     seconds: float
@@ -51,17 +52,21 @@ class HankelSampling:
         profile = _hankel(beam, problem, self, types).intensity
         return self.line.onto(profile, problem.window, types)
 
+    def field(self, beam: Beam, problem: Problem) -> Field:
+        """U over the window, less the carrier e^{ikz}."""
+        return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
+
     def plane(self, problem: Problem) -> float:
         """Width [m] over which rounding spreads the pupil's light."""
         return 2 * (self.line.radius + problem.radius)
 
     @property
     def samples(self) -> tuple[int, int]:
-        return self.radii, self.angles
+        return sum(self.radii), self.angles
 
     @property
     def largest(self) -> int:
-        return max(self.radii, self.angles, self.line.points)
+        return max(sum(self.radii), self.angles, self.line.points)
 
 
 def hankel(problem: Problem) -> list[HankelSampling]:
@@ -75,16 +80,18 @@ def hankel(problem: Problem) -> list[HankelSampling]:
 
 def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
     digits = 0.5 - math.log10(problem.tolerance)  # choice: a third of the tolerance to each of the two rules
-    radii = gauss_legendre_count(problem.radius * (problem.phase_band_inside + taper.end), digits)
+    cycles = problem.radius * (problem.phase_band_inside + taper.end)
+    rings = problem.aperture.rings
+    radii = tuple(_round_up(gauss_legendre_count(cycles * (outer - inner), digits)) for inner, outer in rings)
     outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
     steepest = math.hypot(problem.distance, problem.radius + outermost) / problem.wavelength
     angles = gauss_legendre_count(steepest * math.asin(min(1.0, taper.end * problem.wavelength)), digits)
     band = min(2 * taper.end, 2 * problem.radius / (problem.wavelength * problem.distance) + 2 / taper.blur)
     line = RadialProfile.resolving(outermost, band, problem.distance, problem.ripple)
-    pairs = radii * angles + angles * line.points
+    pairs = sum(radii) * angles + angles * line.points
     seconds = CALL["hankel"] + pairs * BESSEL_PAIR + line.points * line.table * PROFILE_ENTRY
     seconds += math.prod(problem.window.shape) * PROFILE_SAMPLE
-    return HankelSampling(taper, _round_up(radii), _round_up(angles), line, seconds)
+    return HankelSampling(taper, radii, _round_up(angles), line, seconds)
 
 
 def _round_up(n: int) -> int:
@@ -94,16 +101,16 @@ def _round_up(n: int) -> int:
 
 
 def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision) -> Field:
-    """The field on the line's radii, up to a phase that intensity forgets."""
+    """The field on the line's radii, less the carrier e^{ikz}."""
     import drjit as dr
 
-    nodes, weights = gauss_legendre(how.radii)
-    inner = problem.aperture.inner_radius
-    nodes, weights = inner + (1 - inner) * nodes, (1 - inner) * weights
+    nodes, weights = _on_rings(problem.aperture.rings, how.radii)
     r = types.Float64(nodes) * opaque(types, beam.radius)
-    zero = dr.zeros(types.Float64, how.radii)
+    zero = dr.zeros(types.Float64, len(nodes))
     area = types.Float64(2 * np.pi * weights * nodes) * dr.square(opaque(types, beam.radius))
-    pupil = Field.from_waves(area, beam.waves(r, zero, types), Grid((1, how.radii), 1.0), types)
+    if beam.pupil.mask is not None:
+        area *= beam.pupil.amplitude(types.Float64(nodes), zero, types)
+    pupil = Field.from_waves(area, beam.waves(r, zero, types), Grid((1, len(nodes)), 1.0), types)
     edge = math.asin(how.taper.end * problem.wavelength)
     nodes, weights = gauss_legendre(how.angles)
     theta = types.Float64(nodes * edge)
@@ -117,6 +124,16 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
     grid = Grid((1, how.angles), 1.0)
     spectrum = spectrum * Field.from_waves(ring * types.Float64(fade), waves, grid, types)
     return _transform(spectrum, f, types.Float64(how.line.positions), types, exactly)
+
+
+def _on_rings(rings: tuple[tuple[float, float], ...], counts: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights over the open radii, in units of R."""
+    parts = [
+        (inner + (outer - inner) * nodes, (outer - inner) * weights)
+        for (inner, outer), (nodes, weights) in zip(rings, map(gauss_legendre, counts), strict=True)
+    ]
+    nodes, weights = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return nodes, weights
 
 
 def _transform(field: Field, at: Array, to: Array, types: Precision, exactly: bool) -> Field:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from optics.elements.beam import Beam
+from optics.methods.carrier import on_window
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples, samples_of
 from optics.numerics.autodiff import Array
@@ -43,6 +44,10 @@ class LowRankSampling:
     def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _low_rank(beam, problem, self, precision(problem.dtype)).intensity
+
+    def field(self, beam: Beam, problem: Problem) -> Field:
+        """U over the window, less the carrier e^{ikz}."""
+        return on_window(_low_rank(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def plane(self, problem: Problem) -> float:
         """Width [m] over which rounding spreads the pupil's light."""

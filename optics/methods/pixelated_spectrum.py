@@ -37,6 +37,12 @@ class PixelSpectrum(SpectrumSampling):
     model_error: float = 0.0
     padding: float = 1.0
 
+    def field(self, beam: Beam, problem: Problem) -> Field:
+        """U over the window, less the carrier e^{ikz}."""
+        types = precision(problem.dtype)
+        spectrum = _spectrum(self.pupil.field(beam, types), beam, self, types)
+        return self.whole_phase(arrived(spectrum, beam, problem, self).scaled(1 / self.period**2), beam, problem)
+
     def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         types = precision(problem.dtype)

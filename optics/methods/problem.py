@@ -42,6 +42,7 @@ class Problem:
         beyond may be wrong, and edge-diffracted light less exact (None: the window counts to its corners).
     rays: where geometrical optics sends the light, by which approximations judge themselves (None: these are not
         weighed).
+    masked: whether a mask sends light where rays do not tell, so that approximations cannot judge themselves.
     """
 
     aperture: Aperture
@@ -59,6 +60,7 @@ class Problem:
     widest_band: float = math.inf
     reach: float | None = None
     rays: Rays | None = None
+    masked: bool = False
 
     @classmethod
     def of(cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
@@ -141,11 +143,11 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
     slopes = pupil.slopes(wavelength, beam.source)
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
     detail = pupil.bandwidth(wavelength, tolerance / 10)  # choice: a tenth, of the phase [rad]
-    turning, inside = slopes.turning(distance, window, pupil.medium_n)
+    turning, inside = slopes.turning(distance, window, beam.index)
     return Problem(
         aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
         radius=pupil.radius,
-        wavelength=wavelength / pupil.medium_n,
+        wavelength=wavelength / beam.index,
         distance=distance,
         window=window,
         phase_band=SLOPE_MARGIN * slopes.steepest / wavelength + detail,
@@ -155,5 +157,6 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
         symmetric=pupil.rotationally_symmetric(wavelength) and beam.source.angle == (0.0, 0.0),
         tolerance=tolerance,
         dtype=dtype,
-        rays=None if pixels else Rays.of(slopes, pupil.aperture, distance, pupil.medium_n),
+        masked=pupil.mask is not None,
+        rays=None if pixels else Rays.of(slopes, pupil.aperture, distance, beam.index),
     )

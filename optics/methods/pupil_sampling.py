@@ -108,6 +108,8 @@ class PixelSamples:
         radius, at = opaque(types, beam.radius), self.aperture.rows(self.across)
         x, y = (types.Float64(np.ascontiguousarray(axis.ravel())) for axis in np.meshgrid(at, at))
         weight = types.Float64(self.aperture.weights(self.across).ravel()) * radius * radius
+        if beam.pupil.mask is not None:
+            weight *= beam.pupil.amplitude(x, y, types)
         grid = Grid.square(len(at), 2 * self.radius / len(at))
         return Field.from_waves(weight, beam.waves(x * radius, y * radius, types), grid, types)
 

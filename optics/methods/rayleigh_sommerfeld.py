@@ -10,6 +10,7 @@ import numpy as np
 
 from optics.apertures.aperture import Aperture, Nodes
 from optics.elements.beam import Beam
+from optics.methods.carrier import on_line
 from optics.methods.problem import Problem
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import CALL, NODE, PAIRS_PER_SECOND
@@ -63,6 +64,16 @@ class NodeSampling:
             return direct_sum(beam, self.rule, x, y, types).intensity
         r = types.Float64(self.line.positions)
         return self.line.onto(direct_sum(beam, self.rule, r, 0 * r, types).intensity, problem.window, types)
+
+    def field(self, beam: Beam, problem: Problem) -> Field:
+        """U over the window, less the carrier e^{ikz}."""
+        types = precision(problem.dtype)
+        if self.line is None:
+            x, y = problem.window.coordinates(types)
+            found = direct_sum(beam, self.rule, x, y, types)
+            return Field(found.re, found.im, problem.window, types)
+        r = types.Float64(self.line.positions)
+        return on_line(direct_sum(beam, self.rule, r, 0 * r, types), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
         """Width [m] over which rounding spreads the pupil's light: the focus, times the root of the summands."""
@@ -147,8 +158,10 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
     found = cached_nodes(*rule)
     radius = opaque(types, beam.radius)
     nodes_x, nodes_y = types.Float64(found.x) * radius, types.Float64(found.y) * radius
-    z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.pupil.medium_n)
+    z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.index)
     weight = types.Float64(found.weight) * dr.square(radius) * z / (2 * math.pi)
+    if beam.pupil.mask is not None:
+        weight *= beam.pupil.amplitude(types.Float64(found.x), types.Float64(found.y), types)
     waves = beam.waves(nodes_x, nodes_y, types)
     dr.eval(nodes_x, nodes_y, weight, waves, x, y)
     count = dr.opaque(types.Index, len(found.weight))

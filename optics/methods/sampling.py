@@ -7,8 +7,16 @@ from typing import Protocol
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.numerics.autodiff import Array
+from optics.numerics.field import Field
 
-__all__ = ["Sampling"]
+__all__ = ["Sampling", "WithField"]
+
+
+class WithField(Protocol):
+    """What exact methods but "far_field" give besides."""
+
+    def field(self, beam: Beam, problem: Problem) -> Field:
+        """U over the window for unit amplitude at the pupil, less the carrier e^{ikz}."""
 
 
 class Sampling(Protocol):

@@ -60,8 +60,8 @@ class RadialProfile:
         """Radii [m], from the rim inwards."""
         return self.radius * np.cos(np.pi * (np.arange(self.points) + 0.5) / (2 * self.points))
 
-    def onto(self, values: Array, window: Grid, types: Precision) -> Array:
-        """Values at `positions` carried to the window's samples, at least 0, and 0 beyond the rim: flat arrays."""
+    def onto(self, values: Array, window: Grid, types: Precision, signed: bool = False) -> Array:
+        """Values at `positions` carried to the window's samples, flat: at least 0 unless signed, 0 beyond the rim."""
         import drjit as dr
 
         matrix = types.Tensor(_refinement(self.points, self.table, self.rim / self.radius, types.dtype))
@@ -75,7 +75,7 @@ class RadialProfile:
         first = types.Index(cell)
         weights = lagrange_weights(types.Float(place - cell), TAPS)
         total = sum((w * dr.gather(types.Float, table, first + i) for i, w in enumerate(weights)), types.Float(0))
-        return dr.select(within, dr.maximum(total, 0), 0)
+        return dr.select(within, total if signed else dr.maximum(total, 0), 0)
 
 
 @lru_cache(maxsize=32)

@@ -81,7 +81,9 @@ def psf_batch(
     for member in (members[index] for index in rest):
         setup = Setup(member.distance, PointSource(member.source), window, tolerance, method, dtype)
         requests.append(setup.request(member.pupil, member.wavelength))
-    whole, plans = _joined(known, dict(zip(rest, pictures(requests), strict=True)), precision(dtype))
+    whole, plans = _joined(
+        known, {index: picture[:2] for index, picture in zip(rest, pictures(requests), strict=True)}, precision(dtype)
+    )
     sizes = len(pupils), len(source_distances), len(wavelengths), *window.shape
     return PSFBatch(precision(dtype).Tensor(whole, sizes), window.dx, tuple(plans))
 

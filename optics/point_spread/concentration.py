@@ -29,6 +29,7 @@ NOT_YET = 0.9  # choice: of the bound below which no sample is beside the peak; 
 CLIMBS = 8  # choice: windows that are moved to their brightest sample
 NEIGHBOURHOOD = 9  # choice: samples a side of such a window
 PARABOLOID_ERROR = 3e-5
+OF_A_MASK = 1e-6  # choice: of its spectrum, which the unaberrated peak is good to
 RIPPLE = 1e-5  # choice: of the circle's spectrum
 FINE = 1 / 3  # choice: of 1/cutoff, the coarsest pitch for circles; the finer, the less they need around them
 
@@ -69,12 +70,18 @@ def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
     import drjit as dr
 
     types = precision("float64")
-    nodes = result.pupil.aperture.nodes(0.5, 10.0)
+    mask, own = result.pupil.mask, result.pupil.radius
+    bends = 0.0 if mask is None else mask.bandwidth(OF_A_MASK, own) * own
+    nodes = result.pupil.aperture.nodes(0.5 + bends, 10.0)
     radius, z = opaque(types, result.pupil.aperture_radius), opaque(types, result.sensor_distance)
     weight = types.Float(nodes.weight)
     slant = dr.sqrt(z * z + radius * radius * types.Float(nodes.x**2 + nodes.y**2))
     size = weight * z / (2 * np.pi * slant * slant)
-    wavenumber = types.Float(2 * np.pi * result.pupil.medium_n / wavelengths)
+    wavenumber = types.Float(
+        np.array([2 * np.pi * result.pupil.index_behind(at) / at for at in map(float, wavelengths)])
+    )
+    if mask is not None:
+        size = size * dr.abs(result.pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types))
     near, far = dr.sum(size / slant), dr.sum(size) * wavenumber
     return (near * near + far * far) * radius * radius / result.pupil.aperture.area
 

@@ -100,7 +100,7 @@ def mtf(result: PSFResult, arriving: Any = None, tolerance: float = 0.02) -> MTF
     known = light.numpy()
     seen = _wide(result.with_pitch(0.5 / result.highest_cutoff, "the MTF"), known, tolerance)
     lost = np.maximum(known - plain(seen.held), 0)
-    error = lost + unsure + seen.sum_error
+    error = (lost + unsure + seen.sum_error) / known
     if float(error.max()) > tolerance and tolerance < 1:
         raise AccuracyError(
             f"tolerance = {tolerance:g}: contrasts err by up to {float(error.max()):.2g}, of which the picture's own "
@@ -119,7 +119,7 @@ def combined_mtf(
     light, unsure = _arriving(result, None)
     known = light.numpy()
     seen = _wide(result.with_pitch(0.5 / float(result.cutoff.max()), "the MTF"), known, tolerance)
-    error = weights @ (np.maximum(known - plain(seen.held), 0) + unsure + seen.sum_error)
+    error = weights @ (np.maximum(known - plain(seen.held), 0) + unsure + seen.sum_error) / (weights @ known)
     if float(error.max()) > tolerance and tolerance < 1:
         raise AccuracyError(f"tolerance = {tolerance:g}: contrasts err by up to {float(error.max()):.2g}: widen it")
     shortest = np.array([result.wavelengths[row > 0].min() for row in weights])
@@ -132,7 +132,7 @@ def _wide(result: PSFResult, known: np.ndarray, tolerance: float) -> PSFResult:
     with the inverse of its width. Widths and pitches come in steps: a small change of the pupil changes none."""
     seen, coarsest = result, 0.5 / result.highest_cutoff
     for _ in range(GROWTHS):
-        lost = float((known - plain(seen.held)).max())
+        lost = float((1 - plain(seen.held) / known).max())
         if lost <= tolerance or tolerance >= 1:
             break
         half = max(seen.tensor.shape[1:]) * seen.dx / 2
@@ -168,7 +168,7 @@ def _transformed(seen: PSFResult, light: Array, error: np.ndarray) -> MTF:
 
 
 def _arriving(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]:
-    """Share of the pupil's power that arrives anywhere, and how unsure that is, (wavelength,)."""
+    """Share of the light on the opening that arrives anywhere, and how unsure that is, (wavelength,)."""
     types = precision("float64")
     if arriving is None:
         return _not_evanescent(result)
@@ -184,28 +184,30 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     """All but evanescent light, and how unsure that is.
 
     A straight edge has 1/(2π²f) of |its spectrum|² per length beyond the frequency f: of an aperture with perimeter P
-    and area A the share λP/(2π²A) is evanescent. So is what the relief bends beyond grazing.
+    and area A the share λP/(2π²A) is evanescent, times what a mask leaves of the light there more than elsewhere. So
+    is what the relief bends beyond grazing.
     """
     import drjit as dr
 
     pupil, outline, types = result.pupil, result.pupil.aperture.outline, precision("float64")
-    perimeter = 2 * math.pi * sum(outline.radii)
-    if outline.vertices is not None:
-        perimeter += float(np.hypot(*(np.roll(outline.vertices, -1, axis=0) - outline.vertices).T).sum())
-    wavelength = types.Float(result.wavelengths / pupil.medium_n)
-    ratio = perimeter / (2 * math.pi**2 * pupil.aperture.area)
-    edge = dr.minimum(wavelength * ratio / opaque(types, pupil.aperture_radius), 0.5)
+    wavelength = types.Float(np.array([at / pupil.index_behind(at) for at in map(float, result.wavelengths)]))
+    ratio = outline.length / (2 * math.pi**2 * pupil.aperture.area)
+    light, rim = pupil.transmission, 1.0
+    if pupil.mask is not None:
+        x, y = (types.Float64(np.ascontiguousarray(at)) for at in outline.points().T)
+        rim = float(np.mean(np.square(pupil.amplitude(x, y, types).numpy()))) / number(light)
+    edge = dr.minimum(wavelength * ratio / opaque(types, pupil.aperture_radius) * rim, 0.5)
     bent = np.zeros(len(result.wavelengths))
     if result.can_be_seen_anew:
         bent = np.array([_bent_beyond_grazing(request) for request in result.requests])
         bent = bent if result.shares is None else np.atleast_1d(result.shares @ bent)
-    return (1 - edge) * types.Float(1 - bent), np.square(edge.numpy()) + bent
+    return (1 - edge) * types.Float(1 - bent) * light, number(light) * (np.square(edge.numpy()) + bent)
 
 
 def _bent_beyond_grazing(request: Request) -> float:
     """Share of the pupil's light."""
     pupil = request.beam.pupil
-    x, _ = pupil.slopes(request.beam.wavelength, request.beam.source).rays(1.0, pupil.medium_n)
+    x, _ = pupil.slopes(request.beam.wavelength, request.beam.source).rays(1.0, request.beam.index)
     return float(np.mean(~np.isfinite(x)))
 
 

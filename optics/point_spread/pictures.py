@@ -5,22 +5,32 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from optics.methods.problem import Problem
-from optics.methods.sampling import Sampling
+from optics.methods.sampling import Sampling, WithField
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
 from optics.numerics.autodiff import Array
+from optics.numerics.field import Field
 from optics.numerics.precision import opaque, precision
 from optics.point_spread.request import Request
 from optics.point_spread.spot_check import spot_check
 
-__all__ = ["pictures"]
+__all__ = ["PSFPicture", "pictures"]
 
 TRIES = 3  # choice: pictures that are computed before a tolerance is given up
 # Choice: after an error f times too large, ask for a tolerance f / 0.3 times smaller, so that one more try is enough.
 NEXT_TOLERANCE = 0.3
+
+
+class PSFPicture(NamedTuple):
+    """A PSF, flat; its plan; the field whose square it is, carrier included, where that was wanted."""
+
+    image: Array
+    plan: Plan
+    field: Field | None = None
 
 
 @dataclass(frozen=True)
@@ -34,25 +44,33 @@ class _Attempt:
     plan: Plan
     sampling: Sampling
     image: Array
+    field: Field | None = None
 
     @classmethod
     def at(cls, request: Request, planned: tuple[Plan, Sampling]) -> _Attempt:
         """The picture as planned. Dr.Jit has then recorded it, and computes it when it is first looked at."""
+        import drjit as dr
+
         plan, sampling = planned
         problem, beam = request.problem, request.beam
         types = precision(problem.dtype)
         radius = opaque(types, beam.radius)
-        intensity = sampling.intensity(beam, problem)
-        return cls(request, plan, sampling, intensity / types.Float(beam.pupil.aperture.area * radius * radius))
+        area = types.Float(beam.pupil.aperture.area * radius * radius)
+        if not request.keeps_field:
+            return cls(request, plan, sampling, sampling.intensity(beam, problem) / area)
+        whole = cast(WithField, sampling).field(beam, problem)
+        waves = opaque(types, beam.distance) * opaque(types, 1 / problem.wavelength)
+        field = whole * Field.from_waves(dr.rsqrt(area), waves, whole.grid, types)
+        return cls(request, plan, sampling, field.intensity, field)
 
     @property
     def approximates(self) -> bool:
         """Whether the method errs however many samples it takes."""
         return self.sampling.model_error > 0
 
-    def stated(self, error: float) -> tuple[Array, Plan]:
+    def stated(self, error: float) -> PSFPicture:
         """The picture, and the plan with the error that is now known."""
-        return self.image, replace(self.plan, predicted_error=error)
+        return PSFPicture(self.image, replace(self.plan, predicted_error=error), self.field)
 
     def repeated(self, error: float, tolerance: float) -> _Attempt | None:
         """What to try after the check saw an error above the tolerance: an exact method, or else a smaller tolerance,
@@ -71,7 +89,7 @@ class _Attempt:
         return _Attempt.at(request, request.planned())
 
 
-def pictures(requests: Sequence[Request]) -> list[tuple[Array, Plan]]:
+def pictures(requests: Sequence[Request]) -> list[PSFPicture]:
     """PSFs, flat, and their plans. All are planned before any is computed, so that one that cannot be had is refused at
     once; and all are started before any is waited for.
 
@@ -83,11 +101,13 @@ def pictures(requests: Sequence[Request]) -> list[tuple[Array, Plan]]:
     planned = [request.planned() for request in requests]
     started = [_Attempt.at(*each) for each in zip(requests, planned, strict=True)]
     for attempt in started:
-        dr.eval(attempt.image)  # one launch each: one kernel for all would be compiled anew for every number of them
+        dr.eval(
+            attempt.image, attempt.field and (attempt.field.re, attempt.field.im)
+        )  # one launch each: one kernel for all would be compiled anew for every number of them
     return [_checked(attempt, attempt.request, TRIES) for attempt in started]
 
 
-def _checked(attempt: _Attempt, asked: Request, tries: int) -> tuple[Array, Plan]:
+def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
     """The picture, or a better one, and its plan with the error that a spot check tells.
 
     asked: the request in its first form; an approximation that it names stays, however wrong it is seen to be.

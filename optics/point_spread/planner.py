@@ -39,7 +39,7 @@ from optics.methods.richards_wolf import scalar_theory_error
 from optics.methods.sampling import Sampling
 from optics.numerics.accuracy import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Option, Plan
 
-__all__ = ["APPROXIMATE", "EXACT", "METHODS", "choose"]
+__all__ = ["APPROXIMATE", "EXACT", "FIELDS", "METHODS", "choose"]
 
 
 # Each maps a problem to the samplings by which it meets the tolerance: none, one or several.
@@ -58,6 +58,7 @@ APPROXIMATE: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "pinhole": pinhole,
 }
 METHODS = EXACT | APPROXIMATE
+FIELDS = tuple(name for name in EXACT if name != "far_field")  # whose pictures have a phase
 # Why a method may have no sampling at all.
 UNSUITED = {
     "hankel": "for circles and rings with reliefs that are the same all around, lit along the axis: this pupil is not",
@@ -78,14 +79,15 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
     """The cheapest sampling that meets the problem's tolerance. Planning takes as long as a small PSF: the same
     problem is planned once.
 
-    method: "auto" weighs all, "exact" all that approximate nothing; a method's name asks for it alone, and then
+    method: "auto" weighs all, "exact" all that approximate nothing, "field" those of them that have a phase; a
+        method's name asks for it alone, and then
         only its sampling has to meet the tolerance, not its model.
 
     Raises:
         ValueError: unknown method.
         AccuracyError: nothing within the limits on memory and time meets the tolerance.
     """
-    asked = {"auto": tuple(METHODS), "exact": tuple(EXACT)}.get(method, (method,))
+    asked = {"auto": tuple(METHODS), "exact": tuple(EXACT), "field": FIELDS}.get(method, (method,))
     if asked[0] not in METHODS:
         raise ValueError(f"method = {method!r}: must be 'auto', 'exact' or one of {', '.join(METHODS)}")
     _check_dtype(problem)

@@ -55,17 +55,15 @@ class Member:
 
     @property
     def plain(self) -> bool:
-        """Whether it has a smooth relief of 4 x 4 points at most, and asks for no derivative."""
+        """Whether it has a relief of 4 x 4 points at most and no more, in one medium, and asks for no derivative."""
         pupil = self.pupil
-        numbers = (
-            pupil.aperture_radius,
-            self.distance,
-            self.source,
-            pupil.n.a,
-            pupil.n.b,
-            pupil.thin_lens_focal_length,
-        )
-        if pupil.wavefront is not None or any(is_differentiable(value) for value in numbers):
+        numbers = (pupil.aperture_radius, self.distance, self.source, pupil.thin_lens_focal_length)
+        more = pupil.wavefront, pupil.mask, pupil.object_n
+        if (
+            any(part is not None for part in more)
+            or pupil.n.is_differentiable
+            or any(is_differentiable(value) for value in numbers)
+        ):
             return False
         relief = pupil.height
         return relief is None or (isinstance(relief, BSplineRelief) and not is_differentiable(relief.control_points))
@@ -74,7 +72,7 @@ class Member:
     def numbers(self) -> tuple[float, ...]:
         """Radius, wavelength in the medium, distances of sensor and source, focal length [m]."""
         focal = self.pupil.thin_lens_focal_length
-        wavelength = self.wavelength / self.pupil.medium_n
+        wavelength = self.wavelength / self.pupil.index_behind(self.wavelength)
         return self.pupil.radius, wavelength, self.distance, self.source, math.inf if focal is None else focal
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from optics.numerics.accuracy import Plan
 from optics.numerics.arguments import of_kind, vacuum_wavelength, vacuum_wavelengths
 from optics.numerics.autodiff import Scalar, number
 from optics.numerics.grid import Grid
+from optics.point_spread.planner import FIELDS
 from optics.point_spread.psf_result import PSFResult, spread
 from optics.point_spread.request import Setup
 
@@ -31,6 +33,7 @@ def psf(
     method: str = "auto",
     dtype: str = "float32",
     centre: tuple[float, float] = (0.0, 0.0),
+    field: bool = False,
 ) -> PSFResult:
     """|U|² / (pupil area) of the field U that a unit-amplitude wave makes behind the pupil.
 
@@ -41,6 +44,8 @@ def psf(
     tolerance: relative L2 error of the intensity over the window.
     method: "auto", "exact" (nothing approximate), or one of planner.METHODS. An approximation asked for by its name
         answers however wrong it is: the tolerance is then that of its sampling, and the plan tells the error.
+    field: whether the complex amplitude is wanted, too, for the PSF's price (`PSFResult.field`); then only methods that
+        have a phase are weighed.
     Both distances, as what the pupil is made of, may be Dr.Jit arrays that carry derivatives: see PSFResult.tensor.
 
     Raises:
@@ -55,7 +60,12 @@ def psf(
         raise ValueError("wavelengths is empty: must hold at least one wavelength [m]")
     if lambdas.ndim > 1:
         raise ValueError(f"wavelengths has shape {lambdas.shape}: must be one wavelength [m], or a row of them")
-    return spread([setup.request(pupil, float(wavelength)) for wavelength in lambdas])
+    if field and method not in ("auto", "exact", *FIELDS):
+        raise ValueError(
+            f"method = {method!r} has no phase: with field=True must be 'auto' or one of {', '.join(FIELDS)}"
+        )
+    requests = [setup.request(pupil, float(wavelength)) for wavelength in lambdas]
+    return spread([replace(request, keeps_field=True) for request in requests] if field else requests)
 
 
 def plan(

@@ -44,6 +44,9 @@ class PSFResult:
     plans: one per wavelength; `plan` is the least accurate of them.
     requests: what was asked, one per wavelength, so that measures may look again; none for a picture from elsewhere.
     shares: (request,) of which a picture is the mean, see `mean`; None: one picture per request.
+    field_parts: real and imaginary part of the complex amplitude, Dr.Jit tensors (wavelength, y, x) with derivatives,
+        where `psf` was asked for it; `field`: both in one NumPy array. Its square is the PSF, and it has the carrier
+        exp(ikz).
     """
 
     tensor: Array
@@ -55,6 +58,14 @@ class PSFResult:
     centre: tuple[float, float] = (0.0, 0.0)
     requests: tuple[Request, ...] = ()
     shares: np.ndarray | None = None
+    field_parts: tuple[Array, Array] | None = None
+
+    @cached_property
+    def field(self) -> np.ndarray | None:
+        if self.field_parts is None:
+            return None
+        re, im = (np.asarray(part.numpy()) for part in self.field_parts)
+        return re + 1j * im
 
     @cached_property
     def psf(self) -> np.ndarray:
@@ -100,7 +111,8 @@ class PSFResult:
     def cutoff(self) -> np.ndarray:
         """Frequency [1/m] beyond which the intensity has none, 2R/√(R² + z²) n/λ, (wavelength,)."""
         radius, distance = self.pupil.radius, number(self.sensor_distance)
-        found: np.ndarray = 2 * radius / math.hypot(radius, distance) * self.pupil.medium_n / self.wavelengths
+        index = np.array([self.pupil.index_behind(float(wavelength)) for wavelength in self.wavelengths])
+        found: np.ndarray = 2 * radius / math.hypot(radius, distance) * index / self.wavelengths
         return found
 
     @property
@@ -157,7 +169,15 @@ class PSFResult:
             raise ValueError(f"shares = {shown(shares)}: must be {self.wavelengths.size} that sum to 1")
         image = np.tensordot(parts, self.psf.astype(np.float64), axes=1)[None]
         wavelength, asked = np.array([parts @ self.wavelengths]), self.requests if self.can_be_seen_anew else ()
-        return replace(self, tensor=image, wavelengths=wavelength, plans=(self.plan,), requests=asked, shares=parts)
+        return replace(
+            self,
+            tensor=image,
+            wavelengths=wavelength,
+            plans=(self.plan,),
+            requests=asked,
+            shares=parts,
+            field_parts=None,
+        )
 
     def through(self, window: Grid, what: str, waves: slice = slice(None)) -> PSFResult:
         """The same light through another window, to the same tolerance, of some of the wavelengths.
@@ -205,7 +225,7 @@ def _through(request: Request, window: Grid) -> Request:
     asked = request.problem
     problem = Problem.of(request.beam, window, asked.tolerance, asked.dtype)
     method = request.method if request.method in APPROXIMATE else "auto"
-    return replace(request, problem=problem, method=method, most_seconds=MOST_SECONDS)
+    return replace(request, problem=problem, method=method, most_seconds=MOST_SECONDS, keeps_field=False)
 
 
 def spread(requests: Sequence[Request]) -> PSFResult:
@@ -216,9 +236,13 @@ def spread(requests: Sequence[Request]) -> PSFResult:
     """
     import drjit as dr
 
-    flat, plans = zip(*pictures(requests), strict=True)
+    flat, plans, fields = zip(*pictures(requests), strict=True)
     beam, window, types = requests[0].beam, requests[0].problem.window, precision(requests[0].problem.dtype)
     tensor = types.Tensor(flat[0] if len(flat) == 1 else dr.concat(flat), (len(flat), *window.shape))
     wavelengths = np.array([request.beam.wavelength for request in requests])
     where = (window.dx, wavelengths, beam.distance, beam.pupil)
-    return PSFResult(tensor, *where, tuple(plans), window.centre, tuple(requests))
+    parts = None
+    if requests[0].keeps_field:
+        re, im = ([getattr(field, part) for field in fields] for part in ("re", "im"))
+        parts = tuple(types.Tensor(row[0] if len(row) == 1 else dr.concat(row), tensor.shape) for row in (re, im))
+    return PSFResult(tensor, *where, tuple(plans), window.centre, tuple(requests), field_parts=parts)

@@ -24,13 +24,15 @@ class Request:
     """One monochromatic picture that somebody wants.
 
     beam: the light; problem: the same in numbers, with the window and the tolerance.
-    method: "auto", "exact" or a method's name. most_seconds: what the picture may take.
+    method: "auto", "exact" or a method's name. most_seconds: what the picture may take. keeps_field: whether its
+        complex amplitude is wanted, too.
     """
 
     beam: Beam
     problem: Problem
     method: str = "auto"
     most_seconds: float = 60.0
+    keeps_field: bool = False
 
     def planned(self) -> tuple[Plan, Sampling]:
         """How it is best answered.
@@ -41,7 +43,8 @@ class Request:
         relief = self.beam.pupil.height
         jump = 0.0 if relief is None else relief.jump
         try:
-            plan, sampling = choose(self.problem, self.method, self.most_seconds)
+            method = "field" if self.keeps_field and self.method in ("auto", "exact") else self.method
+            plan, sampling = choose(self.problem, method, self.most_seconds)
         except AccuracyError as error:
             raise AccuracyError(f"{error}; {_wrapped(jump)}" if jump else str(error)) from None
         if jump and plan.seconds > MOST_SECONDS_OF_JUMPS:

@@ -71,17 +71,18 @@ def vector_focus(
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
     lambda_ = vacuum_wavelength(wavelength)
     one_of("apodization", apodization, ("flat", "aplanatic"))
-    if not pupil.rotationally_symmetric(lambda_):
+    if not pupil.rotationally_symmetric(lambda_) or len(pupil.aperture.rings) > 1:
         raise ValueError(f"pupil = {shown(pupil)}: must be the same all around, a circle or ring with such a relief")
     z = pupil.image_distance(math.inf) if sensor_distance is None else positive("sensor_distance", sensor_distance)
-    zones = pupil.radius**2 * pupil.medium_n / (lambda_ * z)
+    index = pupil.index_behind(lambda_)
+    zones = pupil.radius**2 * index / (lambda_ * z)
     if zones < FEWEST_ZONES:
         raise AccuracyError(f"Fresnel number {zones:.3g}: must be at least {FEWEST_ZONES:g} for rays to meet; use psf")
     ends, light = _aplanatic(pupil, z) if apodization == "aplanatic" else _flat(pupil, lambda_, z)
     window = Grid(shape, dx)
     x, y = window.x[None, :], window.y[:, None]
     radii, back = np.unique(np.round(np.hypot(x, y) / dx, 9), return_inverse=True)
-    found = focal_integrals(radii * dx, 2 * math.pi * pupil.medium_n / lambda_, z, ends, light)
+    found = focal_integrals(radii * dx, 2 * math.pi * index / lambda_, z, ends, light)
     found = found[:, back.reshape(window.shape)] / math.sqrt(pupil.area)
     return _components(found, np.arctan2(y, x), polarization, window.dx)
 
@@ -89,16 +90,20 @@ def vector_focus(
 def _flat(pupil: Pupil, wavelength: float, z: float) -> tuple[tuple[float, float], Light]:
     """r = z tan θ; W is what the path through the pupil and on to the axis has more than the axial one."""
     types = precision("float64")
-    inner = pupil.aperture.inner_radius * pupil.radius
+    inner = pupil.aperture.rings[0][0] * pupil.radius
     r = np.linspace(inner, pupil.radius, PATH_SAMPLES)
 
     def waves(r: np.ndarray) -> np.ndarray:
         path = pupil.path(types.Float64(r), types.Float64(0 * r), wavelength, PointSource(), types).numpy()
-        found: np.ndarray = (path + pupil.medium_n * r * r / (np.sqrt(r * r + z * z) + z)) / wavelength
+        found: np.ndarray = (path + pupil.index_behind(wavelength) * r * r / (np.sqrt(r * r + z * z) + z)) / wavelength
+        return found
+
+    def passed(r: np.ndarray) -> np.ndarray:
+        found: np.ndarray = pupil.amplitude(types.Float64(r / pupil.radius), types.Float64(0 * r), types).numpy()
         return found
 
     def at(theta: np.ndarray) -> np.ndarray:
-        found: np.ndarray = np.exp(2j * np.pi * waves(z * np.tan(theta))) / np.cos(theta)
+        found: np.ndarray = passed(z * np.tan(theta)) * np.exp(2j * np.pi * waves(z * np.tan(theta))) / np.cos(theta)
         return found
 
     turns = float(np.abs(np.diff(waves(r))).max()) * (PATH_SAMPLES - 1)
@@ -107,13 +112,13 @@ def _flat(pupil: Pupil, wavelength: float, z: float) -> tuple[tuple[float, float
 
 def _aplanatic(pupil: Pupil, z: float) -> tuple[tuple[float, float], Light]:
     """r = z sin θ, all rays in phase."""
-    bare = pupil.height is None and pupil.wavefront is None
+    bare = pupil.height is None and pupil.wavefront is None and pupil.mask is None
     if not bare or pupil.thin_lens_focal_length is None or pupil.radius >= z:
         raise ValueError(
-            f"apodization = 'aplanatic': must be an ideal lens without relief or wavefront, its radius "
+            f"apodization = 'aplanatic': must be an ideal lens without relief or wavefront or mask, its radius "
             f"{pupil.radius:.3g} m below the distance {z:.3g} m"
         )
-    inner = pupil.aperture.inner_radius * pupil.radius
+    inner = pupil.aperture.rings[0][0] * pupil.radius
     return (math.asin(inner / z), math.asin(pupil.radius / z)), Light(lambda theta: np.sqrt(np.cos(theta)))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from optics.apertures.aperture import EDGE_REACH
 from optics.elements.pupil import Pupil
+from optics.elements.refractive_index import Dispersion
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
 from optics.numerics.arguments import in_range, positive, vacuum_wavelength
@@ -155,7 +156,13 @@ def _stops(elements: Sequence[Pupil | FreeSpace], backward: bool, window: Grid) 
 
 
 def _medium(elements: Sequence[Pupil | FreeSpace]) -> float:
-    media = sorted({element.medium_n for element in elements})
+    found = set()
+    for element in elements:
+        index = element.medium_n
+        if isinstance(index, Dispersion) or (isinstance(element, Pupil) and element.object_n is not None):
+            raise ValueError("elements: media that differ before and behind a pupil, or disperse, are psf's alone")
+        found.add(float(index))
+    media = sorted(found)
     if len(media) > 1:
         raise ValueError(f"medium_n = {', '.join(f'{n:g}' for n in media)}: must be the same throughout the elements")
     return media[0]

@@ -12,7 +12,22 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import optics
-from optics import AccuracyError, Annulus, BSplineRelief, Circle, Pupil, RefractiveIndex
+from optics import (
+    AccuracyError,
+    Annulus,
+    BSplineRelief,
+    Circle,
+    Disk,
+    GaussianMask,
+    MaskMap,
+    Pupil,
+    RefractiveIndex,
+    Rings,
+    Spider,
+    difference,
+    medium,
+    union,
+)
 from optics.apertures.polygonal import Polygon, Slit
 from optics.point_spread.planner import APPROXIMATE, METHODS
 from validation.reference import relative_l2
@@ -38,7 +53,7 @@ def or_odd(usual):
 
 @st.composite
 def apertures(draw):
-    kind = draw(st.sampled_from(["circle", "annulus", "polygon", "slit", "star"]))
+    kind = draw(st.sampled_from(["circle", "annulus", "polygon", "slit", "star", "cut", "joined", "rings"]))
     if kind == "annulus":
         return Annulus(draw(st.floats(0.01, 0.99)))
     if kind == "polygon":
@@ -46,12 +61,29 @@ def apertures(draw):
     if kind == "slit":
         width = draw(st.floats(0.02, 1.9))
         return Slit(width, draw(st.floats(0.02, 1.0)) * math.sqrt(4 - width**2))
+    if kind == "cut":
+        return difference(
+            Annulus(draw(st.floats(0.05, 0.6))), Spider(draw(st.integers(1, 5)), 0.05, draw(st.floats(0, 90)))
+        )
+    if kind == "joined":
+        places = [(draw(st.floats(-0.7, 0.7)), draw(st.floats(-0.7, 0.7))) for _ in range(2)]
+        return union(*(Disk(draw(st.floats(0.1, 0.8)), place) for place in places))
+    if kind == "rings":
+        return Rings(sorted(draw(st.lists(st.floats(0.01, 1), min_size=4, max_size=4, unique=True))))
     if kind == "star":
         inner = draw(st.floats(0.3, 0.9))
         angle = np.arange(10) * math.pi / 5
         radius = np.where(np.arange(10) % 2, inner, 1.0)
         return Polygon(np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
     return Circle()
+
+
+@st.composite
+def masks(draw):
+    kind = draw(st.sampled_from(["none", "none", "gaussian", "map"]))
+    if kind == "gaussian":
+        return GaussianMask(draw(logarithmic(1e-7, 1e-3)))
+    return MaskMap(np.full((4, 4), draw(st.floats(-1, 1)))) if kind == "map" else None
 
 
 @st.composite
@@ -74,9 +106,11 @@ def requests(draw, radius=(3e-7, 5e-5)):
         "aperture_radius": draw(logarithmic(*radius)),
         "height": draw(reliefs()),
         "n": draw(st.one_of(st.floats(1, 2.5), st.floats(20, 80).map(lambda v: RefractiveIndex.from_abbe(1.5, v)))),
-        "medium_n": draw(st.sampled_from([1.0, 1.0, 1.33])),
+        "medium_n": draw(st.sampled_from([1.0, 1.0, 1.33, medium("water")])),
+        "object_n": draw(st.sampled_from([None, None, 1.0, medium("aqueous")])),
         "thin_lens_focal_length": draw(st.one_of(st.none(), logarithmic(2e-5, 1e-2))),
         "aperture": draw(apertures()),
+        "mask": draw(masks()),
     }
     distance = draw(logarithmic(1e-6, 1e-2))
     dtype = draw(st.sampled_from(["float32", "float64"]))

@@ -86,3 +86,26 @@ def test_the_mtf_is_drawn_beside_its_limit_up_to_the_cutoff(run, monkeypatch):
     assert contrast[0, 1] > 0.9 > contrast[-1, 1]
     assert (contrast[:, 1] <= limit[:, 1] + 0.03).all()
     np.testing.assert_allclose(nyquist[:, 0], light.per_degree / (2 * light.eye.receptor_pitch))
+
+
+def test_a_figure_that_cannot_be_known_is_one_line(monkeypatch):
+    """And the others are drawn."""
+
+    def refused(*_, **__):
+        raise optics.AccuracyError("the MTF needs 4097 x 4097 samples")
+
+    class Animal:
+        refractive_index = 1.5
+
+        def eyes(self, _):
+            pupil = optics.Pupil(20e-6, thin_lens_focal_length=optics.Eye().sensor_distance)
+            return type("Eyes", (), {"eye": lambda _: optics.Eye(pupil, (5, 5))})()
+
+    monkeypatch.setattr(optics, "mtf", refused)
+    page = str(eye_figures.eye_figures(Animal(), None))
+    assert "<b>Contrast.</b> It is not known: the MTF needs 4097 x 4097 samples." in page
+    assert page.count("<figure") == 3
+    monkeypatch.setattr(WhiteLight, "through", refused)
+    page = str(eye_figures.eye_figures(Animal(), None))
+    assert "<b>Point spread function.</b> It is not known" in page
+    assert page.count("<figure") == 1

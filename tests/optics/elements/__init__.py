@@ -3,9 +3,10 @@
 beam: methods/test_textbook.py
 pixel_relief: test_pixel_relief.py
 pupil: test_pupil.py
-refractive_index: test_refractive_index.py
+refractive_index: test_refractive_index.py, test_media.py
 relief: test_relief.py
 source: test_source.py
+transmittance: test_transmittance.py
 wavefront: test_wavefront.py
 wavefront_slopes: test_pupil.py
 """

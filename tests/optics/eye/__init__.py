@@ -2,6 +2,7 @@
 
 band_choice: spectra/test_bands.py
 eye: test_eye.py, test_eye_derivatives.py, test_eye_robustness.py
+geometry: test_patches.py
 kernel_bank: test_kernel_bank.py
 kernel_interpolation: test_kernel_interpolation.py, test_kernel_bank.py
 photoreceptor: test_photoreceptor.py

@@ -63,8 +63,10 @@ def test_any_lens_is_described_or_refused(a, defocus, fov_deg, sigma):
         refused(error)
         return
     assert 0 <= found.acuity_cpd <= found.diffraction_cpd
-    assert 0 <= found.image_quality <= 1.001 * found.throughput
-    assert 0 < found.strehl_ratio < 1.1
+    unknown = {line.split(":")[0] for line in found.unknown}
+    assert ("image quality" in unknown) == math.isnan(found.image_quality)
+    assert "image quality" in unknown or 0 <= found.image_quality <= 1.001 * found.throughput
+    assert "Strehl ratio" in unknown or 0 < found.strehl_ratio < 1.1
     assert found.acceptance_angle_deg > 0.9 * found.interommatidial_angle_deg
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from optics import Eye, PhotonBudget, Pupil
+from optics import AccuracyError, Eye, PhotonBudget, Pupil
+from optics.eye import summary
 
 F = Eye().sensor_distance
 
@@ -136,3 +137,21 @@ def test_the_table_names_every_limit():
     ):
         assert word in table
     assert max(map(len, table.splitlines())) < 120
+
+
+def test_what_the_light_cannot_tell_is_one_named_line(monkeypatch):
+    """The rest of the table stays."""
+
+    def refused(*_, **__):
+        raise AccuracyError("tolerance = 0.02: contrasts err by up to 0.5")
+
+    monkeypatch.setattr(summary, "image_quality", refused)
+    monkeypatch.setattr(summary, "mtf", refused)
+    described = lens().describe()
+    assert math.isnan(described.image_quality)
+    assert described.binding in ("diffraction", "sampling")
+    assert described.acuity_cpd == lens().describe().sampling_cpd
+    assert [line.split(":")[0] for line in described.unknown] == ["image quality", "limit by noise"]
+    assert "not known (1)       image quality: tolerance = 0.02" in str(described)
+    monkeypatch.undo()
+    assert lens().describe().unknown == ()

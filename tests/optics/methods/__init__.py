@@ -1,6 +1,7 @@
 """Which test fails when a module of optics/methods is broken. The oracles are closed forms that all methods meet.
 
 angular_spectrum: test_textbook.py, test_oracles_waves.py
+carrier: point_spread/test_field.py
 far_field: test_textbook.py
 fresnel: test_fresnel.py
 geometric: test_geometric.py

@@ -6,7 +6,7 @@ contrast: test_measures.py, test_measure_errors.py
 pictures: test_pictures.py
 planner: test_planner.py
 population: test_population.py
-psf: test_psf.py, test_derivatives.py, test_robustness.py
+psf: test_psf.py, test_field.py, test_derivatives.py, test_robustness.py
 request: test_psf.py
 psf_result: test_psf.py, test_measure_errors.py
 spot_check: test_spot_check.py

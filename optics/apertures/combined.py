@@ -1,0 +1,150 @@
+"""Openings made of several shapes: joined, cut out of each other, or what they have in common."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from math import sqrt
+
+import numpy as np
+
+from optics.apertures.aperture import Aperture, Nodes, SoftAperture
+from optics.apertures.boundary import Boundary, boundary
+from optics.apertures.outline import Outline
+from optics.apertures.polygonal import Polygon
+from optics.apertures.shapes import Disk, Shape
+from optics.apertures.soft_edge import SoftEdge
+from optics.apertures.soft_outline import SoftOutline
+from optics.apertures.strips import strips
+from optics.numerics.arguments import finite, in_range, shown, whole, without_derivative
+
+__all__ = ["Combined", "difference", "hexagonal_segments", "intersection", "union"]
+
+MOST_RINGS = 12  # choice: 469 segments
+SMALLEST = 1e-9  # choice, R²: of an opening
+
+RULES: dict[str, Callable[[list[np.ndarray]], np.ndarray]] = {
+    "union": lambda inside: reduce(np.logical_or, inside),
+    "intersection": lambda inside: reduce(np.logical_and, inside),
+    "difference": lambda inside: inside[0] & ~reduce(np.logical_or, inside[1:]),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Combined(Aperture):
+    """What `union`, `difference` and `intersection` make of shapes, as far as it lies within the pupil's circle.
+
+    rule: one of these names. shapes: apertures, or `Disk`, `Oblong` and `Spider`, which may lie anywhere.
+
+    Raises:
+        ValueError: no such rule, a shape that is none, or nothing is open.
+    """
+
+    rule: str
+    shapes: tuple[Shape, ...]
+
+    def __post_init__(self) -> None:
+        if self.rule not in RULES:
+            raise ValueError(f"rule = {shown(self.rule)}: must be one of {', '.join(map(repr, RULES))}")
+        least = 2 if self.rule == "difference" else 1
+        if len(self.shapes) < least:
+            raise ValueError(f"{len(self.shapes)} shapes: a {self.rule} must have {least} or more")
+        for shape in self.shapes:
+            if not (hasattr(shape, "outline") and hasattr(shape, "contains")):
+                raise ValueError(f"shape = {shown(shape)}: must be an aperture, a Disk, a Oblong or a Spider")
+        if self.area < SMALLEST:
+            raise ValueError(f"{self.rule} of {len(self.shapes)} shapes: must leave something open within the pupil")
+
+    def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        return np.asarray(RULES[self.rule]([shape.contains(x, y) for shape in self.shapes]) & (np.hypot(x, y) <= 1))
+
+    @cached_property
+    def _boundary(self) -> Boundary:
+        pieces = Outline.joined([*(shape.outline for shape in self.shapes), Disk(1.0).outline])
+        return boundary(pieces, self.contains)
+
+    @property
+    def outline(self) -> Outline:
+        return self._boundary.outline
+
+    @property
+    def area(self) -> float:
+        return self._boundary.area
+
+    @property
+    def rotationally_symmetric(self) -> bool:
+        return False
+
+    @cached_property
+    def half_widths(self) -> tuple[float, float]:
+        return self._boundary.half_widths
+
+    def _nodes(self, cycles: float, digits: float) -> Nodes:
+        x, y = self.half_widths
+        parts = list(strips(self.outline, (-x, x, -y, y), cycles, digits))
+        return Nodes(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+    def _softened(self, edge: SoftEdge) -> SoftAperture:
+        return SoftOutline(edge, self._boundary.segments, self._boundary.arcs)
+
+
+def union(*shapes: Shape) -> Combined:
+    """Open where any of the shapes is, within the pupil.
+
+    Raises:
+        ValueError: see `Combined`.
+    """
+    return Combined("union", shapes)
+
+
+def difference(shape: Shape, *closed: Shape) -> Combined:
+    """Open where the first shape is and none of the others, within the pupil: `difference(Annulus(0.3), Spider(4,
+    0.02))` is a telescope's.
+
+    Raises:
+        ValueError: see `Combined`.
+    """
+    return Combined("difference", (shape, *closed))
+
+
+def intersection(*shapes: Shape) -> Combined:
+    """Open where all of the shapes are, within the pupil.
+
+    Raises:
+        ValueError: see `Combined`.
+    """
+    return Combined("intersection", shapes)
+
+
+def hexagonal_segments(
+    rings: int, gap: float = 0.0, rotation_deg: float = 0.0, without: tuple[int, ...] = ()
+) -> Combined:
+    """A mirror of hexagons in rings around a middle one, as wide as the pupil: corners of the outermost lie on its rim.
+
+    gap: between neighbours, in units of the distance of their centres. rotation_deg: 0 has corners of hexagons towards
+        x. without: segments that are left out, by their number: 0 the middle one, then ring by ring, counterclockwise
+        from `rotation_deg` + 30 degrees on (James Webb's: 2 rings without segment 0).
+
+    Raises:
+        ValueError: rings outside 0 to 12, gap outside [0, 1), a number that no segment has, or nothing left.
+    """
+    whole("rings", rings, 0, MOST_RINGS)
+    in_range("gap", without_derivative("gap", gap), 0, 0.999)
+    turn = np.exp(1j * np.deg2rad(finite("rotation_deg", rotation_deg)))
+    centres = [0j]
+    for ring in range(1, rings + 1):
+        corners = ring * np.exp(1j * np.pi * (np.arange(7) / 3 + 1 / 6))
+        for first, last in itertools.pairwise(corners):
+            centres += [first + (last - first) * step / ring for step in range(ring)]
+    for number in without:
+        whole("without", number, 0, len(centres) - 1)
+    corners = (1 - gap) / sqrt(3) * np.exp(1j * np.pi / 3 * np.arange(6))
+    kept = [centre for number, centre in enumerate(centres) if number not in set(without)]
+    if not kept:
+        raise ValueError(f"without = {shown(without)}: must leave a segment")
+    outermost = max(abs(centre + corner) for centre in centres for corner in corners)
+    places = [turn * (centre + corners) / outermost for centre in kept]
+    return union(*(Polygon(np.column_stack([at.real, at.imag])) for at in places))

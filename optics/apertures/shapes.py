@@ -1,0 +1,126 @@
+"""Shapes that openings are cut from: they may lie anywhere, and reach beyond the pupil."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from optics.apertures.outline import Outline
+from optics.numerics.arguments import finite, in_range, point_2d, positive, whole, without_derivative
+
+__all__ = ["Disk", "Oblong", "Shape", "Spider"]
+
+BEYOND = 1.5  # choice, radii: how far out a spider's vanes end, beyond any opening
+MOST_VANES = 64
+FARTHEST = 10.0  # choice, radii
+
+
+class Shape(Protocol):
+    """What can be joined, cut out or intersected: every aperture is one. Lengths in units of the pupil's radius R."""
+
+    @property
+    def outline(self) -> Outline:
+        """Its edge, or more than that."""
+
+    def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Which points lie within."""
+
+
+@dataclass(frozen=True)
+class Disk:
+    """A disk of this radius about a centre (x, y), in units of R.
+
+    Raises:
+        ValueError: radius not positive, or either above 10.
+    """
+
+    radius: float
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        positive("radius", without_derivative("radius", self.radius), "pupil radii")
+        in_range("radius", self.radius, 0, FARTHEST)
+        object.__setattr__(self, "centre", _centre(self.centre))
+
+    @property
+    def outline(self) -> Outline:
+        return Outline.circles((float(self.radius),), self.centre)
+
+    def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.asarray(np.hypot(x - self.centre[0], y - self.centre[1]) <= self.radius)
+
+
+@dataclass(frozen=True)
+class Oblong:
+    """A rectangle of full `width` and `height` about a centre (x, y), turned by an angle, in units of R.
+
+    Raises:
+        ValueError: a side not positive or above 20, a centre beyond 10, an angle that is no finite number.
+    """
+
+    width: float
+    height: float
+    centre: tuple[float, float] = (0.0, 0.0)
+    rotation_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height"):
+            value = getattr(self, name)
+            positive(name, without_derivative(name, value), "pupil radii")
+            in_range(name, value, 0, 2 * FARTHEST)
+        object.__setattr__(self, "centre", _centre(self.centre))
+        finite("rotation_deg", without_derivative("rotation_deg", self.rotation_deg))
+
+    @property
+    def outline(self) -> Outline:
+        x, y = self.width / 2, self.height / 2
+        turn = np.exp(1j * np.deg2rad(self.rotation_deg))
+        corners = turn * np.array([-x - 1j * y, x - 1j * y, x + 1j * y, -x + 1j * y])
+        return Outline.polygon(np.column_stack([corners.real, corners.imag]) + self.centre)
+
+    def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        place = (x - self.centre[0] + 1j * (y - self.centre[1])) * np.exp(-1j * np.deg2rad(self.rotation_deg))
+        return np.asarray((np.abs(place.real) <= self.width / 2) & (np.abs(place.imag) <= self.height / 2))
+
+
+@dataclass(frozen=True)
+class Spider:
+    """Vanes of this full width from the centre outwards, evenly around it, the first towards `rotation_deg` from the x
+    axis: what holds a telescope's second mirror.
+
+    Raises:
+        ValueError: vanes outside 1 to 64, or a width outside (0, 1].
+    """
+
+    vanes: int
+    width: float
+    rotation_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vanes", whole("vanes", self.vanes, 1, MOST_VANES))
+        positive("width", without_derivative("width", self.width), "pupil radii")
+        in_range("width", self.width, 0, 1)
+        finite("rotation_deg", without_derivative("rotation_deg", self.rotation_deg))
+
+    @property
+    def rectangles(self) -> list[Oblong]:
+        angles = self.rotation_deg + 360 / self.vanes * np.arange(self.vanes)
+        middles = BEYOND / 2 * np.exp(1j * np.deg2rad(angles))
+        return [
+            Oblong(BEYOND, self.width, (float(at.real), float(at.imag)), float(angle))
+            for at, angle in zip(middles, angles, strict=True)
+        ]
+
+    @property
+    def outline(self) -> Outline:
+        return Outline.joined([rectangle.outline for rectangle in self.rectangles])
+
+    def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.any([rectangle.contains(x, y) for rectangle in self.rectangles], axis=0)
+
+
+def _centre(value: tuple[float, float]) -> tuple[float, float]:
+    x, y = point_2d("centre", value, "lengths (x, y) in pupil radii")
+    return in_range("centre", x, -FARTHEST, FARTHEST), in_range("centre", y, -FARTHEST, FARTHEST)

@@ -1,0 +1,142 @@
+"""An opening of straight pieces and arcs convolved with the soft edge's kernel, at any point.
+
+As in `soft_polygon`, with the arcs beside the lines: the kernel's share that a piece of the edge adds is ∫ G(r) dθ over
+the angle θ under which it is seen. Along a circle of radius R that is H(r) (R - d cos t) R dt where the arc is within
+the kernel's reach, d the distance between its centre and the point, and the angle over 2π where it is not.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from math import ceil, log10, pi
+
+import numpy as np
+
+from optics.apertures.aperture import SoftAperture
+from optics.apertures.soft_edge import SoftEdge
+from optics.apertures.soft_polygon import TINY, radial_table, sides_share
+from optics.numerics.autodiff import Array
+from optics.numerics.cost import SOFT_EDGE_SAMPLE
+from optics.numerics.precision import Precision, opaque
+from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
+
+__all__ = ["SoftOutline"]
+
+MOST_OF_A_TURN = pi / 2  # choice: of an arc that is looked at as one
+
+
+@dataclass(frozen=True, eq=False)
+class SoftOutline(SoftAperture):
+    """segments: (n, 2, 2), with the opening on their left. arcs: (m, 6), cx, cy, radius, from, to [rad] and 1 where the
+    opening is on the side of the centre, -1 where it is not."""
+
+    edge: SoftEdge
+    segments: np.ndarray
+    arcs: np.ndarray
+
+    @property
+    def seconds_per_point(self) -> float:
+        pieces = len(self.segments) + 3 * len(_short(self.arcs))
+        return pieces * SOFT_EDGE_SAMPLE * (1 + self.edge.cycles)
+
+    def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
+        import drjit as dr
+
+        total = dr.zeros(types.Float64, max(dr.width(x), dr.width(y)))
+        if len(self.segments):
+            total += sides_share(self.edge, self.segments[:, 0], self.segments[:, 1], x, y, types)
+        if len(self.arcs):
+            total += _arcs_share(self.edge, _short(self.arcs), x, y, types)
+        return total
+
+
+def _short(arcs: np.ndarray) -> np.ndarray:
+    """The same arcs, none longer than a quarter of a turn."""
+    found = []
+    for *circle, begin, end, side in arcs:
+        parts = max(1, ceil((end - begin) / MOST_OF_A_TURN - 1e-9))
+        at = np.linspace(begin, end, parts + 1)
+        found += [(*circle, first, last, side) for first, last in itertools.pairwise(at)]
+    return np.array(found, dtype=np.float64).reshape(-1, 6)
+
+
+def _arcs_share(edge: SoftEdge, arcs: np.ndarray, x: Array, y: Array, types: Precision) -> Array:
+    import drjit as dr
+
+    columns = [types.Float64(np.ascontiguousarray(column)) for column in arcs.T]
+    count = dr.opaque(types.Index, len(arcs))
+    arc = _Arc(edge, types)
+
+    def add(i: Array, total: Array, x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+        cx, cy, radius, begin, end, side = (dr.gather(types.Float64, column, i) for column in columns)
+        return i + 1, total + side * arc.share(x - cx, y - cy, radius, begin, end), x, y
+
+    width = max(dr.width(x), dr.width(y))
+    state = dr.zeros(types.Index, width), dr.zeros(types.Float64, width), types.Float64(x), types.Float64(y)
+    return dr.while_loop(state, lambda i, total, x, y: i < count, add, max_iterations=-1)[1]
+
+
+class _Arc:
+    """What an arc adds, counterclockwise around its centre, at a point (x, y) from that centre."""
+
+    def __init__(self, edge: SoftEdge, types: Precision) -> None:
+        import drjit as dr
+
+        self.types = types
+        self.reach = opaque(types, edge.reach)
+        self.radial = radial_table(edge)
+        # Within the reach a quarter of a turn is no longer than π/2 of its chord.
+        nodes, weights = gauss_legendre(gauss_legendre_count(pi * edge.cycles, 1 - log10(edge.ripple)) + 4)
+        self.nodes, self.weights = types.Float64(nodes), types.Float64(weights)
+        self.count = dr.opaque(types.Index, len(nodes))
+
+    def share(self, x: Array, y: Array, radius: Array, begin: Array, end: Array) -> Array:
+        """The part within reach is centred on the point's direction φ, half as wide as τ; seen from the arc's middle
+        that is at most one turn back or on, and may come in from both ends."""
+        import drjit as dr
+
+        squared = x * x + y * y
+        d = dr.sqrt(squared + TINY)
+        phi = dr.atan2(y, x + TINY)
+        middle = (begin + end) / 2
+        phi = phi + 2 * pi * dr.round((middle - phi) / (2 * pi))
+        phi = dr.select(phi > middle, phi - 2 * pi, phi)
+        cosine = (radius * radius + squared - self.reach * self.reach) / (2 * radius * d)
+        tau = dr.acos(dr.clip(cosine, -1, 1))
+        near = (dr.clip(phi - tau, begin, end), dr.clip(phi + tau, begin, end))
+        after = (dr.clip(phi + 2 * pi - tau, begin, end), dr.clip(phi + 2 * pi + tau, begin, end))
+        total = dr.zeros(self.types.Float64, dr.width(x))
+        for first, last in ((begin, near[0]), (near[1], after[0]), (after[1], end)):
+            total += self._angle(x, y, radius, first, last) / (2 * pi)
+        for first, last in (near, after):
+            arguments = (x, y, radius, first, last, dr.zeros(self.types.Float64, dr.width(x)))
+            total += dr.if_stmt(arguments, last > first, self._integral, lambda *arguments: arguments[-1])
+        return total
+
+    def _angle(self, x: Array, y: Array, radius: Array, first: Array, last: Array) -> Array:
+        """Under which an arc is seen: that of its chord, and a whole turn more from between the two."""
+        import drjit as dr
+
+        (sin_a, cos_a), (sin_b, cos_b) = dr.sincos(first), dr.sincos(last)
+        ax, ay, bx, by = radius * cos_a - x, radius * sin_a - y, radius * cos_b - x, radius * sin_b - y
+        cross, dot = ax * by - ay * bx, ax * bx + ay * by
+        between = (cross < 0) & (x * x + y * y < radius * radius)
+        return dr.atan2(cross, dot + TINY) + dr.select(between, 2 * pi, 0)
+
+    def _integral(self, x: Array, y: Array, radius: Array, first: Array, last: Array, zero: Array) -> Array:
+        """∫ H(r) (R - p·e(t)) R dt."""
+        import drjit as dr
+
+        types = self.types
+
+        def add(j: Array, total: Array, x: Array, y: Array, radius: Array, first: Array, last: Array) -> tuple:
+            sin, cos = dr.sincos(first + (last - first) * dr.gather(types.Float64, self.nodes, j))
+            outwards = radius - (x * cos + y * sin)
+            distance = dr.sqrt(dr.square(radius * cos - x) + dr.square(radius * sin - y) + TINY)
+            value = self.radial.at(distance, types) * outwards
+            return j + 1, total + dr.gather(types.Float64, self.weights, j) * value, x, y, radius, first, last
+
+        start = dr.zeros(types.Index, dr.width(x)), zero, x, y, radius, first, last
+        total = dr.while_loop(start, lambda j, *_: j < self.count, add, max_iterations=-1)[1]
+        return total * radius * (last - first)

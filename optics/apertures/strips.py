@@ -1,0 +1,78 @@
+"""Quadrature over what an outline encloses of a rectangle: panels between the heights at which the edge enters, leaves
+or turns, and chords across them. Exact edge, spectral convergence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from math import ceil, pi
+
+import numpy as np
+
+from optics.apertures.outline import Outline
+from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
+
+__all__ = ["strips"]
+
+EDGE_DEGREE = 4  # choice: more than the digits asked for: of the polynomials that a curved edge is to these digits
+ROUNDING = 1e-12
+STEEPNESS = 3.0  # choice: of panels' lengths beside a square root
+
+Box = tuple[float, float, float, float]
+
+
+def strips(
+    outline: Outline, box: Box, cycles: float, digits: float, degree: int = 0
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """x, y and weights over each panel of what is inside the box (left, right, bottom, top), for a wave of so many
+    cycles per unit of length times a polynomial of this degree in either direction."""
+    left, right, bottom, top = box
+    within = np.concatenate([outline.turning, outline.heights(left), outline.heights(right)])
+    ends = np.unique([bottom, top, *within[(within > bottom) & (within < top)]])
+    for low, high in pairwise(_graded(ends, outline.tangent)):
+        if high - low < ROUNDING:
+            continue
+        # Where the edge slants, nodes slide along it, and the wave turns by as much more.
+        inner = low + (high - low) * np.array([1e-6, 1 - 1e-6])
+        slide = np.abs(np.diff(np.clip(outline.crossings(inner), left, right), axis=0)).max(initial=0.0)
+        turns = cycles * float(np.hypot(slide, high - low))
+        y, weight = _panel(low, high, outline.tangent, turns, digits, 2 * degree + EDGE_DEGREE + ceil(digits))
+        sides = np.clip(outline.crossings(y), left, right)
+        for start, end in zip(sides.T[::2], sides.T[1::2], strict=True):
+            if not (end > start).any():
+                continue
+            u, share = gauss_legendre(gauss_legendre_count(cycles * float((end - start).max()), digits + 0.3, degree))
+            x = start[:, None] + (end - start)[:, None] * u
+            size = (weight * (end - start))[:, None] * share
+            yield x.ravel(), np.broadcast_to(y[:, None], x.shape).ravel(), size.ravel()
+
+
+def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+    """Ends of panels, with more of them where a circle's top or bottom is nearer to a panel than the panel is long:
+    polynomials do not follow the square root beside it."""
+    more = []
+    for at in tangent:
+        for low, high in pairwise(ends):
+            gap = max(low - at, at - high)
+            if ROUNDING < gap < high - low:
+                distances = gap * STEEPNESS ** np.arange(
+                    1, 1 + ceil(np.log((gap + high - low) / gap) / np.log(STEEPNESS))
+                )
+                places = at + distances if at < low else at - distances
+                more.append(places[(places > low) & (places < high)])
+    return np.unique(np.concatenate([ends, *more]))
+
+
+def _panel(
+    low: float, high: float, tangent: np.ndarray, cycles: float, digits: float, degree: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Heights and weights between two ends, for a wave of so many cycles between them. Where one is a circle's top or
+    bottom, whose chord begins there like a square root, y goes there like sin²."""
+    span = high - low
+    touching = any(abs(end - at) < ROUNDING for at in tangent for end in (low, high))
+    slower = pi / 2 if touching else 1.0
+    u, weight = gauss_legendre(gauss_legendre_count(slower * cycles, digits + 0.3, ceil(slower * degree)))
+    if not touching:
+        return low + span * u, span * weight
+    return low + span * np.sin(pi * u / 2) ** 2, span * weight * np.sin(pi * u) * pi / 2

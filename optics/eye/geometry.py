@@ -1,0 +1,61 @@
+"""Lengths and directions of an eye: what its retina sees of the world, and how wide its pupil may be."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from optics.elements.pupil import MIDDLE, Pupil
+from optics.numerics.arguments import in_range, of_kind, point_2d, positive, without_derivative
+from optics.numerics.autodiff import Scalar, is_differentiable, number
+
+__all__ = ["behind_pupil", "check_pupil", "direction", "etendue", "focal_length", "tangents"]
+
+WIDEST_DEG = 80
+
+
+def focal_length(width: float, fov_deg: Scalar) -> Scalar:
+    """f [m] at which a retina this wide has this field of view, L / (2 tan(fov/2))."""
+    if is_differentiable(fov_deg):
+        import drjit as dr
+
+        return width / (2 * dr.tan(dr.deg2rad(fov_deg) / 2))
+    return width / (2 * math.tan(math.radians(fov_deg) / 2))
+
+
+def behind_pupil(pupil: Pupil | None, focal: Scalar) -> Scalar:
+    """[m] from pupil to retina, f n/n₀ at 550 nm between two media."""
+    if pupil is None or pupil.object_n is None:
+        return focal
+    return focal * (pupil.index_behind(MIDDLE) / pupil.index_before(MIDDLE))
+
+
+def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) -> None:
+    """ValueError unless it is a pupil no wider than what gathers a throughput of 1."""
+    if full_aperture is not None:
+        positive("full_aperture", without_derivative("full_aperture", full_aperture))
+    if pupil is None:
+        return
+    of_kind("pupil", pupil, Pupil, "Pupil(25e-6), or None for the perfect lens")
+    name, widest = ("sensor_width", width) if full_aperture is None else ("full_aperture", full_aperture)
+    if 2 * number(pupil.aperture_radius) > widest * (1 + 1e-9):
+        raise ValueError(
+            f"pupil.aperture_radius = {pupil.radius:g}: must be at most {name} / 2 = {widest / 2:g} m (of a patch of "
+            "retina, full_aperture says how wide a whole eye's pupil may be)"
+        )
+
+
+def etendue(widest_pupil: float, receptor_pitch: float, focal: float) -> float:
+    """[m² sr] of a receptor behind a pupil that gathers a throughput of 1."""
+    return math.pi / 4 * (widest_pupil * receptor_pitch / focal) ** 2
+
+
+def direction(name: str, value: Any) -> tuple[float, float]:
+    """(right, up) [degrees] off the axis."""
+    right, up = point_2d(name, value, "angles (right, up) [degrees]")
+    return in_range(name, right, -WIDEST_DEG, WIDEST_DEG), in_range(name, up, -WIDEST_DEG, WIDEST_DEG)
+
+
+def tangents(direction_deg: tuple[float, float]) -> tuple[float, float]:
+    """(right, down)."""
+    return math.tan(math.radians(direction_deg[0])), -math.tan(math.radians(direction_deg[1]))

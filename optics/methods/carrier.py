@@ -1,0 +1,38 @@
+"""The phase of a spherical wave from the pupil's middle, which methods split off a field before they interpolate it."""
+
+from __future__ import annotations
+
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem
+from optics.numerics.autodiff import Array
+from optics.numerics.field import Field
+from optics.numerics.precision import opaque, precision
+from optics.numerics.radial_profile import RadialProfile
+
+__all__ = ["on_line", "on_window", "with_sphere"]
+
+
+def with_sphere(field: Field, x: Array, y: Array, beam: Beam, problem: Problem, sign: int) -> Field:
+    """Times e^{±ik(ρ - z)} at points (x, y) [m], ρ their distance from the pupil's middle; ρ - z = r²/(ρ + z)."""
+    import drjit as dr
+
+    types = precision(problem.dtype)
+    z, r2 = opaque(types, beam.distance), x * x + y * y
+    waves = r2 / (dr.sqrt(r2 + z * z) + z) * opaque(types, sign / problem.wavelength)
+    return field * Field.from_waves(1.0, waves, field.grid, types)
+
+
+def on_window(field: Field, beam: Beam, problem: Problem) -> Field:
+    """A field over the window whose method left the sphere out."""
+    x, y = problem.window.coordinates(precision(problem.dtype))
+    return with_sphere(field, x, y, beam, problem, +1)
+
+
+def on_line(profile: Field, line: RadialProfile, beam: Beam, problem: Problem) -> Field:
+    """A symmetric field, known on the radii of a line, over the window: without its sphere it is as smooth as the
+    intensity."""
+    types, window = precision(problem.dtype), problem.window
+    r = types.Float64(line.positions)
+    slow = with_sphere(profile, r, 0 * r, beam, problem, -1)
+    re, im = (line.onto(part, window, types, signed=True) for part in (slow.re, slow.im))
+    return on_window(Field(re, im, window, types), beam, problem)

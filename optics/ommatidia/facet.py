@@ -1,0 +1,100 @@
+"""A facet's lens: thick, curved on both sides, between air and the crystalline cone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from optics.apertures.aperture import Aperture
+from optics.apertures.circular import Circle
+from optics.apertures.polygonal import Polygon
+from optics.elements.pupil import MIDDLE, Pupil
+from optics.elements.refractive_index import Dispersion, index_of
+from optics.numerics.arguments import finite, one_of, positive, without_derivative
+
+__all__ = ["FacetLens"]
+
+SHAPES = ("hexagon", "circle")
+
+
+@dataclass(frozen=True)
+class FacetLens:
+    """A thick lens of two spherical surfaces (Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1).
+
+    diameter: [m], of a hexagon between opposite sides. radius_front, radius_back: of curvature [m], positive where the
+        centre lies behind the surface: a lens that bulges to both sides has a negative back. thickness: [m].
+    n: of the lens. object_n: of what is before it; medium_n: of the cone behind it; numbers or curves.
+    shape: "hexagon", with corners along y, or "circle".
+
+    Raises:
+        ValueError: names argument, value and valid range, or the lens does not focus.
+    """
+
+    diameter: float
+    radius_front: float
+    radius_back: float = -math.inf
+    thickness: float = 0.0
+    n: float | Dispersion = 1.45
+    object_n: float | Dispersion = 1.0
+    medium_n: float | Dispersion = 1.34
+    shape: str = "hexagon"
+
+    def __post_init__(self) -> None:
+        positive("diameter", without_derivative("diameter", self.diameter))
+        for name in ("radius_front", "radius_back"):
+            value = without_derivative(name, getattr(self, name))
+            if not (isinstance(value, float) and math.isinf(value)):
+                positive(f"abs({name})", abs(finite(name, value)))
+        if self.thickness != 0:
+            positive("thickness", without_derivative("thickness", self.thickness))
+        for name in ("n", "object_n", "medium_n"):
+            index_of(name, getattr(self, name))
+        one_of("shape", self.shape, SHAPES)
+        if self.power(MIDDLE) <= 0:
+            raise ValueError(f"radius_front = {self.radius_front:g}: must make a lens that focuses parallel light")
+
+    def power(self, wavelength: float) -> float:
+        """P = P₁ + P₂ - t P₁P₂/n [1/m] at a vacuum wavelength [m]."""
+        front, back, n = self._surfaces(wavelength)
+        return front + back - self.thickness / n * front * back
+
+    def focal_length(self, wavelength: float = MIDDLE) -> float:
+        """f' = n'/P [m] behind the second principal plane, in the cone."""
+        return self._index("medium_n", wavelength) / self.power(wavelength)
+
+    def object_focal_length(self, wavelength: float = MIDDLE) -> float:
+        """f = n₀/P [m]: a receptor of width d sees the angle d/f."""
+        return self._index("object_n", wavelength) / self.power(wavelength)
+
+    def principal_planes(self, wavelength: float = MIDDLE) -> tuple[float, float]:
+        """Where [m] behind the front vertex the first and the second principal plane lie."""
+        front, back, n = self._surfaces(wavelength)
+        power, thickness = self.power(wavelength), self.thickness
+        first = self._index("object_n", wavelength) * thickness * back / (n * power)
+        second = thickness - self._index("medium_n", wavelength) * thickness * front / (n * power)
+        return first, second
+
+    def pupil(self, **others: Any) -> Pupil:
+        """In the principal planes: the facet with an ideal lens of the focal length at 550 nm. others: of `Pupil`, as a
+        wavefront for the lens' aberrations."""
+        corners = 2 / math.sqrt(3) if self.shape == "hexagon" else 1.0
+        return Pupil(
+            corners * self.diameter / 2,
+            aperture=self._opening(),
+            thin_lens_focal_length=self.focal_length(),
+            medium_n=self.medium_n,
+            object_n=self.object_n,
+            **others,
+        )
+
+    def _opening(self) -> Aperture:
+        return Polygon.regular(6, 90.0) if self.shape == "hexagon" else Circle()
+
+    def _surfaces(self, wavelength: float) -> tuple[float, float, float]:
+        """Powers [1/m] of both, and the index between them."""
+        before, n, behind = (self._index(name, wavelength) for name in ("object_n", "n", "medium_n"))
+        return (n - before) / self.radius_front, (behind - n) / self.radius_back, n
+
+    def _index(self, name: str, wavelength: float) -> float:
+        return float(index_of(name, getattr(self, name)).at(wavelength))

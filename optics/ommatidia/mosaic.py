@@ -1,0 +1,95 @@
+"""Apposition eyes: ommatidia side by side, each with its own direction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from optics.numerics.arguments import in_range, of_kind, positive, vacuum_wavelength, whole, without_derivative
+from optics.ommatidia.ommatidium import Ommatidium
+
+__all__ = ["AppositionEye", "hexagonal_directions"]
+
+MOST_RINGS = 60
+PER_CYCLE = 4  # choice: directions per λ/D, of which a facet's sensitivity has detail no finer than one
+WIDTHS = 3.0  # choice: half a field, in acceptance angles
+FINEST = 0.5  # sine of the widest direction
+
+
+def hexagonal_directions(rings: int, interommatidial_deg: float) -> np.ndarray:
+    """(n, 2) angles [rad] along x and y of ommatidia in hexagonal rings about the axis, neighbours Δφ apart, rows along
+    x.
+
+    Raises:
+        ValueError: rings outside 0 to 60, or an angle that is not positive.
+    """
+    whole("rings", rings, 0, MOST_RINGS)
+    apart = math.radians(positive("interommatidial_deg", interommatidial_deg, "degrees"))
+    steps = np.arange(-rings, rings + 1)
+    q, r = (axis.ravel() for axis in np.meshgrid(steps, steps))
+    kept = np.abs(q + r) <= rings
+    q, r = q[kept], r[kept]
+    return apart * np.column_stack([q + r / 2, math.sqrt(3) / 2 * r])
+
+
+@dataclass(frozen=True, eq=False)
+class AppositionEye:
+    """Equal ommatidia that look in hexagonally arranged directions.
+
+    ommatidium: of which there are many. rings: about the one on the axis. interommatidial_deg: Δφ between neighbours.
+
+    Raises:
+        ValueError: names argument, value and valid range.
+    """
+
+    ommatidium: Ommatidium
+    rings: int
+    interommatidial_deg: float
+
+    def __post_init__(self) -> None:
+        of_kind("ommatidium", self.ommatidium, Ommatidium, "Ommatidium(FacetLens(25e-6, 14e-6), Waveguide(2e-6))")
+        without_derivative("interommatidial_deg", self.interommatidial_deg)
+        in_range("interommatidial_deg", self.interommatidial_deg, 1e-3, 30.0)
+        hexagonal_directions(self.rings, self.interommatidial_deg)
+
+    @cached_property
+    def directions(self) -> np.ndarray:
+        """(ommatidium, 2) angles [rad] along x and y."""
+        return hexagonal_directions(self.rings, self.interommatidial_deg)
+
+    def field(self, wavelength: float = 500e-9) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Directions x, y [rad] about an ommatidium's own, flat, and what each counts; these weights sum to 1."""
+        eye, at = self.ommatidium, vacuum_wavelength(wavelength)
+        half = WIDTHS * max(eye.acceptance_angle(at), eye.acceptance_angle(at, 90.0))
+        half = min(half, math.asin(FINEST) / 1.5)
+        pitch = at / (2 * eye.pupil.radius * PER_CYCLE)
+        steps = pitch * np.arange(-math.ceil(half / pitch), math.ceil(half / pitch) + 1)
+        x, y = (axis.ravel() for axis in np.meshgrid(steps, steps))
+        weights = eye.sensitivity(x, y, at)
+        return x, y, weights / weights.sum()
+
+    def see(self, radiance: Callable[[np.ndarray, np.ndarray], np.ndarray], wavelength: float = 500e-9) -> np.ndarray:
+        """(ommatidium,) signals of a scene: its radiance over angles x, y [rad]; a field of radiance 1 gives 1.
+
+        Raises:
+            ValueError: the radiance is not finite, or of another shape than its angles.
+        """
+        x, y, weights = self.field(wavelength)
+        own = self.directions
+        scene = np.asarray(radiance(own[:, :1] + x, own[:, 1:] + y), dtype=np.float64)
+        if scene.shape != (len(own), len(x)) or not np.isfinite(scene).all():
+            raise ValueError(f"radiance gives shape {scene.shape}: must be finite, of its angles' shape")
+        found: np.ndarray = scene @ weights
+        return found
+
+    def contrast(self, cycles_per_degree: float, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
+        """Of a sine grating as an ommatidium sees it, the transform of its angular sensitivity: what falls as the
+        grating becomes finer. (Neighbours tell gratings apart up to 1/(√3 Δφ).)"""
+        x, y, weights = self.field(wavelength)
+        turn = math.radians(azimuth_deg)
+        phase = 2 * np.pi * np.degrees(x * math.cos(turn) + y * math.sin(turn)) * cycles_per_degree
+        return float(np.abs(np.sum(weights * np.exp(1j * phase))))

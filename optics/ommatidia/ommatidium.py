@@ -1,0 +1,134 @@
+"""An ommatidium: a facet's lens before a rhabdom that is a waveguide, and the directions it sees."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from optics.elements.pupil import Pupil
+from optics.numerics.arguments import in_range, of_kind, positive, reals, vacuum_wavelength, without_derivative
+from optics.ommatidia.coupling import ModesAtPupil, modes_at_pupil
+from optics.ommatidia.facet import FacetLens
+from optics.ommatidia.waveguide import Mode, Waveguide
+
+__all__ = ["Ommatidium", "snyder_acceptance"]
+
+STEEPEST = (0.03, 0.06, 0.12, 0.25, 0.5)  # sines of directions that are asked about, the last the widest
+ALONG = 121  # choice: directions in which an acceptance angle is looked for
+WIDE = 6.0  # choice: of them, times the sum of diffraction's and the rhabdom's angle
+
+
+@dataclass(frozen=True, eq=False)
+class Ommatidium:
+    """A lens and the waveguide on its axis.
+
+    lens: a FacetLens, or any Pupil. rhabdom: the waveguide. distance: [m] from the lens' (second principal) plane to
+        the rhabdom's end; None: the lens' focus at 550 nm.
+
+    Raises:
+        ValueError: names argument, value and valid range.
+    """
+
+    lens: FacetLens | Pupil
+    rhabdom: Waveguide
+    distance: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.lens, FacetLens):
+            of_kind("lens", self.lens, Pupil, "FacetLens(25e-6, 14e-6), or a Pupil")
+        of_kind("rhabdom", self.rhabdom, Waveguide, "Waveguide(2e-6)")
+        if self.distance is not None:
+            positive("distance", without_derivative("distance", self.distance))
+
+    @property
+    def pupil(self) -> Pupil:
+        return self.lens.pupil() if isinstance(self.lens, FacetLens) else self.lens
+
+    def modes(self, wavelength: float = 500e-9) -> tuple[Mode, ...]:
+        """What the rhabdom guides at a vacuum wavelength [m]: see `Waveguide.modes`."""
+        return self.rhabdom.modes(wavelength)
+
+    def mode_power(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
+        """Share of the light on the facet that each mode takes, (mode, ...), of a point far away at these angles [rad]
+        along x and y off the axis.
+
+        Raises:
+            ValueError: an angle whose sine is above 0.5, or the rhabdom guides nothing.
+        """
+        x, y = np.broadcast_arrays(
+            *(reals(name, value) for name, value in (("angle_x", angle_x), ("angle_y", angle_y)))
+        )
+        for name, value in (("angle_x", x), ("angle_y", y)):
+            in_range(f"abs({name})", float(np.abs(value).max(initial=0.0)), 0.0, math.asin(STEEPEST[-1]))
+        tx, ty = np.tan(x), np.tan(y)
+        norm = np.sqrt(1 + tx * tx + ty * ty)
+        sines = tx / norm, ty / norm
+        steepest = float(np.hypot(*sines).max(initial=0.0))
+        wide = next((limit for limit in STEEPEST if limit >= steepest), 1.0)
+        found = _coupled(self, vacuum_wavelength(wavelength), wide).power(*sines)
+        return found.reshape(len(found), *x.shape)
+
+    def sensitivity(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
+        """Share of the light on the facet that the rhabdom absorbs, of a point at these angles [rad], any shape.
+
+        Raises:
+            ValueError: see `mode_power`.
+        """
+        taken = np.array([self.rhabdom.absorbed(mode) for mode in self.modes(wavelength)])
+        return np.asarray(np.tensordot(taken, self.mode_power(angle_x, angle_y, wavelength), axes=1))
+
+    def acceptance_angle(self, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
+        """Δρ [rad]: full width at half of its peak of the sensitivity, along a line through the axis at an azimuth from
+        x. The outermost angles of half the peak count, where there are several lobes.
+
+        Raises:
+            ValueError: see `mode_power`.
+        """
+        pupil = self.pupil
+        turn = math.radians(in_range("azimuth_deg", azimuth_deg, -360, 360))
+        expected = vacuum_wavelength(wavelength) / pupil.radius + self.rhabdom.diameter / self._distance()
+        half = min(WIDE / 2 * expected, math.asin(STEEPEST[-1]))
+        at = np.linspace(-half, half, ALONG)
+        seen = self.sensitivity(at * math.cos(turn), at * math.sin(turn), wavelength)
+        above = np.flatnonzero(seen >= seen.max() / 2)
+        first, last = int(above[0]), int(above[-1])
+        if first == 0 or last == ALONG - 1:
+            raise ValueError(f"distance = {self._distance():.3g} m: must be nearer to the focus, for a peak to be seen")
+        near = range(max(0, int(seen.argmax()) - 1), min(ALONG, int(seen.argmax()) + 2))
+        peak = float(np.polynomial.Polynomial.fit(at[near], seen[near], 2)(self._top(at[near], seen[near])))
+        flanks = (at[first - 1], at[first]), (at[last], at[last + 1])
+        left, right = (self._half(*ends, peak, turn, wavelength) for ends in flanks)
+        return right - left
+
+    @staticmethod
+    def _top(at: np.ndarray, seen: np.ndarray) -> float:
+        """Where a parabola through three is highest."""
+        (left, middle, right), step = seen, float(at[1] - at[0])
+        bend = left - 2 * middle + right
+        return float(at[1]) if bend >= 0 else float(at[1]) + step * (left - right) / (2 * bend)
+
+    def _half(self, low: float, high: float, peak: float, turn: float, wavelength: float) -> float:
+        """Where between two angles the sensitivity is half the peak's, by a cubic through four."""
+        at = np.linspace(low, high, 4)
+        seen = self.sensitivity(at * math.cos(turn), at * math.sin(turn), wavelength)
+        return float(np.polynomial.polynomial.polyval(peak / 2, np.polynomial.polynomial.polyfit(seen, at, 3)))
+
+    def _distance(self) -> float:
+        return self.pupil.image_distance(math.inf) if self.distance is None else self.distance
+
+
+@lru_cache(maxsize=32)
+def _coupled(eye: Ommatidium, wavelength: float, steepest: float) -> ModesAtPupil:
+    modes = eye.modes(wavelength)
+    if not modes:
+        raise ValueError(f"rhabdom: guides nothing at {wavelength:g} m; must be wider, or of a higher index")
+    return modes_at_pupil(eye.pupil, modes, wavelength, eye._distance(), steepest)
+
+
+def snyder_acceptance(diameter: float, focal_length: float, rhabdom: float, wavelength: float) -> float:
+    """Δρ [rad] after Snyder (J. Comp. Physiol. 116, 161, 1977), √((λ/D)² + (d/f)²): diffraction and rhabdom as if both
+    were Gaussian and no waveguide. focal_length: the object's, n₀/P [m]."""
+    return math.hypot(wavelength / diameter, rhabdom / focal_length)

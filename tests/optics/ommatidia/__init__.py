@@ -1,0 +1,8 @@
+"""Which test fails when a module of optics/ommatidia is broken.
+
+coupling: test_ommatidium.py
+facet: test_facet.py
+mosaic: test_mosaic.py
+ommatidium: test_ommatidium.py
+waveguide: test_waveguide.py
+"""

@@ -1,0 +1,56 @@
+"""Ommatidia side by side: where they look, and what they tell of a grating."""
+
+import math
+
+import numpy as np
+import pytest
+
+from optics import AppositionEye, Ommatidium, Pupil, Waveguide, hexagonal_directions
+
+LENS = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.0)
+FLY = AppositionEye(Ommatidium(LENS, Waveguide(1.4e-6)), 3, 1.5)
+
+
+def test_directions_are_a_hexagonal_lattice():
+    at = hexagonal_directions(4, 2.0)
+    assert len(at) == 1 + 3 * 4 * 5
+    apart = np.degrees(np.hypot(*(at[:, None] - at[None]).transpose(2, 0, 1)))
+    np.testing.assert_allclose(np.sort(apart, axis=1)[:, 1], 2.0)
+    middle = np.argmin(np.hypot(*at.T))
+    np.testing.assert_allclose(np.sort(apart[middle])[:7], [0, 2, 2, 2, 2, 2, 2], atol=1e-12)
+
+
+def test_a_grating_comes_with_its_contrast():
+    """And dark and bright where it is."""
+    frequency = 0.25
+    seen = FLY.see(lambda x, y: 1 + np.cos(2 * np.pi * frequency * np.degrees(x) + 0 * y))
+    expected = 1 + FLY.contrast(frequency) * np.cos(2 * np.pi * frequency * np.degrees(FLY.directions[:, 0]))
+    np.testing.assert_allclose(seen, expected, atol=1e-6)
+    assert FLY.contrast(0.0) == pytest.approx(1)
+
+
+def test_contrast_falls_as_a_gaussian_of_the_acceptance_angle():
+    """exp(-(π Δρ ν)²/(4 ln 2)) (Götz 1964), nearly; nothing beyond D/λ."""
+    rho = math.degrees(FLY.ommatidium.acceptance_angle())
+    for frequency in (0.1, 0.3):
+        gauss = math.exp(-((math.pi * rho * frequency) ** 2) / (4 * math.log(2)))
+        assert FLY.contrast(frequency) == pytest.approx(gauss, abs=0.05)
+    beyond = 1.05 * math.radians(1) * 25e-6 / 500e-9
+    assert FLY.contrast(beyond) < 5e-3
+    assert FLY.contrast(0.5 * beyond) > 0.02
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: hexagonal_directions(-1, 1.0), "rings = -1"),
+        (lambda: hexagonal_directions(1, 0.0), "interommatidial_deg = 0"),
+        (lambda: AppositionEye(LENS, 1, 1.0), "ommatidium = "),
+        (lambda: AppositionEye(FLY.ommatidium, 1, 90.0), "interommatidial_deg = 90"),
+        (lambda: FLY.see(lambda x, y: 1.0), "radiance gives shape"),
+        (lambda: FLY.see(lambda x, y: np.nan * x * y), "must be finite"),
+    ],
+)
+def test_bad_input_names_itself(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
