@@ -44,7 +44,8 @@ MANY, ROUNDS = 64, 5
 class Row:
     """One model.
 
-    moving: geoms · same: share of receptors of the same depth, worst: of the worst eye · rate: steps per CPU second
+    moving: geoms · same: share of receptors of the same depth, worst: of the worst eye of a world
+    rate: steps per CPU second
     """
 
     name: str
@@ -113,8 +114,18 @@ def compare(name: str, model: mujoco.MjModel, rng: np.random.Generator) -> Row |
         return None
     seen, cast = renderer.depth(datas), expected(renderer, datas)
     # MuJoCo's rays end where they begin, if that is on a surface, as a head's camera may be.
-    same = (np.isclose(seen, cast, rtol=TOLERANCE, atol=0) | (cast < ON_SURFACE)).mean(axis=(0, 2, 3))
+    same = (np.isclose(seen, cast, rtol=TOLERANCE, atol=0) | (cast < ON_SURFACE)).mean(axis=(2, 3))
+    same = same[in_front(renderer, datas)]
     return Row(name, renderer.moving, float(same.mean()), float(same.min()), rate(model, datas))
+
+
+def in_front(renderer: sim.ModelRenderer, datas: list[mujoco.MjData]) -> np.ndarray:
+    """Eyes that are on the front side of every plane, (world, eye)."""
+    pupils, _ = renderer.eye_frames(sim.Poses.of(datas))
+    eyes = [
+        [before_planes(renderer.model, data, pupil) for pupil in own] for data, own in zip(datas, pupils, strict=True)
+    ]
+    return np.array(eyes)
 
 
 def expected(renderer: sim.ModelRenderer, datas: list[mujoco.MjData]) -> np.ndarray:
