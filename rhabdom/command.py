@@ -13,5 +13,13 @@ def run_command() -> int:
     try:
         return int(import_module("evolve.cli.main").main())
     except KeyboardInterrupt:  # while it was being loaded
-        print("evolve: interrupted", file=sys.stderr)
-        return 130
+        return _interrupted()
+    except RuntimeError as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 hides one that meets a class being made
+            return _interrupted()
+        raise
+
+
+def _interrupted() -> int:
+    print("evolve: interrupted", file=sys.stderr)
+    return 130

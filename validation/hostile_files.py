@@ -26,7 +26,7 @@ from validation.hostile_runs import TEXTS, Stage
 EXPECTED = {
     *("html", "head", "meta", "title", "style", "body", "div", "table", "thead", "tbody", "tr", "th", "td", "h3")
 }
-EXPECTED |= {*("dl", "dt", "dd", "small", "details", "summary", "pre")}
+EXPECTED |= {*("dl", "dt", "dd", "dfn", "small", "details", "summary", "pre")}
 MARKUP = "<>\"'&/= \x00\x1b{}$-;"
 
 

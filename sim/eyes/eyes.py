@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from optics import Eye, Pupil
 
 BODY_RADIUS = 0.2  # [m]
+MOST = 10**6  # of anything that is counted; memory ends long before
 EYE_HEIGHT = BODY_RADIUS  # [m] above the floor: the equator of a sphere that stands on it
 
 
@@ -67,19 +68,22 @@ class Eyes:
                 raise ValueError(f"Eyes: {name} = {value!r}: must be {range_}")
 
         def counts(value: Any) -> bool:
-            return value == int(value) >= 1
+            return 1 <= value == int(value) <= MOST
 
-        check("n_eyes", counts, "a whole number, at least 1")
+        check("n_eyes", counts, f"a whole number, at least 1 and at most {MOST}")
         check(
             "resolution",
             lambda r: len(r) == 2 and all(map(counts, r)),
-            "(height, width), whole numbers, each at least 1",
+            f"(height, width), whole numbers, each at least 1 and at most {MOST}",
         )
         check("fov_deg", lambda x: 0.0 < x < 180.0, "in (0, 180)")
         check("placement_range_deg", lambda x: 0.0 <= x <= 360.0, "in [0, 360]")
         check("sensor_width", lambda x: 0.0 < x < math.inf, "positive and finite")
         check("noise_sigma", lambda x: 0.0 <= x < math.inf, "non-negative and finite")
-        check("bands", counts, "a whole number, at least 1")
+        check("bands", counts, f"a whole number, at least 1 and at most {MOST}")
+        for name in ("n_eyes", "bands"):
+            object.__setattr__(self, name, int(getattr(self, name)))
+        object.__setattr__(self, "resolution", tuple(map(int, self.resolution)))
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
         check("optics", _is_pupil, "an optics.Pupil or None, the perfect lens")
         if not isinstance(self.photon_budget, PhotonBudget | None):

@@ -7,6 +7,10 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
+from rhabdom import command
+
 ROOT = Path(__file__).parents[2]
 # As pip writes the script `evolve`, with a line that says when its first ones have run.
 SCRIPT = """
@@ -47,3 +51,18 @@ def test_ctrl_c_while_it_loads(tmp_path):
         assert "Traceback" not in told
         assert told.count("evolve: interrupted\n") == (code == 130)
     assert [code for code, _ in found].count(130) >= 5, "or nothing was shown"
+
+
+def test_ctrl_c_while_a_class_is_made(monkeypatch, capsys):
+    """Python 3.11 makes another error of it there; others of that kind are none of ours."""
+
+    def load(name):
+        raise RuntimeError("Error calling __set_name__") from cause
+
+    monkeypatch.setattr(command, "import_module", load)
+    cause = KeyboardInterrupt()
+    assert command.run_command() == 130
+    assert capsys.readouterr().err == "evolve: interrupted\n"
+    cause = ValueError()
+    with pytest.raises(RuntimeError, match="__set_name__"):
+        command.run_command()

@@ -80,8 +80,8 @@ def test_same_seed_same_life(outcome, tmp_path):
 @pytest.mark.parametrize(("most", "expected"), [(4096.0, None), (3.0, 3.0)])
 @pytest.mark.parametrize("resolution", [(3, 4), (1, 1)])
 def test_training_looks_less_closely_than_evaluation(resolution, most, expected, tmp_path, monkeypatch):
-    """At most so many rays for a receptor, whatever the eye; None: as many as the noise asks for. Fitness is measured
-    with those in any case, and checkpoints as training is, in the same light."""
+    """At most so many samples for a receptor, whatever the eye; None: as the noise asks, 4 or 6 in the maze.
+    Fitness is measured with those in any case, and checkpoints as training is, in the same light."""
     fidelities = []
 
     def recorded(make):
@@ -95,7 +95,7 @@ def test_training_looks_less_closely_than_evaluation(resolution, most, expected,
     monkeypatch.setattr("evolve.learning.fitness.vec_env_in", recorded(vec_env_in))
     config = small_config()
     learning = replace(config.learning, rays_per_receptor=most)
-    config = replace(config, eye=replace(config.eye, rays_per_receptor="auto"), learning=learning)
+    config = replace(config, task="maze", eye=replace(config.eye, rays_per_receptor="auto"), learning=learning)
     animal = replace(PHENOTYPE, resolution=resolution)
     assert evaluate(animal, config, 5, tmp_path / "0.safetensors").failure is None
     (_, checkpoints), (_, finals), (_, lessons) = fidelities
