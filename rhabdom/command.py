@@ -2,24 +2,40 @@
 
 from __future__ import annotations
 
-import sys
+import os
+import signal
+import threading
 from importlib import import_module
+from types import FrameType
 
 __all__ = ["run_command"]
+
+INTERRUPTED = 130
+_SAID = b"evolve: interrupted\n"
 
 
 def run_command() -> int:
     """Run one command; returns the exit code."""
+    ours = threading.current_thread() is threading.main_thread()
+    if ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupt)
     try:
         return int(import_module("evolve.cli.main").main())
-    except KeyboardInterrupt:  # while it was being loaded
-        return _interrupted()
-    except RuntimeError as error:
-        if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 hides one that meets a class being made
-            return _interrupted()
-        raise
+    except KeyboardInterrupt:
+        os.write(2, _SAID)
+        return INTERRUPTED
 
 
-def _interrupted() -> int:
-    print("evolve: interrupted", file=sys.stderr)
-    return 130
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Ctrl-C, an exception as always. While a module loads it ends the process instead: there an exception comes up
+    within somebody's initialisation, and Python, or a library, makes another one of it, or none."""
+    if _imports(frame):
+        os.write(2, _SAID)
+        os._exit(INTERRUPTED)
+    signal.default_int_handler(number, frame)
+
+
+def _imports(frame: FrameType | None) -> bool:
+    while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
+        frame = frame.f_back
+    return frame is not None

@@ -7,10 +7,6 @@ import sys
 import time
 from pathlib import Path
 
-import pytest
-
-from rhabdom import command
-
 ROOT = Path(__file__).parents[2]
 # As pip writes the script `evolve`, with a line that says when its first ones have run.
 SCRIPT = """
@@ -42,27 +38,13 @@ def test_ctrl_c_while_it_loads(tmp_path):
     time only, as everything else is done within milliseconds."""
     chance = random.Random(0)
     found = []
-    for number in range(14):
+    for number in range(24):
         arguments = ["run", "detection", "--dry-run"] if number % 2 else ["genes"]
-        seconds = 0.002 + chance.random() * (0.3 if number % 2 else 0.03)
+        seconds = 0.002 + chance.random() * (0.5 if number % 2 else 0.1)
         found.append(interrupted_after(seconds, arguments))
     for code, told in found:
-        assert code in (0, 130), told
+        # Python itself, once it has begun to shut down, dies of it without a word.
+        assert code in (0, 130) or (code, told) == (-signal.SIGINT, ""), told
         assert "Traceback" not in told
         assert told.count("evolve: interrupted\n") == (code == 130)
     assert [code for code, _ in found].count(130) >= 5, "or nothing was shown"
-
-
-def test_ctrl_c_while_a_class_is_made(monkeypatch, capsys):
-    """Python 3.11 makes another error of it there; others of that kind are none of ours."""
-
-    def load(name):
-        raise RuntimeError("Error calling __set_name__") from cause
-
-    monkeypatch.setattr(command, "import_module", load)
-    cause = KeyboardInterrupt()
-    assert command.run_command() == 130
-    assert capsys.readouterr().err == "evolve: interrupted\n"
-    cause = ValueError()
-    with pytest.raises(RuntimeError, match="__set_name__"):
-        command.run_command()
