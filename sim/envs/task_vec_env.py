@@ -50,9 +50,10 @@ class TaskVecEnv(OneEnvironment):
         frame = (len(task.mounts), self.renderer.eye.channels, *self.renderer.eye.resolution)
         self._normals = Normals(self.worlds.noise_keys, frame)
         self._everyone = np.arange(n_envs)
-        self.worlds.reset(self._everyone)
+        self.worlds.reset(self._everyone[:1])  # what an animal feels may want an episode
         super().__init__(n_envs, self._space((memory, *frame)), self._actions())
-        self._action = np.zeros((n_envs, *self.action_space.shape), np.float32)
+        self.worlds.seed(self.worlds.entropy)
+        self._commanded = self._action = np.zeros((n_envs, *self.action_space.shape), np.float32)
         self._returns, self._told = np.zeros(n_envs), set[str]()
 
     def reset(self) -> dict[str, np.ndarray]:
@@ -62,7 +63,7 @@ class TaskVecEnv(OneEnvironment):
         self._reset_seeds()
         self._reset_options()
         self.worlds.reset(self._everyone)
-        self._returns[:], self._action[:] = 0.0, 0.0
+        self._returns[:], self._action = 0.0, np.zeros_like(self._action)
         self.reset_infos = [{"reward_terms": {}, "is_success": False} for _ in self._everyone]
         return self._observation(self._look(), self._everyone)
 
@@ -70,21 +71,21 @@ class TaskVecEnv(OneEnvironment):
         actions = np.asarray(actions, np.float32)
         if actions.shape != self._action.shape:
             raise ValueError(f"actions have shape {actions.shape}: must be {self._action.shape}")
-        self._action = actions.copy()
+        self._commanded = actions
 
     def step_once(
         self, actions: np.ndarray
     ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """One action without starting ended worlds anew: observation, reward, terminated, truncated, info."""
         self.step_async(actions)
-        outcomes = self.worlds.step(self._action)
+        outcomes = self._moved()
         infos = self._infos(outcomes)
         reward = np.array([sum(outcome.terms.values()) for outcome in outcomes])
         terminated, truncated = (np.array([getattr(o, name) for o in outcomes]) for name in ("terminated", "truncated"))
         return self._observation(self._look(), self._everyone[:0]), reward, terminated, truncated, infos
 
     def step_wait(self) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        outcomes = self.worlds.step(self._action)
+        outcomes = self._moved()
         infos, seen = self._infos(outcomes), self._look()
         done = np.array([outcome.terminated or outcome.truncated for outcome in outcomes])
         ended = np.flatnonzero(done)
@@ -110,6 +111,11 @@ class TaskVecEnv(OneEnvironment):
             view = self.task.camera or _overview(self.worlds.model)
             return [self._camera.picture(data, view, PICTURE[1], PICTURE[0]) for data in self.worlds.datas]
         return []
+
+    def _moved(self) -> list[StepOfWorld]:
+        """One action later. Remembered is what was done: nothing, where an action was no number."""
+        self._action = np.clip(np.nan_to_num(self._commanded, posinf=0, neginf=0), -1, 1)
+        return self.worlds.step(self._commanded)
 
     def _look(self) -> np.ndarray:
         """All eyes of all worlds, noise included."""

@@ -6,6 +6,7 @@ import traceback
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -32,6 +33,7 @@ class TaskWorlds:
     """Their data, and what is done with it.
 
     task, model · datas: mjData of every world · steps: actions taken in its episode, (n,) int
+    entropy: what all random streams come from; seeded with it again, everything happens again
     """
 
     def __init__(self, task: Task, n: int, seed: int | None, threads: int = 1) -> None:
@@ -41,10 +43,10 @@ class TaskWorlds:
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self.seed(seed)
 
-    def seed(self, seed: int | None) -> None:
+    def seed(self, seed: Any) -> None:
         """Begin all random streams anew; world i's depends on the seed and i alone."""
-        root = np.random.SeedSequence(seed)
-        children = [np.random.SeedSequence(root.entropy, spawn_key=(i,)) for i in range(len(self.datas))]
+        self.entropy = np.random.SeedSequence(seed).entropy
+        children = [np.random.SeedSequence(self.entropy, spawn_key=(i,)) for i in range(len(self.datas))]
         self._rngs = [np.random.default_rng(child) for child in children]
         self.noise_keys = np.array([child.generate_state(1, np.uint64)[0] for child in children])
 

@@ -73,6 +73,9 @@ def test_worlds_depend_on_seed_and_number_alone():
 
     np.testing.assert_array_equal(episode(1, 3), episode(5, 3))
     assert np.abs(episode(1, 3) - episode(1, 4)).max() > 0.1
+    later = sim.make_vec_env(Face(), n_envs=1, seed=None)
+    later.seed(3)
+    np.testing.assert_array_equal(later.reset()["eyes"][0], episode(1, 3)[0])
 
 
 def test_episodes_end_and_begin_as_stable_baselines_has_it():
@@ -158,8 +161,10 @@ def test_actions_and_physics_that_are_not_finite():
     env = sim.make_vec_env(Face(), n_envs=3)
     env.reset()
     with pytest.warns(UserWarning, match="action is not finite"):
-        _, _, done, infos = env.step(np.array([[0], [np.nan], [0]]))
+        observation, _, done, infos = env.step(np.array([[7], [np.nan], [0]]))
     np.testing.assert_array_equal(done, [False, True, False])
+    assert infos[1]["terminal_observation"]["previous_action"] == 0
+    np.testing.assert_array_equal(observation["previous_action"], [[1], [0], [0]])
     env.worlds.datas[2].qvel[:] = np.nan
     with pytest.warns(UserWarning, match="physics is unstable"):
         observation, _, done, infos = env.step(np.zeros((3, 1)))
@@ -204,6 +209,40 @@ class FailingReset(Face):
 def test_bad_tasks_are_named(task, options, error, words):
     with pytest.raises(error, match=words):
         sim.make_vec_env(task(), **{"n_envs": 2, **options})
+
+
+class Seen(Face):
+    """With a camera of its own, and names for what a spectrum may take the place of."""
+
+    model = (
+        CART.replace("<worldbody>", '<asset><material name="red" rgba=".9 .2 .1 1"/></asset><worldbody>')
+        .replace('size=".3" rgba=".9 .2 .1 1"', 'size=".3" material="red"')
+        .replace("<body name=", '<camera name="above" pos="0 0 6"/><body name=', 1)
+    )
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "where"),
+    [
+        ("substeps", 9, "eyes"),
+        ("fidelity", sim.Fidelity(9, bands=4), "eyes"),
+        ("eye", optics.Eye(resolution=(2, 16), fov_deg=60, bands=4), "eyes"),
+        ("mounts", (sim.Mount("cart", azimuth_deg=20, offset=(0.2, 0, 0.1)),), "eyes"),
+        ("spectra", {"red": optics.Spectrum((400.0, 700.0), (0.5, 0.5))}, "eyes"),
+        ("camera", "above", "picture"),
+    ],
+)
+def test_every_field_moves_what_is_seen(field, value, where):
+    """Noise is the same in both, so that whatever differs is the field's doing."""
+    found = []
+    for task in (Seen(), Seen()):
+        if found:
+            setattr(task, field, value)
+        env = sim.make_vec_env(task, n_envs=1, render_mode="rgb_array")
+        env.reset()
+        observation = env.step(np.ones((1, 1)))[0]
+        found.append(observation["eyes"] if where == "eyes" else env.get_images()[0].astype(float))
+    assert np.abs(found[1] - found[0]).max() > 0.01
 
 
 def test_actuators_are_driven_over_their_range():
