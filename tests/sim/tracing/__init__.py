@@ -16,11 +16,11 @@ areas.light_store: test_light_table.py
 areas.cell_grid: test_light_table.py
 areas.branches: test_areas.py
 areas.columns: test_areas.py
-areas.half_planes: test_areas.py
+areas.half_planes: test_area_integrals.py, test_areas.py
 areas.illumination: test_illumination.py, test_areas.py
 areas.patch: test_areas.py
 areas.shadows: test_areas.py
-areas.sphere_areas: test_areas.py
-areas.stripes: test_areas.py
+areas.sphere_areas: test_area_integrals.py, test_areas.py
+areas.stripes: test_area_integrals.py, test_areas.py
 lighting: test_lighting.py, render/test_batched_renderer.py, render/test_reference_renderer.py
 """

@@ -1,0 +1,101 @@
+"""The integrals that areas are made of, against sums over very many points."""
+
+import mitsuba as mi
+import numpy as np
+
+from sim.scene.variant import variant
+from sim.tracing.areas import half_planes, sphere_areas, stripes
+from sim.tracing.areas.patch import Area
+
+
+def test_shares_of_spheres():
+    """Against a count of 200 x 200 points, of spheres from right before the eye to 6 m away, of which some fill the
+    area and others lie within it. Exact but for what the area cuts off, where a chord stands for a strip's."""
+    rng = np.random.default_rng(3)
+    n, radius = 300, 0.5
+    azimuth, (width, height), (x, up) = (
+        rng.uniform(-3, 3, n),
+        rng.uniform(0.05, 0.6, (2, n)),
+        rng.uniform(-0.4, 0.4, (2, n)),
+    )
+    cos, sin, zero, distance = np.cos(azimuth), np.sin(azimuth), np.zeros(n), rng.uniform(0.51, 9, n)
+    sides = np.stack([np.stack([sin, -cos, zero]) * width, np.stack([zero, zero, height])])
+    ahead = np.stack([cos + sin * x, sin - cos * x, up])
+    aim = ahead + np.einsum("skn,sn->kn", sides, rng.uniform(-0.6, 0.6, (2, n)))
+    way = aim / np.linalg.norm(aim, axis=0) * distance
+    ab = np.stack(np.meshgrid(*[(np.arange(200) + 0.5) / 200 - 0.5] * 2))
+    v = ahead[..., None, None] + np.einsum("skn,shw->knhw", sides, ab)
+    towards = np.einsum("knhw,kn->nhw", v, way)
+    expected = (towards > 0) & (towards**2 > (v**2).sum(axis=0) * (distance**2 - radius**2)[:, None, None])
+    within = expected.any(axis=(1, 2)) & ~(
+        expected[:, [0, -1]].any(axis=(1, 2)) | expected[..., [0, -1]].any(axis=(1, 2))
+    )
+    with variant():
+        ahead, right, way = (tuple(mi.Float(k.astype(np.float32)) for k in rows) for rows in (ahead, sides[0], way))
+        area = Area(
+            mi.Point3f(0),
+            mi.Vector2f(*ahead[:2]),
+            mi.Vector2f(*right[:2]),
+            ahead[2],
+            mi.Float(height.astype(np.float32)),
+        )
+        view = sphere_areas.SphereView(area, mi.Point3f(*way), radius)
+        found = sum(view.slice(mi.UInt32(i)).share for i in range(view.count)).numpy()
+    error = found - expected.mean(axis=(1, 2))
+    assert within.sum() > 10
+    assert np.abs(error[within]).max() < 1e-3
+    assert np.abs(error).max() < 0.03
+    assert np.sqrt(np.mean(error**2)) < 0.003
+
+
+def test_shares_above_lines():
+    """Against a count of 400 x 400 points: a line crosses 800 of their cells at most, so that is known to 1/200."""
+    rng = np.random.default_rng(0)
+    s, p, q = rng.uniform(-1, 1, (3, 300))
+    p[:50], q[50:100] = 0, 0
+    a, b = np.meshgrid(*[(np.arange(400) + 0.5) / 400 - 0.5] * 2)
+    expected = [np.mean(si + pi * a + qi * b > 0) for si, pi, qi in zip(s, p, q, strict=True)]
+    with variant():
+        found = half_planes.share_above(*(mi.Float(np.ascontiguousarray(x, np.float32)) for x in (s, p, q))).numpy()
+    np.testing.assert_allclose(found, expected, atol=5e-3)
+
+
+def test_means_of_clamped_lines():
+    rng = np.random.default_rng(1)
+    first = rng.uniform(-3, 4, 400)
+    last = first + rng.choice([1e-3, 0.02, 1, 5], 400) * rng.uniform(-1, 1, 400)
+    steps = (np.arange(10_000) + 0.5) / 10_000
+    expected = np.clip(first + (last - first) * steps[:, None], 0, 1).mean(axis=0)
+    with variant():
+        found = half_planes.mean_clamped(mi.Float(first.astype(np.float32)), mi.Float(last.astype(np.float32))).numpy()
+    np.testing.assert_allclose(found, expected, atol=2e-5)
+
+
+def test_textures_are_averaged():
+    """Over stretches and parallelograms of any size, against the mean of many texels looked up."""
+    rng = np.random.default_rng(2)
+    texels = np.concatenate([rng.random((512, 2)), np.repeat(rng.random((8, 2)), 32, axis=0)])
+    places = np.array([[0, 512], [512, 256]])
+    pattern = stripes.Stripes(texels, places)
+    n = 200
+    which = rng.integers(2, size=n)
+    middle, one, other = rng.uniform(-900, 900, n), rng.uniform(3, 700, n), rng.uniform(3, 300, n)
+
+    def look(x):
+        first, columns = places[which].T
+        whole = np.floor(x).astype(int)
+        a, b = (texels[first + (whole + i) % columns] for i in (0, 1))
+        return a + (b - a) * (x - whole)[..., None]
+
+    across = (np.arange(400) + 0.5) / 400 - 0.5
+    line = np.mean([look(middle + one * a) for a in (np.arange(20_000) + 0.5) / 20_000 - 0.5], axis=0)
+    both = np.mean([look(middle + one * a + other * b) for a in across for b in across[::4]], axis=0)
+    with variant():
+        floats = [mi.Float(np.ascontiguousarray(x, np.float32)) for x in (middle, one, other, *places[which].T)]
+        inputs = {name: mi.Float(table) for name, table in pattern.tables.items()}
+        x, w, h, *texture = floats
+        texture = stripes.Texture(*texture)
+        found_line = np.transpose(pattern.mean(texture, [x - w / 2, x + w / 2], 0, inputs))
+        found_both = np.transpose(pattern.mean_over(texture, x, (w, h), inputs))
+    np.testing.assert_allclose(found_line, line, atol=2e-3)
+    np.testing.assert_allclose(found_both, both, atol=3e-3)
