@@ -13,6 +13,7 @@ from optics.numerics.arguments import of_kind, whole
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.sensor import directions_of, eye_sampling
 from sim.render.fidelity import Fidelity
+from sim.render.memory_budget import Demand, check_memory
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.robots.inside import depth_inside
 from sim.robots.model_scene import ModelScene
@@ -43,8 +44,9 @@ class ModelRenderer:
     Warns (`sim.MirrorWarning`) once of what eyes do not see of the model.
 
     Raises:
-        ValueError: a bad argument, a mount on what the model does not have, an eye inside a geom, or a fidelity that
-            wants areas or light that was reflected twice.
+        ValueError: a bad argument, a mount on what the model does not have, an eye that is inside of a sphere, a
+            capsule or another primitive in the model's reference pose, or a fidelity that wants areas or light that was
+            reflected twice, or more rays than there is memory for.
         optics.AccuracyError: a pupil whose light spreads too far.
     """
 
@@ -68,6 +70,7 @@ class ModelRenderer:
         if not self._places:
             raise ValueError("mounts = []: must be one sim.Mount at least")
         wavelengths = self.eye.spectral_bands.wavelengths
+        self._check_memory()
         self._scene = ModelScene(self.model, wavelengths, groups, spectra)
         self._refuse_eyes_inside()
         sampling = eye_sampling(self.eye, fidelity.depth)
@@ -144,6 +147,12 @@ class ModelRenderer:
         signals = signals.reshape(self.n_envs, n_eyes, len(bands.weights), *self.eye.resolution)
         mosaic = self.eye.mosaic
         return signals if mosaic is None else np.take_along_axis(signals, mosaic[None, None, None], axis=2)
+
+    def _check_memory(self) -> None:
+        fidelity, planes = self.fidelity, self.fidelity.depth.count * self.fidelity.bands
+        weights = 0 if self.eye.pupil is None else planes
+        eyes, size = len(self.mounts), self.eye.resolution
+        check_memory(Demand(fidelity.rays_per_receptor, self.n_envs, eyes, size, planes, weights))
 
     def _check_poses(self, poses: Poses) -> None:
         if poses.n != self.n_envs:

@@ -52,7 +52,7 @@ class ModelTracer:
         hit = movers.nearest(ray, si.t, rows.movers, rows.first_mover, inputs)
         on_mover = hit.which < len(movers)
         seen = si.is_valid() | on_mover
-        point = dr.select(seen, ray(dr.select(seen, hit.t, 0)), mi.Point3f(0))
+        point = ray(dr.select(seen, hit.t, 0))
         normal = dr.select(on_mover, hit.normal, mi.Vector3f(si.sh_frame.n))
         normal = dr.select(dr.dot(normal, ray.d) > 0, -normal, normal)
         si.p, si.n, si.uv = point, mi.Normal3f(normal), dr.select(on_mover, hit.uv, si.uv)

@@ -12,6 +12,7 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from sim.eyes.sensor import Sensor
 from sim.render.frozen_kernels import garbage_kept
+from sim.robots.model_lights import ROWS as LIGHT_ROWS
 from sim.robots.model_scene import ModelScene
 from sim.robots.model_tracer import ModelTracer, Rows
 from sim.robots.poses import Poses
@@ -20,9 +21,7 @@ from sim.scene.variant import MitsubaObject
 from sim.scene.variant import variant as in_variant
 
 EYE_ROWS = 4  # of four floats: the pupil, right, up and ahead
-LIGHT_ROWS = 2
 SIZES = 4  # numbers of rays, eyes, rows of movers and lights
-Kernel = Callable[[MitsubaObject, list[MitsubaObject], dict[str, Array], dict[str, Array]], Array]
 
 
 class ModelWavefront:

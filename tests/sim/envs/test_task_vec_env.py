@@ -46,7 +46,7 @@ class Face(sim.Task):
 
 
 def test_ppo_learns_to_go_by_sight():
-    """Success of a third of the episodes by chance; a blind cart's best is to stay in the middle, at a sixth."""
+    """A cart that stays in the middle is before the ball in 0.15 of the episodes: 0.6 m of 4."""
     env = sim.make_vec_env(Face(), n_envs=32)
     learner = PPO(
         "MultiInputPolicy", env, n_steps=64, batch_size=512, learning_rate=1e-3, n_epochs=8, gamma=0.9, seed=0

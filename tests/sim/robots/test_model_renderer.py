@@ -171,6 +171,7 @@ def test_eyes_behind_a_pupil_see_it_too(model):
         ({"fidelity": sim.Fidelity(4, bands=3, light="bounce")}, "light = 'bounce', samples = 'rays'.*direct light"),
         ({"fidelity": 16}, "fidelity = 16: must be a kind of Fidelity"),
         ({"groups": (5,)}, "no visible geom"),
+        ({"n_envs": 10**8}, "worlds with 1 eyes of 40 x 56 receptors would take .* GiB of memory"),
         ({"spectra": {"nothing": "D65"}}, "no material or light 'nothing'"),
     ],
 )

@@ -6,7 +6,7 @@ import pytest
 
 import sim
 from optics import Eye
-from sim.robots import primitives
+from sim.robots import movers, primitives
 
 SHAPES = {
     "sphere": '<geom type="sphere" size=".3"/>',
@@ -52,7 +52,7 @@ def cast(model, data, pupil, directions):
 
 
 def depths(model, datas):
-    renderer = sim.ModelRenderer(model, EYE, [sim.Mount("eye")], len(datas), sim.Fidelity(1, bands=1))
+    renderer = sim.ModelRenderer(model, EYE, [sim.Mount("eye")], max(len(datas), 1), sim.Fidelity(1, bands=1))
     pupils, frames = renderer.eye_frames(sim.Poses.of(datas))
     side = 2 * np.tan(np.radians(EYE.fov_deg) / 2) / EYE.resolution[1]
     row, column = np.indices(EYE.resolution)
@@ -110,3 +110,9 @@ def test_what_stands_still_hides_what_moves():
     found, expected = depths(model, [posed(model, 0, 0.1)])
     assert agreement(found, expected) > 0.998
     assert found[0, 12, 12] == pytest.approx(0.9, abs=1e-5)
+
+
+def test_too_many_meshes_for_one_kernel_are_named(monkeypatch):
+    monkeypatch.setattr(movers, "MESHES", 1)
+    with pytest.raises(ValueError, match="2 moving meshes: must be 1 at most; hide some by group"):
+        depths(model_of(SHAPES["mesh"], SHAPES["mesh"]), [])
