@@ -119,6 +119,10 @@ class Aperture(ABC):
         """
         return self._nodes(in_range("cycles", cycles, 0.0, 1e5), in_range("digits", digits, 0.0, 16.0))
 
+    def node_count(self, cycles: float, digits: float) -> int | None:
+        """How many `nodes` there are; None: only who makes them knows."""
+        return None
+
     def soften(self, passband: float, ripple: float, widest_reach: float = EDGE_REACH) -> SoftAperture:
         """The aperture, low-passed from `passband` [cycles per R] on with the transition that costs fewest samples.
 

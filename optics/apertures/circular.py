@@ -46,6 +46,9 @@ class Circle(Aperture):
     def _nodes(self, cycles: float, digits: float) -> Nodes:
         return ring_nodes(0.0, 1.0, cycles, digits)
 
+    def node_count(self, cycles: float, digits: float) -> int:
+        return int(_ring_rule(0.0, 1.0, cycles, digits)[2].sum())
+
     def _softened(self, edge: SoftEdge) -> SoftAperture:
         return SoftAnnulus(edge, 0.0)
 
@@ -92,6 +95,9 @@ class Annulus(Aperture):
 
     def _nodes(self, cycles: float, digits: float) -> Nodes:
         return ring_nodes(self.inner, 1.0, cycles, digits)
+
+    def node_count(self, cycles: float, digits: float) -> int:
+        return int(_ring_rule(self.inner, 1.0, cycles, digits)[2].sum())
 
     def _softened(self, edge: SoftEdge) -> SoftAperture:
         return SoftAnnulus(edge, self.inner)
@@ -143,6 +149,16 @@ def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Node
 
     Over a full disk the mean around a ring is a smooth function of r², which pays for few cycles.
     """
+    r, weight, count = _ring_rule(inner, outer, cycles, digits)
+    place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    angle = 2 * pi * (place + 0.5) / np.repeat(count, count)
+    r = np.repeat(r, count)
+    return Nodes(r * np.cos(angle), r * np.sin(angle), np.repeat(weight * 2 * pi / count, count) * r)
+
+
+@lru_cache(maxsize=256)
+def _ring_rule(inner: float, outer: float, cycles: float, digits: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Radii, their weights, and how many nodes each ring has."""
     digits += 0.3  # log10 2: half the error to each of the two rules
     span = outer - inner
     u, weight = gauss_legendre(gauss_legendre_count(cycles * span, digits))
@@ -153,8 +169,4 @@ def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Node
         rings.append((outer * np.sqrt(u), outer * weight / (2 * np.sqrt(u))))
     counts = [harmonics(2 * pi * cycles * r, digits) for r, _ in rings]
     best = min(range(len(rings)), key=lambda i: int(counts[i].sum()))
-    (r, weight), count = rings[best], counts[best]
-    place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    angle = 2 * pi * (place + 0.5) / np.repeat(count, count)
-    r = np.repeat(r, count)
-    return Nodes(r * np.cos(angle), r * np.sin(angle), np.repeat(weight * 2 * pi / count, count) * r)
+    return *rings[best], counts[best]

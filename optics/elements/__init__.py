@@ -6,6 +6,7 @@ relief            Relief, HeightMap, BSplineRelief
 pixel_relief      PixelRelief: steps
 wavefront         Zernike, WavefrontMap
 transmittance     GaussianMask, MaskMap
+exit_pupil        read_exit_pupil: lenses of other programs
 refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
 wavefront_slopes  where the rays of a wavefront go
 beam              light of one wavelength on its way to a plane

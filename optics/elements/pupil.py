@@ -164,13 +164,24 @@ class Pupil:
 
     def index_behind(self, wavelength: float) -> float:
         """Of the medium between pupil and sensor at a vacuum wavelength [m]."""
-        return number(index_of("medium_n", self.medium_n).at(wavelength))
+        return self._index("medium_n", wavelength)
 
     def index_before(self, wavelength: float) -> float:
         """Of the medium between source and pupil."""
         if self.object_n is None:
             return self.index_behind(wavelength)
-        return number(index_of("object_n", self.object_n).at(wavelength))
+        return self._index("object_n", wavelength)
+
+    def _index(self, name: str, wavelength: float) -> float:
+        """Of a medium; asked for many times for every picture."""
+        known = self._indices
+        if (name, wavelength) not in known:
+            known[name, wavelength] = number(index_of(name, getattr(self, name)).at(wavelength))
+        return known[name, wavelength]
+
+    @cached_property
+    def _indices(self) -> dict[tuple[str, float], float]:
+        return {}
 
     @cached_property
     def _level(self) -> Pupil:

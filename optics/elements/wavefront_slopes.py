@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +16,9 @@ __all__ = ["Slopes"]
 
 def _derivative(values: np.ndarray, step: float) -> np.ndarray:
     """Along axis 0, by central differences of fourth order (second order near the ends)."""
-    slope = np.gradient(values, step, axis=0)
+    slope = np.empty_like(values)
+    slope[[0, -1]] = (values[[1, -1]] - values[[0, -2]]) / step
+    slope[[1, -2]] = (values[[2, -1]] - values[[0, -3]]) / (2 * step)
     slope[2:-2] = (8 * (values[3:-1] - values[1:-3]) - values[4:] + values[:-4]) / (12 * step)
     return slope
 
@@ -34,33 +37,38 @@ class Slopes:
         return np.hypot(self.grid.x[None, :], self.grid.y[:, None])
 
     @cached_property
+    def _squared(self) -> np.ndarray:
+        return np.square(self.along_x) + np.square(self.along_y)
+
+    @cached_property
     def steepest(self) -> float:
         """Largest slope over the disk and its soft edge."""
-        inside = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
-        return float(np.hypot(self.along_x, self.along_y)[inside].max())
+        return math.sqrt(self._squared[self.distance_from_axis <= (1 + EDGE_REACH) * self.radius].max())
 
     @cached_property
     def steepest_inside(self) -> float:
         """Largest slope over the disk alone."""
-        return float(np.hypot(self.along_x, self.along_y)[self.distance_from_axis <= self.radius].max())
+        return math.sqrt(self._squared[self.distance_from_axis <= self.radius].max())
 
     def turning(self, distance: float, window: Grid, medium_n: float) -> tuple[float, float]:
         """Largest slope of the path through the pupil and on to any point of the window in a plane at `distance` [m],
         |∇L + n (ξ - x) / D|: over the disk and its soft edge, and over the disk alone."""
         soft = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
-        x = np.broadcast_to(self.grid.x[None, :], soft.shape)[soft]
-        y = np.broadcast_to(self.grid.y[:, None], soft.shape)[soft]
+        x, y = np.broadcast_arrays(self.grid.x[None, :], self.grid.y[:, None])
+        # Seven digits do: SLOPE_MARGIN is much more.
+        x, y, px, py = (part[soft].astype(np.float32) for part in (x, y, self.along_x, self.along_y))
         angle = np.linspace(0, 2 * np.pi, 16, endpoint=False)
         (cx, cy), outermost = window.centre, window.own_half_diagonal
         targets = [(cx, cy), *zip(cx + outermost * np.cos(angle), cy + outermost * np.sin(angle), strict=True)]
-        worst = np.zeros(x.size)
+        squared = np.zeros_like(x)
         for tx, ty in targets:
-            scale = medium_n / np.sqrt((x - tx) ** 2 + (y - ty) ** 2 + distance**2)
-            slope = np.hypot(self.along_x[soft] + (x - tx) * scale, self.along_y[soft] + (y - ty) * scale)
-            worst = np.maximum(worst, slope)
+            dx, dy = x - np.float32(tx), y - np.float32(ty)
+            scale = np.float32(medium_n) / np.sqrt(dx * dx + dy * dy + np.float32(distance**2))
+            dx, dy = px + dx * scale, py + dy * scale
+            np.maximum(squared, dx * dx + dy * dy, out=squared)
         # A cell more than the disk, so that its rim is not missed.
         inside = self.distance_from_axis[soft] <= self.radius + self.grid.dx
-        return float(worst.max()), float(worst[inside].max())
+        return math.sqrt(squared.max()), math.sqrt(squared[inside].max())
 
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
         """Where rays from the disk's points meet a plane at `distance` [m]; evanescent ones end at infinity."""

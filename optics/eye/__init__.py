@@ -2,6 +2,7 @@
 
 eye                   Eye
 geometry              lengths and directions, and how wide the pupil may be
+cell_integrals        integrals over cells of what is known at samples
 receptive_field       which directions a receptor sees: the kernel
 kernel_interpolation  how few kernels stand for a range of distances and directions
 kernel_bank           the kernels of an eye for a scene

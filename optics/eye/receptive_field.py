@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
+from optics.eye.cell_integrals import Tiles, cell_integrals, samples_per_cycle
 from optics.methods.problem import Problem
 from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
 from optics.numerics.matrices import matmul
 from optics.numerics.precision import precision
+from optics.point_spread.pictures import pictures
 from optics.point_spread.psf_result import PSFResult, spread
 from optics.point_spread.request import Request
 
@@ -26,9 +27,6 @@ __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 WIDEST_TANGENT = math.tan(math.radians(50))
 MOST_CELLS = 2049  # choice: of a kernel, along an axis
 MOST_SECONDS = 3.0  # choice: per band
-# A spline of degree seven through three samples per cycle errs by 4e-6 (see `_cell_integrals`), enough for tolerances
-# down to 1e-4. For smaller ones samples lie closer: the error falls with the eighth power of their distance.
-SAMPLES_PER_CYCLE, SPLINE_TOLERANCE, SPLINE_ORDER = 3, 1e-4, 8
 
 
 @dataclass(frozen=True)
@@ -62,11 +60,10 @@ class _Spot:
     pitch: float
     needs: tuple[_WindowNeeds, ...]
 
-    @property
-    def window(self) -> Grid:
+    def window(self, pitch: float) -> Grid:
         """Samples around the geometric image that hold the square."""
-        side = 2 * math.ceil(self.half / self.pitch) + 1
-        return Grid((side, side), self.pitch, self.centre)
+        side = 2 * math.ceil(self.half / pitch) + 1
+        return Grid((side, side), pitch, self.centre)
 
     def cells(self, cell: float) -> int:
         return _cells_within((math.ceil(self.half / self.pitch) + 0.5) * self.pitch, cell)
@@ -86,12 +83,20 @@ def visual_kernel(
         raise ValueError("fov_deg is a Dr.Jit array: must be a number off the axis, where it turns the light as well")
     beams = _beams(pupil, retina, z, (-direction[0], -direction[1]))
     spot = _spot(beams, retina)
-    result = _spread(beams, spot, retina)
-    tiles, types = _Tiles(spot.cells(retina.cell) + 2 * from_cell, retina.cell, from_cell), precision(retina.dtype)
-    across, along = (
-        types.Tensor(_cell_integrals(n, result.dx, tiles)[::-1].copy()) for n in result.tensor.shape[:0:-1]
-    )
-    return dr.maximum(matmul(along, matmul(result.tensor, across, transposed=True)), 0)
+    # Each wavelength on samples of its own: longer ones need fewer.
+    requests = [
+        _request(beam, spot, need, spot.window(need.pitch), retina)
+        for beam, need in zip(beams, spot.needs, strict=True)
+    ]
+    tiles, types = Tiles(spot.cells(retina.cell) + 2 * from_cell, retina.cell, from_cell), precision(retina.dtype)
+    kernels = []
+    for request, picture in zip(requests, pictures(requests, alike=True), strict=True):
+        window = request.problem.window
+        across = types.Tensor(cell_integrals(window.shape[0], window.dx, tiles)[::-1].copy())
+        image = types.Tensor(picture.image, window.shape)
+        kernels.append(matmul(across, matmul(image, across, transposed=True)).array)
+    flat = kernels[0] if len(kernels) == 1 else dr.concat(kernels)
+    return dr.maximum(types.Tensor(flat, (len(kernels), tiles.count, tiles.count)), 0)
 
 
 def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0)) -> PSFResult:
@@ -135,12 +140,14 @@ def _image(beam: Beam, distance: float) -> tuple[float, float]:
 
 
 def _spread(beams: list[Beam], spot: _Spot, retina: Retina) -> PSFResult:
+    window = spot.window(spot.pitch)
+    return spread([_request(beam, spot, need, window, retina) for beam, need in zip(beams, spot.needs, strict=True)])
+
+
+def _request(beam: Beam, spot: _Spot, need: _WindowNeeds, window: Grid, retina: Retina) -> Request:
     reach = spot.half + math.hypot(*spot.centre)
-    problems = [
-        replace(Problem.of(beam, spot.window, retina.tolerance, retina.dtype), widest_band=need.band, reach=reach)
-        for beam, need in zip(beams, spot.needs, strict=True)
-    ]
-    return spread([Request(*each, most_seconds=MOST_SECONDS) for each in zip(beams, problems, strict=True)])
+    problem = Problem.of(beam, window, retina.tolerance, retina.dtype)
+    return Request(beam, replace(problem, widest_band=need.band, reach=reach), most_seconds=MOST_SECONDS)
 
 
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:
@@ -174,8 +181,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
     # |U|² holds the differences of the field's frequencies. At a point of the sensor, lit from all over the pupil,
     # these span 2R/(λz); and no two within the band differ by more than twice the band.
     detail = min(2 * radius / (wavelength * z), 2 * band)
-    finer = max(1.0, (SPLINE_TOLERANCE / retina.tolerance) ** (1 / SPLINE_ORDER))
-    return _WindowNeeds(half, 1 / (SAMPLES_PER_CYCLE * finer * detail), band)
+    return _WindowNeeds(half, 1 / (samples_per_cycle(retina.tolerance) * detail), band)
 
 
 def _shadow(beam: Beam, retina: Retina, centre: tuple[float, float]) -> float:
@@ -197,32 +203,3 @@ def _beyond_edge(radius: float, share: float) -> float:
 def _cells_within(half: float, cell: float) -> int:
     """Odd number of cells, one centred on the axis, that covers ± half."""
     return 2 * math.ceil(max(half / cell - 0.5, 0) - 1e-6) + 1
-
-
-@dataclass(frozen=True)
-class _Tiles:
-    """Cells in a row, their size [m], and whether light comes from all over a cell of that size or from a point."""
-
-    count: int
-    size: float
-    from_cell: bool
-
-
-@lru_cache(maxsize=8)
-def _cell_integrals(samples: int, pitch: float, tiles: _Tiles) -> np.ndarray:
-    """(cell, sample): integrals over tiles around the middle of the spline through the samples, one axis. From a cell:
-    means over sources all over it, PSF ⊗ cell ⊗ cell. At three samples per cycle a cubic errs by 4e-4, degree seven by
-    4e-6."""
-    from scipy.interpolate import make_interp_spline
-
-    grid = Grid((1, samples), pitch)
-    degree = min(7, (samples - 2) // 2 * 2 + 1)
-    primitive = make_interp_spline(grid.x, np.eye(samples), k=degree).antiderivative()
-    count = tiles.count + tiles.from_cell
-    edges = (np.arange(count + 1) - count / 2) * tiles.size
-    inside = np.clip(edges, grid.x[0], grid.x[-1])
-    if not tiles.from_cell:
-        return np.diff(primitive(inside), axis=0)
-    # Beyond the samples is no light: there the primitive stays what it is, and its own rises in a straight line.
-    second = primitive.antiderivative()(inside) + primitive(inside) * (edges - inside)[:, None]
-    return np.diff(second, 2, axis=0) / tiles.size

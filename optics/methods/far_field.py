@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -22,6 +23,7 @@ __all__ = ["FarFieldSampling", "far_field"]
 MOST_DIRECTIONS = 4096  # choice: along an axis, by memory
 STEEPEST_CORNER = 0.95  # choice: sine towards a window's corner
 GRAZING = 0.98  # choice: sine that interpolation beyond the window's rim may reach
+TRIED = 41  # choice: places between, for each of 8 on the rim
 # Choice: counts to try.
 CHEBYSHEV_NODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16)
 
@@ -104,17 +106,22 @@ def _nodes_needed(problem: Problem, error: float) -> int | None:
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim_x, rim_y = problem.radius * np.cos(angle), problem.radius * np.sin(angle)
     half_angle = math.atan2(problem.window.half_width, problem.distance)
-    test = half_angle * np.linspace(-1, 1, 41)  # choice: 41 places between, 8 on the rim
+    rows = 0.0, problem.window.half_width
+
+    def along(angles: np.ndarray) -> np.ndarray:
+        return np.stack([_slow_part(problem, rim_x, rim_y, half_angle * angles, row) for row in rows])
+
+    exact = along(np.linspace(-1, 1, TRIED))
     for n in CHEBYSHEV_NODES:
-        places = half_angle * chebyshev_points(n)
-        weights = lagrange_basis(test, places)
-        worst = 0.0
-        for across in (0.0, problem.window.half_width):
-            exact, known = (_slow_part(problem, rim_x, rim_y, angles, across) for angles in (test, places))
-            worst = max(worst, float(np.abs(exact - known @ weights).max()))
-        if worst < error:
+        if np.abs(exact - along(chebyshev_points(n)) @ _between(n)).max() < error:
             return n
     return None
+
+
+@lru_cache(maxsize=len(CHEBYSHEV_NODES))
+def _between(n: int) -> np.ndarray:
+    """What each of so many Chebyshev points counts at the places that are tried, (point, place)."""
+    return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(n))
 
 
 def _slow_part(problem: Problem, rim_x: np.ndarray, rim_y: np.ndarray, angle: np.ndarray, y: float) -> np.ndarray:

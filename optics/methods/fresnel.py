@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -23,19 +24,24 @@ __all__ = ["ParaxialSampling", "fraunhofer", "fresnel", "paraxial_integral"]
 RAYS, ENDS = 48, 24  # choice: from whose origins, and at whose ends, the neglected phase is looked at
 # Choice. Of a ray's first Fresnel zone: how far from its origin light still adds up coherently at its end.
 ZONES = 3.0
+ROUNDING = 1e-15  # of sums of numbers near 1
 MUCH = 0.7  # choice: a field that errs by more is another field
 
 
 @dataclass(frozen=True)
 class ParaxialSampling:
-    """Pupil samples; model_error: relative L2 error of the intensity that the approximation itself will make."""
+    """Pupil samples. model_error is found when it is asked for: that takes longer than the rest of a plan."""
 
     method: str
     edge: PupilEdge
     pupil: Grid
     seconds: float
-    model_error: float
+    problem: Problem
     padding: float = 1.0
+
+    @cached_property
+    def model_error(self) -> float:
+        return model_error(self.problem, self.method == "fresnel")
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
         """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
@@ -75,7 +81,7 @@ def fraunhofer(problem: Problem) -> list[ParaxialSampling]:
 
 
 def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSampling]:
-    if problem.rays is None:
+    if problem.slopes is None:
         return []
     edge = problem.soft_edge(turning)
     pitch = 1 / (turning + edge.stopband)
@@ -85,7 +91,7 @@ def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSam
         + predicted_seconds(pupil.shape, 0.5, problem.window.shape)
         + pupil.shape[0] ** 2 * (PUPIL_SAMPLE + edge.seconds_per_point)
     )
-    return [ParaxialSampling(method, edge, pupil, seconds, model_error(problem, method == "fresnel"))]
+    return [ParaxialSampling(method, edge, pupil, seconds, problem)]
 
 
 def model_error(problem: Problem, curved: bool) -> float:
@@ -107,16 +113,16 @@ def model_error(problem: Problem, curved: bool) -> float:
     waves = d2 * d2 / (2 * z * (root + z) ** 2)  # d²/2z - (D - z)
     if not curved:
         waves = waves - (some.x**2 + some.y**2) / (2 * z)
-    ratio = (root / z) ** 2 * np.exp(2j * np.pi * waves / problem.wavelength)
+    size, angle = np.square(root / z), 2 * np.pi / problem.wavelength * waves
     zone = math.inf if rays.folded else ZONES * np.sqrt(problem.wavelength * z / np.maximum(ends.least, 1e-12))[:, None]
     apart2 = (ends.x[:, None] - some.x) ** 2 + (ends.y[:, None] - some.y) ** 2
     nearest = apart2 == apart2.min(axis=1, keepdims=True)
     near = np.tile((apart2 <= np.square(zone)) | nearest, (len(x) // len(ends), 1))
-    count = near.sum(axis=1)
-    mean = (ratio * near).sum(axis=1) / count
-    common = mean / np.maximum(np.abs(mean), 1e-30)
-    squared = (np.abs(ratio - common[:, None]) ** 2 * near).sum(axis=1) / count
-    error = 2 * math.sqrt(squared.mean())
+    count, size = near.sum(axis=1), size * near
+    re, im = ((size * part).sum(axis=1) for part in (np.cos(angle), np.sin(angle)))
+    # Mean of |q - q₀|², q₀ the unit number that is nearest: 1 - 2|Σ q| / n + Σ |q|² / n, rounding on the safe side.
+    squared = 1 + (np.square(size).sum(axis=1) - 2 * np.hypot(re, im)) / count
+    error = 2 * math.sqrt(np.maximum(squared, 0).mean() + ROUNDING)
     return MARGIN * error if error < MUCH or curved else _misplaced(problem)
 
 

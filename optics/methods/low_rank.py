@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,6 +24,8 @@ __all__ = ["LowRankSampling", "low_rank"]
 
 # Choice: ranks to try.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
+RANK_RIPPLE = 0.4  # choice: error of the rest at the pupil's rim, of the tolerance; test_low_rank.py
+TRIED = 41  # choice: places along a line through the window
 MOST_ENTRIES = 4_000_000  # choice, by memory: of the matrix between pupil and window
 MOST_PIXEL_ENTRIES = 16_000_000  # for them only the direct sum is left
 
@@ -91,22 +94,25 @@ def _rank(problem: Problem, outermost: float, half: float, scale: float, most: i
     """Chebyshev points along an axis that interpolate the slow rest, tried on the soft aperture's rim."""
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim = outermost * np.cos(angle), outermost * np.sin(angle)
-    test = half * np.linspace(-1, 1, 41)
+    test = half * np.linspace(-1, 1, TRIED)
     centre = problem.window.centre
     # On the axis both directions are alike, and so are both sides.
     places = [(0, 0.0), (0, half)] if centre == (0.0, 0.0) else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
+    exact = np.stack([_rest(problem, scale, rim, _line(centre, along, test, across)) for along, across in places])
     for rank in RANKS:
         if rank > most:
             return None
         points = half * chebyshev_points(rank)
-        weights = lagrange_basis(test, points)
-        worst = 0.0
-        for along, across in places:
-            exact, known = (_rest(problem, scale, rim, _line(centre, along, at, across)) for at in (test, points))
-            worst = max(worst, float(np.abs(exact - known @ weights).max()))
-        if worst < problem.ripple:
+        known = np.stack([_rest(problem, scale, rim, _line(centre, along, points, across)) for along, across in places])
+        if np.abs(exact - known @ _between(rank)).max() < RANK_RIPPLE * problem.tolerance:
             return rank
     return None
+
+
+@lru_cache(maxsize=len(RANKS))
+def _between(rank: int) -> np.ndarray:
+    """What each of so many Chebyshev points counts at the places that are tried, (point, place)."""
+    return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(rank))
 
 
 def _line(centre: tuple[float, float], along: int, at: np.ndarray, across: float) -> tuple[np.ndarray, np.ndarray]:
@@ -139,10 +145,9 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
     """
     window = problem.window
     inner = _kernel(beam, problem, how, types)
-    across_x, across_y = (
-        _fourier(at, middle, problem, how, types)
-        for at, middle in ((window.x, window.centre[0]), (window.y, window.centre[1]))
-    )
+    across_x = across_y = _fourier(window.x, window.centre[0], problem, how, types)
+    if window.shape[0] != window.shape[1] or window.centre[0] != window.centre[1]:
+        across_y = _fourier(window.y, window.centre[1], problem, how, types)
     re, im = complex_matmul(across_y, complex_matmul(inner, across_x, transposed=True))
     return Field(re.array, im.array, window, types)
 
@@ -190,9 +195,9 @@ def _fourier(
     at: np.ndarray, middle: float, problem: Problem, how: LowRankSampling, types: Precision
 ) -> tuple[Array, Array]:
     """A[x, (a, ξ)] = L_a(x) e^{-ik ξ x/c} as two tensors."""
-    rank, xi = how.rank, how.pupil.at
-    waves = np.tile(np.outer(at, xi) / (-problem.wavelength * how.scale), rank)
-    weight = np.repeat(lagrange_basis(at - middle, how.half_width * chebyshev_points(rank)).T, len(xi), axis=1)
-    matrix = weight * np.exp(2j * np.pi * waves)
-    re, im = (padded_for_packets(part.astype(types.dtype)) for part in (matrix.real, matrix.imag))
-    return types.Tensor(re, matrix.shape), types.Tensor(im, matrix.shape)
+    waves = np.outer(at, how.pupil.at) / (-problem.wavelength * how.scale)
+    angle = (2 * np.pi * (waves - np.rint(waves))).astype(types.dtype)
+    weight = lagrange_basis(at - middle, how.half_width * chebyshev_points(how.rank)).T.astype(types.dtype)
+    shape = len(at), weight.shape[1] * angle.shape[1]
+    re, im = (weight[:, :, None] * part[:, None, :] for part in (np.cos(angle), np.sin(angle)))
+    return types.Tensor(padded_for_packets(re), shape), types.Tensor(padded_for_packets(im), shape)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from optics.apertures.aperture import EDGE_REACH, Aperture, SoftAperture
 from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
 from optics.elements.source import PointSource
+from optics.elements.wavefront_slopes import Slopes
 from optics.methods.rays import Rays
 from optics.numerics.arguments import in_range, positive
 from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
+from optics.numerics.quadrature import stepped_up
 
 __all__ = ["SLOPE_MARGIN", "Problem", "PupilEdge"]
 
@@ -40,8 +42,8 @@ class Problem:
     widest_band: frequencies beyond it may be dropped (infinite: whatever reaches the window counts).
     reach: given where all but a tolerance's share of the light stays within this distance of the axis [m]: what lies
         beyond may be wrong, and edge-diffracted light less exact (None: the window counts to its corners).
-    rays: where geometrical optics sends the light, by which approximations judge themselves (None: these are not
-        weighed).
+    slopes: of the wavefront, by whose rays approximations judge themselves (None: these are not weighed).
+    medium_n: index behind the pupil.
     masked: whether a mask sends light where rays do not tell, so that approximations cannot judge themselves.
     """
 
@@ -59,8 +61,9 @@ class Problem:
     dtype: str = "float32"
     widest_band: float = math.inf
     reach: float | None = None
-    rays: Rays | None = None
+    slopes: Slopes | None = None
     masked: bool = False
+    medium_n: float = 1.0
 
     @classmethod
     def of(cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
@@ -74,6 +77,11 @@ class Problem:
         precision(dtype)
         source = PointSource(number(beam.source.distance), beam.source.angle)
         return _problem(Beam(beam.pupil, source, beam.wavelength, distance), window, tolerance, dtype)
+
+    @cached_property
+    def rays(self) -> Rays | None:
+        """Where geometrical optics sends the light."""
+        return None if self.slopes is None else Rays.of(self.slopes, self.aperture, self.distance, self.medium_n)
 
     @property
     def pixelated(self) -> PixelatedAperture | None:
@@ -107,7 +115,7 @@ class Problem:
 
     def soft_edge(self, band: float) -> PupilEdge:
         """The aperture as samples can carry it that leave frequencies up to `band` [1/m] untouched."""
-        return PupilEdge(self.aperture.soften(band * self.radius, self.ripple, EDGE_REACH), self.radius)
+        return PupilEdge(self.aperture.soften(stepped_up(band * self.radius), self.ripple, EDGE_REACH), self.radius)
 
     def band(self, margin: float = 0.0) -> float:
         """Highest frequency [1/m] whose light can come within `margin` of the window from anywhere on the disk."""
@@ -158,5 +166,6 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
         tolerance=tolerance,
         dtype=dtype,
         masked=pupil.mask is not None,
-        rays=None if pixels else Rays.of(slopes, pupil.aperture, distance, beam.index),
+        slopes=None if pixels else slopes,
+        medium_n=beam.index,
     )

@@ -17,6 +17,7 @@ from optics.numerics.cost import CALL, NODE, PAIRS_PER_SECOND
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
+from optics.numerics.quadrature import stepped_up
 from optics.numerics.radial_profile import RadialProfile
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
 MOST_DIGITS = 14.0  # choice: of float64 sums, which carry 16
 SPARE_DIGITS = 0.5  # choice: the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
 ON_AXIS = 1e-9  # rounding, of the radius
+SMALL_RULE = 5000  # choice, by memory: nodes of a rule of which many are kept
 FAR = 0.25  # choice: radius over distance below which nodes that follow a phase follow the kernel, too
 
 
@@ -110,7 +112,8 @@ def nodes(problem: Problem) -> list[NodeSampling]:
 def node_rule(problem: Problem) -> tuple[float, float]:
     """Cycles per radius and digits that nodes must be good for."""
     digits = min(SPARE_DIGITS - math.log10(problem.tolerance), MOST_DIGITS)
-    return turns(problem, digits), digits
+    cycles = turns(problem, digits)
+    return cycles if problem.pixelated else stepped_up(cycles), digits  # pixels' nodes are few already
 
 
 def turns(problem: Problem, digits: float) -> float:
@@ -126,19 +129,29 @@ def turns(problem: Problem, digits: float) -> float:
 def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
     """Number of nodes; beyond a hundred cycles it grows like their square, and is not worth counting."""
     most = 100.0
-    counted = len(cached_nodes(aperture, min(cycles, most), digits).weight)
+    counted = aperture.node_count(min(cycles, most), digits)
+    if counted is None:
+        counted = len(cached_nodes(aperture, min(cycles, most), digits))
     return math.ceil(counted * max(cycles / most, 1.0) ** 2)
 
 
-@lru_cache(maxsize=16)
 def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool = False) -> Nodes:
     """halved: on one side of the x axis, for sums that are the same on both, at points on that axis."""
+    small = (aperture.node_count(cycles, digits) or math.inf) <= SMALL_RULE
+    return (_small_rules if small else _large_rules)(aperture, cycles, digits, halved)
+
+
+def _made(aperture: Aperture, cycles: float, digits: float, halved: bool) -> Nodes:
     found = aperture.nodes(cycles, digits)
     if not halved:
         return found
     weight = np.where(np.abs(found.y) < ON_AXIS, 1, 2) * found.weight
     kept = found.y > -ON_AXIS
     return Nodes(found.x[kept], found.y[kept], weight[kept])
+
+
+_small_rules = lru_cache(maxsize=128)(_made)
+_large_rules = lru_cache(maxsize=16)(_made)
 
 
 def _intensity_band(problem: Problem) -> float:

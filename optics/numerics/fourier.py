@@ -22,7 +22,7 @@ from optics.numerics.cost import DFT_CALL, FFT_COPY, FFT_FLOPS, FFT_LINE_SAMPLE,
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.matrices import complex_matmul
-from optics.numerics.precision import Precision, opaque, padded_for_packets
+from optics.numerics.precision import ROOM, Precision, opaque
 
 __all__ = [
     "dft2",
@@ -35,6 +35,7 @@ __all__ = [
 ]
 
 LONGEST_FFT = 2**31
+AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples that are transformed together, a megabyte; lines, at least
 
 
 def fast_length(least: float) -> int:
@@ -185,11 +186,8 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
     types, shape_in = field.types, field.grid.shape
 
     def transform(re: Array, im: Array, to: tuple[int, int], from_: tuple[int, int], turn: int) -> tuple[Array, Array]:
-        u = np.empty(from_, dtype=types.complex_dtype)
-        u.real, u.imag = re.numpy().reshape(from_), im.numpy().reshape(from_)
-        for axis in (1, 0):
-            u = _fft_axis(u, period, to[axis], turn, axis)
-        return types.Float(padded_for_packets(u.real)), types.Float(padded_for_packets(u.imag))
+        parts = re.numpy().reshape(from_), im.numpy().reshape(from_)
+        return _fft_of_parts(parts, period, to, turn, types)
 
     class FourierSum(dr.CustomOp):
         """Its adjoint is the sum with the other sign, from the output's samples to the input's."""
@@ -207,6 +205,52 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
             self.set_grad_in("im", im)
 
     return dr.custom(FourierSum, field.re, field.im)
+
+
+def _fft_of_parts(
+    parts: tuple[np.ndarray, np.ndarray], period: int, to: tuple[int, int], sign: int, types: Precision
+) -> tuple[Array, Array]:
+    """The sum over both axes, some lines at a time: a whole plane of periods would not stay in the cache."""
+    from scipy import fft
+
+    turned, norm = (fft.fft, None) if sign < 0 else (fft.ifft, "forward")
+    (ny, nx), (my, mx) = parts[0].shape, to
+    rows = np.empty((ny, mx), types.complex_dtype)
+    found = [np.empty(my * mx + ROOM, types.dtype)[: my * mx] for _ in parts]
+    re, im = (part.reshape(to) for part in found)
+    for some in _lines(ny, period):
+        lines = np.zeros((rows[some].shape[0], period), types.complex_dtype)
+        for here, there in _runs(nx, period):
+            lines.real[:, there] += parts[0][some, here]
+            lines.imag[:, there] += parts[1][some, here]
+        lines = turned(lines, axis=1, norm=norm, overwrite_x=True)
+        for here, there in _runs(mx, period):
+            rows[some, here] = lines[:, there]
+    for some in _lines(mx, period):
+        lines = np.zeros((period, rows[:, some].shape[1]), types.complex_dtype)
+        for here, there in _runs(ny, period):
+            lines[there] += rows[here, some]
+        lines = turned(lines, axis=0, norm=norm, overwrite_x=True)
+        for here, there in _runs(my, period):
+            re[here, some], im[here, some] = lines[there].real, lines[there].imag
+    return types.Float(found[0]), types.Float(found[1])
+
+
+def _lines(n: int, period: int) -> list[slice]:
+    """So many of n lines of a period at a time."""
+    step = max(FEWEST_LINES, AT_A_TIME // period)
+    return [slice(start, min(start + step, n)) for start in range(0, n, step)]
+
+
+def _runs(n: int, period: int) -> list[tuple[slice, slice]]:
+    """Where n centred samples are, and where in FFT order, piece by piece; more than a period folds onto itself."""
+    found, start = [], 0
+    while start < n:
+        place = (start - n // 2) % period
+        length = min(n - start, period - place)
+        found.append((slice(start, start + length), slice(place, place + length)))
+        start += length
+    return found
 
 
 def _fft_axis(u: np.ndarray, period: int, n_out: int, sign: int, axis: int) -> np.ndarray:

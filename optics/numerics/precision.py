@@ -12,7 +12,7 @@ import numpy as np
 from optics.numerics.autodiff import Array, Scalar, is_differentiable
 from optics.numerics.device import Device, make_ready
 
-__all__ = ["Precision", "opaque", "padded_for_packets", "precision"]
+__all__ = ["ROOM", "Precision", "opaque", "padded_for_packets", "precision"]
 
 ROOM = 64  # choice, elements: more than any processor takes at once
 

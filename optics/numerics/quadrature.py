@@ -9,11 +9,13 @@ the smallest m from which on 2 |J_m(z)| stays below what is asked.
 from __future__ import annotations
 
 from functools import lru_cache
-from math import ceil, pi
+from math import ceil, log2, pi
 
 import numpy as np
 
-__all__ = ["gauss_legendre", "gauss_legendre_count", "harmonics"]
+__all__ = ["gauss_legendre", "gauss_legendre_count", "harmonics", "stepped_up"]
+
+STEPS = 16  # choice: to an octave; half a step, 2 %, is what is taken too much of in the mean
 
 
 def harmonics(z: np.ndarray, digits: float) -> np.ndarray:
@@ -44,3 +46,8 @@ def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
     nodes, weights = (nodes + 1) / 2, weights / 2
     nodes.flags.writeable = weights.flags.writeable = False
     return nodes, weights
+
+
+def stepped_up(cycles: float) -> float:
+    """The next of a few numbers, so that problems that are almost alike share what is made ready for them."""
+    return 2.0 ** (ceil(STEPS * log2(cycles) - 1e-9) / STEPS) if cycles > 0 else 0.0

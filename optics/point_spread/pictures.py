@@ -23,6 +23,7 @@ __all__ = ["PSFPicture", "pictures"]
 TRIES = 3  # choice: pictures that are computed before a tolerance is given up
 # Choice: after an error f times too large, ask for a tolerance f / 0.3 times smaller, so that one more try is enough.
 NEXT_TOLERANCE = 0.3
+LAST_TOLERANCE = 1e-2  # choice: of that, once nothing is tried after it
 
 
 class PSFPicture(NamedTuple):
@@ -72,15 +73,19 @@ class _Attempt:
         """The picture, and the plan with the error that is now known."""
         return PSFPicture(self.image, replace(self.plan, predicted_error=error), self.field)
 
-    def repeated(self, error: float, tolerance: float) -> _Attempt | None:
+    def repeated(self, error: float, tolerance: float, last: bool) -> _Attempt | None:
         """What to try after the check saw an error above the tolerance: an exact method, or else a smaller tolerance,
         because a dark window needs more digits than a bright one. None where the dtype carries no more digits.
+
+        last: nothing is tried after it, so that it may cost what it takes: rules of nodes come in steps, and a little
+            smaller tolerance may get the same nodes
         """
         request, problem = self.request, self.request.problem
         if self.approximates:
             request = replace(request, method="exact")
         else:
-            smaller = max(NEXT_TOLERANCE * problem.tolerance * tolerance / error, 10 * FLOAT_NOISE[problem.dtype])
+            share = (LAST_TOLERANCE if last else 1.0) * NEXT_TOLERANCE
+            smaller = max(share * problem.tolerance * tolerance / error, 10 * FLOAT_NOISE[problem.dtype])
             if smaller >= problem.tolerance:
                 return None
             # Stated anew: fine detail of the relief counts for more, too.
@@ -89,17 +94,22 @@ class _Attempt:
         return _Attempt.at(request, request.planned())
 
 
-def pictures(requests: Sequence[Request]) -> list[PSFPicture]:
+def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPicture]:
     """PSFs, flat, and their plans. All are planned before any is computed, so that one that cannot be had is refused at
     once; and all are started before any is waited for.
+
+    alike: whether what does for one request may do for the next, unasked.
 
     Raises:
         AccuracyError: no method meets a tolerance, or a window is so dark that rounding breaks it.
     """
     import drjit as dr
 
-    planned = [request.planned() for request in requests]
-    started = [_Attempt.at(*each) for each in zip(requests, planned, strict=True)]
+    planned: list[tuple[Request, tuple[Plan, Sampling]]] = []
+    for request in requests:
+        told = request.after(planned[-1][0], planned[-1][1][0].method) if alike and planned else request
+        planned.append((told, told.planned()))
+    started = [_Attempt.at(*each) for each in planned]
     for attempt in started:
         dr.eval(
             attempt.image, attempt.field and (attempt.field.re, attempt.field.im)
@@ -129,7 +139,7 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
         f"{attempt.plan.method} in {problem.dtype}"
     )
     try:
-        better = attempt.repeated(error, tolerance) if tries > 1 else None
+        better = attempt.repeated(error, tolerance, tries == 2) if tries > 1 else None
     except AccuracyError as refused:
         needs = str(refused).partition(": ")[0].partition(" needs ")[2]
         more = f", and to do better needs {needs}" if needs else ""

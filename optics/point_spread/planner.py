@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 from optics.methods.angular_spectrum import split_spectrum, whole_spectrum
@@ -38,6 +39,7 @@ from optics.methods.rayleigh_sommerfeld import nodes
 from optics.methods.richards_wolf import scalar_theory_error
 from optics.methods.sampling import Sampling
 from optics.numerics.accuracy import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Option, Plan
+from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, WINDOW_SAMPLE
 
 __all__ = ["APPROXIMATE", "EXACT", "FIELDS", "METHODS", "choose"]
 
@@ -74,14 +76,42 @@ FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
 }
 
 
+@dataclass(frozen=True)
+class Weighing:
+    """What is known of a method before it is asked: the least time [s] that a picture takes, and each of its samples;
+    and what the method takes to say how much it really is (choice)."""
+
+    least: float
+    per_sample: float = 0.0
+    asking: float = 0.0
+
+    def pays(self, best: float, outputs: int) -> bool:
+        """Whether so much less than `best` [s] is possible that asking may pay."""
+        return self.least + outputs * self.per_sample + self.asking < best
+
+
+# In this order.
+WEIGHING = {
+    "hankel": Weighing(CALL["hankel"]),
+    "low_rank": Weighing(CALL["low_rank"]),
+    "rayleigh_sommerfeld": Weighing(CALL["rayleigh_sommerfeld"], 1 / PAIRS_PER_SECOND, 1e-4),
+    "fresnel": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 4e-4),
+    "fraunhofer": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 2e-4),
+    "geometric": Weighing(CALL["geometric"], 0.0, 2e-4),
+    "pinhole": Weighing(CALL["pinhole"], 0.0, math.inf),
+    "far_field": Weighing(CALL["far_field"] + 2 * DFT_CALL, WINDOW_SAMPLE, 4e-4),
+    "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 4e-4),
+    "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 4e-4),
+}
+
+
 @lru_cache(maxsize=256)
 def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -> tuple[Plan, Sampling]:
     """The cheapest sampling that meets the problem's tolerance. Planning takes as long as a small PSF: the same
     problem is planned once.
 
-    method: "auto" weighs all, "exact" all that approximate nothing, "field" those of them that have a phase; a
-        method's name asks for it alone, and then
-        only its sampling has to meet the tolerance, not its model.
+    method: "auto" weighs all that may pay, "exact" those that approximate nothing, "field" those of them that have a
+        phase; a method's name asks for it alone, and then only its sampling has to meet the tolerance, not its model.
 
     Raises:
         ValueError: unknown method.
@@ -91,26 +121,27 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
     if asked[0] not in METHODS:
         raise ValueError(f"method = {method!r}: must be 'auto', 'exact' or one of {', '.join(METHODS)}")
     _check_dtype(problem)
-    cheapest = _weigh(problem, asked)
     allowed = _model_tolerance(problem) if method == "auto" else math.inf
-    fitting = [
-        option
-        for option in cheapest.values()
-        if option is not None and _within(option, most_seconds) and option.model_error <= allowed
-    ]
-    if not fitting:
-        candidates = [option for option in cheapest.values() if option and option.model_error <= allowed]
-        raise AccuracyError(_refusal(problem, candidates, most_seconds, method))
-    best = min(fitting, key=_seconds)
-    return _plan(problem, best, cheapest, most_seconds), best
-
-
-@lru_cache(maxsize=256)
-def _weigh(problem: Problem, methods: tuple[str, ...]) -> dict[str, Sampling | None]:
-    """The cheapest sampling of each method."""
+    outputs = math.prod(problem.window.shape)
     known = METHODS if problem.pixelated is None else FOR_PIXELS
-    found = {name: known[name](problem) for name in methods if name in known}
-    return {name: min(samplings, key=_cost) if samplings else None for name, samplings in found.items()}
+    weighed: dict[str, Sampling] = {}
+    best: Sampling | None = None
+    for name in sorted(set(asked) & set(known), key=list(WEIGHING).index):
+        if best is not None and not WEIGHING[name].pays(best.seconds, outputs):
+            continue
+        if name == "fraunhofer" and "fresnel" in weighed and weighed["fresnel"].model_error > allowed:
+            continue  # it leaves out the same and more
+        samplings = known[name](problem)
+        if not samplings:
+            continue
+        weighed[name] = option = min(samplings, key=_cost)
+        if _within(option, most_seconds) and (best is None or option.seconds < best.seconds):
+            best = option if option.model_error <= allowed else best
+    if best is None:
+        candidates = [option for option in weighed.values() if option.model_error <= allowed]
+        raise AccuracyError(_refusal(problem, candidates, most_seconds, method))
+    in_order = {name: weighed[name] for name in asked if name in weighed}
+    return _plan(problem, best, in_order, most_seconds), best
 
 
 def _check_dtype(problem: Problem) -> None:
@@ -141,7 +172,7 @@ def _within(option: Sampling, most_seconds: float) -> bool:
     return option.largest <= MOST_SAMPLES and option.seconds <= most_seconds
 
 
-def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None], most_seconds: float) -> Plan:
+def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_seconds: float) -> Plan:
     options = [
         Option(
             name,
@@ -151,7 +182,6 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling | None],
             _verdict(option, best, problem, most_seconds),
         )
         for name, option in weighed.items()
-        if option is not None
     ]
     why = (
         f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "

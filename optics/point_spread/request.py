@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
@@ -12,7 +12,7 @@ from optics.methods.sampling import Sampling
 from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import Scalar
 from optics.numerics.grid import Grid
-from optics.point_spread.planner import choose
+from optics.point_spread.planner import EXACT, choose
 
 __all__ = ["Request", "Setup"]
 
@@ -25,7 +25,7 @@ class Request:
 
     beam: the light; problem: the same in numbers, with the window and the tolerance.
     method: "auto", "exact" or a method's name. most_seconds: what the picture may take. keeps_field: whether its
-        complex amplitude is wanted, too.
+        complex amplitude is wanted, too. like: a method to try before all are weighed.
     """
 
     beam: Beam
@@ -33,6 +33,15 @@ class Request:
     method: str = "auto"
     most_seconds: float = 60.0
     keeps_field: bool = False
+    like: str | None = None
+
+    def after(self, other: Request, method: str) -> Request:
+        """This request, told what another was answered by that differs by its wavelength and samples alone: what did
+        for one wavelength does for the next, and weighing takes as long as a small picture."""
+        mine, its = self.beam, other.beam
+        same = mine.pupil is its.pupil and mine.source == its.source and mine.distance is its.distance
+        alike = self.method == other.method == "auto" and self.keeps_field == other.keeps_field
+        return replace(self, like=method) if same and alike and method in EXACT else self
 
     def planned(self) -> tuple[Plan, Sampling]:
         """How it is best answered.
@@ -43,13 +52,25 @@ class Request:
         relief = self.beam.pupil.height
         jump = 0.0 if relief is None else relief.jump
         try:
-            method = "field" if self.keeps_field and self.method in ("auto", "exact") else self.method
-            plan, sampling = choose(self.problem, method, self.most_seconds)
+            plan, sampling = self._as_before() or choose(self.problem, self._methods, self.most_seconds)
         except AccuracyError as error:
             raise AccuracyError(f"{error}; {_wrapped(jump)}" if jump else str(error)) from None
         if jump and plan.seconds > MOST_SECONDS_OF_JUMPS:
             raise AccuracyError(f"about {plan.seconds:.2g} s by {plan.method}: {_wrapped(jump)}")
         return plan, sampling
+
+    @property
+    def _methods(self) -> str:
+        return "field" if self.keeps_field and self.method in ("auto", "exact") else self.method
+
+    def _as_before(self) -> tuple[Plan, Sampling] | None:
+        if self.like is None:
+            return None
+        try:
+            plan, sampling = choose(self.problem, self.like, self.most_seconds)
+        except AccuracyError:
+            return None
+        return replace(plan, why=plan.why.replace("asked for", "as at the wavelength before")), sampling
 
 
 def _wrapped(jump: float) -> str:

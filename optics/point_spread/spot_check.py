@@ -15,12 +15,16 @@ from optics.numerics.accuracy import FLOAT_NOISE
 from optics.numerics.cost import PAIRS_PER_SECOND
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
+from optics.numerics.quadrature import stepped_up
 
 __all__ = ["CAUTION", "spot_check"]
 
 # Choice, over the estimate's own spread: 40 points see the root mean square within a factor of about two. What is said
 # then bounds the error: tests/optics/point_spread/test_robustness.py holds it to that.
 CAUTION = 3.5
+
+
+DIGITS_STEP = 0.25  # choice: few different rules of nodes, so that they are found again
 
 
 @dataclass(frozen=True)
@@ -93,8 +97,9 @@ def _affordable(problem: Problem, darkness: float, seconds: float, samples: int)
     pairs = max(EFFORT.share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND
     wanted = min(EFFORT.points_along_radius if problem.symmetric else EFFORT.points, samples)
     for spare in EFFORT.spare_digits:
-        digits = min(spare - math.log10(problem.tolerance) + darkness, MOST_DIGITS)
-        cycles = turns(problem, digits)
+        wished = spare - math.log10(problem.tolerance) + darkness
+        digits = min(math.ceil(wished / DIGITS_STEP) * DIGITS_STEP, MOST_DIGITS)
+        cycles = stepped_up(turns(problem, digits))
         nodes = node_count(problem.aperture, cycles, digits) / (2 if problem.symmetric else 1)
         found = _DirectSum(int(min(wanted, pairs / nodes)), cycles, digits)
         if found.points == wanted:

@@ -115,6 +115,7 @@ def test_one_or_zero_beyond_the_reach(shape):
 def test_nodes_integrate_plane_waves(shape, cycles, digits):
     nodes = shape.nodes(cycles, digits)
     assert len(nodes) == len(nodes.x) == len(nodes.y)
+    assert shape.node_count(cycles, digits) in (len(nodes), None)
     assert shape.contains(nodes.x, nodes.y).all()
     slow, fast = frequencies(cycles / 60, cycles), frequencies(cycles, cycles)
     fx, fy = (np.concatenate(both) for both in zip(slow, fast, strict=True))

@@ -1,6 +1,7 @@
 """Which test fails when a module of optics/elements is broken.
 
 beam: methods/test_textbook.py
+exit_pupil: test_exit_pupil.py
 pixel_relief: test_pixel_relief.py
 pupil: test_pupil.py
 refractive_index: test_refractive_index.py, test_media.py

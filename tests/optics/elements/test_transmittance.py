@@ -182,7 +182,8 @@ def test_bad_input_names_itself(make, message):
 
 def test_rays_do_not_judge_a_mask():
     """A mask that is narrow against its pupil spreads light as no ray tells: approximations are never chosen."""
-    narrow = optics.plan(lens(GaussianMask(1e-6)), WAVE, F, tolerance=0.3, dx=20e-6, shape=(9, 9))
-    chosen = {option.method: option.predicted_error for option in narrow.options}
-    assert narrow.method not in ("fresnel", "fraunhofer", "geometric", "pinhole")
-    assert min(chosen[name] for name in ("fresnel", "fraunhofer", "geometric")) >= 1
+    asked = {"tolerance": 0.3, "dx": 20e-6, "shape": (9, 9)}
+    approximate = ("fresnel", "fraunhofer", "geometric", "pinhole")
+    assert optics.plan(lens(GaussianMask(1e-6)), WAVE, F, **asked).method not in approximate
+    for method in approximate[:3]:
+        assert optics.plan(lens(GaussianMask(1e-6)), WAVE, F, **asked, method=method).predicted_error >= 1

@@ -1,6 +1,7 @@
 """Which test fails when a module of optics/eye is broken.
 
 band_choice: spectra/test_bands.py
+cell_integrals: test_cell_integrals.py
 eye: test_eye.py, test_eye_derivatives.py, test_eye_robustness.py
 geometry: test_patches.py
 kernel_bank: test_kernel_bank.py

@@ -6,7 +6,7 @@ far_field: test_textbook.py
 fresnel: test_fresnel.py
 geometric: test_geometric.py
 hankel: test_textbook.py, test_oracles_circular.py
-low_rank: test_textbook.py
+low_rank: test_low_rank.py, test_textbook.py
 pixelated_spectrum: elements/test_pixel_relief.py
 problem: point_spread/test_planner.py
 pupil_sampling: test_textbook.py, elements/test_pixel_relief.py

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics
+from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics, stepped_up
 
 
 @pytest.mark.parametrize("digits", [1, 3, 8, 12])
@@ -28,3 +28,13 @@ def test_gauss_legendre_count(cycles, digits):
     n = gauss_legendre_count(cycles, digits)
     assert error(n) < 10.0**-digits
     assert error(int(0.8 * n)) > 10.0**-digits
+
+
+def test_steps_up_are_few_small_and_never_down():
+    cycles = np.geomspace(0.01, 100, 2000)
+    stepped = np.array([stepped_up(each) for each in cycles])
+    assert (stepped >= (1 - 1e-9) * cycles).all()
+    assert (stepped < 1.05 * cycles).all()
+    assert len(set(stepped)) < 220  # 13.3 octaves of 16 steps, where 2000 were asked
+    assert all(stepped_up(each) == pytest.approx(each, rel=1e-9) for each in set(stepped))
+    assert stepped_up(0.0) == 0.0

@@ -9,7 +9,7 @@ import pytest
 from optics import AccuracyError, BSplineRelief, Grid, PointSource, Pupil
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
-from optics.point_spread.planner import APPROXIMATE, EXACT, METHODS, choose
+from optics.point_spread.planner import APPROXIMATE, EXACT, METHODS, WEIGHING, choose
 
 
 def problem_of(pupil, distance, window, tolerance, **more):
@@ -40,7 +40,8 @@ def test_method_follows_the_problem():
     symmetric = problem_of(Pupil(30e-6, thin_lens_focal_length=240e-6), 240e-6, Grid.square(65, 0.5e-6), 1e-3)
     assert choose(symmetric)[0].method in ("hankel", "rayleigh_sommerfeld")
     # Near a focus pupil and path turn through few cycles together: a few nodes do, but not for many outputs.
-    assert choose(LENS)[0].method == "rayleigh_sommerfeld"
+    coarsely = problem_of(LENS_PUPIL, 240e-6, Grid.square(33, 1e-6), 1e-3)
+    assert choose(coarsely)[0].method == "rayleigh_sommerfeld"
     finely = problem_of(LENS_PUPIL, 240e-6, Grid.square(801, 0.04e-6), 1e-3)
     assert choose(finely)[0].method in ("low_rank", "split_angular_spectrum")
     assert choose(PINHOLE, "exact")[0].method in ("far_field", "rayleigh_sommerfeld", "low_rank")
@@ -55,6 +56,22 @@ def test_auto_takes_no_approximation_that_errs_by_more_than_the_tolerance(proble
         assert sampling.model_error < tolerance / 2
         assert plan.predicted_error <= tolerance
         assert choose(dataclasses.replace(problem, tolerance=tolerance), "exact")[0].method in EXACT
+
+
+def test_a_method_is_not_asked_where_that_costs_more_than_it_can_save():
+    """Those that are left out are slower than what was chosen, or save less than asking takes; and a problem that
+    takes long asks all."""
+    small = problem_of(LENS_PUPIL, 240e-6, Grid.square(33, 1e-6), 1e-2)
+    plan, _ = choose(small)
+    asked = {option.method for option in plan.options}
+    left_out = {name for name in METHODS if name not in asked and name not in ("hankel", "pinhole")}
+    assert "far_field" in left_out
+    for name in left_out:
+        other, sampling = choose(small, name)
+        assert other.seconds + WEIGHING[name].asking > plan.seconds or sampling.model_error > small.tolerance / 2
+    finely = problem_of(LENS_PUPIL, 240e-6, Grid.square(801, 0.04e-6), 1e-3)
+    asked = {option.method for option in choose(finely)[0].options}
+    assert asked >= {"low_rank", "angular_spectrum", "split_angular_spectrum", "rayleigh_sommerfeld", "fresnel"}
 
 
 @pytest.mark.parametrize("method", APPROXIMATE)

@@ -1,0 +1,142 @@
+"""Lenses of other programs: their exit pupil and wavefront, read from their objects by the names they have there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.elements.pupil import Pupil
+from optics.elements.wavefront import Zernike, mode
+from optics.numerics.arguments import positive, vacuum_wavelength, whole
+
+__all__ = ["ExitPupil", "read_exit_pupil"]
+
+MM, UM = 1e-3, 1e-6
+SECTORS, ROUND = 8, 0.9  # choice: around the pupil, in each of which light reaches so far out, of the farthest
+RAYS_PER_MODE = 3  # choice
+LIT = 1e-3  # choice: of the brightest sample
+
+
+@dataclass(frozen=True, eq=False)
+class ExitPupil:
+    """pupil: an ideal lens to the reference sphere's centre, with the wavefront before it as Zernike's modes.
+
+    distance: [m] to that centre, where a sensor sees what the other program calls its image.
+    rms: of the wavefront [m], piston and tilt aside; residual: of what the modes leave over [m].
+    """
+
+    pupil: Pupil
+    distance: float
+    rms: float
+    residual: float
+
+
+def read_exit_pupil(
+    system: Any, wavelength: float, medium_n: float = 1.0, focal_length: float | None = None, order: int = 8
+) -> ExitPupil:
+    """What another program's object says of a lens, as a pupil with a wavefront.
+
+    system: with pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves], like optiland's WavefrontData, of any
+        distribution of rays; or with data (complex), dx [mm] and wavelength [µm], like prysm's Wavefront in a pupil,
+        whose phase must turn by less than half a wave from sample to sample.
+    wavelength: in vacuum [m]. medium_n: of the image space.
+    focal_length: [m] from pupil to image, where the object does not say (prysm).
+    order: of the highest Zernike mode that is fitted.
+
+    Raises:
+        ValueError: the object has neither set of names, too few samples, or a pupil that is not round; or a bad
+            argument.
+    """
+    vacuum_wavelength(wavelength)
+    count = whole("order", order, 1, 30)
+    if all(hasattr(system, name) for name in ("pupil_x", "pupil_y", "pupil_z", "opd", "radius")):
+        x, y, ahead, distance = _of_rays(system, wavelength)
+    elif all(hasattr(system, name) for name in ("data", "dx", "wavelength")):
+        if focal_length is None:
+            raise ValueError("focal_length is missing: this object does not say how far [m] its image is")
+        distance = positive("focal_length", focal_length)
+        x, y, ahead = _of_samples(system, wavelength)
+    else:
+        raise ValueError(
+            f"system = {type(system).__name__}: must have pupil_x, pupil_y, pupil_z, opd and radius (optiland's "
+            "WavefrontData), or data, dx and wavelength (prysm's Wavefront)"
+        )
+    return _fitted(x, y, ahead, distance, medium_n, count)
+
+
+def _of_rays(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Places on the plane that touches the reference sphere at the chief ray, how far the wave is ahead there, and the
+    sphere's radius: a point of the sphere lies in the direction of the plane's R tan θ."""
+    places = np.stack([_flat(getattr(system, name)) for name in ("pupil_x", "pupil_y", "pupil_z")]) * MM
+    intensity = _flat(getattr(system, "intensity", np.ones(places.shape[1])))
+    ahead = _flat(system.opd) * wavelength  # theirs is the chief ray's path less the ray's: positive is ahead
+    lit = np.isfinite(places).all(axis=0) & np.isfinite(ahead) & (intensity > LIT * np.nanmax(intensity))
+    places, ahead = places[:, lit], ahead[lit]
+    radius = abs(float(_flat(system.radius)[0])) * MM
+    given = getattr(system, "reference_center", None)
+    centre = _centre(places, radius) if given is None else np.array([float(_flat(at)[0]) for at in given]) * MM
+    away = places - centre[:, None]
+    axis = away.mean(axis=1)
+    axis /= np.linalg.norm(axis)
+    across = np.array([1.0, 0.0, 0.0]) - axis[0] * axis
+    across /= np.linalg.norm(across)
+    along = away / np.abs(axis @ away) * radius
+    return across @ along, np.cross(axis * np.sign(axis[2]), across) @ along, ahead, radius
+
+
+def _centre(places: np.ndarray, radius: float) -> np.ndarray:
+    """Of the sphere through the places, behind them."""
+    matrix = np.concatenate([2 * places, np.ones((1, places.shape[1]))]).T
+    found = np.linalg.lstsq(matrix, np.sum(places**2, axis=0), rcond=None)[0][:3]
+    if not np.isclose(np.linalg.norm(places - found[:, None], axis=0).mean(), radius, rtol=0.05):
+        raise ValueError(f"radius = {radius:.3g} m: the samples lie on another sphere")
+    return np.asarray(found)
+
+
+def _of_samples(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places [m] on the pupil's plane, and how far the wave is ahead there: the negative of its phase."""
+    data, pitch = np.asarray(system.data), positive("dx", float(system.dx)) * MM
+    if data.ndim != 2 or not np.isfinite(data).all():
+        raise ValueError(f"data has shape {data.shape}: must be a plane of finite complex numbers")
+    if not np.isclose(float(system.wavelength) * UM, wavelength, rtol=1e-6):
+        raise ValueError(f"wavelength = {wavelength:g} m: the object's is {float(system.wavelength):g} µm")
+    lit = np.abs(data) > np.sqrt(LIT) * np.abs(data).max()
+    y, x = ((np.arange(n) - n // 2) * pitch for n in data.shape)
+    rows, columns = np.nonzero(lit)
+    return x[columns], y[rows], -_unwrapped(data, lit)[lit] * wavelength / (2 * np.pi)
+
+
+def _unwrapped(data: np.ndarray, lit: np.ndarray) -> np.ndarray:
+    """Phase without jumps: along the brightest column, and from there along every row."""
+    phase, middle = np.where(lit, np.angle(data), 0.0), int(lit.sum(axis=0).argmax())
+    phase[:, middle] = np.unwrap(phase[:, middle])
+    right, left = np.unwrap(phase[:, middle:], axis=1), np.unwrap(phase[:, middle::-1], axis=1)[:, ::-1]
+    return np.concatenate([left[:, :-1], right], axis=1)
+
+
+def _fitted(x: np.ndarray, y: np.ndarray, ahead: np.ndarray, distance: float, medium_n: float, order: int) -> ExitPupil:
+    modes = [(n, m) for n in range(order + 1) for m in range(-n, n + 1, 2)]
+    if len(x) < RAYS_PER_MODE * len(modes):
+        raise ValueError(f"{len(x)} samples of the wavefront: must be {RAYS_PER_MODE * len(modes)} or more")
+    x, y = x - (x.max() + x.min()) / 2, y - (y.max() + y.min()) / 2
+    r = np.hypot(x, y)
+    sector = ((np.arctan2(y, x) / (2 * np.pi) % 1) * SECTORS).astype(int) % SECTORS
+    farthest = np.array([r[sector == each].max(initial=0.0) for each in range(SECTORS)])
+    if farthest.min() < ROUND * farthest.max():
+        raise ValueError("the pupil is not round: only circles are read")
+    radius = float(farthest.max())
+    basis = np.stack([mode(n, m, x / radius, y / radius) for n, m in modes], axis=1)
+    found = np.linalg.lstsq(basis, ahead, rcond=None)[0]
+    residual = float(np.sqrt(np.mean(np.square(ahead - basis @ found))))
+    waves = Zernike({key: float(value) / UM for key, value in zip(modes, found, strict=True) if key != (0, 0)})
+    rms = float(np.sqrt(sum(value**2 for (n, _), value in zip(modes, found, strict=True) if n > 1)))
+    pupil = Pupil(radius, medium_n=medium_n, thin_lens_focal_length=distance, wavefront=waves)
+    return ExitPupil(pupil, distance, rms, residual)
+
+
+def _flat(values: Any) -> np.ndarray:
+    """Of NumPy, or of a tensor that can be turned into it."""
+    plain = values.detach().cpu().numpy() if hasattr(values, "detach") else values
+    return np.atleast_1d(np.asarray(plain, dtype=np.float64)).ravel()

@@ -1,0 +1,60 @@
+"""One claim of somebody else's, and the slow systems that most claims are about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+import optics
+
+__all__ = ["FOCAL", "RADIUS", "UNIT", "WAVE", "Case", "across", "amplitude_across", "lens", "strehl_at_centre"]
+
+# f/100: closed forms here are paraxial, and the exact integral departs from them by the square of NA 0.005.
+RADIUS, FOCAL, WAVE = 0.5e-3, 0.1, 0.55e-6
+UNIT = WAVE * FOCAL / (2 * RADIUS)  # λ f/D [m]
+ASKED = {"tolerance": 1e-7, "dtype": "float64"}
+
+
+@dataclass(frozen=True)
+class Case:
+    """source: repository and test, or book and equation; says: in our words; theirs, ours: the number; bound: by how
+    much the two may differ, the source's own where it has one."""
+
+    source: str
+    says: str
+    theirs: float
+    ours: Callable[[], float]
+    bound: float
+
+
+def lens(**more: object) -> optics.Pupil:
+    return optics.Pupil(RADIUS, thin_lens_focal_length=FOCAL, **more)  # type: ignore[arg-type]
+
+
+def across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
+    """PSF in the focus at evenly spaced places [λ f/D] along x, over the peak of a perfect opening."""
+    dx = float(at[1] - at[0]) * UNIT
+    n = 2 * round(float(at[-1]) * UNIT / dx) + 1
+    found = optics.psf(pupil, [WAVE], FOCAL, dx=dx, shape=(1, n), **ASKED).psf[0, 0]  # type: ignore[arg-type]
+    peak = pupil.area / (WAVE * FOCAL) ** 2
+    first = n // 2 + round(float(at[0]) * UNIT / dx)
+    return np.asarray(found[first : first + len(at)] / peak, dtype=np.float64)
+
+
+def amplitude_across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
+    """|U| likewise, over the middle's."""
+    n = 2 * (len(at) - 1) + 1
+    dx = float(at[1] - at[0]) * UNIT
+    result = optics.psf(pupil, [WAVE], FOCAL, dx=dx, shape=(1, n), field=True, **ASKED)  # type: ignore[arg-type]
+    assert result.field is not None
+    u = result.field[0, 0]
+    # Less the sphere e^{ikx²/2f} on which a flat screen is touched by the wave.
+    sphere = np.exp(1j * np.pi * result.x**2 / (WAVE * FOCAL))
+    return np.asarray((u / u[n // 2] / sphere)[n // 2 :].real)
+
+
+def strehl_at_centre(pupil: optics.Pupil) -> float:
+    """Of the light on the axis, over a perfect wave's through the same opening."""
+    return float(across(pupil, np.array([0.0, 0.1]))[0])
