@@ -10,9 +10,9 @@ still learn one that many receptors share). Speed is agent-steps (all eyes of on
 CPU time, the best of several interleaved rounds, without physics.
 
 The eyes are those of the published experiments, with a perfect lens, and behind a lens in focus with a pupil of radius
-a times half the retina's width. Levels: samples (rays, by closed forms or by Mitsuba's ray tracing; areas, behind
-perfect lenses; the reference renderer with few samples), their number per receptor, bands, light (direct; with one
-bounce, light that is reflected twice; all light, which areas have from tables; paths of any length), depth layers.
+a times half the retina's width. Levels: samples (rays, by closed forms or by Mitsuba's ray tracing; areas; the
+reference renderer with few samples), their number per receptor, bands, light (direct; with one bounce, light that is
+reflected twice; all light, which areas have from tables; paths of any length), depth layers.
 Everything is float32, the only arithmetic that Mitsuba's spectral variants are built with, so precision is no level.
 
 "auto" is what `choose_fidelity` picks by itself, bands included. Compared with path-traced light, its error must not
@@ -70,6 +70,8 @@ PERFECT_LENS = (
 BEHIND_LENS = (
     AUTO,
     *(Setting("closed_form", rays, light=light) for light in LIGHTS for rays in RAYS),
+    *(Setting("areas", areas, light=light) for light in ("direct", "all") for areas in (1, 4)),
+    *(Setting("areas", 1, bands, light) for bands in (8, 16) for light in ("direct", "all")),
     *(Setting("closed_form", 1, bands) for bands in (1, 8, 16)),
     *(Setting("closed_form", 16, bands, "bounce") for bands in (8, 16)),
     Setting("closed_form", 16, light="bounce", layers=3),

@@ -9,7 +9,7 @@ import numpy as np
 import optics
 import sim
 from sim.envs.simulation import Simulation
-from sim.eyes.sensor import BoxSampling
+from sim.eyes.sampling import BoxSampling
 from sim.render.random_views import RandomViews, on_objects
 from sim.worlds.state import WorldState
 

@@ -1,8 +1,10 @@
 """The eyes of an agent: where they look, and how rays become signals.
 
 eyes              Eyes
-sensor            ray directions and their weights
+sampling          which rays or areas, and how many
+sensor            their directions and weights
 receptive_fields  directions drawn from all receptive fields at once
+field_areas       areas, and what of all receptive fields lies in each
 receptor_sums     from rays to receptors
 depth_layers      one PSF for each of a few distances
 """

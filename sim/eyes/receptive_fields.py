@@ -5,7 +5,7 @@ Fields are tabulated on square cells of the visual field's tangent plane, in the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,7 +59,12 @@ class ReceptiveFields:
         # (K ⊗ L)(r) = Σ_v K(r - v) L(v): as weights around the receptor, the convolution's kernel is turned about.
         kernels = [eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances]
         field = _averaged(_as_wide(kernels), cells)
-        return cls(field, _mixture(field, eye.resolution, cells), eye.resolution, cells)
+        everyone = np.arange(np.prod(eye.resolution))
+        return cls(field, _mixture(field, eye.resolution, cells, everyone), eye.resolution, cells)
+
+    def drawn_for(self, receptors: np.ndarray) -> ReceptiveFields:
+        """The same fields, and the mixture of some receptors' alone."""
+        return replace(self, density=_mixture(self.field, self.resolution, self.cells, receptors))
 
     @property
     def power(self) -> np.ndarray:
@@ -171,11 +176,10 @@ def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
     return np.maximum(fields, 0.0)
 
 
-def _mixture(field: np.ndarray, resolution: tuple[int, int], cells: int) -> np.ndarray:
-    """Probability per cell of the mean field over receptors and planes."""
+def _mixture(field: np.ndarray, resolution: tuple[int, int], cells: int, receptors: np.ndarray) -> np.ndarray:
+    """Probability per cell of the mean field over these receptors and all planes."""
     one = (field / field.sum(axis=(1, 2), keepdims=True)).mean(axis=0)
     total = np.zeros([size + cells * (n - 1) for size, n in zip(one.shape, resolution, strict=True)])
-    for i in range(resolution[0]):
-        for j in range(resolution[1]):
-            total[i * cells : i * cells + one.shape[0], j * cells : j * cells + one.shape[1]] += one
+    for i, j in zip(*np.divmod(receptors, resolution[1]), strict=True):
+        total[i * cells : i * cells + one.shape[0], j * cells : j * cells + one.shape[1]] += one
     return total / total.sum()

@@ -19,7 +19,7 @@ import optics
 from optics.numerics.arguments import whole
 from optics.numerics.autodiff import Array
 from sim.eyes.eyes import Eyes, eye_positions, eye_rotations
-from sim.eyes.sensor import BoxSampling, Sensor
+from sim.eyes.sensor import Sensor
 from sim.render import memory_budget
 from sim.render.fidelity import AREAS, Fidelity
 from sim.render.fidelity_choice import chosen_fidelity
@@ -87,12 +87,13 @@ class BatchedRenderer:
         self.tracer: Tracer | AreaTracer
         self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.of)(fidelity.light)
         self._check_memory(n_envs)
-        if isinstance(sampling, BoxSampling) and fidelity.samples == AREAS:
-            self.sensor: Sensor = scene.area_sensor(sampling, fidelity.rays_per_receptor)
+        self.sensor: Sensor
+        if fidelity.samples == AREAS:
+            self.sensor = scene.area_sensor(sampling, fidelity.rays_per_receptor)
         else:
             self.sensor = sampling.sensor(fidelity.rays_per_receptor)
-        if self.eye.pupil is None:  # a whole number of its own for every receptor
-            self.fidelity = replace(fidelity, rays_per_receptor=float(self.sensor.rays_per_receptor))
+        if self.eye.pupil is None or fidelity.samples == AREAS:  # a whole number of its own for every receptor
+            self.fidelity = replace(fidelity, rays_per_receptor=float(max(1, round(fidelity.rays_per_receptor))))
         mixing = self.eye.throughput * self.bands.weights
         self.brightest = float((mixing @ white).max())
         self._receptor_sums = self.sensor.receptor_sums(mixing, self.tracer.basis)

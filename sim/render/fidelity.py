@@ -36,7 +36,8 @@ class Fidelity:
     depth: distances for which the eye has a PSF
     light: what of it is followed: "direct"; "bounce", which adds light that is reflected twice; or, with areas, "all"
     samples: what eyes look along: "rays", or "areas", which cut each receptor's square into rays_per_receptor
-        rectangles and find the mean of each in closed form; perfect lenses and upright worlds only
+        rectangles and find the mean of each in closed form, behind a pupil of some around the receptors', too; upright
+        worlds only
     tolerance: error allowed to a receptor's signal (root mean square); None where nothing was chosen
     levels: what was chosen for each stage, and why
 

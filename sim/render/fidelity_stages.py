@@ -10,7 +10,7 @@ import numpy as np
 import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.eyes import Eyes
-from sim.eyes.sensor import EyeSampling
+from sim.eyes.sampling import EyeSampling
 from sim.render.band_error import band_error, measured
 from sim.render.fidelity import Level
 from sim.render.fidelity_trials import FidelityTrials

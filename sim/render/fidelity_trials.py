@@ -18,7 +18,7 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.eyes.depth_layers import DepthLayers
-from sim.eyes.sensor import BoxSampling, EyeSampling, Trial
+from sim.eyes.sampling import BoxSampling, EyeSampling, Trial
 from sim.render.prepared_scene import PreparedScene
 from sim.render.random_views import RandomViews, near_views, on_objects, random_views
 from sim.scene.device_arrays import floats
@@ -109,33 +109,50 @@ class FidelityTrials:
 
         return error
 
-    def area_errors(self, sampling: BoxSampling, light: str) -> Callable[[int], float]:
-        """The same with so many areas per receptor; the truth's own noise is part of it.
+    def have_areas(self, *lights: str) -> bool:
+        """Whether they see this world in all of these."""
+        try:
+            for light in lights:
+                self._scene.areas(light)
+        except ValueError:
+            return False
+        return True
 
-        Raises:
-            ValueError: eyes or worlds that areas cannot see.
-        """
-        self._scene.areas(light)
-        per_receptor = int(np.clip(TRUE_RAYS // (VIEWS[1] // 2 * len(self._receptors)), *TRUE_AREA))
-        populations, true = self._populations(sampling), sampling.trial(per_receptor, self._receptors)
+    def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[int], float]:
+        """The same with so many areas per receptor; the truth's own noise is part of it."""
+        true = self._truth(sampling)
+        populations = self._populations(sampling)
         truths = [self._signals(true, sampling.depth, light, p.views, TRUE_RAYS) for p in populations]
 
         def error(areas: int) -> float:
+            trial = self._scene.area_trial(sampling, areas, self._receptors)
             found = (
-                (p, self._area_signals(sampling, areas, light, p.views.take(len(t))) - t)
+                (p, self._signals(trial, sampling.depth, light, p.views.take(len(t)), TRUE_RAYS) - t)
                 for p, t in zip(populations, truths, strict=True)
             )
             return max(population.rms(error) for population, error in found)
 
         return error
 
-    def reflected_more_often(self, sampling: BoxSampling) -> float:
-        """Root mean square of what light that is reflected more than twice adds to the signals, as areas see it.
+    def areas_seen(self, sampling: EyeSampling, per_receptor: float) -> float:
+        """How many are seen per receptor where each one's square is cut into so many: behind a pupil, some around."""
+        n = len(self._scene.area_trial(sampling, per_receptor, self._receptors[:1]).directions)
+        return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 
-        Raises:
-            ValueError: it cannot be followed.
-        """
-        twice, all_ = (self._area_signals(sampling, 1, light, self._views) for light in lighting.LEVELS[1:])
+    def _truth(self, sampling: EyeSampling) -> Trial:
+        """Rays that areas are held against; behind a pupil those that these receptors see."""
+        of_a_view = TRUE_RAYS // (VIEWS[1] // 2)
+        if isinstance(sampling, BoxSampling):
+            return sampling.trial(int(np.clip(of_a_view // len(self._receptors), *TRUE_AREA)), self._receptors)
+        planes = sampling.depth.count * self._eye.bands * len(self._receptors)
+        rays = min(of_a_view, max(WEIGHTS // planes, TRUE))
+        own = replace(sampling, fields=sampling.fields.drawn_for(self._receptors))
+        return own.trial(rays / np.prod(self._eyes.resolution), self._receptors)
+
+    def reflected_more_often(self, sampling: EyeSampling) -> float:
+        """Root mean square of what light that is reflected more than twice adds to the signals, as areas see it."""
+        trial = self._scene.area_trial(sampling, 1, self._receptors)
+        twice, all_ = (self._signals(trial, sampling.depth, light) for light in lighting.LEVELS[1:])
         return _rms(all_ - twice)
 
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
@@ -183,40 +200,38 @@ class FidelityTrials:
         """(view, channel, receptor), of as many views as that many rays allow."""
         rays = len(trial.directions)
         views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))
-        components, z = self._trace(views, trial, light)
-        with variant(self._scene.static.variant):
-            shared = [np.array(share * c) for share in depth.shares(dr.rcp(z)) for c in components]
-        layers = np.reshape(shared, (depth.count, len(components), len(views), rays))
+        if trial.extent:
+            shared = self._see_areas(views, trial, light, depth)
+        else:
+            components, z = self._trace(views, trial, light)
+            with variant(self._scene.static.variant):
+                shared = [np.array(share * c) for share in depth.shares(dr.rcp(z)) for c in components]
+        layers = np.reshape(shared, (depth.count, -1, len(views), rays))
         planes = trial.weights.reshape(depth.count, -1, *trial.weights.shape[1:])
-        weights = np.einsum("ckb,lbrp->clkrp", self._factors(light), planes, optimize=True).astype(np.float32)
+        weights = np.einsum("ckb,lbrp->clkrp", self._factors(light, trial), planes, optimize=True).astype(np.float32)
         return np.einsum("clkrp,lkvp->vcr", weights, layers, optimize=True)
 
-    def _factors(self, light: str) -> np.ndarray:
+    def _factors(self, light: str, trial: Trial) -> np.ndarray:
         """(channel, component, band): signals_c = sum_b mixing[c, b] sum_l sum_k basis[k, b] sum_p W_lb[r, p]
         light_lk[p]."""
-        basis = self._scene.tracers.of(light).basis
+        basis = (self._scene.areas if trial.extent else self._scene.tracers.of)(light).basis
         return self._eye.throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
 
-    def _area_signals(self, sampling: BoxSampling, areas: int, light: str, views: RandomViews) -> np.ndarray:
-        """The same of so many areas for each receptor."""
-        tracer, sensor = self._scene.areas(light), self._scene.area_sensor(sampling, areas)
-        count = sensor.rays_per_receptor
-        mine = sensor.directions.reshape(-1, count, 3)[self._receptors].reshape(-1, 3)
-        origins, directions = views.in_agents(self._eyes, mine)
-        n = len(mine)
-        assert sensor.extent is not None
+    def _see_areas(self, views: RandomViews, trial: Trial, light: str, depth: DepthLayers) -> list[np.ndarray]:
+        """Components of the mean light in a trial's areas, for each depth layer, flat (view, area)."""
+        tracer = self._scene.areas(light)
+        origins, directions = views.in_agents(self._eyes, trial.directions)
+        n = len(trial.directions)
+        assert trial.extent is not None
         with variant(self._scene.static.variant):
-            origin = _points(origins, n)
-            width, height = (dr.opaque(mi.Float, side) for side in sensor.extent)
-            agent = _points(views.agents, n)
+            origin, agent = _points(origins, n), _points(views.agents, n)
+            width, height = (dr.opaque(mi.Float, side) for side in trial.extent)
             ray = mi.Ray3f(origin, mi.Vector3f([floats(d) for d in np.moveaxis(directions, -1, 0)]))
             area = Area.of(ray, agent, (width, height))
             centres = [_points(views.objects[:, k], n) for k in range(views.objects.shape[1])]
-            components = tracer.radiance(area, agent, centres, tracer.inputs)
+            components = tracer.radiance(area, agent, centres, tracer.inputs, depth)
             dr.eval(components)
-            light_ = np.reshape([np.array(c) for c in components], (len(components), len(views), -1, count))
-        mixing = self._eye.throughput * np.einsum("cb,kb->ck", self._eye.spectral_bands.weights, tracer.basis)
-        return np.einsum("ck,kvr->vcr", mixing, light_.mean(axis=-1))
+            return [np.array(c) for c in components]
 
     def _trace(self, views: RandomViews, trial: Trial, light: str) -> tuple[list[Array], Array]:
         """Components of light along a trial's rays of each view's eye, and from how far along its axis [m]: Dr.Jit,

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 import optics
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import Eyes
-from sim.eyes.sensor import BoxSampling, BoxSensor, EyeSampling, eye_sampling
+from sim.eyes.sampling import EyeSampling, Trial, eye_sampling
+from sim.eyes.sensor import Sensor
 from sim.render.band_error import with_band_averaged_lights
 from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.static_scene import StaticScene, build_static_scene
@@ -39,16 +42,22 @@ class PreparedScene:
         """What sees the world by areas.
 
         Raises:
-            ValueError: eyes behind a pupil, and worlds that have no closed form.
+            ValueError: a world that has no closed form.
         """
-        if self.eye.pupil is not None:
-            raise ValueError("samples = 'areas': eyes behind a pupil are sampled by rays only")
         return self.tracers.areas(light)
 
-    def area_sensor(self, sampling: BoxSampling, per_receptor: float) -> BoxSensor:
-        """What areas are seen along: so many parts of each receptor's square. What is upright has closed forms along
-        columns of any height; spheres' outlines want rows, too."""
-        return sampling.areas(per_receptor, in_rows=len(self.static.spheres) > 0)
+    def area_sensor(self, sampling: EyeSampling, per_receptor: float) -> Sensor:
+        """What areas are seen along: so many parts of each receptor's square."""
+        return sampling.areas(per_receptor, in_rows=self._in_rows)
+
+    def area_trial(self, sampling: EyeSampling, per_receptor: float, receptors: np.ndarray) -> Trial:
+        """What that sensor has for these receptors."""
+        return sampling.area_trial(per_receptor, receptors, in_rows=self._in_rows)
+
+    @property
+    def _in_rows(self) -> bool:
+        """What is upright has closed forms along columns of any height; spheres' outlines want rows, too."""
+        return len(self.static.spheres) > 0
 
     def sampling(self, depth: DepthLayers) -> EyeSampling:
         """How the eye is sampled with these depth layers; its PSFs are computed once, when first asked for.

@@ -43,6 +43,15 @@ class Normals:
         """Draw from the first frame on, under these keys (n,)."""
         self._keys, self._frames = keys, np.zeros(len(keys), np.uint32)
 
+    @property
+    def place(self) -> np.ndarray:
+        """Keys, and frames drawn so far, (n, 2) uint64: where every world's numbers go on."""
+        return np.stack([self._keys, self._frames.astype(np.uint64)], axis=1)
+
+    def go_on_from(self, place: np.ndarray) -> None:
+        """Inverse of `place`."""
+        self._keys, self._frames = place[:, 0].astype(np.uint64), place[:, 1].astype(np.uint32)
+
     def begin(self, worlds: np.ndarray) -> PendingFrame:
         """Begin to draw the next frame of these worlds, (len(worlds), *shape) float32; it runs beside whatever comes
         next."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from sim.eyes.receptive_fields import NoRaysError
-from sim.eyes.sensor import BoxSampling, EyeSampling
+from sim.eyes.sampling import BoxSampling, EyeSampling
 from sim.render.fidelity import AREAS, RAYS, Level
 from sim.render.fidelity_stages import CAUTION
 from sim.render.fidelity_trials import FidelityTrials
@@ -46,34 +46,32 @@ def fewest_samples(
     light: what rays would follow of it · without_light: allowed, where no light is left out
     """
     errors = trials.errors(sampling, light.level)
+    numbers: tuple[float, ...] = PERFECT_LENS_RAYS if isinstance(sampling, BoxSampling) else PUPIL_RAYS
 
-    def rays(numbers: tuple[float, ...]) -> Samples:
-        return Samples(RAYS, light, *_fewest(errors, numbers, allowed, RAYS))
+    def rays(most: float = math.inf) -> Samples:
+        return Samples(RAYS, light, *_fewest(errors, tuple(n for n in numbers if n <= most), allowed, RAYS))
 
-    if not isinstance(sampling, BoxSampling):
-        return rays(PUPIL_RAYS)
-    if (few := rays(PERFECT_LENS_RAYS[:AREA_WORTH])).enough:
+    if (few := rays(AREA_WORTH * trials.areas_seen(sampling, 1))).enough:
         return few
     areas = _areas(trials, sampling, light, allowed, without_light)
     if areas is None:
-        return rays(PERFECT_LENS_RAYS)
+        return rays()
     if not areas.enough:
-        return min(areas, rays(PERFECT_LENS_RAYS), key=lambda samples: (not samples.enough, samples.error))
-    cheaper = rays(tuple(n for n in PERFECT_LENS_RAYS if n <= AREA_WORTH * areas.number))
+        return min(areas, rays(), key=lambda samples: (not samples.enough, samples.error))
+    cheaper = rays(AREA_WORTH * trials.areas_seen(sampling, areas.number))
     return cheaper if cheaper.enough else areas
 
 
 def _areas(
-    trials: FidelityTrials, sampling: BoxSampling, light: Level, allowed: float, without_light: float
+    trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: float, without_light: float
 ) -> Samples | None:
     """None where they cannot see the world."""
-    try:
-        errors = trials.area_errors(sampling, light.level)
-        if light.level == BOUNCE:
-            more, allowed = trials.reflected_more_often(sampling), without_light
-            light = Level("light", ALL, None, f"light that is reflected more than twice is worth {more:.1e}; in tables")
-    except ValueError:
+    if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):
         return None
+    errors = trials.area_errors(sampling, light.level)
+    if light.level == BOUNCE:
+        more, allowed = trials.reflected_more_often(sampling), without_light
+        light = Level("light", ALL, None, f"light that is reflected more than twice is worth {more:.1e}; in tables")
     return Samples(AREAS, light, *_fewest(lambda n: errors(int(n)), NUMBERS_OF_AREAS, allowed, AREAS))
 
 

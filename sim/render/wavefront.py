@@ -65,7 +65,7 @@ class Wavefront:
         sample = lane - view * n_rays
         eye = view - world * n_eyes
         if isinstance(self.tracer, AreaTracer):
-            components = self.tracer.radiance(*self._area(poses, inputs, world, eye, sample), inputs)
+            components = self.tracer.radiance(*self._area(poses, inputs, world, eye, sample), inputs, self.depth)
         else:
             components = self._along_rays(self.tracer, scene, poses, inputs, (world, eye, sample))
         if len(components) == 1:

@@ -14,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.scene.device_arrays import floats
 from sim.tracing import lighting
 from sim.tracing.areas import sphere_areas
@@ -79,17 +80,27 @@ class AreaTracer:
         tables = {"faces": _in_eights(rows[:-1])} | {k: v for part in parts if part for k, v in part.tables.items()}
         self.inputs = {name: floats(table) for name, table in tables.items()}
 
-    def radiance(self, area: Area, agent: Array, centres: list[Array], inputs: dict[str, Array]) -> list[Array]:
-        """Mean of what comes out of each area, one array per component; agent, centres: of the spheres that move."""
-        bodies, nothing = [*centres, agent], [0.0] * len(self.basis)
+    def radiance(
+        self,
+        area: Area,
+        agent: Array,
+        centres: list[Array],
+        inputs: dict[str, Array],
+        depth: DepthLayers = ONE_PSF,
+    ) -> list[Array]:
+        """Mean of what comes out of each area, one array per component, for each depth layer; agent, centres: of the
+        spheres that move."""
+        bodies, nothing = [*centres, agent], [0.0] * (depth.count * len(self.basis))
         now = self._illumination.moment(bodies, inputs) if self._reflected else Moment(bodies, inputs)
         pieces = self._columns.pieces(area, inputs)
-        seen = [only_where(piece.beside > 0, partial(self._wall, area, piece, now), nothing) for piece in pieces]
-        seen.append(only_where(pieces[0].below + pieces[1].below > 0, partial(self._floor, area, pieces, now), nothing))
+        seen = [only_where(piece.beside > 0, partial(self._wall, area, piece, now, depth), nothing) for piece in pieces]
+        floor = partial(self._floor, area, pieces, now, depth)
+        seen.append(only_where(pieces[0].below + pieces[1].below > 0, floor, nothing))
         spheres = []
         for k, centre in enumerate(centres):
             in_view = sphere_areas.may_see(area, centre, self._radii[k])
-            spheres.append(only_where(in_view, partial(self._sphere, area, k, pieces, now), [0.0] * 3 + nothing))
+            sphere = partial(self._sphere, area, k, pieces, now, depth)
+            spheres.append(only_where(in_view, sphere, [0.0] * 3 + nothing))
         parts = pieces[0].beside, pieces[1].beside, pieces[0].below + pieces[1].below
         total = [mi.Float(0) for _ in nothing]
         for part, light, *hidden in zip(parts, seen, *(sphere[:3] for sphere in spheres), strict=True):
@@ -97,7 +108,7 @@ class AreaTracer:
             total = [dr.fma(left, own, sum_) for own, sum_ in zip(light, total, strict=True)]
         return [sum(own, rest) for rest, *own in zip(total, *(sphere[3:] for sphere in spheres), strict=True)]
 
-    def _wall(self, area: Area, piece: Piece, now: Moment) -> list[Array]:
+    def _wall(self, area: Area, piece: Piece, now: Moment, depth: DepthLayers) -> list[Array]:
         patch = piece.patch(area, self._walls.floor, self._columns.top)
         row = dr.gather(mi.Vector4f, now.inputs["faces"], 2 * piece.face.index)
         place = dr.gather(mi.Vector2f, now.inputs["faces"], 4 * piece.face.index + 2)
@@ -112,9 +123,10 @@ class AreaTracer:
         if self._reflected:
             arriving = self._reflected.on_wall(patch, now.inputs)
             light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
-        return [piece.beside * r * e for r, e in zip(reflectance, light, strict=True)]
+        sent_on = [piece.beside * r * e for r, e in zip(reflectance, light, strict=True)]
+        return _in_layers(depth, piece.nearness_at(piece.middle), sent_on)
 
-    def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: Moment) -> list[Array]:
+    def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: Moment, depth: DepthLayers) -> list[Array]:
         """In bands of the same height, which lie the further apart the nearer they are to the horizon."""
         share = pieces[0].below + pieces[1].below
         a = sum(piece.middle * piece.below for piece in pieces) / dr.maximum(share, LEAST_DIP)
@@ -127,10 +139,12 @@ class AreaTracer:
             if self._reflected:
                 arriving = self._reflected.on_floor(patch, now.inputs)
                 light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
-            sent_on = zip(self._floor_reflectance(patch, now), light, strict=True)
+            reflectance = self._floor_reflectance(patch, now)
+            layers = _in_layers(depth, dip / (area.origin.z - self._walls.floor), light)
+            sent_on = zip(reflectance * depth.count, layers, strict=True)
             return index + 1, [dr.fma(r, e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
 
-        start = mi.UInt32(0), [mi.Float(0) for _ in self.basis]
+        start = mi.UInt32(0), [mi.Float(0) for _ in range(depth.count * len(self.basis))]
         _, total = dr.while_loop(start, lambda index, total: index < BANDS, add, label="bands")
         return [sum_ * share / BANDS for sum_ in total]
 
@@ -148,7 +162,7 @@ class AreaTracer:
         along, across = (per_x * side.x + per_y * side.y for side in (patch.along, patch.across))
         return self._stripes.mean_over(self._floor_texture, column, (along, across), now.inputs)
 
-    def _sphere(self, area: Area, k: int, pieces: tuple[Piece, Piece], now: Moment) -> list[Array]:
+    def _sphere(self, area: Area, k: int, pieces: tuple[Piece, Piece], now: Moment, depth: DepthLayers) -> list[Array]:
         """Shares of the area in which it hides either wall and the floor, and light that comes from it, per component,
         times its share; without what is hidden by nearer spheres."""
         texture, radius = self._sphere_textures[k], self._radii[k]
@@ -166,12 +180,13 @@ class AreaTracer:
             if around:
                 arriving = [sum_of(fours, slice_.patch.normal) for fours in around]
                 light = _sum(light, self._illumination.past_bodies(slice_.patch, arriving, now, k))
-            sent_on = zip(reflectance, light, strict=True)
+            layers = _in_layers(depth, slice_.vergence(area), light)
+            sent_on = zip(reflectance * depth.count, layers, strict=True)
             total = [dr.fma(slice_.share * bare, r * e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
             hidden = [dr.fma(own, bare, sum_) for own, sum_ in zip(found, hidden, strict=True)]
             return index + 1, hidden, total
 
-        start = mi.UInt32(0), [mi.Float(0)] * 3, [mi.Float(0) for _ in self.basis]
+        start = mi.UInt32(0), [mi.Float(0)] * 3, [mi.Float(0) for _ in range(depth.count * len(self.basis))]
         _, hidden, total = dr.while_loop(start, lambda index, *_: index < view.count, add, label="slices")
         return [*hidden, *total]
 
@@ -188,6 +203,13 @@ class AreaTracer:
 
     def _seen_bodies(self, now: Moment) -> list[Array]:
         return now.bodies[: len(self._sphere_textures)]
+
+
+def _in_layers(depth: DepthLayers, vergence: Array, light: list[Array]) -> list[Array]:
+    """Light from the distance 1 / vergence along the eye's axis, shared out among depth layers."""
+    if depth.count == 1:
+        return light
+    return [share * component for share in depth.shares(vergence) for component in light]
 
 
 def _in_eights(rows: np.ndarray) -> np.ndarray:

@@ -49,6 +49,11 @@ class Slice:
     across: Array
     patch: Patch
 
+    def vergence(self, area: Area) -> Array:
+        """1/z along the eye's axis [1/m]."""
+        found: Array = dr.norm(self.seen) * dr.rcp(dr.norm(self.patch.point - area.origin))
+        return found
+
 
 class SphereView:
     """What an area sees of a sphere, in slices: STRIPS across what it fills, cut to PARTS each."""

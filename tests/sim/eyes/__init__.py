@@ -1,7 +1,9 @@
 """What tests hold of eyes, module by module.
 
 eyes: test_eyes.py, envs/test_env.py
+sampling: test_sensor.py, test_field_areas.py
 sensor: test_sensor.py
+field_areas: test_field_areas.py, tracing/test_areas_behind_pupils.py
 receptive_fields: test_sensor.py, tracing/test_lighting.py
 receptor_sums: test_sensor.py
 depth_layers: test_depth_layers.py

@@ -52,6 +52,34 @@ def test_layers_agree_with_the_convolution_in_depth(close_by):
     assert layers < 0.0025
 
 
+def test_areas_share_their_light_among_layers_as_rays_do(close_by, monkeypatch):
+    """Means over all samples of a view, of two views that see spheres, walls and floor; and not if distances are taken
+    for their inverses. Samples here are not weighted: as many areas as groups of rays, over the receptors' squares."""
+    world, eyes, state = close_by
+    heading = state.heading[0] - np.linspace(0, 0.6, 7)
+    states = dataclasses.replace(state.take(np.zeros(7, int)), heading=heading)
+    sharp = dataclasses.replace(eyes, optics=None)
+    depth = DepthLayers(FAR, NEAR, 3)
+
+    def layers(eyes, samples, kind):
+        """(layer, view)"""
+        renderer = sim.BatchedRenderer(world, eyes, 7, sim.Fidelity(samples, 1, depth, samples=kind))
+        renderer.sensor = dataclasses.replace(renderer.sensor, depth=depth)
+        renderer._set_width(7)
+        return renderer._components(renderer._sums, states).reshape(3, 14, -1).mean(axis=-1) / samples
+
+    along_rays = layers(sharp, 256, "rays")
+
+    def error():
+        return np.abs(layers(sharp, 4, "areas") - along_rays).max() / along_rays.max()
+
+    right, shares = error(), DepthLayers.shares
+    monkeypatch.setattr(DepthLayers, "shares", lambda self, vergence: shares(self, dr.rcp(vergence)))
+    assert (along_rays.max(axis=1) > 0.01).all()
+    assert right < 0.01
+    assert error() > 0.1
+
+
 def test_auto_takes_layers_for_large_eyes_alone(close_by):
     world, large, _ = close_by
     small = sim.Eyes(2, (15, 15), optics=optics.Pupil(25e-6, thin_lens_focal_length=2.4e-4))

@@ -7,7 +7,8 @@ import pytest
 
 import optics
 from sim.eyes.receptive_fields import NoRaysError, ReceptiveFields, cells_per_receptor, low_discrepancy
-from sim.eyes.sensor import BoxSampling, BoxSensor, FieldSampling, ReceptiveFieldSensor, build_sensor, eye_sampling
+from sim.eyes.sampling import BoxSampling, FieldSampling, build_sensor, eye_sampling
+from sim.eyes.sensor import BoxSensor, ReceptiveFieldSensor
 
 L = 200e-6
 

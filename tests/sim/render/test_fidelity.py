@@ -53,10 +53,10 @@ def near_objects(world, eyes):
 
 @cache
 def picked(name):
-    """The world of a case and the pick."""
+    """The world of a case and the pick of rays, which is all that Mitsuba traces."""
     task, eyes = CASES[name]
     world = sim.build_world(task, seed=11)
-    return world, sim.choose_fidelity(world, eyes)
+    return world, sim.choose_fidelity(world, eyes, tracer="mitsuba")
 
 
 def signals(world, eyes, state, fidelity, samples):
@@ -90,8 +90,17 @@ def test_the_pick_is_enough_and_not_far_more_than_enough(name):
         assert actual_error(fewer) > 0.35 * eyes.noise_sigma
 
 
-@pytest.mark.parametrize(("task", "eyes"), [("detection", sim.Eyes()), ("maze", ROW), ("navigation", ROW)])
-def test_perfect_lenses_see_by_areas_where_rays_would_be_many(task, eyes, recwarn):
+@pytest.mark.parametrize(
+    ("task", "eyes"),
+    [
+        ("detection", sim.Eyes()),
+        ("maze", ROW),
+        ("navigation", ROW),
+        ("detection", behind_lens(DETECTION, 0.6)),
+        ("maze", behind_lens(ROW, 0.6)),
+    ],
+)
+def test_eyes_see_by_areas_where_rays_would_be_many(task, eyes, recwarn):
     """With all light, and as well as promised, over all receptors and over those that see an object near: in the light
     that rays can follow, where they are the truth."""
     world = sim.build_world(task)
@@ -102,7 +111,8 @@ def test_perfect_lenses_see_by_areas_where_rays_would_be_many(task, eyes, recwar
     state, seen = near_objects(world, eyes)
     by_areas = signals(world, eyes, state, replace(fidelity, light="bounce"), fidelity.rays_per_receptor)
     rays = sim.Fidelity(1, eyes.bands, light="bounce")
-    truth = signals(world, eyes, state, rays, 1024 if world.objects else 8192)
+    finely = 256 if eyes.optics else 1024
+    truth = signals(world, eyes, state, rays, finely if world.objects else 8 * finely)
     for error in (by_areas - truth, (by_areas - truth)[seen]):
         assert np.sqrt(np.mean(error**2)) < eyes.noise_sigma / 2 if error.size else not world.objects
 
@@ -136,7 +146,7 @@ def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
 
     def rays(a, noise_sigma=FEW.noise_sigma):
         eyes = behind_lens(replace(FEW, noise_sigma=noise_sigma), a)
-        return sim.choose_fidelity(world, eyes, bands="own").rays_per_receptor
+        return sim.choose_fidelity(world, eyes, bands="own", tracer="mitsuba").rays_per_receptor
 
     found = [rays(a) for a in (0.1, 0.25, 0.6)]
     assert found == sorted(found)
@@ -166,7 +176,7 @@ def test_light_is_followed_where_objects_alone_need_it():
     over those that see an object."""
     world, eyes = sim.build_world("tracking"), behind_lens(DETECTION, 0.5)
     chosen = sim.choose_fidelity(world, eyes, bands="own")
-    assert chosen.light == "bounce"
+    assert chosen.light == "all"
     state, seen = near_objects(world, eyes)
     direct, both = (signals(world, eyes, state, sim.Fidelity(1, eyes.bands, light=light), 64) for light in LIGHTS)
     without, missing = (np.sqrt(np.mean((both - direct)[which] ** 2)) for which in (~seen, seen))
@@ -194,9 +204,9 @@ def test_environments_and_renderers_have_what_is_chosen_with_the_eyes_own_bands(
 def test_it_can_be_overruled():
     world = sim.build_world("detection")
     eyes = behind_lens(FEW, 0.25)
-    strict = sim.choose_fidelity(world, eyes, tolerance=2e-3)
+    strict, usual = (sim.choose_fidelity(world, eyes, at, tracer="mitsuba") for at in (2e-3, None))
     assert strict.tolerance == 2e-3
-    assert strict.rays_per_receptor > sim.choose_fidelity(world, eyes).rays_per_receptor
+    assert strict.rays_per_receptor > usual.rays_per_receptor
     renderer = sim.BatchedRenderer(world, eyes, 1, strict)
     assert renderer.fidelity is strict
     assert len(renderer.bands.wavelengths) == strict.bands

@@ -8,7 +8,7 @@ spheres: render/test_batched_renderer.py
 walls: test_closed_form_tracer.py
 wall_intersection: test_closed_form_tracer.py
 reflectance_atlas: test_closed_form_tracer.py
-areas.area_tracer: test_areas.py
+areas.area_tracer: test_areas.py, test_areas_behind_pupils.py
 areas.light_table: test_light_table.py
 areas.light_nodes: test_light_table.py
 areas.light_baking: test_light_table.py

@@ -1,0 +1,228 @@
+"""Which samples of the visual field an eye looks along, as many as asked for: rays or areas.
+
+Coordinates are those of `sim.eyes.sensor`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+
+import optics
+from sim.eyes.depth_layers import ONE_PSF, DepthLayers
+from sim.eyes.field_areas import FieldAreas
+from sim.eyes.receptive_fields import (
+    Draw,
+    NoRaysError,
+    ReceptiveFields,
+    bounce_samples,
+    low_discrepancy,
+    receptive_fields_of,
+)
+from sim.eyes.receptor_sums import within_stretches
+from sim.eyes.sensor import BoxSensor, ReceptiveFieldSensor, Sensor
+
+# Chosen: weights that together change no signal by more than this share of the receptors' noise are left out; beside
+# it, that makes √(1 + 0.1²) = 1.005 of it.
+NEGLIGIBLE = 0.1
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Some receptors of a sensor that need not be built: directions (ray, 3), bounce samples (ray, 2), weights
+    (layer * band, receptor, ray), and of areas their extent."""
+
+    directions: np.ndarray
+    bounce_samples: np.ndarray
+    weights: np.ndarray
+    extent: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class BoxSampling:
+    """Every receptor's square sampled by the same low-discrepancy points, each receptor's shifted (on the torus)
+    by its own fixed random offset so that the errors of neighbours are independent; a whole number of points each."""
+
+    eye: optics.Eye
+    depth: DepthLayers = ONE_PSF
+
+    def sensor(self, rays_per_receptor: float) -> BoxSensor:
+        """The sensor with so many rays per receptor."""
+        rays = max(1, round(rays_per_receptor))
+        return BoxSensor(*self._rays(rays, np.arange(np.prod(self.eye.resolution))), rays)
+
+    def areas(self, per_receptor: float, *, in_rows: bool = True) -> BoxSensor:
+        """The sensor whose samples are all of a receptor's square, cut into so many rectangles: one row of them, or, in
+        rows, as many rows as columns or fewer."""
+        count = max(1, round(per_receptor))
+        return BoxSensor(*self._areas(count, in_rows, np.arange(np.prod(self.eye.resolution))))
+
+    def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
+        """What that sensor has for these receptors (numbered row by row)."""
+        count = max(1, round(per_receptor))
+        plane, unused, _, _, extent = self._areas(count, in_rows, receptors)
+        return Trial(plane, unused, self._means(len(receptors), count), extent)
+
+    def _areas(
+        self, count: int, in_rows: bool, receptors: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, int, DepthLayers, tuple[float, float]]:
+        rows, columns = parts_of(count, in_rows)
+        y, x = (index.ravel() for index in np.indices((rows, columns)))
+        within = np.stack([(x + 0.5) / columns, (y + 0.5) / rows], axis=-1)
+        points = (within + self._corners()[receptors]).reshape(-1, 2)
+        plane = on_tangent_plane(self.eye, points).astype(np.float32)
+        return plane, _unused(plane), count, self.depth, _extent(self.eye, (1 / columns, 1 / rows))
+
+    def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
+        """What that sensor has for these receptors (numbered row by row)."""
+        rays = max(1, round(rays_per_receptor))
+        return Trial(*self._rays(rays, receptors), self._means(len(receptors), rays))
+
+    def _means(self, receptors: int, samples: int) -> np.ndarray:
+        """Weights of so many samples each, (band, receptor, sample)."""
+        weights = np.kron(np.eye(receptors), np.full((1, samples), 1 / samples))
+        return np.broadcast_to(weights, (self.eye.bands, *weights.shape))
+
+    def _rays(self, rays: int, receptors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Directions and places."""
+        height, width = self.eye.resolution
+        shifts, turns = (np.random.default_rng(seed).random((height * width, 1, 2))[receptors] for seed in (0, 1))
+        corners = self._corners()[receptors]
+        directions = directions_of(self.eye, ((low_discrepancy(rays) + shifts) % 1.0 + corners).reshape(-1, 2))
+        return directions, ((bounce_samples(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
+
+    def _corners(self) -> np.ndarray:
+        """Of every receptor's square, upper left, (receptor, 1, 2)."""
+        height, width = self.eye.resolution
+        row, column = (index.ravel() for index in np.indices((height, width)))
+        return np.stack([column - width / 2, row - height / 2], axis=-1)[:, None]
+
+
+@dataclass(frozen=True)
+class FieldSampling:
+    """Directions drawn from the mixture of all receptive fields; as many as asked for, or as it takes until every
+    receptor has one."""
+
+    eye: optics.Eye
+    fields: ReceptiveFields
+    depth: DepthLayers = ONE_PSF
+
+    def sensor(self, rays_per_receptor: float) -> ReceptiveFieldSensor:
+        """The sensor with so many rays per receptor, on average."""
+        rays = self._rays(rays_per_receptor)
+        while True:
+            try:
+                return self._sensor(rays)
+            except NoRaysError:
+                rays += max(1, rays // 4)
+
+    def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
+        """What that sensor has for these receptors.
+
+        Raises:
+            NoRaysError: one of them has no ray.
+        """
+        draw = self.fields.draw(self._rays(rays_per_receptor))
+        weights = self.fields.weights(draw, receptors)
+        return Trial(directions_of(self.eye, draw.points), _bounce_samples(draw), weights)
+
+    def _rays(self, rays_per_receptor: float) -> int:
+        return max(1, round(rays_per_receptor * np.prod(self.eye.resolution)))
+
+    def areas(self, per_receptor: float, *, in_rows: bool = True) -> ReceptiveFieldSensor:
+        """The sensor whose samples are rectangles: as many of each receptor's square as `BoxSampling.areas` has, and
+        of what more its receptors see."""
+        lattice = self._lattice(per_receptor, in_rows)
+        plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
+        weights = self._in_rows(lambda receptors: lattice.weights(self.fields, receptors))
+        extent = _extent(self.eye, lattice.size)
+        return ReceptiveFieldSensor(plane, _unused(plane), weights, self.eye.resolution, self.depth, extent)
+
+    def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
+        """What that sensor has for these receptors."""
+        lattice = self._lattice(per_receptor, in_rows)
+        plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
+        return Trial(plane, _unused(plane), lattice.weights(self.fields, receptors), _extent(self.eye, lattice.size))
+
+    def _lattice(self, per_receptor: float, in_rows: bool) -> FieldAreas:
+        return FieldAreas.of(self.fields, parts_of(max(1, round(per_receptor)), in_rows))
+
+    def _sensor(self, rays: int) -> ReceptiveFieldSensor:
+        draw = self.fields.draw(rays)
+        weights = self._in_rows(lambda receptors: self.fields.weights(draw, receptors))
+        directions = directions_of(self.eye, draw.points)
+        return ReceptiveFieldSensor(directions, _bounce_samples(draw), weights, self.eye.resolution, self.depth)
+
+    def _in_rows(self, of: Callable[[np.ndarray], np.ndarray]) -> tuple[scipy.sparse.csr_array, ...]:
+        """Weights of all receptors, found row by row, without what changes no signal."""
+        height, width = self.eye.resolution
+        rows: list[list[scipy.sparse.csr_array]] = []
+        for i in range(height):
+            dense = of(i * width + np.arange(width)).astype(np.float32)
+            rows.append([scipy.sparse.csr_array(plane) for plane in dense])
+        weights = tuple(scipy.sparse.vstack(plane, format="csr") for plane in zip(*rows, strict=True))
+        return within_stretches(weights, self.eye.resolution, negligible_share(self.eye))
+
+
+def parts_of(count: int, in_rows: bool) -> tuple[int, int]:
+    """Rows and columns of a receptor that is cut into so many parts."""
+    rows = max(n for n in range(1, math.isqrt(count) + 1) if count % n == 0) if in_rows else 1
+    return rows, count // rows
+
+
+def _unused(plane: np.ndarray) -> np.ndarray:
+    """Bounce samples of areas, which have a table instead."""
+    return np.zeros((len(plane), 2), np.float32)
+
+
+def _extent(eye: optics.Eye, size: tuple[float, float]) -> tuple[float, float]:
+    """A rectangle's width and height on the plane at distance 1, from those in receptor pitches."""
+    side = eye.receptor_pitch / eye.sensor_distance
+    return side * size[0], side * size[1]
+
+
+def _bounce_samples(draw: Draw) -> np.ndarray:
+    return bounce_samples(len(draw)).astype(np.float32)
+
+
+# Makes sensors of one eye, with any number of rays.
+EyeSampling = BoxSampling | FieldSampling
+
+
+def eye_sampling(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> EyeSampling:
+    """How an eye is sampled.
+
+    Raises:
+        optics.AccuracyError: a pupil whose light spreads too far to be computed.
+    """
+    return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, receptive_fields_of(eye, depth), depth)
+
+
+def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers = ONE_PSF) -> Sensor:
+    """The sensor of an eye.
+
+    Raises:
+        optics.AccuracyError: a pupil whose light spreads too far to be computed.
+    """
+    return eye_sampling(eye, depth).sensor(rays_per_receptor)
+
+
+def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
+    """Unit vectors (ray, 3) in the eye's frame of points (x right, y down) [receptor pitches] on the tangent plane."""
+    v = on_tangent_plane(eye, plane)
+    return (v / np.linalg.norm(v, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def on_tangent_plane(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
+    """The same points in the eye's frame, on the plane at distance 1, (ray, 3)."""
+    side = eye.receptor_pitch / eye.sensor_distance
+    return np.stack([plane[:, 0] * side, -plane[:, 1] * side, np.ones(len(plane))], axis=-1)
+
+
+def negligible_share(eye: optics.Eye) -> float:
+    """Share of a receptor's weights that can be left out: a share s changes a signal by a² s at most."""
+    return min(NEGLIGIBLE * eye.noise_sigma / eye.throughput, eye.tolerance)

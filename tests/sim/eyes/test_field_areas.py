@@ -1,0 +1,126 @@
+"""Areas behind a pupil against the convolution of `Eye.see`, with exact means of a scene that has no closed form."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from sim.eyes import field_areas
+from sim.eyes.field_areas import BEYOND, FieldAreas
+from sim.eyes.receptive_fields import ReceptiveFields, cells_per_receptor
+from sim.eyes.sampling import FieldSampling
+from tests.sim.eyes.test_sensor import convolved, dense, eye, focused, plane_of, prism, scene
+
+FINE = 8  # points along an area's side, on which its mean is found
+
+
+def sampling_of(e):
+    return FieldSampling(e, ReceptiveFields.of(e, cells_per_receptor(e.resolution)))
+
+
+def from_means(e, sensor):
+    """Signals (channel, h, w) from the scene's means over the sensor's areas."""
+    width, height = (side * e.sensor_distance / e.receptor_pitch for side in sensor.extent)
+    x, y = plane_of(e, sensor.directions.astype(float))
+    within = (np.arange(FINE) + 0.5) / FINE - 0.5
+    x, y = x[:, None, None] + width * within, y[:, None, None] + height * within[:, None]
+    means = np.stack([scene(x, y, band).mean(axis=(1, 2)) for band in range(e.bands)]).astype(np.float32)
+    receptors = sensor.receptor_radiance(means[:, None])[:, 0].reshape(e.bands, *e.resolution)
+    return e.throughput * np.einsum("cb,byx->cyx", e.spectral_bands.weights, receptors)
+
+
+def error(e, per_receptor):
+    expected = convolved(e, cells_per_receptor(e.resolution))
+    found = from_means(e, sampling_of(e).areas(per_receptor))
+    return np.sqrt(np.mean((found - expected) ** 2)) / expected.mean()
+
+
+@pytest.mark.parametrize(("pupil", "most"), [(focused(), 0.004), (prism(), 0.02)], ids=["focused", "prism"])
+def test_agrees_with_the_convolution(pupil, most):
+    """One area per receptor, relative to the mean signal; 16 rays are allowed .01. The prism's light comes from 1.5
+    receptors around each direction: within one area, light is not even."""
+    assert error(eye(pupil=pupil), 1) < most
+
+
+@pytest.mark.parametrize("pupil", [focused(), prism()], ids=["focused", "prism"])
+def test_errors_fall_with_smaller_areas(monkeypatch, pupil):
+    """As the square of their sides, and better where that makes them fit the fields: by 3 at least for half the side.
+    Then nothing may be left beyond the lattice; the convolution's own cells, a quarter as wide as receptors, err by
+    .0015 at most."""
+    monkeypatch.setattr(field_areas, "BEYOND", 5e-4)
+    e = eye(pupil=pupil)
+    errors = [error(e, n) for n in (1, 4, 16)]
+    assert errors[1] < errors[0] / 3
+    assert errors[2] < 0.0015
+
+
+def turned(self, fields, receptors, right=FieldAreas.weights):
+    return right(self, dataclasses.replace(fields, field=fields.field[:, ::-1, ::-1]), receptors)
+
+
+def none_at_all(self, fields, receptors, right=FieldAreas.weights):
+    """Every receptor sees the one area that most of its field lies in."""
+    weights = right(self, fields, receptors)
+    return (weights == weights.max(axis=2, keepdims=True)) * fields.power[:, None, None]
+
+
+@pytest.mark.parametrize("wrong", [turned, none_at_all])
+def test_wrong_weights_are_noticed(monkeypatch, wrong):
+    monkeypatch.setattr(FieldAreas, "weights", wrong)
+    assert error(eye(pupil=prism()), 1) > 0.03
+
+
+def test_white_light_gives_the_kernels_power():
+    e = eye(pupil=focused(0.1))
+    sampling = sampling_of(e)
+    for weights, power in zip(sampling.areas(2).weights, sampling.fields.power, strict=True):
+        np.testing.assert_allclose(weights.sum(axis=1), power, rtol=1e-5)
+
+
+def test_each_receptor_is_cut_and_light_comes_from_around_it():
+    """A lens in focus needs no rim; a prism looks to one side, and the lattice reaches there alone."""
+    sharp, beside = (FieldAreas.of(sampling_of(eye(pupil=pupil)).fields, (2, 3)) for pupil in (focused(), prism()))
+    assert sharp.size == pytest.approx((1 / 3, 1 / 2))
+    np.testing.assert_allclose(sharp.edges[1], np.arange(28) / 3 - 4.5)
+    assert len(sharp.middles) == 18 * 27
+    y, x = beside.edges
+    rims = np.array([-4.5 - y[0], y[-1] - 4.5, -4.5 - x[0], x[-1] - 4.5])
+    assert (rims >= 0).all()
+    assert 0 < rims.max() < 3
+    assert rims.min() == 0
+    # Of a lattice that reaches everywhere, what lies beyond that one's upper end is less than was allowed.
+    fields = sampling_of(eye(pupil=prism())).fields
+    everywhere = FieldAreas((np.arange(-20, 21) / 2, np.arange(-60, 61) / 3))
+    weights = everywhere.weights(fields, np.arange(81)).reshape(3, 81, 40, 120)
+    beyond = weights[:, :, everywhere.edges[0][1:] <= y[0] + 1e-9].sum(axis=(2, 3)) / fields.power[:, None]
+    assert beyond.mean() <= BEYOND
+
+
+def test_a_trial_is_part_of_the_sensor():
+    e, some = eye((4, 5), focused()), np.array([0, 7, 19])
+    sampling = sampling_of(e)
+    trial, sensor = sampling.area_trial(4, some), sampling.areas(4)
+    np.testing.assert_array_equal(trial.directions, sensor.directions)
+    assert trial.extent == sensor.extent
+    # The sensor leaves out weights that change signals by less than a tenth of the noise.
+    light = np.random.default_rng(0).random(len(sensor.directions))
+    np.testing.assert_allclose(
+        trial.weights @ light, (dense(sensor) @ light)[:, some], atol=0.1 * e.noise_sigma / e.throughput
+    )
+
+
+def test_rays_can_be_drawn_for_some_receptors_alone():
+    """As many rays then tell more about these: all of them lie in one of their fields, and signals stay the same."""
+    e, some = eye(pupil=focused()), np.array([0, 40])
+    sampling = sampling_of(e)
+    own = dataclasses.replace(sampling, fields=sampling.fields.drawn_for(some))
+
+    def signals(which, rays):
+        trial = which.trial(rays, some)
+        x, y = plane_of(e, trial.directions.astype(float))
+        return np.stack([trial.weights[band] @ scene(x, y, band) for band in range(e.bands)])
+
+    trial = own.trial(4, some)
+    assert (trial.weights.sum(axis=(0, 1)) > 0).all()
+    assert (sampling.trial(4, some).weights.sum(axis=(0, 1)) > 0).mean() < 0.7
+    np.testing.assert_allclose(signals(own, 16), signals(sampling, 256), atol=0.01)

@@ -1,0 +1,124 @@
+"""What eyes behind a pupil see by areas, against what very many rays through the same pupil see of the same worlds."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import optics
+import sim
+from sim.eyes import field_areas
+from sim.worlds.state import WorldState
+from sim.worlds.world import build_world
+from tests.sim.tracing.area_views import EYES, ROW, SIGMA, sees_object, views
+
+BANDS = 4
+
+
+def behind_lens(eyes, a):
+    focal_length = eyes.eye().sensor_distance
+    return dataclasses.replace(
+        eyes, optics=optics.Pupil(a * eyes.sensor_width / 2, thin_lens_focal_length=focal_length)
+    )
+
+
+# An open hole: light of one direction falls on several receptors, and red light on more of them than blue.
+HOLE = dataclasses.replace(EYES, optics=optics.Pupil(6e-6))
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    world: sim.World
+    eyes: sim.Eyes
+    state: WorldState
+    truth: np.ndarray
+    on_object: np.ndarray
+
+    def errors(self, samples, kind="areas"):
+        """Root mean square, of a perfect lens's noise beside its signals: over all receptors, and over those that see
+        an object."""
+        signals = sim.BatchedRenderer(
+            self.world, self.eyes, self.state.n, sim.Fidelity(samples, BANDS, samples=kind)
+        ).signals(self.state)
+        error = (signals - self.truth).transpose(0, 1, 3, 4, 2) / SIGMA / self.eyes.eye().throughput
+        seen = error[self.on_object]
+        return np.sqrt(np.mean(error**2)), np.sqrt(np.mean(seen**2)) if seen.size else 0.0
+
+
+@pytest.fixture(scope="module")
+def cases():
+    worlds = {
+        "detection, a = 1/4": ("detection", behind_lens(EYES, 0.25), 256),
+        "detection, a = 1/2": ("detection", behind_lens(EYES, 0.5), 256),
+        "detection, hole": ("detection", HOLE, 64),
+        "maze, a = 0.8": ("maze", behind_lens(ROW, 0.8), 1024),
+    }
+    found = {}
+    for name, (task, eyes, rays) in worlds.items():
+        world = build_world(task)
+        state = views(world)
+        truth = sim.BatchedRenderer(world, eyes, state.n, sim.Fidelity(rays, BANDS)).signals(state)
+        found[name] = Case(world, eyes, state, truth, sees_object(world, eyes, state))
+    return found
+
+
+# Largest errors over all receptors and over those that see an object, about a quarter more than measured with these
+# views.
+TOLERANCE = {
+    ("detection, a = 1/4", 1): (0.224, 0.51),
+    ("detection, a = 1/2", 1): (0.156, 0.38),
+    ("detection, a = 1/2", 4): (0.096, 0.236),
+    ("detection, hole", 1): (0.605, 1.28),
+    ("detection, hole", 4): (0.255, 0.52),
+    ("maze, a = 0.8", 1): (0.82, 0.0),
+    ("maze, a = 0.8", 4): (0.18, 0.0),
+}
+
+
+@pytest.mark.parametrize(("name", "areas"), list(TOLERANCE))
+def test_areas_see_what_very_many_rays_see(cases, name, areas):
+    everywhere, on_objects = cases[name].errors(areas)
+    assert everywhere <= TOLERANCE[name, areas][0]
+    assert on_objects <= TOLERANCE[name, areas][1]
+
+
+@pytest.mark.parametrize(("name", "rays"), [("detection, a = 1/4", 8), ("detection, a = 1/2", 8), ("maze, a = 0.8", 8)])
+def test_one_area_errs_less_than_many_rays(cases, name, rays):
+    """Over all receptors, and over those that see an object."""
+    pairs = zip(cases[name].errors(1), cases[name].errors(rays, "rays"), strict=True)
+    assert all(by_areas < by_rays / 2 for by_areas, by_rays in pairs if by_rays)
+
+
+def sharp(self, fields, receptors, right=field_areas.FieldAreas.weights):
+    """As if the pupil did not blur."""
+    weights = right(self, fields, receptors)
+    return (weights == weights.max(axis=2, keepdims=True)) * fields.power[:, None, None]
+
+
+def of_another_band(self, fields, receptors, right=field_areas.FieldAreas.weights):
+    return right(self, fields, receptors)[::-1]
+
+
+@pytest.mark.parametrize(
+    ("mutant", "name", "areas"),
+    [
+        (sharp, "detection, hole", 1),
+        (sharp, "detection, a = 1/4", 1),
+        (of_another_band, "detection, hole", 4),
+    ],
+)
+def test_wrong_matrices_are_noticed(cases, monkeypatch, mutant, name, areas):
+    monkeypatch.setattr(field_areas.FieldAreas, "weights", mutant)
+    everywhere, on_objects = cases[name].errors(areas)
+    tolerance = TOLERANCE[name, areas]
+    assert everywhere > tolerance[0] or on_objects > tolerance[1], (everywhere, on_objects)
+
+
+def test_the_kernel_is_recorded_once(cases):
+    case = cases["detection, a = 1/2"]
+    renderer = sim.BatchedRenderer(case.world, case.eyes, case.state.n, sim.Fidelity(1, BANDS, samples="areas"))
+    first = renderer.signals(case.state)
+    other = renderer.signals(views(case.world, seed=1))
+    assert renderer.recordings == 1
+    assert np.abs(first - other).max() > 0.02
+    np.testing.assert_array_equal(renderer.signals(case.state), first)
