@@ -8,7 +8,8 @@ BatchedRenderer                     all eyes of all worlds as one wavefront
 choose_fidelity, Fidelity           how finely: as the receptors' noise allows
 FidelityWarning                     where nothing is fine enough
 ReferenceRenderer                   the same, slowly: Mitsuba's integrators and optics' convolution
-ModelRenderer, Mount, Poses         eyes on any model of one's own; ring, both_sides: of several
+ModelRenderer, Mount, Poses         eyes on any model of one's own; fan, ring, both_sides: of several
+choose_model_fidelity               how finely eyes on a model see
 Task                                what a robot of one's own has to do: for make_vec_env
 make_vec_env, make_env              the environments, natively batched or single
                                     (also gymnasium.make("rhabdom/Detection-v0"), Foraging, Maze ...)
@@ -33,8 +34,9 @@ if TYPE_CHECKING:
     from sim.render.fidelity import Fidelity
     from sim.render.fidelity_choice import FidelityWarning, choose_fidelity
     from sim.render.reference_renderer import ReferenceRenderer
+    from sim.robots.model_fidelity import choose_model_fidelity
     from sim.robots.model_renderer import ModelRenderer
-    from sim.robots.mounts import Mount, both_sides, ring
+    from sim.robots.mounts import Mount, both_sides, fan, ring
     from sim.robots.poses import Poses
     from sim.robots.task import Task
     from sim.scene.mirror import Mirror, MirrorWarning, mirror
@@ -52,8 +54,10 @@ _HOME = {
     "BatchedRenderer": "sim.render.batched_renderer",
     "ReferenceRenderer": "sim.render.reference_renderer",
     "ModelRenderer": "sim.robots.model_renderer",
+    "choose_model_fidelity": "sim.robots.model_fidelity",
     "Mount": "sim.robots.mounts",
     "both_sides": "sim.robots.mounts",
+    "fan": "sim.robots.mounts",
     "ring": "sim.robots.mounts",
     "Poses": "sim.robots.poses",
     "Task": "sim.robots.task",
@@ -86,6 +90,8 @@ __all__ = [
     "both_sides",
     "build_world",
     "choose_fidelity",
+    "choose_model_fidelity",
+    "fan",
     "make_env",
     "make_vec_env",
     "mirror",

@@ -23,6 +23,7 @@ from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, SIDE, gene_table
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.fitness import evaluate
+from evolve.learning.worlds import own_task_for
 from evolve.search.loop import evolve as carry
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
@@ -44,6 +45,7 @@ SMALL = (
 OBLONG = ("genome.resolution_height.start=4", "genome.resolution_width.start=4")  # genes that square eyes have not
 PERFECT = ("eye.optics=false",)
 SQUARE = ("eye.square=true", "genome.resolution.start=4", *PERFECT)
+OWN = f"{Path(__file__).parents[1] / 'examples' / 'find_ball.py'}:FindBall"
 FOUR_TYPES = ("eye.receptors=genes", "genome.receptor_types.start=4", *PERFECT)
 
 
@@ -66,6 +68,15 @@ def life(config, animal):
 def sight(config, animal):
     """What the animal sees when it comes into its world."""
     worlds = sim.make_vec_env(config.task, animal.eyes(config.eye), 1, 7, memory=animal.memory_frames)
+    try:
+        return worlds.reset()["eyes"].tobytes()
+    finally:
+        worlds.close()
+
+
+def own_sight(config, animal):
+    """The same in a task of one's own."""
+    worlds = sim.make_vec_env(own_task_for(animal, config), n_envs=1, seed=7, memory=animal.memory_frames)
     try:
         return worlds.reset()["eyes"].tobytes()
     finally:
@@ -196,6 +207,7 @@ DOE = {name: point_image for name in GENES if name.startswith("doe_")}
 GENE_OUTPUTS = {
     "n_eyes": sight,
     "placement_range_deg": sight,
+    "elevation_deg": own_sight,
     "fov_deg": sight,
     "resolution_height": sight,
     "resolution_width": sight,
@@ -234,6 +246,8 @@ def _names(cls, prefix=""):
     for f in fields(cls):
         if f.name == "genome":
             yield from (f"genome.GENE.{part.name}" for part in fields(GeneConfig))
+        elif f.name in ("own", "task_sha256"):
+            continue  # text of a task of one's own, and its hash: tests/evolve/config/test_own_task.py
         elif f.name in SECTIONS:
             yield from _names(SECTIONS[f.name], f"{f.name}.")
         else:
@@ -260,7 +274,7 @@ def test_every_setting_moves_its_output(name):
 def test_every_gene_moves_its_output(name):
     output = GENE_OUTPUTS[name]
     spectral = ALL_GENES[name].cluster == "spectral"
-    task = "foraging" if spectral else "detection"  # of the tasks, foraging alone is not grey
+    task = "foraging" if spectral else OWN if output is own_sight else "detection"  # foraging alone is not grey
     given = FOUR_TYPES if spectral else SQUARE if name == SIDE else () if output is point_image else PERFECT
     before = _settled(output, task, given)
     config = small(task, (*given, f"genome.{name}.open=true"))

@@ -1,7 +1,8 @@
 """What a run's record and its animals say.
 
-statistics  per generation; acuity, confidence
-genealogy   who came from whom
-vision      what the best eyes see
-episode     Episode: one episode, recorded
+statistics      per generation; acuity, confidence
+genealogy       who came from whom
+vision          what the best eyes see
+episode         Episode: one episode, recorded
+filmed_episode  FilmedEpisode: one in a task of somebody's own
 """

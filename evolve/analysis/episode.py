@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 import sim
+from evolve.analysis.filmed_episode import FilmedEpisode, film
 from evolve.config.formats import task_then
 from evolve.config.run_config import EyeConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
@@ -19,6 +20,7 @@ from evolve.genome.plain_values import parsed
 from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
 from evolve.store import regular_files
 from evolve.store.atomic_files import write_whole
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, RunError
 from evolve.store.policies import require_policy
 from sim.worlds.state import WorldState, concatenate
@@ -123,20 +125,27 @@ def _arrays(path: Path | str) -> dict[str, Any]:
             return dict(file)
 
 
-def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_every: int = 8) -> Episode:
-    """Let a candidate (default: the best) play one evaluation episode; same arguments, same episode, bit for bit.
+def record(
+    run: Run, candidate_id: int | None = None, seed: int = 0, radiance_every: int = 8
+) -> Episode | FilmedEpisode:
+    """Let a candidate (default: the best) play one evaluation episode; same arguments, same episode, bit for bit. In a
+    task of somebody's own it is filmed.
 
     radiance_every: actions between two pictures of the scene's radiance
 
     Raises:
         RunError: there is no such candidate, or its policy is missing or no policy.
+        ConfigError: the task is somebody's own, and has not been named.
     """
     candidate = run.candidate(candidate_id)
     require_policy(candidate, run.policy_path(candidate.id))
+    own = run.config.own_task
     try:
         policy = load_policy(run.policy_path(candidate.id))
     except ValueError as error:
         raise RunError(str(error)) from error
+    if own is not None:
+        return _filmed(run, candidate, policy, seed, radiance_every)
     eyes = candidate.phenotype.eyes(run.config.eye)
     worlds = sim.make_vec_env(
         run.config.task,
@@ -169,6 +178,16 @@ def record(run: Run, candidate_id: int | None = None, seed: int = 0, radiance_ev
         **columns,
         **views,
     )
+
+
+def _filmed(run: Run, candidate: Candidate, policy: EyePolicy, seed: int, radiance_every: int) -> FilmedEpisode:
+    animal, space = candidate.phenotype, policy.observation_space["eyes"].shape
+    if space[:2] != (animal.memory_frames, animal.n_eyes) or space[3:] != animal.resolution:
+        raise RunError(f"{run.policy_path(candidate.id)} is another animal's: it sees {space}")
+    try:
+        return film(animal, run.config, policy, candidate.id, seed, radiance_every)
+    except TrainingDiverged as error:
+        raise RunError(f"{run.policy_path(candidate.id)} is damaged: {error}") from error
 
 
 def _require_fit(policy: EyePolicy, worlds: Any, path: Path) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.genome.genes import LAMBDA_MAX
+from evolve.genome.genes import LAMBDA_MAX, TILT
 from evolve.genome.phenotype import Phenotype
 
 if TYPE_CHECKING:
@@ -144,6 +144,7 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
     values = {
         "n_eyes": float(phenotype.n_eyes),
         "placement_range_deg": phenotype.placement_range_deg,
+        **({} if phenotype.elevation_deg is None else {TILT: phenotype.elevation_deg}),
         "fov_deg": phenotype.fov_deg,
         "resolution_height": float(height),
         "resolution_width": float(width),

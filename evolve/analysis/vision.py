@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 
 import optics
 import sim
+from evolve.analysis.filmed_episode import moments
 from evolve.analysis.statistics import eye_image_quality, polychromatic, psnr
+from evolve.config.own_task import is_own
 from evolve.config.run_config import RunConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
+from evolve.learning.worlds import own_task_for
+from sim.envs.task_fidelity import fidelity_of
 
 __all__ = ["Vision", "ssim", "vision"]
 
@@ -43,7 +47,9 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
     eyes = animal.eyes(config.eye)
     try:
         quality, contrast = eye_image_quality(animal, config.eye), _contrast(eyes.eye())
-        seen, perfect = seen_and_perfect(eyes, config.task, config.world)
+        seen, perfect = (
+            _own_views(animal, config) if is_own(config.task) else seen_and_perfect(eyes, config.task, config.world)
+        )
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)
     gain = 1 / float(eyes.eye().throughput)
@@ -63,6 +69,18 @@ def seen_and_perfect(eyes: sim.Eyes, task: str, world: WorldConfig | None = None
         worlds.close()
     seen, sharp = (
         sim.BatchedRenderer(built, e, SCENES, sim.Fidelity(RAYS, e.bands)).signals(states) for e in (eyes, perfect)
+    )
+    return np.asarray(seen), np.asarray(sharp)
+
+
+def _own_views(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
+    """The same in a task of somebody's own."""
+    task = own_task_for(animal, config)
+    model, poses = moments(task, SCENES, 0)
+    fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
+    seen, sharp = (
+        sim.ModelRenderer(model, eye, task.mounts, SCENES, fidelity, spectra=task.spectra).signals(poses)
+        for eye in (task.eye, replace(task.eye, pupil=None))
     )
     return np.asarray(seen), np.asarray(sharp)
 

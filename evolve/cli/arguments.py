@@ -28,6 +28,7 @@ EXAMPLES = {
   evolve run navigation --dry-run                           genes, hours and disk; nothing is begun
   evolve run detection --set search.generations=10 --out runs/first
   evolve run foraging --from runs/first:12                  from an animal of another run
+  evolve run ant_seeks.py:AntSeeks --preset quick           a task of your own
 """,
     "demo": "  evolve demo --open\n  evolve demo --out elsewhere\n",
     "resume": "  evolve resume runs/first --open\n",
@@ -123,6 +124,7 @@ def _add_runs(commands: Commands) -> None:
         "--dry-run", action="store_true", help="print the plan with the hours and disk space it needs, then stop"
     )
     resume = _command(commands, "resume", "run.resume", "continue an interrupted run", directory=True)
+    _add_task(resume)
     for command in (run, resume):
         told = command.add_mutually_exclusive_group()
         told.add_argument("--json", action="store_true", help="print one line of JSON per event")
@@ -155,7 +157,8 @@ def _add_settings(command: argparse.ArgumentParser) -> None:
         "task",
         metavar="TASK",
         nargs="?",
-        help="task to evolve for; not needed if the preset sets one (list: evolve tasks)",
+        help="task to evolve for, or FILE.py:CLASS, one of your own; not needed if the preset sets one (list: evolve "
+        "tasks)",
     )
     command.add_argument(
         "--preset",
@@ -194,6 +197,7 @@ def _add_products(commands: Commands) -> None:
         ("export", "write what the best agent sees as spectral EXR files", "DIR"),
     ):
         product = _command(commands, name, f"products.{name}", meaning, directory=True)
+        _add_task(product)
         if name != "report":
             product.add_argument("--candidate", type=int, metavar="ID", help="candidate to play (default: the best)")
             product.add_argument("--seed", type=_seed, default=0, help="seed of the episode (default: 0)")
@@ -212,6 +216,13 @@ def _add_products(commands: Commands) -> None:
     )
     demo.add_argument("--open", action="store_true", help="open the report in a browser")
     _add_voice(demo)
+
+
+def _add_task(command: argparse.ArgumentParser) -> None:
+    """Code of a run's own task runs only if it is named."""
+    command.add_argument(
+        "--task", metavar="FILE.py:CLASS", help="the run's task, where it is one of your own: allows its code to run"
+    )
 
 
 def _add_voice(command: argparse.ArgumentParser) -> None:

@@ -10,6 +10,7 @@ lint           what is odd, though nothing forbids it
 relief_starts  where the genes of a relief start
 formats        formats of config.toml, and how former ones are read
 square_eyes    one gene for both sides of an eye
+own_task       a task of somebody's own, as text
 numbering      which id belongs to which generation
 tasks/         what a task sets unless a run says otherwise
 """

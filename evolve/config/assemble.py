@@ -11,18 +11,19 @@ from typing import Any
 
 from evolve.config.checks import check_gene_value, check_value, suggestion
 from evolve.config.formats import FORMAT, format_of, upgraded
+from evolve.config.own_task import OwnTask, is_own, looks_own
 from evolve.config.provenance import Source
 from evolve.config.relief_starts import no_such_gene, with_relief
 from evolve.config.run_config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
 from evolve.config.sources import parsed_toml, preset_sources, read_assignment, read_toml, task_defaults
 from evolve.config.square_eyes import no_such_side, with_square_eyes
-from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, SIDE, SIDES, GeneConfig, group_members
+from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, SIDE, SIDES, TILT, GeneConfig, group_members
 
 __all__ = ["assemble", "from_text", "from_toml", "to_toml"]
 
 Tree = dict[str, Any]
 GENE_FIELDS = tuple(f.name for f in fields(GeneConfig))
-TOP_LEVEL = ("task", "seed", "workers")
+TOP_LEVEL = ("task", "seed", "workers", "task_sha256")
 SETTINGS = (*TOP_LEVEL, *(f"{section}.{f.name}" for section, cls in SECTIONS.items() for f in fields(cls)))
 
 
@@ -36,7 +37,7 @@ def assemble(
 ) -> RunConfig:
     """A run's configuration from all its sources; `task` and `assignments` ("search.population=8") win.
 
-    task: may be missing where preset or file names one
+    task: one of TASKS, or FILE.py:CLASS; may be missing where preset or file names one
     starts: where the genes start instead, as `evolve.cli.start_from` reads it from another run
     scale: how much of its work a preset does, where it comes in several: one of SCALES, "laptop" if not given
 
@@ -44,10 +45,14 @@ def assemble(
         ConfigError: unknown key, wrong type, value out of range, contradiction, unreadable file; one line that names
             key, value, what is allowed, and where it was set.
     """
-    asked = [_of_this_format(read_toml(file))] if file is not None else []
+    own = OwnTask.read(task) if task is not None and looks_own(task) else None
+    asked = [_asked_for(read_toml(file), own)] if file is not None else []
     if starts is not None:
         asked.append(starts)
-    asked += [read_assignment(text) for text in assignments]
+    asked += [_asked_for(read_assignment(text), own) for text in assignments]
+    if own is not None:
+        asked.append(Source("", {"task": own.label, "task_sha256": own.sha256}))
+        return replace(_assembled(None, preset_sources(preset, scale), asked), own=own)
     return _assembled(task, preset_sources(preset, scale), asked)
 
 
@@ -84,18 +89,28 @@ def _read_back(written: Source) -> RunConfig:
     return _assembled(None, [], [replace(written, tree=upgraded(written.tree))])
 
 
-def _of_this_format(source: Source) -> Source:
-    """What somebody asks for, maybe with another run's config.toml."""
+def _asked_for(source: Source, own: OwnTask | None) -> Source:
+    """What somebody asks for, maybe with another run's config.toml: of this format, and naming no code to run, which
+    only the command itself does."""
+    if looks_own(source.tree.get("task")) and own is None:
+        raise ConfigError(
+            f"{source.name}: task = {source.tree['task']!r}: a file names no code to run: say evolve run FILE.py:CLASS",
+            "task",
+        )
     if "format" in source.tree and format_of(source.tree) != FORMAT:
         raise ConfigError(f"{source.name}: format = {source.tree['format']}: must be {FORMAT}", "format")
-    return replace(source, tree={key: value for key, value in source.tree.items() if key != "format"})
+    known = ("format", "task", "task_sha256") if own else ("format",)
+    return replace(source, tree={key: value for key, value in source.tree.items() if key not in known})
 
 
 def to_toml(config: RunConfig) -> str:
     """TOML text with every setting; `from_toml` reads it back equal."""
     import tomli_w
 
-    tree = {"format": FORMAT, **asdict(config)}
+    tree = {"format": FORMAT, **asdict(replace(config, own=None))}
+    del tree["own"]
+    if not config.task_sha256:
+        del tree["task_sha256"]
     for name, use in tree["genome"].items():
         if ALL_GENES[name].kind == "integer":
             use.update({key: int(use[key]) for key in ("low", "high", "start")})
@@ -122,7 +137,7 @@ def _blamed(error: ConfigError, layers: Iterable[Source]) -> str:
 
 def _checked_entry(key: str, value: Any) -> Any:
     if key == "task":
-        if not isinstance(value, str) or value not in TASKS:
+        if not is_own(value) and (not isinstance(value, str) or value not in TASKS):
             raise ConfigError(f"unknown task {str(value)!r}; {suggestion(str(value), TASKS)}", key)
         return value
     if key in TOP_LEVEL:
@@ -176,22 +191,28 @@ def _merge(below: Tree, above: Tree) -> Tree:
     return merged
 
 
-def _require_genes(source: Source, eye: EyeConfig) -> None:
+def _require_genes(source: Source, eye: EyeConfig, own: bool) -> None:
     """Genes that are named one by one must be genes of such eyes."""
     for name in with_relief(source.tree, eye).get("genome", {}):
         if name in (SIDE, *SIDES) and name not in eye.genes:
             raise ConfigError(no_such_side(name, eye, not source.name), f"genome.{name}", "eye.square")
+        if name == TILT and not own:
+            raise ConfigError(
+                f"genome.{TILT}: is for tasks of one's own; in others eyes look along the floor",
+                *(f"genome.{TILT}", "task"),
+            )
         if name in ALL_GENES and name not in eye.genes:
             raise ConfigError(no_such_gene(name, eye), f"genome.{name}", "eye.relief_points", "eye.relief_symmetric")
 
 
 def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
     """RunConfig from checked trees, later ones winning, defaults filled in."""
-    eye = EyeConfig(**_merged(trees).get("eye", {}))
-    table = eye.genes
+    asked = _merged(trees)
+    eye, own = EyeConfig(**asked.get("eye", {})), is_own(asked.get("task"))
+    table = {name: gene for name, gene in eye.genes.items() if own or name != TILT}
     layers = [with_square_eyes(source, eye) for source in layers]
     for source in layers:
-        _require_genes(source, eye)
+        _require_genes(source, eye, own)
     tree = _merged([with_relief(_checked(source), eye) for source in layers])
     sections = {name: cls(**tree.get(name, {})) for name, cls in SECTIONS.items()}
     genes = tree.get("genome", {})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from evolve.config.own_task import is_own
 from evolve.config.run_config import RunConfig
 from evolve.genome.genes import INHERITED, LAMBDA_MAX
 
@@ -22,7 +23,7 @@ def lint(config: RunConfig) -> list[str]:
 
 def coarse_bands(config: RunConfig) -> list[str]:
     """A line where the bands misjudge the world's measured spectra by more than a receptor's noise."""
-    if config.task in GREY_TASKS:
+    if config.task in GREY_TASKS or is_own(config.task):
         return []
     from sim.render.band_error import band_error, measured
     from sim.worlds.world import build_world
@@ -70,7 +71,7 @@ def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
 
 def idle_genes(config: RunConfig) -> list[str]:
     """Open genes that have no effect because of how other genes are fixed, one line each."""
-    uses, table = config.genome, config.eye.genes
+    uses, table = config.genome, config.genes
     notes = []
     if uses["placement_range_deg"].open and not uses["n_eyes"].open and uses["n_eyes"].start == 1:
         notes.append("genome.placement_range_deg is open but has no effect: genome.n_eyes is fixed at 1")
@@ -98,7 +99,7 @@ def idle_starts(config: RunConfig) -> list[str]:
         unread["spectral"] = f"eye.receptors = {config.eye.receptors}, not {INHERITED}"
     notes = []
     for cluster, why in unread.items():
-        genes = [gene for gene in config.eye.genes.values() if gene.cluster == cluster]
+        genes = [gene for gene in config.genes.values() if gene.cluster == cluster]
         given = [g.name for g in genes if config.genome[g.name].start != g.default.start]
         if given:
             names = ", ".join(given if len(given) < SHOWN else [*given[: SHOWN - 1], "..."])

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from evolve.config.checks import ConfigError
+from evolve.config.own_task import OwnTask, is_own
 from evolve.config.settings import (
     SECTIONS,
     EvaluationConfig,
@@ -17,7 +19,7 @@ from evolve.config.settings import (
     setting,
 )
 from evolve.genome import anatomy
-from evolve.genome.genes import CLUSTERS, GENES, INHERITED, Gene, GeneConfig
+from evolve.genome.genes import CLUSTERS, GENES, INHERITED, TILT, Gene, GeneConfig
 from evolve.genome.interval import Interval
 from optics.spectra.receptors import RECEPTORS
 from sim.worlds.catalog import COURSES, TASKS
@@ -35,12 +37,17 @@ __all__ = [
     "WorldConfig",
 ]
 
+# What only our own agents have: a speed and a turn, contact with walls, a course. Their body stands level.
+OF_OUR_AGENTS = ("learning.first_speed", "learning.contact_ramp", "learning.least_return")
 LEAST_EXPOSURE = 2e-4  # [lx s]: of some 30 photons from white at a = 1; of few, noise is not what it is taken for
 
 
 @dataclass(frozen=True)
 class RunConfig:
     """Everything that decides a run's outcome, and how many processes work on it.
+
+    task: one of TASKS, or FILE.py:CLASS, a `sim.Task` of somebody's own
+    own: that task, if whoever works with this config has named it: nothing of it is executed otherwise
 
     Raises:
         ConfigError: settings that contradict each other.
@@ -49,23 +56,24 @@ class RunConfig:
     task: str
     seed: int = setting(0, Interval(0, 2**63 - 1), "seed of search, training and evaluation")
     workers: int = setting(0, Interval(0, 1024), "worker processes; 0: one per core")
+    task_sha256: str = setting("", None, "of the file of a task of one's own: another text is another task")
     eye: EyeConfig = field(default_factory=EyeConfig)
     world: WorldConfig = field(default_factory=WorldConfig)
-    genome: Mapping[str, GeneConfig] = field(default_factory=lambda: {name: g.default for name, g in GENES.items()})
+    genome: Mapping[str, GeneConfig] = field(default_factory=lambda: _default_genome())
     search: SearchConfig = field(default_factory=SearchConfig)
     learning: LearningConfig = field(default_factory=LearningConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+    own: OwnTask | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        if self.task not in TASKS:
-            raise ConfigError(f"task = {self.task!r}: must be one of {', '.join(TASKS)}", "task")
+        self._check_task()
         if self.eye.receptors not in (known := (*RECEPTORS, INHERITED)):
             raise ConfigError(
                 f"eye.receptors = {self.eye.receptors!r}: must be one of {', '.join(known)}", "eye.receptors"
             )
         self._check_light()
         self._check_world()
-        for name, gene in self.eye.genes.items():
+        for name, gene in self.genes.items():
             _check_gene_use(gene, self.genome[name])
         self._check_clusters()
         self._check_phases()
@@ -85,6 +93,25 @@ class RunConfig:
         if (cramped := anatomy.contradiction(self.genome, self.eye)) is not None:
             message, keys = cramped
             raise ConfigError(message, *keys)
+
+    def _check_task(self) -> None:
+        own = is_own(self.task)
+        if not own and self.task not in TASKS:
+            raise ConfigError(
+                f"task = {self.task!r}: must be one of {', '.join(TASKS)}, or FILE.py:CLASS, one of your own", "task"
+            )
+        if (re.fullmatch("[0-9a-f]{64}", self.task_sha256) is None) if own else self.task_sha256:
+            needs = "the SHA-256 of the file, 64 digits" if own else "empty, as no file belongs to this task"
+            raise ConfigError(f"task_sha256 = {self.task_sha256!r:.80}: must be {needs}", "task_sha256", "task")
+        if not own and TILT in self.genome:
+            raise ConfigError(
+                f"genome.{TILT}: is for tasks of one's own; in {self.task} eyes look along the floor",
+                *(f"genome.{TILT}", "task"),
+            )
+        for key in OF_OUR_AGENTS if own else ():
+            section, name = key.split(".")
+            if getattr(getattr(self, section), name) != getattr(SECTIONS[section], name):
+                raise ConfigError(f"{key}: is for rhabdom's own agents, not for {self.task}", key, "task")
 
     def _check_world(self) -> None:
         """Only what the task's world has may be set."""
@@ -114,7 +141,7 @@ class RunConfig:
 
     def _check_clusters(self) -> None:
         """Something must be open, and nothing that the run leaves out."""
-        genes = [gene for name, gene in self.eye.genes.items() if self.genome[name].open]
+        genes = [gene for name, gene in self.genes.items() if self.genome[name].open]
         opened = {
             cluster: [f"genome.{gene.name}.open" for gene in genes if gene.cluster == cluster] for cluster in CLUSTERS
         }
@@ -174,9 +201,56 @@ class RunConfig:
         return f"<RunConfig {self.task}, seed {self.seed}, {plan}>"
 
     @property
+    def genes(self) -> Mapping[str, Gene]:
+        """Every gene that this run's animals have, by name."""
+        return {name: gene for name, gene in self.eye.genes.items() if name in self.genome}
+
+    @property
+    def task_name(self) -> str:
+        """In a few letters: "detection"; the class of a task of one's own."""
+        return self.task.rpartition(":")[2]
+
+    @property
+    def own_task(self) -> OwnTask | None:
+        """The task of one's own that animals of this run live in; None: one of TASKS.
+
+        Raises:
+            ConfigError: it has not been named, so that its code must not run.
+        """
+        if is_own(self.task) and self.own is None:
+            raise ConfigError(
+                f"this run evolves {self.task}, whose code runs only if you name it: add --task {self.task} "
+                "(or the file's path where it is now)"
+            )
+        return self.own
+
+    def with_own_task(self, named: str) -> RunConfig:
+        """The same, with the code of its task named: "FILE.py:CLASS".
+
+        Raises:
+            ConfigError: the run has no such task, the class has another name, or the file has changed.
+        """
+        if not is_own(self.task):
+            raise ConfigError(f"--task {named}: this run's task, {self.task}, is rhabdom's own: leave it out")
+        own = OwnTask.read(named)
+        if own.name != self.task_name:
+            raise ConfigError(f"--task {named}: this run evolves {self.task}, not {own.name}")
+        if own.sha256 != self.task_sha256:
+            raise ConfigError(
+                f"--task {named}: {own.file.name} has changed since the run began (SHA-256 {own.sha256[:12]}..., was "
+                f"{self.task_sha256[:12]}...): bring the old text back, or begin a new run"
+            )
+        return replace(self, own=own)
+
+    @property
     def candidates(self) -> int:
         """Evaluations in the whole run."""
         return self.search.population * self.search.generations
+
+
+def _default_genome() -> Mapping[str, GeneConfig]:
+    """Of animals in rhabdom's own tasks."""
+    return {name: gene.default for name, gene in GENES.items() if name != TILT}
 
 
 def _check_gene_use(gene: Gene, use: GeneConfig) -> None:

@@ -24,6 +24,7 @@ __all__ = [
     "RELIEF_POINTS",
     "SIDE",
     "SIDES",
+    "TILT",
     "Gene",
     "GeneConfig",
     "gene_table",
@@ -37,6 +38,7 @@ FAMILIES = ("doe", "lambda_max")  # genes of one kind: what their names begin wi
 RELIEF_POINTS = Interval(4, 9)  # of a relief along one side; names of its genes have a digit for each side
 SIDE = "resolution"  # of a square eye, which has it in place of the two
 SIDES = ("resolution_height", "resolution_width")
+TILT = "elevation_deg"  # of eyes on bodies of somebody's own; rhabdom's own agents look along the floor
 REAL: Literal["real"] = "real"
 INTEGER: Literal["integer"] = "integer"
 APERTURE_SHAPES = ("circle", "annulus", "slit", "triangle", "square", "pentagon", "hexagon")
@@ -119,6 +121,7 @@ def _body() -> list[Gene]:
     return [
         gene("n_eyes", INTEGER, (1, 32), (1, 16, 1), "", "eyes around the body"),
         gene("placement_range_deg", REAL, (0, 180), (0, 180, 90), "deg", "arc over which the eyes are spread"),
+        _held(gene(TILT, REAL, (-90, 90), (-60, 60, 0), "deg", "how far eyes look up; in tasks of one's own")),
         gene("fov_deg", REAL, (1, 100), (1, 100, 45), "deg", "an eye's horizontal field of view"),
         gene("resolution_height", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, top to bottom"),
         gene("resolution_width", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, left to right"),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evolve.genome.anatomy import Sizes, fitted, retina_width, sides
-from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, GeneConfig
+from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, TILT, GeneConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype_on_record import checked_fields
 from evolve.genome.relief_genes import representatives
@@ -70,6 +70,7 @@ class Phenotype:
     `relief` holds N x N heights in [0, 1], row-major (y, x): for N = 4 control points of a bicubic B-spline patch, for
     more the heights at cell centres that a cubic spline goes through.
     `aperture_shape` is a place in APERTURE_SHAPES, `dispersion` the inverse of the relief's Abbe number.
+    `elevation_deg` is how far its eyes look up; None in rhabdom's own tasks, where they look along the floor.
     `encoder` is the width of the layers that each eye's signals go through first.
     `lambda_max_nm` are the peaks of its receptor types' pigments; None: the receptors that all eyes of the run have.
     """
@@ -88,6 +89,7 @@ class Phenotype:
     layers: int = 2
     lambda_max_nm: tuple[float, ...] | None = None
     encoder: int = FORMER_ENCODER
+    elevation_deg: float | None = None
 
     def pupil(self, eye: EyeSettings) -> optics.Pupil | None:
         """Pupil of each of the eyes; None for the perfect lens."""
@@ -159,6 +161,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
         layers=int(values["layers"]),
         lambda_max_nm=peaks if config.eye.receptors == INHERITED else None,
         encoder=ceil(values["neurons"] / NEURONS_PER_FEATURE),
+        elevation_deg=values.get(TILT),
     )
 
 

@@ -34,7 +34,7 @@ def run(
 
     The record is the same, whoever began the run: `evolve status`, `resume` and `report` know it too.
 
-    task: to evolve for; may be missing where the preset names one
+    task: to evolve for, or "FILE.py:CLASS", one of your own; may be missing where the preset names one
     preset: settings to start from: "quick" (minutes), "paper" (a day), or an experiment
     settings: by their dotted names, {"search.generations": 2, "seed": 1}; they override all others
     config: TOML file of settings, which override the preset's
@@ -54,7 +54,12 @@ def run(
     chosen = assemble(task, preset, None if config is None else Path(config), assignments, starts, scale)
     Search(chosen)  # an unknown optimizer, say, is refused before anything is written
     device.make_ready()
-    directory = Path(out) if out is not None else next_directory(chosen.task, preset.removesuffix(f"-{chosen.task}"))
+    if chosen.own_task is not None:
+        from evolve.learning.task_trial import try_task
+
+        try_task(chosen)
+    named = chosen.task_name, preset.removesuffix(f"-{chosen.task}")
+    directory = Path(out) if out is not None else next_directory(*named)
     begun = OpenedRun.create(directory, chosen, starts.name.removeprefix("--from ") if starts else None)
     with begun.lock():
         carry_on(begun, callbacks, progress)

@@ -1,6 +1,9 @@
 """One lifetime: an animal learns its task.
 
 fitness           evaluate: a candidate's whole life
+worlds            where an animal lives
+task_module       a task of somebody's own, executed
+task_trial        the same, tried for a moment
 ppo               PPO, its settings' meaning, early stopping
 policy            actor and critic, stored and loaded
 eye_features      the network behind each eye

@@ -15,10 +15,8 @@ from evolve.learning.checkpoint import Checkpoint, load_checkpoint, save_checkpo
 from evolve.learning.policy import Brain, TrainingDiverged, save_policy
 from evolve.learning.ppo import Episodes, Progress, Training, Worlds, play, train
 from evolve.learning.training_stage import TrainingStage
+from evolve.learning.worlds import worlds_of
 from evolve.store.evaluation import Evaluation
-from sim.envs.assembly import prepared_scene, vec_env_in
-from sim.envs.vec_env import EyesVecEnv
-from sim.render.fidelity_choice import fidelity_for
 
 __all__ = ["evaluate"]
 
@@ -88,28 +86,12 @@ def _live(
     """Training, and the evaluation episodes after it, from starts and objects' places never seen before. Mazes are
     the same for all of a run, and of all runs."""
     weights, *seeds = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
-    lessons, checkpoints, finals = _worlds(phenotype, config, *seeds)
-    with closing(lessons), closing(checkpoints), closing(finals):
+    places = worlds_of(phenotype, config, *seeds)
+    with (
+        closing(places.lessons) as lessons,
+        closing(places.checkpoints) as checkpoints,
+        closing(places.finals) as finals,
+    ):
         brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder)
         training = train(Worlds(lessons, checkpoints), brain, config.learning, weights, progress, begun)
         return training, play(training.policy, finals, seeds[1])
-
-
-def _worlds(
-    phenotype: Phenotype, config: RunConfig, learning: int, evaluation: int
-) -> tuple[EyesVecEnv, EyesVecEnv, EyesVecEnv]:
-    """Worlds to learn in, to try out in meanwhile, and to measure fitness in, of two seeds. All have the same light;
-    the first two take no more rays than are good enough to learn from, as their noise averages out."""
-    eyes, memory, wanted = phenotype.eyes(config.eye), phenotype.memory_frames, config.learning
-    scene = prepared_scene(config.task, eyes, **config.world.evaluation)
-    fine = fidelity_for(scene, config.eye.rays_per_receptor)
-    coarse = replace(fine, rays_per_receptor=min(fine.rays_per_receptor, wanted.rays_per_receptor))
-    same_place = config.world.training == config.world.evaluation
-    school = scene if same_place else prepared_scene(config.task, eyes, **config.world.training)
-    checkpoints, finals = (
-        vec_env_in(scene, how, config.evaluation.episodes, evaluation, memory=memory, mode="evaluation")
-        for how in (coarse, fine)
-    )
-    least = wanted.least_return or None
-    lessons = vec_env_in(school, coarse, wanted.n_envs, learning, memory=memory, least_return=least)
-    return lessons, checkpoints, finals

@@ -24,7 +24,7 @@ from torch import Tensor
 
 from evolve.genome.phenotype import FORMER_ENCODER
 from evolve.learning.adam import Adam
-from evolve.learning.eye_features import UNITS, EyeFeatures
+from evolve.learning.eye_features import UNITS, EyeFeatures, known_beside_eyes
 from evolve.learning.tensor_file import read_tensors
 from evolve.store.atomic_files import write_whole
 
@@ -53,21 +53,56 @@ class PolicyConfig:
 
     eyes: shape of the observation's `eyes` (memory, eye, channel, height, width)
     neurons, layers, encoder: see `Brain`
+    actions: numbers in an action · feels: in what the animal feels; None for rhabdom's own agents, who know contact
     """
 
     eyes: tuple[int, ...]
     neurons: int
     layers: int = 2
     encoder: int = FORMER_ENCODER
+    actions: int = 2
+    feels: int | None = None
+
+    @classmethod
+    def of(cls, space: spaces.Dict, neurons: int, layers: int, encoder: int) -> PolicyConfig:
+        """For these observations."""
+        beside = known_beside_eyes(space)
+        feels = None if "contact" in beside else beside.get("feels", 0)
+        return cls(tuple(space["eyes"].shape), neurons, layers, encoder, beside["previous_action"], feels)
 
     def observation_space(self) -> spaces.Dict:
         """The observation that sim's environments give with these eyes."""
-        return spaces.Dict(
-            {
-                "eyes": spaces.Box(-np.inf, np.inf, self.eyes, np.float32),
-                "contact": spaces.Box(0.0, 1.0, (1,), np.float32),
-                "previous_action": spaces.Box(-1.0, 1.0, (2,), np.float32),
-            }
+        known: dict[str, spaces.Space[Any]] = {
+            "eyes": spaces.Box(-np.inf, np.inf, self.eyes, np.float32),
+            "previous_action": spaces.Box(-1.0, 1.0, (self.actions,), np.float32),
+        }
+        if self.feels is None:
+            known["contact"] = spaces.Box(0.0, 1.0, (1,), np.float32)
+        elif self.feels:
+            known["feels"] = spaces.Box(-np.inf, np.inf, (self.feels,), np.float32)
+        return spaces.Dict(known)
+
+    def record(self) -> dict[str, Any]:
+        """Plain values; what rhabdom's own agents all have alike is left out."""
+        values = asdict(self)
+        return values if self.feels is not None else {k: v for k, v in values.items() if k not in ("actions", "feels")}
+
+    @classmethod
+    def from_record(cls, stored: Mapping[str, Any]) -> PolicyConfig:
+        """Inverse of `record`.
+
+        Raises:
+            KeyError: an entry is missing.
+            TypeError: an entry is no number.
+            ValueError: an entry is no number.
+        """
+        return cls(
+            eyes=tuple(int(n) for n in stored["eyes"]),
+            neurons=int(stored["neurons"]),
+            layers=int(stored.get("layers", 2)),
+            encoder=int(stored.get("encoder", FORMER_ENCODER)),
+            actions=int(stored.get("actions", 2)),
+            feels=int(stored["feels"]) if "feels" in stored else None,
         )
 
 
@@ -94,7 +129,8 @@ class EyePolicy(MultiInputActorCriticPolicy):
     """SB3's actor-critic over EyeFeatures of width `encoder`, with `layers` hidden layers of `neurons` each for actor
     and critic.
 
-    first_speed: mean of the untrained policy's speeds, and twice their standard deviation, as a part of the highest.
+    first_speed: of rhabdom's own agents: mean of the untrained policy's speeds, and twice their standard deviation, as
+        a part of the highest; all actions of others begin around 0.
     """
 
     def __init__(
@@ -117,10 +153,13 @@ class EyePolicy(MultiInputActorCriticPolicy):
             "optimizer_class": Adam,
         }
         super().__init__(observation_space, action_space, lr_schedule, **kwargs)
-        self.config = PolicyConfig(tuple(observation_space["eyes"].shape), neurons, layers, encoder)
+        self.config = PolicyConfig.of(observation_space, neurons, layers, encoder)
         with torch.no_grad():
-            self.action_net.bias.copy_(torch.tensor([2 * first_speed - 1, 0.0]))
-            self.log_std.copy_(torch.tensor([first_speed, FIRST_TURN]).log())
+            if self.config.feels is None:
+                self.action_net.bias.copy_(torch.tensor([2 * first_speed - 1, 0.0]))
+                self.log_std.copy_(torch.tensor([first_speed, FIRST_TURN]).log())
+            else:
+                self.log_std.fill_(math.log(FIRST_TURN))
 
     def extract_features(
         self, obs: dict[str, Tensor], features_extractor: BaseFeaturesExtractor | None = None
@@ -137,7 +176,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
 
 def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy:
     """An untrained policy, drawn from torch's random state."""
-    action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+    action_space = spaces.Box(-1.0, 1.0, (config.actions,), np.float32)
     shape = {"neurons": config.neurons, "layers": config.layers, "encoder": config.encoder}
     return EyePolicy(config.observation_space(), action_space, lambda _: learning_rate, **shape)
 
@@ -146,7 +185,7 @@ def save_policy(policy: EyePolicy, path: Path | str) -> None:
     """Write the policy's tensors as safetensors, its shape in the metadata; whole or not at all."""
     tensors = {name: tensor.detach().clone() for name, tensor in learnt(policy).items()}
     # One entry: safetensors writes several in random order, and the same policy must be the same bytes.
-    metadata = {"config": json.dumps({**asdict(policy.config), "units": UNITS.__name__})}
+    metadata = {"config": json.dumps({**policy.config.record(), "units": UNITS.__name__})}
     write_whole(Path(path), safetensors.torch.save(tensors, metadata))
 
 
@@ -165,12 +204,7 @@ def load_policy(path: Path | str) -> EyePolicy:
         stored = json.loads(metadata["config"])
         if stored.get("units") != UNITS.__name__:
             raise ValueError(f"its units are not {UNITS.__name__}, as those of this version's policies are")
-        config = PolicyConfig(
-            eyes=tuple(int(n) for n in stored["eyes"]),
-            neurons=int(stored["neurons"]),
-            layers=int(stored.get("layers", 2)),
-            encoder=int(stored.get("encoder", FORMER_ENCODER)),
-        )
+        config = PolicyConfig.from_record(stored)
         if not all(torch.isfinite(tensor).all() for tensor in tensors.values()):
             raise ValueError("it holds numbers that are not finite")
         _require_shape(config, tensors)
@@ -206,7 +240,8 @@ def set_learnt(policy: EyePolicy, tensors: Mapping[str, Tensor]) -> None:
 
 def _require_shape(config: PolicyConfig, tensors: Mapping[str, Tensor]) -> None:
     """Whether a policy of this shape has these tensors, found out before anything of its size is built."""
-    counts = [count for value in asdict(config).values() for count in (value if isinstance(value, tuple) else (value,))]
+    feels = config.feels or 0
+    counts = [*config.eyes, config.neurons, config.layers, config.encoder, config.actions, feels + 1]
     if min(counts) < 1 or max(counts) > LARGEST_COUNT or math.prod(config.eyes) > MOST_SIGNALS:
         raise ValueError(f"its shape is impossible: {config}")
     if config.layers > len(tensors):

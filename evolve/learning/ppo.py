@@ -6,7 +6,7 @@ Its settings, with their ranges, are `evolve.config.settings.LearningConfig`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -50,16 +50,14 @@ class Training:
 class Episodes:
     """One whole episode of each world.
 
-    returns (world,) · first_events (world,): what was reached first, +1 the goal, -1 an adversary, 0 nothing
+    returns (world,) · successes (world,) bool: where the goal was reached, and before any adversary; in a task of one's
+    own, where what is to be done was done at the end
+    first_events (world,): what was reached first, +1 the goal, -1 an adversary, 0 nothing; zeros in tasks of one's own
     """
 
     returns: np.ndarray
+    successes: np.ndarray
     first_events: np.ndarray
-
-    @property
-    def successes(self) -> np.ndarray:
-        """Where the goal was reached, and before any adversary, (world,) bool."""
-        return self.first_events > 0
 
 
 class AdaptingPPO(PPO):
@@ -103,7 +101,7 @@ class AdaptingPPO(PPO):
         self, env: VecEnv, callback: BaseCallback, rollout_buffer: RolloutBuffer, n_rollout_steps: int
     ) -> bool:
         if self.num_timesteps == 0:
-            self.policy.features_extractor.adapt(torch.from_numpy(self._last_obs["eyes"][:, -1]))
+            self._adapt(self._last_obs["eyes"][:, -1], self._last_obs)
         self.env.contact_share = contact_share(self.num_timesteps, self.contact_ramp)
         return super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps)
 
@@ -116,8 +114,12 @@ class AdaptingPPO(PPO):
         for name, parameter in self.policy.named_parameters():
             _require_finite(f"policy's {name}", parameter.detach().numpy(), self.num_timesteps)
         # Not before: the update compares the policy with what it was when it acted. Neighbouring frames are alike.
-        self.policy.features_extractor.adapt(torch.from_numpy(self.rollout_buffer.new_frames[:, ::8]))
+        self._adapt(self.rollout_buffer.new_frames[:, ::8], self.rollout_buffer.beside)
         self._adapt_unit()
+
+    def _adapt(self, frames: np.ndarray, beside: Mapping[str, np.ndarray]) -> None:
+        feels = torch.from_numpy(beside["feels"]) if "feels" in beside else None
+        self.policy.features_extractor.adapt(torch.from_numpy(frames), feels)
 
     @torch.no_grad()
     def _adapt_unit(self) -> None:
@@ -220,14 +222,18 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
     observation = worlds.reset()
     returns = np.zeros(worlds.num_envs)
     playing = np.ones(worlds.num_envs, bool)
-    first_event = np.zeros(worlds.num_envs)
+    first_event, done_at_end = np.zeros(worlds.num_envs), np.zeros(worlds.num_envs, bool)
+    ours = "contact" in worlds.observation_space.spaces
     while playing.any():
         action, _ = policy.predict(observation, deterministic=True)
         observation, reward, done, infos = worlds.step(action)
         returns[playing] += reward[playing]
-        events = np.array([np.sign(terms["goal"] + terms["adversary"]) for terms in map(terms_of, infos)])
-        first_event = np.where(playing & (first_event == 0), events, first_event)
+        if ours:
+            events = np.array([np.sign(terms["goal"] + terms["adversary"]) for terms in map(terms_of, infos)])
+            first_event = np.where(playing & (first_event == 0), events, first_event)
+        else:
+            done_at_end = np.where(playing, [bool(info["is_success"]) for info in infos], done_at_end)
         playing &= ~done
     if not math.isfinite(returns.sum()):
         raise TrainingDiverged("returns of the evaluation episodes not finite")
-    return Episodes(returns, first_event)
+    return Episodes(returns, first_event > 0 if ours else done_at_end, first_event)

@@ -17,6 +17,8 @@ from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.type_aliases import DictRolloutBufferSamples
 from torch import Tensor
 
+from evolve.learning.eye_features import known_beside_eyes
+
 SEGMENT_STEPS = 8  # at most: longer ones share more frames, shorter ones mix better (docs/measurements/learning.md)
 
 
@@ -36,8 +38,8 @@ class FrameRolloutBuffer(RolloutBuffer):
         worlds, steps = self.n_envs, self.buffer_size
         self.frames = np.zeros((worlds, self.memory - 1 + steps, *frame), np.float32)
         self.age = np.zeros((worlds, steps), np.int64)
-        self.contact = np.zeros((worlds, steps, 1), np.float32)
-        self.previous_action = np.zeros((worlds, steps, 2), np.float32)
+        sizes = known_beside_eyes(self.observation_space)
+        self.beside = {name: np.zeros((worlds, steps, size), np.float32) for name, size in sizes.items()}
 
     def reset(self) -> None:
         shape = (self.buffer_size, self.n_envs)
@@ -64,8 +66,8 @@ class FrameRolloutBuffer(RolloutBuffer):
         else:
             self.age[:, step] = np.where(episode_start, 0, self.age[:, step - 1] + 1)
         self.frames[:, remembered + step] = obs["eyes"][:, -1]
-        self.contact[:, step] = obs["contact"]
-        self.previous_action[:, step] = obs["previous_action"]
+        for name, kept in self.beside.items():
+            kept[:, step] = obs[name]
         self.actions[step] = action.reshape(self.n_envs, self.action_dim)
         self.rewards[step] = reward
         self.episode_starts[step] = episode_start
@@ -102,8 +104,7 @@ class FrameRolloutBuffer(RolloutBuffer):
             observations={
                 "frames": torch.from_numpy(self.frames[worlds, frames]),
                 "age": torch.from_numpy(self.age[worlds, steps]),
-                "contact": torch.from_numpy(self.contact[worlds, steps].reshape(-1, 1)),
-                "previous_action": torch.from_numpy(self.previous_action[worlds, steps].reshape(-1, 2)),
+                **{n: torch.from_numpy(a[worlds, steps].reshape(-1, a.shape[-1])) for n, a in self.beside.items()},
             },
             actions=samples(self.actions),
             old_values=samples(self.values),

@@ -8,6 +8,7 @@ agent_figure     an animal's head and eyes
 figures          figures of a whole run
 eye_figures      figures of one eye's optics
 ground_plan      where an episode plays
+footage          the same in a task of somebody's own
 views            one moment, through a perfect lens and through the evolved one
 player           an episode to play
 picture          signals as pictures

@@ -9,6 +9,7 @@ import numpy as np
 
 import sim
 from evolve.analysis.episode import Episode, record
+from evolve.analysis.filmed_episode import FilmedEpisode
 from evolve.store.directory import Run
 from evolve.store.regular_files import folder, require_regular
 
@@ -27,7 +28,7 @@ def export_run(run: Run, candidate_id: int | None = None, seed: int = 0, out: Pa
     return export_episode(record(run, candidate_id, seed), out or run.path / "exr")
 
 
-def export_episode(episode: Episode, directory: Path) -> list[Path]:
+def export_episode(episode: Episode | FilmedEpisode, directory: Path) -> list[Path]:
     """One file per time at which radiance was kept; in it, per eye, one part with the spectral radiance before it
     and one with what its receptors signalled (`left.spectral`, `left.receptors`, ...).
 
@@ -43,7 +44,7 @@ def export_episode(episode: Episode, directory: Path) -> list[Path]:
     return files
 
 
-def _views(episode: Episode, frame: int) -> list[sim.View]:
+def _views(episode: Episode | FilmedEpisode, frame: int) -> list[sim.View]:
     """What each eye saw at one kept time."""
     t = int(episode.radiance_frames[frame])
     return [
@@ -58,13 +59,16 @@ def _views(episode: Episode, frame: int) -> list[sim.View]:
     ]
 
 
-def _attributes(episode: Episode, t: int, eye: int) -> dict[str, Any]:
+def _attributes(episode: Episode | FilmedEpisode, t: int, eye: int) -> dict[str, Any]:
     """Where and when a view was seen."""
-    return {
-        "task": episode.task,
-        "candidate": episode.candidate_id,
-        "seed": episode.seed,
-        "time": t,
+    facts = {"task": episode.task, "candidate": episode.candidate_id, "seed": episode.seed, "time": t}
+    if isinstance(episode, FilmedEpisode):
+        return facts | {
+            "eye_azimuth_deg": float(episode.azimuths_deg[eye]),
+            "eye_elevation_deg": float(episode.elevations_deg[eye]),
+            "fov_deg": episode.eyes.fov_deg,
+        }
+    return facts | {
         "position_m": episode.position[t].tolist(),
         "heading_rad": float(episode.heading[t]),
         "eye_azimuth_deg": float(np.degrees(episode.eyes.azimuths()[eye])),

@@ -11,6 +11,8 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from evolve.analysis.episode import Episode
+from evolve.analysis.filmed_episode import FilmedEpisode
+from evolve.report.footage import AnyEpisode, Stage, stage_of
 from evolve.report.ground_plan import GroundPlan
 from evolve.report.picture import display
 from evolve.report.theme import ACCENT, GREEN, INK, MUTED, PANEL, PAPER, VERMILLION
@@ -27,13 +29,12 @@ OWN = (INK, MUTED, PAPER, PANEL, ACCENT, VERMILLION, GREEN, FIELD)
 LEVELS = (0, 51, 102, 153, 204, 255)  # of red, green and blue that eyes' pictures are shown with
 
 
-def write_gif(episode: Episode, path: Path) -> Path:
+def write_gif(episode: AnyEpisode, path: Path) -> Path:
     """Write an episode as an animated GIF that repeats, whole or not at all; returns its path."""
-    plan = GroundPlan.of(episode)
+    plan = stage_of(episode)
     stride = max(1, -(-len(episode) // LONGEST))
-    kept = range(0, len(episode), stride)
     eyes = display(episode.signals, plan.gain)
-    pictures = [_frame(episode, plan, eyes, time) for time in kept]
+    pictures = [_frame(_world(episode, plan, time), eyes[time]) for time in range(0, len(episode), stride)]
     palette = _palette()
     first, *rest = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
     content = io.BytesIO()
@@ -52,16 +53,26 @@ def _palette() -> Image.Image:
     return palette
 
 
-def _frame(episode: Episode, plan: GroundPlan, eyes: np.ndarray, time: int) -> Image.Image:
-    """One moment: the world on the left, an eye below the other on the right."""
+def _world(episode: AnyEpisode, plan: Stage, time: int) -> Image.Image:
+    """One moment from above; of a task of somebody's own, the picture that was taken last."""
+    if isinstance(episode, FilmedEpisode):
+        taken = int(np.searchsorted(episode.picture_times, time, side="right")) - 1
+        picture = Image.fromarray(episode.pictures[taken])
+        return picture.resize((round(picture.width * HEIGHT / picture.height), HEIGHT), Image.Resampling.LANCZOS)
+    assert isinstance(plan, GroundPlan)
     x0, y0, x1, y1 = plan.bounds
     scale = SMOOTH * HEIGHT / (y1 - y0)
     width = round((x1 - x0) * scale / SMOOTH)
     world = Image.new("RGB", (SMOOTH * width, SMOOTH * HEIGHT), PANEL)
     _draw_world(ImageDraw.Draw(world), episode, plan, time, scale)
+    return world.resize((width, HEIGHT), Image.Resampling.LANCZOS)
+
+
+def _frame(world: Image.Image, seen: np.ndarray) -> Image.Image:
+    """One moment: the world on the left, an eye below the other on the right."""
+    width = world.width
     picture = Image.new("RGB", (width + GAP + ASIDE, HEIGHT), PAPER)
-    picture.paste(world.resize((width, HEIGHT), Image.Resampling.LANCZOS), (0, 0))
-    seen = eyes[time]
+    picture.paste(world, (0, 0))
     room = (HEIGHT - GAP * (len(seen) - 1)) / len(seen)
     size = min(ASIDE / seen.shape[2], room / seen.shape[1])
     for number, one in enumerate(seen):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from evolve.analysis.episode import Episode
 from evolve.analysis.genealogy import descent
 from evolve.analysis.statistics import acuity_cpd, champions, gene_values, generation_statistics, trajectory
 from evolve.analysis.vision import SCENES, vision
+from evolve.config.own_task import is_own
 from evolve.config.run_config import TASKS
 from evolve.genome.genes import CLUSTERS, Gene
 from evolve.report import tables
@@ -21,7 +21,7 @@ from evolve.report.figures import (
     success_figure,
     vision_figure,
 )
-from evolve.report.ground_plan import GroundPlan
+from evolve.report.footage import AnyEpisode, stage_of
 from evolve.report.hints import hint
 from evolve.report.lineup import lineup
 from evolve.report.markup import Html, contents, document, figure, html, joined, key, rounded, section
@@ -43,11 +43,13 @@ VISION = {
 
 def header(run: Run) -> Html:
     """Title, what was evolved, headline numbers."""
-    task = run.config.task
+    task, own = run.config.task_name, is_own(run.config.task)
+    name = task if own else task.capitalize()
+    aim = html("for {}, a task of one’s own", run.config.task) if own else html("to {}", TASKS[task])
     return html(
         '<header><p class="kicker">rhabdom · evolution report · {}</p>\n<h1>{}</h1>\n'
-        "<p>Eyes and brains evolved to {}. {}</p>\n</header>\n",
-        *(run.path.resolve().name, task.capitalize(), TASKS[task], _best_in_a_sentence(run)),
+        "<p>Eyes and brains evolved {}. {}</p>\n</header>\n",
+        *(run.path.resolve().name, name, aim, _best_in_a_sentence(run)),
     )
 
 
@@ -122,7 +124,7 @@ def genes_section(run: Run) -> Html:
             *(hint("genome", "genes"), key("accent"), POPULATION),
         )
     ]
-    shown, table = gene_values(run.candidates[0].phenotype), run.config.eye.genes.values()
+    shown, table = gene_values(run.candidates[0].phenotype), run.config.genes.values()
     for cluster in CLUSTERS:
         genes = [g for g in table if g.cluster == cluster and run.config.genome[g.name].open and g.name in shown]
         figures = joined(_gene(run, gene) for gene in genes if not gene.name.startswith("doe_"))
@@ -200,23 +202,23 @@ def facts_section(run: Run) -> Html:
     return section("facts", "Facts of the run", tables.run_facts(run))
 
 
-def best_section(run: Run, best: Candidate, episode: Episode) -> Html:
+def best_section(run: Run, best: Candidate, episode: AnyEpisode) -> Html:
     """The best candidate: its eye, what it sees, and its genes."""
     content = html(
         "<p>{} {} of {} {}, {} {}.</p>\n{}<h3>What it sees</h3>\n{}<h3>Its genes</h3>\n{}",
         *(hint("candidate", "Candidate"), best.id, hint("generation"), best.generation),
         *(hint("fitness"), rounded(best.fitness, 4), eye_figures(best.phenotype, run.config.eye)),
-        *(what_it_sees(episode, GroundPlan.of(episode)), tables.best_genes(run, best)),
+        *(what_it_sees(episode, stage_of(episode)), tables.best_genes(run, best)),
     )
     return section("best", "The best eye", content)
 
 
-def episode_section(run: Run, episode: Episode) -> Html:
-    content = html("<p>{}</p>\n{}", episode_sentence(episode), player(episode, GroundPlan.of(episode)))
+def episode_section(run: Run, episode: AnyEpisode) -> Html:
+    content = html("<p>{}</p>\n{}", episode_sentence(episode), player(episode, stage_of(episode)))
     return section("episode", "The best animal at its task", content)
 
 
-def render(run: Run, episode: Episode | None) -> bytes:
+def render(run: Run, episode: AnyEpisode | None) -> bytes:
     """The whole page; without an episode where no candidate has succeeded."""
     if (best := run.best) is not None and episode is not None:
         parts = [episode_section(run, episode), animals_section(run), best_section(run, best, episode)]
@@ -225,5 +227,5 @@ def render(run: Run, episode: Episode | None) -> bytes:
     parts += [numbers_section(run), fitness_section(run), genes_section(run), vision_section(run)]
     parts += [candidates_section(run), facts_section(run)]
     body = joined(parts)
-    title = f"{run.config.task} · {run.path.resolve().name}"
+    title = f"{run.config.task_name} · {run.path.resolve().name}"
     return document(title, joined([header(run), contents(body), body]), ["player.js", "lineup.js"])

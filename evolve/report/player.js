@@ -34,6 +34,21 @@
     return { scale, x: (x) => left + scale * (x - x0), y: (y) => top + scale * (y1 - y) };
   }
 
+  // A task of somebody's own: nobody knows what there is to draw, so pictures were taken.
+  function drawPicture(canvas, film, frame, sheet) {
+    if (!sheet.complete || !sheet.naturalWidth) return;
+    const { context: c, width, height } = sharp(canvas);
+    const [h, w] = film.pictures.size, shown = film.pictures.shown[frame], columns = film.pictures.columns;
+    c.drawImage(sheet, (shown % columns) * w, Math.floor(shown / columns) * h, w, h, 0, 0, width, height);
+  }
+
+  function commands(film, frame) {
+    if (film.action)
+      return "action " + film.action[frame].slice(0, 8).map((a) => a.toFixed(2).replace("-", "\u2212")).join(", ");
+    const turn = film.turn_deg[frame], side = turn < 0 ? "right" : "left";
+    return `commands ${film.speed[frame].toFixed(1)} m/s and ${Math.abs(turn).toFixed(0)}\u00b0 to the ${side}`;
+  }
+
   function drawWorld(canvas, film, frame, colour) {
     const { context: c, width, height } = sharp(canvas);
     const at = projection(film.bounds, width, height);
@@ -74,8 +89,8 @@
   function drawFields(c, film, frame, at, colour) {
     const [x, y] = film.position[frame];
     const reach = 0.28 * Math.min(c.canvas.clientWidth, c.canvas.clientHeight);
-    const half = film.eyes.fov / 2;
-    for (const azimuth of film.eyes.azimuths) {
+    const half = film.fov / 2;
+    for (const azimuth of film.azimuths) {
       const axis = film.heading[frame] + azimuth;
       c.beginPath();
       c.moveTo(at.x(x), at.y(y));
@@ -213,7 +228,7 @@
     let frame = 0, playing = false, clock = 0, colour = colours(root);
 
     function drawEyes() {
-      const [height, width] = film.eyes.resolution, n = film.eyes.azimuths.length;
+      const [height, width] = film.eyes.resolution, n = film.eyes.count;
       for (const canvas of root.querySelectorAll("canvas[data-eye]")) {
         const sheet = sheets[canvas.dataset.sheet];
         if (!sheet.complete || !sheet.naturalWidth) continue;
@@ -228,9 +243,7 @@
       slider.setAttribute("aria-valuetext", film.times[frame].toFixed(1) + " seconds");
       root.dataset.frame = frame;
       find(".time").textContent = `${film.times[frame].toFixed(1)} s of ${film.times[last].toFixed(1)} s`;
-      const turn = film.turn_deg[frame], side = turn < 0 ? "right" : "left";
-      find(".action").textContent =
-        `commands ${film.speed[frame].toFixed(1)} m/s and ${Math.abs(turn).toFixed(0)}\u00b0 to the ${side}`;
+      find(".action").textContent = commands(film, frame);
       for (const cell of root.querySelectorAll("[data-term]")) {
         const values = cell.dataset.term === "total" ? film.total : film.terms[cell.dataset.term];
         cell.textContent = values[frame].toFixed(2).replace("-", "\u2212");
@@ -238,7 +251,8 @@
     }
 
     function draw() {
-      drawWorld(find("canvas.world"), film, frame, colour);
+      if (film.pictures) drawPicture(find("canvas.world"), film, frame, sheets.pictures);
+      else drawWorld(find("canvas.world"), film, frame, colour);
       drawRewards(find("canvas.rewards"), film, frame, colour);
       drawEyes();
       write();

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from evolve.analysis.episode import Episode
+from evolve.analysis.filmed_episode import FilmedEpisode
+from evolve.report.footage import AnyEpisode, Footage, Stage, stage_of
 from evolve.report.ground_plan import GroundPlan
 from evolve.report.markup import Html, document, exact, html, joined, json_script, key, look, rounded
 from evolve.report.picture import data_uri, display, film_sheet
@@ -21,28 +23,32 @@ LARGEST_FILM = 1_500_000  # bytes of pixels per sheet; noise hardly compresses, 
 TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # as in player.js
 
 
-def write_player(episode: Episode, path: Path) -> Path:
+def write_player(episode: AnyEpisode, path: Path) -> Path:
     """Write the playable episode as a page of its own; returns its path."""
-    name = f"{episode.task.capitalize()}: candidate {episode.candidate_id} plays"
+    task = episode.task.rpartition(":")[2] if isinstance(episode, FilmedEpisode) else episode.task.capitalize()
+    name = f"{task}: candidate {episode.candidate_id} plays"
     body = html(
         '<header><p class="kicker">rhabdom · replay</p>\n<h1>{}</h1>\n<p>{}</p></header>\n{}',
-        *(name, episode_sentence(episode), player(episode, GroundPlan.of(episode))),
+        *(name, episode_sentence(episode), player(episode, stage_of(episode))),
     )
     write_whole(Path(path), document(name, body, ["player.js"]))
     return Path(path)
 
 
-def episode_sentence(episode: Episode) -> str:
+def episode_sentence(episode: AnyEpisode) -> str:
     """One sentence on how the episode went."""
     total = rounded(float(episode.reward.sum(dtype=np.float64)), 4)
     terms = ", ".join(f"{name} {rounded(float(term.sum()))}" for name, term in episode.reward_terms.items())
-    return f"Evaluation episode with seed {episode.seed}: {len(episode)} actions, return {total} ({terms})."
+    failed = episode.failure if isinstance(episode, FilmedEpisode) else None
+    end = "" if failed is None else f" It ended because the task failed: {failed}."
+    return f"Evaluation episode with seed {episode.seed}: {len(episode)} actions, return {total} ({terms}).{end}"
 
 
-def player(episode: Episode, stage: GroundPlan) -> Html:
+def player(episode: AnyEpisode, stage: Stage) -> Html:
     """The player's element; the page that holds it needs player.js."""
     film = json_script(_film(episode, stage), "film")
-    left, right = _world(stage) + _controls(episode), _sights(stage) + _score(episode)
+    world = stage.figure() if isinstance(stage, Footage) else _world(stage)
+    left, right = world + _controls(episode), _sights(stage) + _score(episode)
     return html(
         '<div class="player" tabindex="0" role="group" aria-label="Replay"><div>{}</div><div>{}</div>{}</div>\n',
         left,
@@ -72,7 +78,7 @@ def _world(stage: GroundPlan) -> Html:
     )
 
 
-def _sights(stage: GroundPlan) -> Html:
+def _sights(stage: Stage) -> Html:
     """A pair of canvases per eye: what it signals, and what it would signal behind a perfect lens."""
     eyes = stage.eyes
     height, width = eyes.resolution
@@ -106,7 +112,7 @@ def _pair(eye: int, name: str, size: Html) -> Html:
     return html('<div class="sight"><span class="name">{}</span><div class="pair">{}</div></div>', name, canvases)
 
 
-def _controls(episode: Episode) -> Html:
+def _controls(episode: AnyEpisode) -> Html:
     return html(
         '<div class="controls"><input type="range" min="0" max="{}" value="0" step="1" '
         'aria-label="Time in the episode"><button type="button" class="play" aria-pressed="false">Play</button>'
@@ -116,7 +122,7 @@ def _controls(episode: Episode) -> Html:
     )
 
 
-def _score(episode: Episode) -> Html:
+def _score(episode: AnyEpisode) -> Html:
     """Cumulated reward, term by term."""
     names = [*episode.reward_terms, "total"]
     colours = [TERM_COLOURS[i % len(TERM_COLOURS)] for i in range(len(names) - 1)] + ["ink"]
@@ -133,24 +139,38 @@ def _score(episode: Episode) -> Html:
     )
 
 
-def _film(episode: Episode, stage: GroundPlan) -> dict[str, Any]:
-    """What player.js reads. Times [s], positions [m], angles [rad], commands [m/s] and [°]; everything over the frames
-    that are kept."""
+def _film(episode: AnyEpisode, stage: Stage) -> dict[str, Any]:
+    """What player.js reads; everything over the frames that are kept."""
     kept = np.arange(0, len(episode), _stride(episode))
     terms = {name: np.cumsum(term, dtype=np.float64)[kept] for name, term in episode.reward_terms.items()}
     seen, columns = film_sheet(display(episode.signals[kept], stage.gain))
     perfect, _ = film_sheet(display(episode.perfect_signals[kept]))
+    if isinstance(episode, FilmedEpisode):
+        assert isinstance(stage, Footage)
+        part = stage.film(episode, kept)
+    else:
+        assert isinstance(stage, GroundPlan)
+        part = _from_above(episode, stage, kept)
     return {
         "times": _rounded(kept * stage.seconds),
+        "eyes": {"count": stage.eyes.n_eyes, "resolution": stage.eyes.resolution},
+        "terms": {name: _rounded(values) for name, values in terms.items()},
+        "total": _rounded(np.sum(list(terms.values()), axis=0)),
+        "sheet_columns": columns,
+        **part,
+        "sheets": {"seen": data_uri(seen), "perfect": data_uri(perfect), **part.get("sheets", {})},
+    }
+
+
+def _from_above(episode: Episode, stage: GroundPlan, kept: np.ndarray) -> dict[str, Any]:
+    """The world's part of it: positions [m], angles [rad], commands [m/s] and [°]."""
+    return {
         "bounds": stage.bounds,
         "walls": _rounded(stage.walls),
         "goal_region": stage.goal_region,
         "body_radius": stage.body_radius,
-        "eyes": {
-            "azimuths": _rounded(stage.eyes.azimuths(), 5),
-            "fov": float(np.radians(stage.eyes.fov_deg)),
-            "resolution": stage.eyes.resolution,
-        },
+        "azimuths": _rounded(stage.eyes.azimuths(), 5),
+        "fov": float(np.radians(stage.eyes.fov_deg)),
         "position": _rounded(episode.position[kept]),
         "heading": _rounded(episode.heading[kept], 4),
         "speed": _rounded(MAX_SPEED * (np.clip(episode.action[kept, 0], -1, 1) + 1) / 2),
@@ -159,14 +179,10 @@ def _film(episode: Episode, stage: GroundPlan) -> dict[str, Any]:
         "object_names": stage.object_names,
         "object_radius": stage.object_radius,
         "events": _events(episode, kept),
-        "terms": {name: _rounded(values) for name, values in terms.items()},
-        "total": _rounded(np.sum(list(terms.values()), axis=0)),
-        "sheet_columns": columns,
-        "sheets": {"seen": data_uri(seen), "perfect": data_uri(perfect)},
     }
 
 
-def _stride(episode: Episode) -> int:
+def _stride(episode: AnyEpisode) -> int:
     """Every so many frames are kept: all, but for eyes so many and fine that the page would grow too large."""
     pixels = episode.signals[0, :, 0].size * 3
     return max(1, -(-len(episode) * pixels // LARGEST_FILM))

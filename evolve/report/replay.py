@@ -6,6 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis.episode import Episode, record
+from evolve.analysis.filmed_episode import FilmedEpisode
+from evolve.config.own_task import is_own
+from evolve.config.run_config import ConfigError
+from evolve.report.footage import AnyEpisode
 from evolve.report.moving_picture import write_gif
 from evolve.report.player import write_player
 from evolve.report.rerun_recording import require_rerun, write_recording
@@ -21,7 +25,7 @@ def write_replay(
     rrd: bool = False,
     gif: bool = False,
     out: Path | None = None,
-) -> tuple[Episode, list[Path]]:
+) -> tuple[AnyEpisode, list[Path]]:
     """Record an episode (default: of the best candidate) and write a page that plays it; with `rrd` a recording for
     rerun as well, with `gif` a moving picture.
 
@@ -30,35 +34,43 @@ def write_replay(
 
     Raises:
         RunError: there is no such candidate, or no policy of it.
-        ConfigError: rerun is asked for, but not installed.
+        ConfigError: rerun is asked for, but not installed, or for a task of one's own.
     """
     if rrd:
         require_rerun()
+        if is_own(run.config.task):
+            raise ConfigError("--rrd is for rhabdom's own tasks; --gif is for all")
     episode = record(run, candidate_id, seed)
     page = write_page(run, episode, out)
     paths = [page]
-    paths += [write_recording(episode, page.with_suffix(".rrd"))] if rrd else []
+    paths += [write_recording(episode, page.with_suffix(".rrd"))] if rrd and isinstance(episode, Episode) else []
     paths += [write_gif(episode, page.with_suffix(".gif"))] if gif else []
     return episode, paths
 
 
-def write_page(run: Run, episode: Episode, out: Path | None = None) -> Path:
+def write_page(run: Run, episode: AnyEpisode, out: Path | None = None) -> Path:
     """Write the page that plays an episode of a run, to `out` or into the run directory; returns its path."""
     path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{episode.seed}.html"
     path.parent.mkdir(parents=True, exist_ok=True)
     return write_player(episode, path)
 
 
-def episode_facts(episode: Episode) -> dict[str, Any]:
+def episode_facts(episode: AnyEpisode) -> dict[str, Any]:
     """How an episode went: return, what it is made of, and what was reached."""
     terms = episode.reward_terms
-    return {
+    facts = {
         "task": episode.task,
         "candidate": episode.candidate_id,
         "episode seed": episode.seed,
         "actions": len(episode),
         "return": float(episode.reward.sum()),
         "terms": {name: float(term.sum()) for name, term in terms.items()},
+    }
+    if isinstance(episode, FilmedEpisode):
+        failed = {} if episode.failure is None else {"failure": episode.failure}
+        return {**facts, "solved": episode.solved, **failed}
+    return {
+        **facts,
         "goals reached": int((terms["goal"] != 0).sum()),
         "adversaries reached": int((terms["adversary"] != 0).sum()),
         "actions in contact": int(episode.contact.sum()),
@@ -66,7 +78,7 @@ def episode_facts(episode: Episode) -> dict[str, Any]:
     }
 
 
-def episode_table(episode: Episode) -> str:
+def episode_table(episode: AnyEpisode) -> str:
     """The same, one line each."""
     rows: list[tuple[str, str]] = []
     for name, value in episode_facts(episode).items():

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import optics
-from evolve.analysis.episode import Episode
 from evolve.analysis.statistics import psnr
-from evolve.report.ground_plan import GroundPlan
+from evolve.report.footage import AnyEpisode, Stage
 from evolve.report.hints import hint
 from evolve.report.markup import Html, html, joined, look, rounded
 from evolve.report.picture import data_uri, display
@@ -18,7 +17,7 @@ WIDTH = 120  # CSS pixels of one picture, where there are few eyes
 MOST_EYES = 6
 
 
-def what_it_sees(episode: Episode, stage: GroundPlan) -> Html:
+def what_it_sees(episode: AnyEpisode, stage: Stage) -> Html:
     """Pictures and their caption."""
     frame = _busiest(episode)
     time = int(episode.radiance_frames[frame])
@@ -40,13 +39,13 @@ def what_it_sees(episode: Episode, stage: GroundPlan) -> Html:
     return html('<figure class="views"><div class="eyes">{}</div><figcaption>{}</figcaption></figure>\n', rows, caption)
 
 
-def _busiest(episode: Episode) -> int:
+def _busiest(episode: AnyEpisode) -> int:
     """The kept frame in which the eyes have most to look at: the largest variance along the horizon (sky above floor
     is there in all of them)."""
     return int(np.argmax(episode.radiance.mean(axis=2).var(axis=-1).mean(axis=(1, 2))))
 
 
-def _row(episode: Episode, eye: int, name: str, frame: int, lens: optics.Eye) -> Html:
+def _row(episode: AnyEpisode, eye: int, name: str, frame: int, lens: optics.Eye) -> Html:
     time = episode.radiance_frames[frame]
     scene = np.einsum("cb,byx->cyx", lens.spectral_bands.weights, episode.radiance[frame, eye])
     gain = 1 / lens.throughput

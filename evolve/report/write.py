@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from evolve.analysis.episode import Episode
+    from evolve.report.footage import AnyEpisode
     from evolve.store.directory import Run
 
 __all__ = ["FILE", "write"]
@@ -14,7 +14,7 @@ __all__ = ["FILE", "write"]
 FILE = "report.html"
 
 
-def write(run: Run, episode: Episode | None = None, out: Path | None = None) -> Path:
+def write(run: Run, episode: AnyEpisode | None = None, out: Path | None = None) -> Path:
     """Write `report.html` of a run, whole or not at all, with an episode of the best candidate (default: played now).
 
     out: another file to write to

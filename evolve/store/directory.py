@@ -76,12 +76,15 @@ class Run:
         return cls(path, config, Record(path / CANDIDATES))
 
     @classmethod
-    def open(cls, path: Path | str) -> Self:
+    def open(cls, path: Path | str, task: str | None = None) -> Self:
         """A run as it is on disk.
+
+        task: FILE.py:CLASS, where the run evolves a task of somebody's own: its code runs only if it is named, and is
+            needed to carry on the run, and to let its animals play
 
         Raises:
             RunError: no run there, or its candidates cannot be read; names file and line.
-            ConfigError: its config cannot be used.
+            ConfigError: its config cannot be used, or another task is named than the run's, or its file has changed.
             StrangeFileError: a link, FIFO or device bears the name of one of its files or folders.
         """
         path = Path(path)
@@ -92,6 +95,8 @@ class Run:
             config = from_text(read(path / CONFIG), str(path / CONFIG))
         except FileNotFoundError:
             raise RunError(f"{path} is no run: it holds no {CONFIG}") from None
+        if task is not None:
+            config = config.with_own_task(task)
         return cls(path, config, Record.read(path / CANDIDATES, config))
 
     def require_present_format(self) -> None:

@@ -4,6 +4,8 @@ assembly               make_vec_env: world, task, physics and eyes put together
 vec_env                EyesVecEnv: stable-baselines3
 task_vec_env           TaskVecEnv: the same for tasks of one's own
 task_worlds            their worlds
+task_fidelity          how finely they are seen
+task_state             where these stand, as arrays
 one_environment        what both answer stable-baselines3 alike
 env                    make_env, EyesEnv: Gymnasium
 vector_env             EyesVectorEnv: Gymnasium's vector environment

@@ -40,6 +40,7 @@ def make_vec_env(
     mazes: int = 1,
     course: str | Course = "short",
     least_return: float | None = None,
+    episode_steps: int | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
     render_mode: str | None = None,
 ) -> EyesVecEnv | TaskVecEnv:
@@ -57,6 +58,7 @@ def make_vec_env(
     fidelity: all of how finely it is rendered, in the place of rays_per_receptor (which takes one, too)
     world_seed, mazes, course: of the layout that all worlds share, see `sim.build_world`
     least_return: in training, an episode whose rewards add up to no more is truncated; None: none is
+    episode_steps: actions after which an episode is truncated; None: as many as the task has
     spectra: of materials and lights, by name, in the place of their colours: see `sim.build_world`
     render_mode: "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye reports,
         side by side
@@ -79,7 +81,10 @@ def make_vec_env(
     check_least_return(least_return, mode)
     eyes = eyes if asked is None else replace(eyes, bands=asked.bands)
     scene = prepared_scene(task, eyes, world_seed=world_seed, mazes=mazes, course=course, spectra=spectra)
+    if episode_steps is not None:
+        _require_whole("episode_steps", episode_steps, 1)
     how: dict[str, Any] = {"memory": memory, "mode": mode, "least_return": least_return, "render_mode": render_mode}
+    how["episode_steps"] = episode_steps
     return vec_env_in(scene, asked or chosen_fidelity(scene), n_envs, seed, **how)
 
 
@@ -105,6 +110,7 @@ def vec_env_in(
     memory: int = 1,
     mode: str = "training",
     least_return: float | None = None,
+    episode_steps: int | None = None,
     render_mode: str | None = None,
 ) -> EyesVecEnv:
     """A batched environment in a scene that has been prepared, rendered as finely as is said; arguments as
@@ -115,7 +121,8 @@ def vec_env_in(
     """
     _check(n_envs, seed, memory, mode, render_mode)
     threads = min(dr.thread_count(), n_envs)
-    simulation = Simulation(scene.world, n_envs, seed, mode, threads, least_return)
+    world = scene.world if episode_steps is None else replace(scene.world, episode_steps=episode_steps)
+    simulation = Simulation(world, n_envs, seed, mode, threads, least_return)
     return EyesVecEnv(simulation, BatchedRenderer.of(scene, n_envs, fidelity), memory, render_mode)
 
 

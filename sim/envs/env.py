@@ -16,8 +16,8 @@ from sim.worlds.state import WorldState
 class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     """One agent with eyes in one world. Spaces, rewards, endings and `info` are in docs/tasks.md.
 
-    task, eyes, memory, mode, rays_per_receptor, fidelity, world_seed, mazes, course, least_return, spectra,
-        render_mode: as in `sim.make_vec_env`
+    task, eyes, memory, mode, rays_per_receptor, fidelity, world_seed, mazes, course, least_return, episode_steps,
+        spectra, render_mode: as in `sim.make_vec_env`
 
     Raises:
         ValueError: a bad argument.

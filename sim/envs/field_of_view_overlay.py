@@ -47,19 +47,22 @@ class _Level:
 
 @dataclass(frozen=True)
 class _Field:
-    """One eye's field as it is if nothing ends it. rows: in _Level, (n,) · opacity, distance [m]: there, (n,)
-    ray, share: the ray of the fan to the right of a pixel, and how far it is to the next one, (n,)"""
+    """One eye's field as it is if nothing ends it. pixels, depth: as of _Level, (n,) · opacity, distance [m]: there,
+    (n,) · ray, share: the ray of the fan to the right of a pixel, and how far it is to the next one, (n,)"""
 
-    rows: np.ndarray
+    pixels: np.ndarray
+    depth: np.ndarray
     opacity: np.ndarray
     distance: np.ndarray
     ray: np.ndarray
     share: np.ndarray
 
     def visible(self, reach: np.ndarray) -> np.ndarray:
-        """Opacity of what lies no farther than the rays of the fan reach [m], (n,)."""
-        end = reach.take(self.ray) + self.share * np.diff(reach).take(self.ray)
-        return np.where(self.distance <= end, self.opacity, np.float32(0))
+        """Which of it lies no farther than the rays of the fan reach [m], (n,) bool."""
+        end = np.diff(reach).take(self.ray)
+        end *= self.share
+        end += reach.take(self.ray)
+        return np.asarray(self.distance <= end)
 
 
 @dataclass(frozen=True)
@@ -82,27 +85,23 @@ class FieldsOfView:
         self.eyes, level = eyes, _level(view, size)
         azimuths = eyes.azimuths()
         places = eye_positions(azimuths)
-        fields = [_field(level, eyes, azimuth, eye[:2]) for azimuth, eye in zip(azimuths, places, strict=True)]
-        used = np.unique(np.concatenate([field.rows for field in fields]))
-        self._pixels, self._depth = level.pixels[used], level.depth[used].astype(np.float32)
-        self._fields = [_Field(np.searchsorted(used, f.rows), f.opacity, f.distance, f.ray, f.share) for f in fields]
+        self._fields = [_field(level, eyes, azimuth, eye[:2]) for azimuth, eye in zip(azimuths, places, strict=True)]
         self._dots = [_dot(eye + np.array([0, 0, EYE_HEIGHT]), view, size, _radius(eyes)) for eye in places]
 
     def draw(self, picture: np.ndarray, nearness: Nearness, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         """A picture (y, x, 3) uint8 with the field of every eye where nothing hides it; data: where everything is."""
         shown = picture.reshape(-1, 3).copy()
-        channels = [shown[:, c].take(self._pixels).astype(np.float32) for c in range(3)]
-        seen = nearness(self._pixels) * self._depth < 1
         heading = float(data.joint("agent_heading").qpos[0])
         azimuths = self.eyes.azimuths() + heading
         skin = data.qpos[:2] + eye_positions(azimuths)[:, :2]
         for i, (azimuth, eye, field) in enumerate(zip(azimuths, skin, self._fields, strict=True)):
-            opacity = field.visible(_reach(azimuth + _fan(self.eyes), eye, model, data)) * seen.take(field.rows)
-            for light, goal in zip(channels, _color(i), strict=True):
-                before = light.take(field.rows)
-                light[field.rows] = before + opacity * (goal - before)
-        for c, light in enumerate(channels):
-            shown[self._pixels, c] = np.rint(light)
+            reach = _reach(azimuth + _fan(self.eyes), eye, model, data)
+            within = np.flatnonzero(field.visible(reach))
+            pixels = field.pixels.take(within)
+            seen = nearness(pixels) * field.depth.take(within) < 1
+            pixels, opacity = pixels[seen], field.opacity.take(within[seen])
+            before = shown.take(pixels, axis=0).astype(np.float32)
+            shown[pixels] = np.rint(before + opacity[:, None] * (_color(i) - before))
         for i, dot in enumerate(self._dots):
             _draw_dot(shown, dot, nearness, _color(i))
         return shown.reshape(picture.shape)
@@ -148,7 +147,8 @@ def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field
     place = np.clip((angle[rows] + half) / (2 * half), 0, 1) * (FAN - 1)
     ray = np.minimum(place.astype(np.int32), FAN - 2)
     share = (place - ray).astype(np.float32)
-    return _Field(rows, opacity[rows].astype(np.float32), distance[rows].astype(np.float32), ray, share)
+    depth, opacity, distance = (a[rows].astype(np.float32) for a in (level.depth, opacity, distance))
+    return _Field(level.pixels[rows], depth, opacity, distance, ray, share)
 
 
 def _fan(eyes: Eyes) -> np.ndarray:

@@ -61,6 +61,20 @@ class Memory:
         return np.stack(self._past, axis=1)
 
     @property
+    def begun(self) -> bool:
+        """Whether there is anything to remember."""
+        return bool(self._past)
+
+    @property
+    def held(self) -> np.ndarray:
+        """All that is remembered, (env, memory, ...)."""
+        return np.stack(self._past, axis=1)
+
+    def hold(self, frames: np.ndarray) -> None:
+        """Remember these instead, (env, memory, ...)."""
+        self._past = [frames[:, k].copy() for k in range(self.frames)]
+
+    @property
     def newest(self) -> np.ndarray:
         """The last frame of every world, (env, ...)."""
         return self._past[-1]

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 from stable_baselines3.common.vec_env import VecEnv
 
 
 class OneEnvironment(VecEnv):
     """Worlds that share one environment: attributes and methods are everybody's."""
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be pickled or copied."""
+        raise TypeError(
+            f"{type(self).__name__} cannot be pickled or copied: it holds compiled kernels and physics; build one in "
+            "every process that needs it"
+        )
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed all random streams at the next reset. World i draws from streams derived from (seed, i)."""

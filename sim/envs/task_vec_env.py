@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import drjit as dr
@@ -10,17 +11,22 @@ import mujoco
 import numpy as np
 from gymnasium import spaces
 
+from sim.envs import task_state
 from sim.envs.observation import ROUNDING, SIGMAS, Memory
 from sim.envs.one_environment import OneEnvironment
 from sim.envs.retina_images import side_by_side
+from sim.envs.task_fidelity import fidelity_of
 from sim.envs.task_worlds import StepOfWorld, TaskWorlds
 from sim.pictures.quick_camera import QuickCamera
 from sim.render.receptor_noise import NoiseModel, Normals
+from sim.robots.eye_marks import with_eyes
 from sim.robots.model_renderer import ModelRenderer
+from sim.robots.poses import Poses
 from sim.robots.task import Task
 from sim.scene.cameras import Viewpoint
 
 PICTURE = (360, 480)  # pixels (height, width)
+RIMS = 0.15  # of the model's extent: how far the rims of fields of view are drawn
 
 
 class TaskVecEnv(OneEnvironment):
@@ -33,7 +39,8 @@ class TaskVecEnv(OneEnvironment):
     the others go on.
 
     task: what is done · n_envs: number of worlds · seed: of episodes and noise
-    memory: frames in an observation · render_mode: "rgb_array", "eyes" or None
+    memory: frames in an observation · render_mode: "rgb_array" (with the animal's eyes and the rims of their fields of
+        view), "eyes" or None
     """
 
     def __init__(
@@ -41,18 +48,15 @@ class TaskVecEnv(OneEnvironment):
     ) -> None:
         self.worlds = TaskWorlds(task, n_envs, seed, min(dr.thread_count(), n_envs))
         self.task, self.render_mode = task, render_mode
-        self.renderer = ModelRenderer(
-            self.worlds.model, task.eye, task.mounts, n_envs, task.fidelity, spectra=task.spectra
-        )
+        fidelity = fidelity_of(task)
+        self.renderer = ModelRenderer(self.worlds.model, task.eye, task.mounts, n_envs, fidelity, spectra=task.spectra)
         self._memory = Memory(memory)
         self._camera: QuickCamera | None = None
         self._noise = NoiseModel.of(self.renderer.eye)
         frame = (len(task.mounts), self.renderer.eye.channels, *self.renderer.eye.resolution)
         self._normals = Normals(self.worlds.noise_keys, frame)
         self._everyone = np.arange(n_envs)
-        self.worlds.reset(self._everyone[:1])  # what an animal feels may want an episode
         super().__init__(n_envs, self._space((memory, *frame)), self._actions())
-        self.worlds.seed(self.worlds.entropy)
         self._commanded = self._action = np.zeros((n_envs, *self.action_space.shape), np.float32)
         self._returns, self._told = np.zeros(n_envs), set[str]()
 
@@ -65,7 +69,7 @@ class TaskVecEnv(OneEnvironment):
         self.worlds.reset(self._everyone)
         self._returns[:], self._action = 0.0, np.zeros_like(self._action)
         self.reset_infos = [{"reward_terms": {}, "is_success": False} for _ in self._everyone]
-        return self._observation(self._look(), self._everyone)
+        return self._observation(self._look(self._everyone), self._everyone)
 
     def step_async(self, actions: np.ndarray) -> None:
         actions = np.asarray(actions, np.float32)
@@ -82,11 +86,11 @@ class TaskVecEnv(OneEnvironment):
         infos = self._infos(outcomes)
         reward = np.array([sum(outcome.terms.values()) for outcome in outcomes])
         terminated, truncated = (np.array([getattr(o, name) for o in outcomes]) for name in ("terminated", "truncated"))
-        return self._observation(self._look(), self._everyone[:0]), reward, terminated, truncated, infos
+        return self._observation(self._look(self._everyone), self._everyone[:0]), reward, terminated, truncated, infos
 
     def step_wait(self) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, list[dict[str, Any]]]:
         outcomes = self._moved()
-        infos, seen = self._infos(outcomes), self._look()
+        infos, seen = self._infos(outcomes), self._look(self._everyone)
         done = np.array([outcome.terminated or outcome.truncated for outcome in outcomes])
         ended = np.flatnonzero(done)
         if len(ended):
@@ -95,9 +99,44 @@ class TaskVecEnv(OneEnvironment):
                 infos[world]["terminal_observation"] = {name: array[k] for name, array in last.items()}
             self._returns[ended], self._action[ended] = 0.0, 0.0
             self.worlds.reset(ended)
-            seen[ended] = self._look()[ended]
+            seen[ended] = self._look(ended)
         reward = np.array([sum(outcome.terms.values()) for outcome in outcomes], np.float32)
         return self._observation(seen, ended), reward, done, infos
+
+    def get_state(self) -> dict[str, np.ndarray]:
+        """Where all worlds stand, as plain arrays whose first axis is the world: what follows from here depends on them
+        and on the actions alone. What a task keeps in itself is the task's own business.
+
+        Raises:
+            RuntimeError: before the first reset.
+        """
+        if not self._memory.begun:
+            raise RuntimeError("the worlds have not begun: call reset first")
+        return {
+            **task_state.of_worlds(self.worlds),
+            "remembered": self._memory.held,
+            "noise": self._normals.place,
+            "returns": self._returns.copy(),
+            "action": self._action.copy(),
+        }
+
+    def set_state(self, state: Mapping[str, np.ndarray], worlds: Sequence[int] | None = None) -> dict[str, np.ndarray]:
+        """Go on from where these worlds (None: all) stood; the observation they had there.
+
+        Raises:
+            ValueError: the state is of another task or number of worlds, or there are no such worlds.
+            RuntimeError: before the first reset.
+        """
+        now = self.get_state()
+        task_state.checked(state, now)
+        chosen = task_state.chosen_worlds(worlds, self.num_envs)
+        task_state.bring_back(self.worlds, state, chosen)
+        for name in ("remembered", "noise", "returns", "action"):
+            now[name][chosen] = state[name][chosen]
+        self._memory.hold(now["remembered"])
+        self._normals.go_on_from(now["noise"])
+        self._returns, self._action = now["returns"], now["action"]
+        return {"eyes": self._memory.held, **self._known(self._everyone)}
 
     def close(self) -> None:
         self.worlds.close()
@@ -108,19 +147,27 @@ class TaskVecEnv(OneEnvironment):
             return [side_by_side(frame, self.renderer.eye) for frame in self._memory.newest]
         if self.render_mode == "rgb_array":
             self._camera = self._camera or QuickCamera(self.worlds.model, self.renderer.spectra)
-            view = self.task.camera or _overview(self.worlds.model)
-            return [self._camera.picture(data, view, PICTURE[1], PICTURE[0]) for data in self.worlds.datas]
+            return [self._picture(self._camera, data) for data in self.worlds.datas]
         return []
+
+    def _picture(self, camera: QuickCamera, data: mujoco.MjData) -> np.ndarray:
+        """With the animal's eyes in it."""
+        named = self.task.camera or _overview(self.worlds.model)
+        picture = camera.picture(data, named, PICTURE[1], PICTURE[0])
+        pupils, frames = self.renderer.eye_frames(Poses.of([data]))
+        reach = RIMS * float(self.worlds.model.stat.extent)
+        fov, view = self.renderer.eye.fov_deg, camera.mirror.viewpoint(named)
+        return with_eyes(picture, view, (pupils[0], frames[0]), fov, reach)
 
     def _moved(self) -> list[StepOfWorld]:
         """One action later. Remembered is what was done: nothing, where an action was no number."""
         self._action = np.clip(np.nan_to_num(self._commanded, posinf=0, neginf=0), -1, 1)
         return self.worlds.step(self._commanded)
 
-    def _look(self) -> np.ndarray:
-        """All eyes of all worlds, noise included."""
-        looking, normals = self.renderer.begin(self.worlds.datas), self._normals.begin(self._everyone)
-        seen = looking.wait()
+    def _look(self, worlds: np.ndarray) -> np.ndarray:
+        """All eyes of these worlds, noise included: no other world's noise goes on."""
+        looking, normals = self.renderer.begin(self.worlds.datas), self._normals.begin(worlds)
+        seen = looking.wait()[worlds]
         return seen if self._noise is None else self._noise(seen, normals.wait())
 
     def _observation(self, seen: np.ndarray, fresh: np.ndarray) -> dict[str, np.ndarray]:
@@ -130,11 +177,8 @@ class TaskVecEnv(OneEnvironment):
         """Beside what is seen."""
         known = {"previous_action": self._action[worlds].copy()}
         if "feels" in self.observation_space.spaces:
-            known["feels"] = np.stack([self._felt(self.worlds.datas[i]) for i in worlds])
+            known["feels"] = self.worlds.felt[worlds].copy()
         return known
-
-    def _felt(self, data: mujoco.MjData) -> np.ndarray:
-        return np.asarray(self.task.feels(data), np.float32)
 
     def _infos(self, outcomes: list[StepOfWorld]) -> list[dict[str, Any]]:
         infos: list[dict[str, Any]] = []
@@ -167,9 +211,8 @@ class TaskVecEnv(OneEnvironment):
             "eyes": spaces.Box(-margin if np.isfinite(high) else -np.inf, high, frame, np.float32),
             "previous_action": spaces.Box(-1.0, 1.0, self._actions().shape, np.float32),
         }
-        felt = self._felt(self.worlds.datas[0])
-        if felt.size:
-            found["feels"] = spaces.Box(-np.inf, np.inf, felt.shape, np.float32)
+        if self.worlds.felt.shape[1]:
+            found["feels"] = spaces.Box(-np.inf, np.inf, self.worlds.felt.shape[1:], np.float32)
         return spaces.Dict(found)
 
     def _actions(self) -> spaces.Box:

@@ -2,7 +2,9 @@
 
 task                Task: what a robot has to do
 model_renderer      ModelRenderer: eyes mounted on any MuJoCo model, in many worlds at once
+model_fidelity      how many rays eyes on a model need
 mounts              Mount: where an eye is, on a body, a site or a camera
+eye_marks           eyes on pictures of a model
 inside              eyes that are inside of a geom
 poses               Poses: where everything is, in all worlds
 model_wavefront     its kernels

@@ -11,7 +11,7 @@ import numpy as np
 import optics
 from optics.numerics.arguments import of_kind, whole
 from optics.spectra.spectrum import Spectrum
-from sim.eyes.sensor import directions_of, eye_sampling
+from sim.eyes.sampling import directions_of, eye_sampling
 from sim.render.fidelity import Fidelity
 from sim.render.memory_budget import Demand, check_memory
 from sim.render.pending_frame import FrameSlot, PendingFrame
@@ -80,7 +80,9 @@ class ModelRenderer:
             self._tracer = ModelTracer(self._scene, wavelengths)
             suns = [light.level for light in self._scene.lights.found if light.kind == "directional"]
             self.brightest = float((mixing @ np.sum(suns, axis=0)).max() / np.pi) if suns else 0.0
-            self._sums = self.sensor.receptor_sums(mixing, self._tracer.basis)
+            basis = self._tracer.basis
+            self._sums = self.sensor.receptor_sums(mixing, basis)
+            self._radiance_sums = self.sensor.receptor_sums(np.eye(len(wavelengths)), basis)
             self._wavefront = ModelWavefront(self._scene, self._tracer, self.sensor, self.n_envs, len(self.mounts))
             along = {"light": self.sensor.directions, "depth": _centres(self.eye)}
             self._looks = {what: self._wavefront.look(directions) for what, directions in along.items()}
@@ -99,6 +101,12 @@ class ModelRenderer:
     def begin(self, poses: Poses | Sequence[mujoco.MjData]) -> PendingFrame:
         """Begin to see; it runs beside whatever comes next, until the signals are waited for."""
         return self._begin(poses, "light").then(self._signals)
+
+    def receptor_radiance(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+        """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
+        light = self._planes(self._begin(poses, "light").wait())
+        found = self._radiance_sums(light).reshape(self.n_envs, len(self.mounts), -1, *self.eye.resolution)
+        return np.moveaxis(found, 2, 0)
 
     def depth(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
         """How far what each receptor's centre looks at is, along the eye's axis [m], (env, eye, height, width) float32;
@@ -141,12 +149,15 @@ class ModelRenderer:
         return self._slot.begin(lambda: self._wavefront.launch(kernel, self._looks[what], placed, eyes))
 
     def _signals(self, light: np.ndarray) -> np.ndarray:
-        planes, n_eyes = self.sensor.depth.count * len(self._tracer.basis), len(self.mounts)
-        signals = self._sums(light.reshape(planes, self.n_envs * n_eyes, -1))
+        signals = self._sums(self._planes(light))
         bands = self.eye.spectral_bands
-        signals = signals.reshape(self.n_envs, n_eyes, len(bands.weights), *self.eye.resolution)
+        signals = signals.reshape(self.n_envs, len(self.mounts), len(bands.weights), *self.eye.resolution)
         mosaic = self.eye.mosaic
         return signals if mosaic is None else np.take_along_axis(signals, mosaic[None, None, None], axis=2)
+
+    def _planes(self, light: np.ndarray) -> np.ndarray:
+        """(plane, view, ray)"""
+        return light.reshape(self.sensor.depth.count * len(self._tracer.basis), self.n_envs * len(self.mounts), -1)
 
     def _check_memory(self) -> None:
         fidelity, planes = self.fidelity, self.fidelity.depth.count * self.fidelity.bands

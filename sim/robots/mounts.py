@@ -95,13 +95,30 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
     Raises:
         ValueError: less than one eye.
     """
+    return fan(Mount(on, offset=(radius, 0.0, 0.0)), n_eyes, placement_range_deg)
+
+
+def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: float = 0.0) -> tuple[Mount, ...]:
+    """Eyes left to right, evenly over a range of azimuths: each is this one, with its offset, turned about the upward
+    axis of what it is on, and then further up by `elevation_deg`; one eye is where this one is.
+
+    Raises:
+        ValueError: less than one eye.
+    """
     if n_eyes < 1:
-        raise ValueError(f"ring: n_eyes = {n_eyes!r}: must be at least 1")
+        raise ValueError(f"n_eyes = {n_eyes!r}: must be at least 1")
     half = placement_range_deg / 2
     azimuths = np.linspace(half, -half, n_eyes) if n_eyes > 1 else np.zeros(1)
-    return tuple(
-        Mount(on, azimuth_deg=float(a), offset=(radius * np.cos(np.radians(a)), radius * np.sin(np.radians(a)), 0.0))
-        for a in azimuths
+    return tuple(_turned(mount, float(azimuth), elevation_deg) for azimuth in azimuths)
+
+
+def _turned(mount: Mount, azimuth_deg: float, elevation_deg: float) -> Mount:
+    (ahead, left, up), (c, s) = mount.offset, (f(np.radians(azimuth_deg)) for f in (np.cos, np.sin))
+    return replace(
+        mount,
+        azimuth_deg=mount.azimuth_deg + azimuth_deg,
+        elevation_deg=mount.elevation_deg + elevation_deg,
+        offset=(ahead * c - left * s, ahead * s + left * c, up),
     )
 
 

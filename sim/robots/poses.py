@@ -33,6 +33,11 @@ class Poses:
         stacked = {f.name: np.stack([getattr(data, f.name) for data in datas]) for f in fields(cls)}
         return cls(**{name: _square(array) if name.endswith("mat") else array for name, array in stacked.items()})
 
+    @classmethod
+    def joined(cls, *parts: Poses) -> Poses:
+        """The worlds of all of them, one after the other."""
+        return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
+
     @property
     def n(self) -> int:
         """Number of worlds."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,9 @@ import numpy as np
 import optics
 from optics.numerics.arguments import whole
 from optics.spectra.spectrum import Spectrum
+from sim.eyes.eyes import Eyes
 from sim.render.fidelity import Fidelity
-from sim.robots.model_renderer import SIXTEEN_RAYS
-from sim.robots.mounts import Mount
+from sim.robots.mounts import Mount, fan
 from sim.scene import source
 
 MOST_STEPS = 10**9
@@ -25,18 +26,23 @@ class Task:
 
     model: an MjModel, or what compiles to one (`sim.mirror`)
     eye: optics and retina of every eye · mounts: where the eyes are
-    fidelity: how finely they see, see `sim.ModelRenderer`
+    fidelity: how finely they see, see `sim.ModelRenderer`; "auto": as a few moments of its episodes want, see
+        `sim.choose_model_fidelity`
     substeps: of physics in one action · episode_steps: actions, then an episode is truncated
     spectra: of materials and lights, by name, in the place of their colours
     camera: name of the camera that pictures for people are taken with; None: one that looks at the whole model
 
-    Methods are called for one world at a time, with its mjData after mj_forward.
+    Where the task evolves (`evolve run FILE.py:CLASS`), every animal has eyes of its own, where `place` puts them; a
+    class without arguments is needed for that.
+
+    Methods are called for one world at a time, with its mjData after mj_forward. One task serves all worlds: what an
+    episode must remember belongs into mjData (`userdata`, say), not into the task.
     """
 
     model: mujoco.MjModel | mujoco.MjSpec | str | Path
     eye: optics.Eye = optics.Eye()
     mounts: Sequence[Mount] = ()
-    fidelity: Fidelity = SIXTEEN_RAYS
+    fidelity: Fidelity | str = "auto"
     substeps: int = 5
     episode_steps: int = 256
     spectra: Mapping[str, Spectrum | str] | None = None
@@ -67,6 +73,10 @@ class Task:
         """What the animal knows beside what it sees, (k,); here: nothing."""
         return np.zeros(0)
 
+    def place(self, n_eyes: int, placement_range_deg: float, elevation_deg: float) -> Sequence[Mount]:
+        """Where an evolving animal has its eyes; here: the first of `mounts`, fanned out, see `sim.fan`."""
+        return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)
+
     def n_actions(self, model: mujoco.MjModel) -> int:
         """Numbers in an action; here: as many as there are actuators."""
         return int(model.nu)
@@ -87,6 +97,22 @@ def compiled(task: Task) -> mujoco.MjModel:
     if task.n_actions(model) < 1:
         raise ValueError(f"{name}: its model has no actuators: n_actions and act must say what an action is")
     return model
+
+
+def grown(task: Task, eyes: Eyes, elevation_deg: float = 0.0) -> Task:
+    """The same task for an animal with such eyes, where the task places them.
+
+    Raises:
+        ValueError: the task places another number of eyes, or none, since it has no mounts.
+    """
+    name, animal = type(task).__name__, copy.copy(task)
+    if not task.mounts and type(task).place is Task.place:
+        raise ValueError(f"{name}: mounts = {task.mounts!r}: must hold one sim.Mount at least, where the eyes are")
+    animal.eye = eyes.eye()
+    animal.mounts = tuple(task.place(eyes.n_eyes, eyes.placement_range_deg, elevation_deg))
+    if len(animal.mounts) != eyes.n_eyes or not all(isinstance(mount, Mount) for mount in animal.mounts):
+        raise ValueError(f"{name}: place returned {animal.mounts!r:.200}: must be {eyes.n_eyes} of sim.Mount")
+    return animal
 
 
 def named_terms(task: Task, data: mujoco.MjData) -> dict[str, float]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from evolve.config.numbering import Place
 from evolve.config.run_config import EvaluationConfig, EyeConfig, LearningConfig, RunConfig
+from evolve.genome.genes import TILT
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.fitness import evaluate
@@ -27,7 +28,9 @@ PHENOTYPE = Phenotype(
 
 
 def small_config(task="detection", learning=LEARNING, **eye):
-    genome = {name: replace(gene.default, open=gene.cluster == "neural") for name, gene in GENES.items()}
+    genome = {
+        name: replace(gene.default, open=gene.cluster == "neural") for name, gene in GENES.items() if name != TILT
+    }
     eye_config = EyeConfig(optics=False, rays_per_receptor=1, **eye)
     return RunConfig(task, eye=eye_config, genome=genome, learning=learning, evaluation=EvaluationConfig(episodes=6))
 

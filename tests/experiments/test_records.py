@@ -88,9 +88,12 @@ def test_pages_hold_what_is_on_record(page, tmp_path, monkeypatch):
     assert len(found) == len(stored)
     for one, other in zip(found, stored, strict=True):
         left_out = OPTICAL if one["strehl"] == "nan" else ()
-        assert {n: v for n, v in one.items() if n not in left_out} == {
-            n: v for n, v in other.items() if n not in left_out
-        }
+        exact, measured = (set(one) - set(OPTICAL), set(OPTICAL) - set(left_out))
+        assert {name: one[name] for name in exact} == {name: other[name] for name in exact}
+        # What optics finds of an eye may move within what the eye promises of its kernel, 1e-2, when a cheaper way is
+        # found; a fifth of that tells neighbours in a generation apart.
+        found_of, stored_of = ({name: float(row[name]) for name in measured & row.keys()} for row in (one, other))
+        assert found_of == pytest.approx(stored_of, rel=2e-3, nan_ok=True)
     looked_at = sum(row["strehl"] != "nan" for row in found)
     assert looked_at == (len(runs) if any(row["relief"] for row in found) else 0)
     assert read_rows(Row, stored_rows(page))

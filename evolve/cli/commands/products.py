@@ -118,6 +118,6 @@ def _waiting(arguments: Namespace, text: str) -> Waiting:
 
 def _open(arguments: Namespace) -> Run:
     """The run, on a machine that can see."""
-    run = Run.open(arguments.directory)
+    run = Run.open(arguments.directory, arguments.task)
     device.make_ready()
     return run

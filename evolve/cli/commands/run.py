@@ -43,7 +43,9 @@ def start(arguments: Namespace) -> int:
     )
     Search(config)  # an unknown optimizer, say, is refused before anything is written
     device.make_ready()
-    directory = arguments.out or next_directory(config.task, arguments.preset.removesuffix(f"-{config.task}"))
+    if config.own_task is not None:
+        _try(config)
+    directory = arguments.out or next_directory(config.task_name, arguments.preset.removesuffix(f"-{config.task}"))
     if arguments.dry_run:
         return _show(RunPlan.of(config, directory), arguments.json)
     notes = (
@@ -61,7 +63,7 @@ def start(arguments: Namespace) -> int:
 def resume(arguments: Namespace) -> int:
     """Carry an interrupted run to its end."""
     scheduler = _scheduler(arguments)
-    run = Run.open(arguments.directory)
+    run = Run.open(arguments.directory, arguments.task)
     device.make_ready()
     with run.lock():
         run.repair()
@@ -72,6 +74,8 @@ def resume(arguments: Namespace) -> int:
                 print(f"{run.path}: all {run.config.candidates} candidates have been evaluated")
             return _already_finished(run, arguments)
         run.require_present_format()
+        if run.config.own_task is not None:
+            _try(run.config)
         if not arguments.quiet:
             _note_changes(run)
         record_start(run.path, len(run.candidates))
@@ -81,6 +85,13 @@ def resume(arguments: Namespace) -> int:
                 flush=True,
             )
         return _carry(run, arguments, scheduler)
+
+
+def _try(config: RunConfig) -> None:
+    """A task of one's own, before anything is written."""
+    from evolve.learning.task_trial import try_task
+
+    try_task(config)
 
 
 def _show(plan: RunPlan, as_json: bool) -> int:
@@ -102,9 +113,10 @@ def _carry(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> int:
         ):
             evolve(run, executor, Watchers([watch, *([tensorboard] if tensorboard else [])]))
     except KeyboardInterrupt:
+        own = f" --task {arguments.task}" if run.config.own is not None else ""
         print(
             f"\nevolve: interrupted; {len(run.candidates)} of {run.config.candidates} candidates are on record. "
-            f"Continue with: evolve resume {run.path}",
+            f"Continue with: evolve resume {run.path}{own}",
             file=sys.stderr,
         )
         return INTERRUPTED

@@ -10,6 +10,7 @@ from typing import Any
 
 from evolve.config.assemble import assemble, to_toml
 from evolve.config.formats import FORMAT
+from evolve.config.own_task import LABEL
 from evolve.config.run_config import SECTIONS, TASKS, RunConfig
 from evolve.genome.genes import ALL_GENES, GENES, Gene
 from evolve.genome.interval import Interval
@@ -32,10 +33,11 @@ def config(arguments: Namespace) -> int:
 def schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of a run's config.toml and of files for `--config`; what one setting means for
     another it cannot say, `evolve config show` does."""
-    top = {f.name: _setting(f) for f in fields(RunConfig) if f.name in ("seed", "workers")}
+    top = {f.name: _setting(f) for f in fields(RunConfig) if f.name in ("seed", "workers", "task_sha256")}
+    task = {"anyOf": [{"enum": list(TASKS)}, {"type": "string", "pattern": f"^{LABEL.pattern}$"}]}
     sections = {name: _object({f.name: _setting(f) for f in fields(cls)}) for name, cls in SECTIONS.items()}
     genome = _object({name: _gene(gene) for name, gene in ALL_GENES.items()}, closed=False)
-    properties = {"format": {"const": FORMAT}, "task": {"enum": list(TASKS)}, **top, **sections, "genome": genome}
+    properties = {"format": {"const": FORMAT}, "task": task, **top, **sections, "genome": genome}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "rhabdom run", **_object(properties)}
 
 

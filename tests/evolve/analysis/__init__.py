@@ -4,4 +4,5 @@ statistics: test_statistics.py, test_genealogy.py
 vision: test_vision.py
 genealogy: test_genealogy.py
 episode: test_episode.py
+filmed_episode: test_filmed_episode.py
 """

@@ -10,5 +10,6 @@ lint: test_lint.py
 relief_starts: test_relief_starts.py
 formats: test_formats.py
 square_eyes: test_square_eyes.py
+own_task: test_own_task.py
 numbering: test_numbering.py
 """

@@ -46,7 +46,8 @@ def test_integers_share_the_unit_interval_equally():
 
 @pytest.mark.parametrize("name", GENES)
 def test_encoding_inverts_decoding(name):
-    gene, use = GENES[name], CONFIG.genome[name]
+    gene = GENES[name]
+    use = CONFIG.genome.get(name, gene.default)
     values = range(int(use.low), int(use.high) + 1) if gene.kind == "integer" else np.linspace(use.low, use.high, 7)
     for value in values:
         assert gene.decode(gene.encode(value, use), use) == pytest.approx(value, rel=1e-12)

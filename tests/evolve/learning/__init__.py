@@ -1,6 +1,9 @@
 """Which test covers which module of evolve/learning.
 
 fitness: test_fitness.py
+worlds: test_fitness.py, test_task_module.py
+task_module: test_task_module.py
+task_trial: test_task_module.py
 ppo: test_ppo.py, test_learning.py, search/test_successive_halving.py
 policy: test_policy.py
 eye_features: test_eye_features.py, test_policy.py, test_learning.py

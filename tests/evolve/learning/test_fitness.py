@@ -92,7 +92,7 @@ def test_training_looks_less_closely_than_evaluation(resolution, most, expected,
 
         return made
 
-    monkeypatch.setattr("evolve.learning.fitness.vec_env_in", recorded(vec_env_in))
+    monkeypatch.setattr("evolve.learning.worlds.vec_env_in", recorded(vec_env_in))
     config = small_config()
     learning = replace(config.learning, rays_per_receptor=most)
     config = replace(config, task="maze", eye=replace(config.eye, rays_per_receptor="auto"), learning=learning)
@@ -136,13 +136,13 @@ def test_unseen_mazes_are_seen_by_the_evaluation_alone(tmp_path):
 
 def test_every_stage_has_chance_of_its_own(tmp_path, monkeypatch):
     """A training that went on in the worlds of its first stage would learn them by heart."""
-    seeds, make = [], fitness._worlds
+    seeds, make = [], fitness.worlds_of
 
     def recorded(phenotype, config, *two):
         seeds.append(two)
         return make(phenotype, config, *two)
 
-    monkeypatch.setattr(fitness, "_worlds", recorded)
+    monkeypatch.setattr(fitness, "worlds_of", recorded)
     kept = tuple(tmp_path / str(number) for number in range(3))
     evaluate(PHENOTYPE, small_config(), 5, tmp_path / "policy", stage=TrainingStage((256, 512, 768), kept))
     assert len(seeds) == 3

@@ -15,6 +15,7 @@ views: test_eye_figures.py
 picture: test_picture.py
 player: test_player.py
 ground_plan: test_player.py, analysis/test_episode.py
+footage: analysis/test_filmed_episode.py
 moving_picture: test_moving_picture.py
 replay: analysis/test_episode.py, test_rerun_recording.py
 rerun_recording: test_rerun_recording.py

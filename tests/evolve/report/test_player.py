@@ -25,8 +25,8 @@ def test_film_is_the_episode(run, episode, content):
     assert film["total"][-1] == pytest.approx(episode.reward.sum(), abs=1e-3)
     assert film["total"][0] == pytest.approx(episode.reward[0], abs=1e-3)
     np.testing.assert_allclose(film["terms"]["progress"], np.cumsum(episode.reward_terms["progress"]), atol=1e-3)
-    assert np.degrees(film["eyes"]["fov"]) == pytest.approx(33.0)
-    assert np.degrees(film["eyes"]["azimuths"]) == pytest.approx([30, -30], abs=1e-3)
+    assert np.degrees(film["fov"]) == pytest.approx(33.0)
+    assert np.degrees(film["azimuths"]) == pytest.approx([30, -30], abs=1e-3)
 
 
 def test_film_shows_what_each_eye_signalled(episode, content):

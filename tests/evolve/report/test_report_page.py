@@ -9,7 +9,7 @@ import pytest
 from evolve.config.assemble import assemble
 from evolve.config.numbering import Place
 from evolve.config.run_config import RunConfig
-from evolve.genome.genotype import GENES, Genotype
+from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.report import figures
 from evolve.report.markup import exact, rounded
@@ -47,7 +47,7 @@ def test_headline_counts(page):
 
 def test_every_section_and_every_open_gene_is_there(run, page):
     assert {"fitness", "genes", "best", "animals", "numbers", "episode", "candidates", "facts"} <= set(page.ids)
-    opened = [name for name in GENES if run.config.genome[name].open]
+    opened = [name for name in run.config.genes if run.config.genome[name].open]
     assert len(opened) > 20
     for name in opened:
         if not name.startswith("doe_"):

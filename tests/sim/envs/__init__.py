@@ -3,6 +3,8 @@
 assembly: test_env.py, test_vec_env.py, test_tasks_page.py
 task_vec_env: test_task_vec_env.py
 task_worlds: test_task_vec_env.py
+task_fidelity: robots/test_model_fidelity.py
+task_state: test_task_state.py
 one_environment: test_vec_env.py
 env: test_env.py
 vec_env: test_vec_env.py, test_env.py

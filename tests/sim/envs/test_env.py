@@ -213,6 +213,7 @@ def test_renders_nothing_before_the_world_has_begun():
         ({"spectra": {"wal": "foliage"}}, "no material or light 'wal'; did you mean 'wall'"),
         ({"memory": 0}, "memory = 0"),
         ({"memory": 1.5}, "memory = 1.5: must be a whole number"),
+        ({"episode_steps": 0}, "episode_steps = 0: must be a whole number"),
         ({"world_seed": 1.5}, "world_seed = 1.5: must be a whole number"),
     ],
 )

@@ -50,6 +50,19 @@ def test_worlds_start_anew_in_the_step_that_ends_them():
     assert env.single_observation_space.contains(info["final_obs"][1])
 
 
+@pytest.mark.parametrize("steps", [3, 300])
+def test_episodes_last_as_long_as_gymnasium_is_told(steps):
+    """Shorter than the task's 256 actions, and longer; in one world, `episode_steps` says so."""
+    env = gymnasium.make_vec("rhabdom/Detection-v0", num_envs=2, max_episode_steps=steps, mode="evaluation", **OPTIONS)
+    env.reset(seed=0)
+    ended = [env.step(np.tile(np.float32([-1, 0]), (2, 1)))[3].all() for _ in range(steps)]
+    assert ended == [False] * (steps - 1) + [True]
+    one = gymnasium.make("rhabdom/Detection-v0", episode_steps=steps, mode="evaluation", **OPTIONS)
+    one.reset(seed=0)
+    ended = [one.step(np.float32([-1, 0]))[3] for _ in range(steps)]
+    assert ended == [False] * (steps - 1) + [True]
+
+
 def test_pictures_of_all_worlds():
     env = gymnasium.make_vec("rhabdom/Detection-v0", num_envs=2, render_mode="eyes", **OPTIONS)
     env.reset()

@@ -2,8 +2,10 @@
 
 model_renderer: test_model_renderer.py
 model_wavefront: test_model_renderer.py
+model_fidelity: test_model_fidelity.py
 mounts: test_mounts.py
 task: envs/test_task_vec_env.py
+eye_marks: test_eye_marks.py
 inside: test_mounts.py
 poses: test_model_renderer.py
 model_scene: test_model_renderer.py

@@ -1,0 +1,156 @@
+"""One episode in a task of somebody's own, recorded: what was seen and done, and pictures of it for people."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+import sim
+from evolve.config.run_config import EyeConfig, RunConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.learning.policy import EyePolicy
+from evolve.learning.worlds import own_task_for
+from sim.envs.task_fidelity import fidelity_of
+from sim.envs.task_vec_env import TaskVecEnv
+from sim.robots.poses import Poses
+from sim.robots.task import Task
+
+__all__ = ["FilmedEpisode", "film", "moments"]
+
+FINE_PIXELS = 60  # least pixels along the longer side of the radiance pictures
+RAYS = 16  # per receptor and pixel, of what nobody has to be quick with
+MOST_PICTURES = 128  # for people: they are kept at even times
+
+
+@dataclass(frozen=True)
+class FilmedEpisode:
+    """One evaluation episode. Time runs along the first axis: at time t the eyes saw, then the animal acted, and
+    `reward` and `reward_terms` are what that action led to.
+
+    task, candidate_id, seed, phenotype, eye: which episode of whom
+    action (t, number)        in [-1, 1]
+    reward (t,), reward_terms name -> (t,)   after it; 0 where the task has not named the term
+    signals: what the receptors reported, noise included, (t, eye, channel, height, width)
+    perfect_signals: the same receptors behind a perfect lens, without noise
+    wavelengths_nm: of the bands, (band,)
+    radiance_frames: times t at which radiance was kept, (frame,)
+    radiance: of the scene before each eye, on a finer grid, (frame, eye, band, y, x)
+    picture_times: times t of which there are pictures, (picture,) · pictures (picture, y, x, 3) uint8 sRGB
+    azimuths_deg, elevations_deg: where each eye looks in the frame of what it is on, (eye,)
+    seconds: that one action lasts · solved: whether what is to be done was done at the end
+    failure: what the task failed with, if it did
+    """
+
+    task: str
+    candidate_id: int
+    seed: int
+    phenotype: Phenotype
+    eye: EyeConfig
+    action: np.ndarray
+    reward: np.ndarray
+    reward_terms: dict[str, np.ndarray]
+    signals: np.ndarray
+    perfect_signals: np.ndarray
+    wavelengths_nm: np.ndarray
+    radiance_frames: np.ndarray
+    radiance: np.ndarray
+    picture_times: np.ndarray
+    pictures: np.ndarray
+    azimuths_deg: np.ndarray
+    elevations_deg: np.ndarray
+    seconds: float
+    solved: bool
+    failure: str | None = None
+
+    def __len__(self) -> int:
+        """Actions taken."""
+        return len(self.action)
+
+    @property
+    def eyes(self) -> sim.Eyes:
+        """The eyes that saw it, as if they were on rhabdom's own agent."""
+        return self.phenotype.eyes(self.eye)
+
+
+def film(
+    phenotype: Phenotype, config: RunConfig, policy: EyePolicy, candidate_id: int, seed: int, radiance_every: int
+) -> FilmedEpisode:
+    """Let an animal play one episode; same arguments, same episode."""
+    task = own_task_for(phenotype, config)
+    with contextlib.closing(TaskVecEnv(task, 1, seed, phenotype.memory_frames, "rgb_array")) as worlds:
+        poses, columns = _play(policy, worlds)
+        views = _perfect_views(worlds.worlds.model, task, poses, radiance_every)
+        seconds = task.substeps * float(worlds.worlds.model.opt.timestep)
+    return FilmedEpisode(
+        task=config.task,
+        candidate_id=candidate_id,
+        seed=seed,
+        phenotype=phenotype,
+        eye=config.eye,
+        azimuths_deg=np.array([mount.azimuth_deg for mount in task.mounts]),
+        elevations_deg=np.array([mount.elevation_deg for mount in task.mounts]),
+        seconds=seconds,
+        **columns,
+        **views,
+    )
+
+
+def moments(task: Task, n: int, seed: int) -> tuple[mujoco.MjModel, Poses]:
+    """Where everything is at the beginnings of n episodes."""
+    with contextlib.closing(TaskVecEnv(task, n, seed)) as worlds:
+        worlds.reset()
+        return worlds.worlds.model, Poses.of(worlds.worlds.datas)
+
+
+def _play(policy: EyePolicy, worlds: TaskVecEnv) -> tuple[list[Poses], dict[str, Any]]:
+    """Where everything was before each action, and the columns that playing fills."""
+    poses: list[Poses] = []
+    rows: list[tuple[Any, ...]] = []
+    pictures: list[np.ndarray] = []
+    observation, info, done = worlds.reset(), dict[str, Any](), False
+    every = max(1, -(-worlds.task.episode_steps // MOST_PICTURES))
+    while not done:
+        if len(rows) % every == 0:
+            pictures.append(worlds.get_images()[0])
+        poses.append(Poses.of(worlds.worlds.datas))
+        seen = observation["eyes"][0, -1]
+        action = policy.predict(observation, deterministic=True)[0]
+        observation, reward, dones, infos = worlds.step(action)
+        done, info = bool(dones[0]), infos[0]
+        rows.append((np.clip(action[0], -1, 1), reward[0], info["reward_terms"], seen))
+    action, reward, terms, signals = zip(*rows, strict=True)
+    names = list(dict.fromkeys(name for of_step in terms for name in of_step))
+    return poses, {
+        "action": np.array(action),
+        "reward": np.array(reward),
+        "reward_terms": {name: np.array([of_step.get(name, 0.0) for of_step in terms]) for name in names},
+        "signals": np.array(signals),
+        "picture_times": np.arange(0, len(rows), every),
+        "pictures": np.array(pictures),
+        "solved": bool(info["is_success"]),
+        "failure": info.get("failure"),
+    }
+
+
+def _perfect_views(model: mujoco.MjModel, task: Task, poses: list[Poses], every: int) -> dict[str, Any]:
+    """The same scenes through a perfect lens: by the same receptors, and as radiance on a finer grid."""
+    perfect = replace(task.eye, pupil=None)
+    height, width = perfect.resolution
+    factor = max(1, -(-FINE_PIXELS // max(height, width)))
+    fine = replace(perfect, resolution=(factor * height, factor * width))
+    fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
+    receptors, pictures = (
+        sim.ModelRenderer(model, eye, task.mounts, 1, fidelity, spectra=task.spectra) for eye in (perfect, fine)
+    )
+    frames = np.arange(0, len(poses), every)
+    radiance = [np.moveaxis(pictures.receptor_radiance(poses[t]), 0, 2) for t in frames]
+    return {
+        "perfect_signals": np.concatenate([receptors.signals(moment) for moment in poses]),
+        "wavelengths_nm": 1e9 * np.asarray(receptors.eye.spectral_bands.wavelengths),
+        "radiance_frames": frames,
+        "radiance": np.concatenate(radiance),
+    }

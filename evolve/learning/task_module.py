@@ -1,0 +1,57 @@
+"""A task of somebody's own, executed: the one place where a run's code becomes objects."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from functools import lru_cache
+from types import ModuleType
+
+from evolve.config.checks import ConfigError
+from evolve.config.own_task import OwnTask
+from sim.robots.task import Task, compiled
+
+__all__ = ["executed_task"]
+
+
+@lru_cache(maxsize=4)
+def executed_task(own: OwnTask) -> Task:
+    """The task: its file's text is executed as it was read, whatever the file holds by now.
+
+    Raises:
+        ConfigError: one line, with file and line where it comes from there: it cannot be executed, the class is no
+            `sim.Task` or wants arguments, its model cannot be compiled, or a setting of it is wrong.
+    """
+    module = _executed(own)
+    cls = getattr(module, own.name, None)
+    if not (isinstance(cls, type) and issubclass(cls, Task)):
+        raise ConfigError(f"{own.label}: must be a class that derives from sim.Task", "task")
+    try:
+        task = cls()
+        compiled(task)
+    except Exception as error:
+        raise ConfigError(f"{own.label}: {_told(error, own)}", "task") from error
+    return task
+
+
+def _executed(own: OwnTask) -> ModuleType:
+    """Under a name that no other module has, where pickle and dataclasses find it, too."""
+    name = f"rhabdom_task_{own.sha256[:16]}"
+    module = ModuleType(name)
+    module.__file__ = str(own.file)
+    sys.modules[name] = module
+    if str(own.file.parent) not in sys.path:
+        sys.path.append(str(own.file.parent))  # last: a neighbour of the file shadows nobody
+    try:
+        exec(compile(own.text, str(own.file), "exec"), module.__dict__)
+    except Exception as error:
+        del sys.modules[name]
+        raise ConfigError(f"{own.file.name}: {_told(error, own)}", "task") from error
+    return module
+
+
+def _told(error: Exception, own: OwnTask) -> str:
+    """The line of the user's file that it comes from, if it does, and what it says."""
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(own.file)]
+    said = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"line {lines[-1]}: {said}" if lines else said

@@ -1,0 +1,52 @@
+"""A task of somebody's own, tried for a moment before anything is begun: what fails there fails in every animal."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import closing
+
+import numpy as np
+
+from evolve.config.checks import ConfigError
+from evolve.config.run_config import RunConfig
+from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop
+from evolve.learning.worlds import own_task_for
+from sim.envs.task_vec_env import TaskVecEnv
+
+__all__ = ["try_task"]
+
+WORLDS, ACTIONS = 2, 4
+
+
+def try_task(config: RunConfig) -> None:
+    """Let the first animal take a few random actions; nothing, where the task is one of rhabdom's own.
+
+    Raises:
+        ConfigError: one line: what the task's module, model, eyes or methods fail with.
+    """
+    if config.own_task is None:
+        return
+    animal = develop(Genotype(config.genome).start, config)
+    try:
+        task = own_task_for(animal, config)
+        with closing(TaskVecEnv(task, WORLDS, config.seed, animal.memory_frames)) as worlds, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the failure itself is told
+            failure = _failure(worlds)
+    except (ValueError, RuntimeError, OSError) as error:
+        said = str(error) if isinstance(error, ConfigError) else f"{config.task}: {error}"
+        raise ConfigError(" ".join(said.split()), "task") from error
+    if failure is not None:
+        raise ConfigError(f"{config.task}: {failure}", "task")
+
+
+def _failure(worlds: TaskVecEnv) -> str | None:
+    """Of the first method that fails."""
+    random = np.random.default_rng(0)
+    worlds.reset()
+    for _ in range(ACTIONS):
+        infos = worlds.step(random.uniform(-1, 1, (WORLDS, *worlds.action_space.shape)))[3]
+        for info in infos:
+            if "failure" in info:
+                return str(info["failure"])
+    return None

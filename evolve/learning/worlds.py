@@ -1,0 +1,88 @@
+"""Where an animal lives: worlds to learn in, to be tried out in meanwhile, and to have its fitness measured in."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, replace
+
+from evolve.config.checks import AUTO
+from evolve.config.run_config import RunConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.learning.task_module import executed_task
+from sim.envs.assembly import prepared_scene, vec_env_in
+from sim.envs.task_fidelity import fidelity_of
+from sim.envs.task_vec_env import TaskVecEnv
+from sim.envs.vec_env import EyesVecEnv
+from sim.render.fidelity import Fidelity
+from sim.render.fidelity_choice import fidelity_for
+from sim.robots.task import Task, grown
+
+__all__ = ["LifeWorlds", "own_task_for", "worlds_of"]
+
+
+@dataclass(frozen=True)
+class LifeWorlds:
+    """All have the same light; the first two take no more rays than are good enough to learn from, as their noise
+    averages out."""
+
+    lessons: EyesVecEnv | TaskVecEnv
+    checkpoints: EyesVecEnv | TaskVecEnv
+    finals: EyesVecEnv | TaskVecEnv
+
+
+def worlds_of(phenotype: Phenotype, config: RunConfig, learning: int, evaluation: int) -> LifeWorlds:
+    """Worlds of two seeds: to learn in, and to be evaluated in.
+
+    Raises:
+        ConfigError: the task is somebody's own, and has not been named, or cannot be begun.
+    """
+    if config.own_task is not None:
+        return _own_worlds(phenotype, config, learning, evaluation)
+    eyes, memory, wanted = phenotype.eyes(config.eye), phenotype.memory_frames, config.learning
+    scene = prepared_scene(config.task, eyes, **config.world.evaluation)
+    fine = fidelity_for(scene, config.eye.rays_per_receptor)
+    coarse = _at_most(fine, wanted.rays_per_receptor)
+    same_place = config.world.training == config.world.evaluation
+    school = scene if same_place else prepared_scene(config.task, eyes, **config.world.training)
+    checkpoints, finals = (
+        vec_env_in(scene, how, config.evaluation.episodes, evaluation, memory=memory, mode="evaluation")
+        for how in (coarse, fine)
+    )
+    least = wanted.least_return or None
+    lessons = vec_env_in(school, coarse, wanted.n_envs, learning, memory=memory, least_return=least)
+    return LifeWorlds(lessons, checkpoints, finals)
+
+
+def own_task_for(phenotype: Phenotype, config: RunConfig) -> Task:
+    """The task of somebody's own with this animal in it.
+
+    Raises:
+        ConfigError: it has not been named, or its module cannot be executed.
+        ValueError: it places other eyes than the animal has.
+    """
+    assert config.own_task is not None
+    task = executed_task(config.own_task)
+    animal = grown(task, phenotype.eyes(config.eye), phenotype.elevation_deg or 0.0)
+    rays, bands = config.eye.rays_per_receptor, config.eye.bands
+    if rays != AUTO:
+        animal.fidelity = Fidelity(float(rays), bands)
+    elif isinstance(task.fidelity, Fidelity):
+        animal.fidelity = replace(task.fidelity, bands=bands)
+    else:
+        animal.fidelity = fidelity_of(animal)
+    return animal
+
+
+def _own_worlds(phenotype: Phenotype, config: RunConfig, learning: int, evaluation: int) -> LifeWorlds:
+    task, memory, wanted = own_task_for(phenotype, config), phenotype.memory_frames, config.learning
+    pupil = copy.copy(task)
+    pupil.fidelity = _at_most(fidelity_of(task), wanted.rays_per_receptor)
+    return LifeWorlds(
+        lessons=TaskVecEnv(pupil, wanted.n_envs, learning, memory),
+        checkpoints=TaskVecEnv(pupil, config.evaluation.episodes, evaluation, memory),
+        finals=TaskVecEnv(task, config.evaluation.episodes, evaluation, memory),
+    )
+
+
+def _at_most(fidelity: Fidelity, rays_per_receptor: float) -> Fidelity:
+    return replace(fidelity, rays_per_receptor=min(fidelity.rays_per_receptor, rays_per_receptor))

@@ -1,0 +1,64 @@
+"""Where worlds of a task stand: all that their future follows from, as plain arrays."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from sim.envs.task_worlds import TaskWorlds
+
+_ALL = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+def of_worlds(worlds: TaskWorlds) -> dict[str, np.ndarray]:
+    """Physics, chance and steps of every world; each array's first axis is the world."""
+    size = mujoco.mj_stateSize(worlds.model, _ALL)
+    physics = np.empty((len(worlds.datas), size))
+    for row, data in zip(physics, worlds.datas, strict=True):
+        mujoco.mj_getState(worlds.model, data, row, _ALL)
+    chance = np.array([json.dumps(rng.bit_generator.state) for rng in worlds.rngs])
+    return {"physics": physics, "chance": chance, "steps": worlds.steps.copy(), "felt": worlds.felt.copy()}
+
+
+def bring_back(worlds: TaskWorlds, state: Mapping[str, np.ndarray], chosen: np.ndarray) -> None:
+    """Worlds `chosen` as they were."""
+    for i in chosen:
+        data, row = worlds.datas[i], np.ascontiguousarray(state["physics"][i])
+        mujoco.mj_resetData(worlds.model, data)
+        mujoco.mj_setState(worlds.model, data, row, _ALL)
+        mujoco.mj_forward(worlds.model, data)
+        mujoco.mj_setState(worlds.model, data, row, _ALL)  # the solver's warm start, which mj_forward has moved
+        worlds.rngs[i].bit_generator.state = json.loads(str(state["chance"][i]))
+        worlds.steps[i], worlds.felt[i] = state["steps"][i], state["felt"][i]
+
+
+def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+    """A state as `like`, of the same shapes.
+
+    Raises:
+        ValueError: it has other entries, or an entry of another shape.
+    """
+    if not isinstance(state, Mapping) or state.keys() != like.keys():
+        raise ValueError(f"state: must be what get_state returns, with the entries {', '.join(like)}")
+    for name, array in like.items():
+        if np.shape(state[name]) != array.shape:
+            raise ValueError(f"state: {name} has shape {np.shape(state[name])}: must be {array.shape}")
+    return state
+
+
+def chosen_worlds(worlds: Any, n: int) -> np.ndarray:
+    """Numbers of worlds; None: all.
+
+    Raises:
+        ValueError: they are no numbers of worlds.
+    """
+    if worlds is None:
+        return np.arange(n)
+    chosen = np.atleast_1d(np.asarray(worlds))
+    if chosen.ndim != 1 or chosen.dtype.kind not in "iu" or ((chosen < 0) | (chosen >= n)).any():
+        raise ValueError(f"worlds = {worlds!r:.80}: must be numbers of worlds, from 0 to {n - 1}")
+    return chosen

@@ -1,0 +1,120 @@
+"""As few rays as the receptors' noise allows, on a model of one's own: tried out, as nobody knows what there is to see.
+
+The moments that are looked at are looked at with ever more rays, and with many more. Receptors whose whole field looks
+alike need one ray, however many of them there are, and would hide what the others need: the error is judged where one
+ray is not enough.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+import optics
+from optics.spectra.spectrum import Spectrum
+from sim.render.fidelity import Fidelity, Level
+from sim.render.fidelity_choice import FidelityWarning
+from sim.render.fidelity_stages import LEAST_TOLERANCE, SHARE_OF_NOISE
+from sim.robots.model_renderer import ModelRenderer
+from sim.robots.mounts import Mount
+from sim.robots.poses import Poses
+from sim.scene import source
+from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
+
+# Rays per receptor that are tried, and those that they are held against: behind a pupil all receptors share all rays.
+PERFECT, PERFECT_TRUTH = (1, 2, 4, 8, 16, 32, 64, 128), 512
+SHARED, SHARED_TRUTH = (0.25, 0.5, 1, 2, 4, 8, 16), 64
+SPLIT = 0.1  # of what is allowed: a receptor that errs by more with the fewest rays has something to tell apart
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Errors of signals over the receptors that have something to tell apart (root mean square), by rays per receptor.
+
+    share: of receptors that have
+    """
+
+    errors: Mapping[float, float]
+    share: float
+
+
+def choose_model_fidelity(
+    model: mujoco.MjModel | mujoco.MjSpec | str,
+    eye: optics.Eye,
+    mounts: Sequence[Mount],
+    poses: Poses | Sequence[mujoco.MjData],
+    tolerance: float | None = None,
+    *,
+    groups: Sequence[int] = VISIBLE_GROUPS,
+    spectra: Mapping[str, Spectrum | str] | None = None,
+) -> Fidelity:
+    """The fewest rays for `ModelRenderer` whose error, tried at these poses, is within the tolerance; a FidelityWarning
+    says where there are none. Bands are the eye's own.
+
+    poses: moments that stand for what will be seen
+    tolerance: of a signal (root mean square), over receptors that do not see the same in all of their field; None: half
+        of the receptors' noise, but no less than LEAST_TOLERANCE of what white is worth behind the eye's pupil
+
+    Raises:
+        ValueError: a tolerance that is not positive, and what ModelRenderer raises.
+    """
+    allowed = _allowed(eye, tolerance)
+    compiled, placed = source.load(model), poses if isinstance(poses, Poses) else Poses.of(poses)
+
+    def seen(rays: float) -> np.ndarray:
+        fidelity = Fidelity(rays, eye.bands)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MirrorWarning)  # whoever renders in earnest is told
+            renderer = ModelRenderer(compiled, eye, mounts, placed.n, fidelity, groups=groups, spectra=spectra)
+        return renderer.signals(placed)
+
+    trials = tried(seen, PERFECT if eye.pupil is None else SHARED, _truth(eye), allowed)
+    rays = next((n for n, error in trials.errors.items() if error <= allowed), max(trials.errors))
+    error = trials.errors[rays]
+    why = (
+        f"fewest with {allowed:.1e} where a receptor has something to tell apart "
+        f"({trials.share:.0%} of them, at {placed.n} moments)"
+    )
+    if error > allowed:
+        warnings.warn(
+            f"{rays:g} rays per receptor err by {error:.1e} of a signal, {error / allowed:.1f} times what is allowed, "
+            f"{allowed:.1e}; no more are tried",
+            FidelityWarning,
+            stacklevel=2,
+        )
+        why = f"most that are tried; {allowed:.1e} is allowed"
+    bands = Level("bands", f"{eye.bands}", None, "the eye's own")
+    return Fidelity(rays, eye.bands, tolerance=allowed, levels=(bands, Level("rays", f"{rays:g}", error, why)))
+
+
+def tried(seen: Callable[[float], np.ndarray], ladder: Sequence[float], truth: float, allowed: float) -> Trials:
+    """What is seen with so many rays, held against what is seen with `truth`; up to the first error that is allowed.
+
+    seen: rays per receptor -> signals (env, eye, channel, height, width)
+    """
+    right = seen(truth)
+    errors: dict[float, float] = {}
+    apart: np.ndarray | None = None
+    for rays in ladder:
+        off = np.abs(seen(rays) - right).max(axis=2)
+        apart = off > SPLIT * allowed if apart is None else apart
+        errors[rays] = float(np.sqrt(np.square(off[apart]).mean())) if apart.any() else 0.0
+        if errors[rays] <= allowed:
+            break
+    return Trials(errors, 0.0 if apart is None else float(apart.mean()))
+
+
+def _truth(eye: optics.Eye) -> float:
+    return PERFECT_TRUTH if eye.pupil is None else SHARED_TRUTH
+
+
+def _allowed(eye: optics.Eye, tolerance: float | None) -> float:
+    if tolerance is None:
+        return max(SHARE_OF_NOISE * eye.noise_sigma, LEAST_TOLERANCE * float(eye.throughput))
+    if not 0 < tolerance < np.inf:
+        raise ValueError(f"tolerance = {tolerance!r}: must be positive")
+    return tolerance

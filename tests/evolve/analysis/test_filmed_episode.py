@@ -1,0 +1,140 @@
+"""A run in a task of one's own, from the command line: evolved, resumed, replayed, reported, exported."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import sim
+from evolve.analysis.episode import record
+from evolve.analysis.filmed_episode import moments
+from evolve.analysis.vision import vision
+from evolve.cli.main import main
+from evolve.learning.worlds import own_task_for
+from evolve.report.footage import Footage, stage_of
+from evolve.store.directory import Run
+
+BALL = Path(__file__).parents[3] / "examples" / "find_ball.py"
+NAMED = f"{BALL}:FindBall"
+SETTINGS = (
+    *("search.population=2", "search.generations=1", "learning.n_envs=8", "learning.n_steps=16"),
+    *("learning.total_steps=128", "learning.batch_size=64", "learning.n_epochs=1", "evaluation.episodes=2"),
+    # Eyes that see the ball, wherever the first animals look.
+    *("eye.optics=false", "genome.placement_range_deg.start=40", "genome.fov_deg.start=60"),
+    *("genome.elevation_deg.open=true", "genome.elevation_deg.low=-5", "genome.elevation_deg.high=5"),
+)
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    """A run of two animals, by the command."""
+    path = tmp_path_factory.mktemp("own") / "run"
+    settings = [part for setting in SETTINGS for part in ("--set", setting)]
+    assert main(["run", NAMED, "--preset", "quick", "--workers", "1", "--quiet", "--out", str(path), *settings]) == 0
+    return path
+
+
+@pytest.fixture(scope="module")
+def episode(path):
+    return record(Run.open(path, NAMED), radiance_every=8)
+
+
+def test_the_record_is_data_that_needs_no_code(path, call):
+    run = Run.open(path)
+    assert len(run.candidates) == 2
+    assert all(candidate.failure is None for candidate in run.candidates)
+    assert len({candidate.phenotype.elevation_deg for candidate in run.candidates}) == 2
+    assert call("status", path)[0] == 0
+    for command in ("replay", "report", "export"):
+        code, _, complaint = call(command, path)
+        assert code == 2
+        assert re.search(r"add --task find_ball\.py:FindBall", complaint)
+    assert call("resume", path, "--task", NAMED)[0] == 0
+
+
+def test_an_episode_is_what_was_seen_and_done(path, episode):
+    assert len(episode) == 20
+    assert (
+        episode.signals.shape == episode.perfect_signals.shape == (20, episode.eyes.n_eyes, 3, *episode.eyes.resolution)
+    )
+    np.testing.assert_allclose(sum(episode.reward_terms.values()), episode.reward, rtol=1e-5)
+    assert episode.pictures.shape == (20, 360, 480, 3)
+    assert episode.seconds == pytest.approx(0.1)
+    # Perfect lenses, so what was signalled is the recorded scene but for noise and rays; another episode's is not.
+    other = record(Run.open(path, NAMED), seed=1)
+    off = [np.square(episode.signals - seen.perfect_signals).mean() ** 0.5 for seen in (episode, other)]
+    assert off[0] < 0.02
+    assert off[1] > 1.5 * off[0]
+
+
+def test_the_fine_picture_is_the_same_scene(episode):
+    weights = episode.eyes.eye().spectral_bands.weights
+    fine = np.einsum("cb,febyx->fecyx", weights, episode.radiance)
+    height, width = episode.eyes.resolution
+    shape = (*fine.shape[:3], height, fine.shape[3] // height, width, fine.shape[4] // width)
+    coarse = fine.reshape(shape).mean(axis=(4, 6))
+    # 16 rays per receptor against 16 per pixel: an edge through a receptor is found to about 1/16 of its step.
+    np.testing.assert_allclose(coarse, episode.perfect_signals[episode.radiance_frames], atol=0.08)
+
+
+def test_the_same_again(path, episode):
+    again = record(Run.open(path, NAMED), radiance_every=8)
+    np.testing.assert_equal(vars(again), vars(episode))
+
+
+def test_replay_report_and_exr_show_it(path, call, tmp_path):
+    code, out, _ = call("replay", path, "--task", NAMED, "--gif", "--json", "--out", tmp_path / "replay.html")
+    assert code == 0
+    facts = json.loads(out)
+    assert facts["task"] == "find_ball.py:FindBall"
+    assert facts["terms"].keys() == {"near"}
+    with Image.open(tmp_path / "replay.gif") as moving:
+        assert moving.n_frames == 20
+    page = (tmp_path / "replay.html").read_text()
+    assert "data:image/jpeg;base64," in page
+    film = json.loads(re.search(r'<script type="application/json" class="film">(.*?)</script>', page)[1])
+    assert film["pictures"]["shown"] == list(range(20))
+    assert np.shape(film["action"]) == (20, 1)
+    assert call("report", path, "--task", NAMED, "--out", tmp_path / "report.html")[0] == 0
+    assert "a task of one’s own" in (tmp_path / "report.html").read_text()
+    assert call("export", path, "--task", NAMED, "--out", tmp_path / "exr")[0] == 0
+    views = sim.read_exr(sorted((tmp_path / "exr").glob("*.exr"))[0])
+    assert views[0].attributes["eye_elevation_deg"] == pytest.approx(Run.open(path).best.phenotype.elevation_deg)
+
+
+def test_recordings_for_rerun_are_refused(path, call):
+    code, _, complaint = call("replay", path, "--task", NAMED, "--rrd")
+    assert code == 2
+    assert "--rrd" in complaint
+
+
+def test_what_is_drawn_is_footage(episode):
+    stage = stage_of(episode)
+    assert isinstance(stage, Footage)
+    assert stage.gain == 1
+    shown = stage.film(episode, np.arange(0, 20, 3))["pictures"]["shown"]
+    assert shown == [0, 3, 6, 9, 12, 15, 18]
+
+
+def test_eyes_are_judged_by_the_scenes_of_the_task(path):
+    run = Run.open(path, NAMED)
+    seen = vision(run.best.phenotype, run.config)
+    assert seen.psnr_db > 60  # a perfect lens against itself: the same rays
+    model, poses = moments(own_task_for(run.best.phenotype, run.config), 3, 0)
+    assert poses.n == 3
+    assert len(np.unique(poses.xpos[:, model.nbody - 1, 1])) == 3  # the ball, elsewhere in each
+
+
+def test_another_task_is_refused(path, call, tmp_path):
+    other = tmp_path / "find_ball.py"
+    other.write_text(BALL.read_text().replace("class FindBall", "class LoseBall"))
+    code, _, complaint = call("resume", path, "--task", f"{other}:LoseBall")
+    assert code == 2
+    assert "this run evolves find_ball.py:FindBall, not LoseBall" in complaint
+    other.write_text(BALL.read_text() + "\n")
+    code, _, complaint = call("replay", path, "--task", f"{other}:FindBall")
+    assert code == 2
+    assert "has changed since the run began" in complaint

@@ -1,0 +1,164 @@
+"""Tasks of one's own, executed: what an animal lives in, and what is refused before anything begins."""
+
+import dataclasses
+import pickle
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from evolve.config.assemble import assemble, to_toml
+from evolve.config.run_config import ConfigError
+from evolve.genome.genotype import Genotype
+from evolve.genome.phenotype import develop
+from evolve.learning.fitness import evaluate
+from evolve.learning.policy import load_policy
+from evolve.learning.task_module import executed_task
+from evolve.learning.task_trial import try_task
+from evolve.learning.worlds import own_task_for, worlds_of
+from evolve.search import dask_worker
+from evolve.search.job import Job
+from evolve.store.evaluation import Evaluation
+from optics.numerics import backend
+
+BALL = Path(__file__).parents[3] / "examples" / "find_ball.py"
+SMALL = (
+    *("learning.n_envs=8", "learning.n_steps=16", "learning.total_steps=256", "learning.batch_size=64"),
+    *("learning.n_epochs=2", "learning.eval_interval=128", "evaluation.episodes=3", "eye.optics=false"),
+)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _device():
+    backend.require()
+
+
+def small(*settings, named=f"{BALL}:FindBall"):
+    config = assemble(named, "quick", assignments=[*SMALL, *settings])
+    return config, develop(Genotype(config.genome).start, config)
+
+
+def written(tmp_path, old, new):
+    """Our task with something wrong in it."""
+    text = BALL.read_text()
+    assert old in text
+    file = tmp_path / "mine.py"
+    file.write_text(text.replace(old, new))
+    return f"{file}:FindBall"
+
+
+def test_an_animal_lives_in_it_twice_alike(tmp_path):
+    config, animal = small()
+    first, second = (evaluate(animal, config, 3, tmp_path / name) for name in ("first", "second"))
+    assert first.failure is None
+    assert first.returns == second.returns
+    assert first.steps == 256
+    assert (tmp_path / "first").read_bytes() == (tmp_path / "second").read_bytes()
+    policy = load_policy(tmp_path / "first")
+    assert (policy.config.actions, policy.config.feels) == (1, 1)
+    # The first observation, and all that was felt until the best of two evaluations.
+    assert policy.features_extractor.felt.seen.item() in (8 + 128, 8 + 256)
+
+
+def test_eyes_are_the_animals_own_where_the_task_puts_them():
+    config, animal = small("genome.elevation_deg.start=20", "genome.placement_range_deg.start=80")
+    task = own_task_for(animal, config)
+    assert [mount.azimuth_deg for mount in task.mounts] == [40, -40]
+    assert {mount.elevation_deg for mount in task.mounts} == {20}
+    assert np.hypot(*task.mounts[0].offset[:2]) == pytest.approx(0.26)  # as far out, turned with the eye
+    assert task.eye.resolution == animal.resolution
+    assert task.eye.noise_sigma == config.eye.noise_sigma
+    plain = executed_task(config.own_task)
+    assert len(plain.mounts) == 1  # what belongs to the class is as it was
+
+
+def test_rays_are_the_runs_or_the_tasks_and_few_in_lessons():
+    worlds = {}
+    for rays in ("auto", "12"):
+        config, animal = small(f"eye.rays_per_receptor={rays}", "learning.rays_per_receptor=1")
+        life = worlds_of(animal, config, 1, 2)
+        with closing(life.lessons), closing(life.checkpoints), closing(life.finals):
+            worlds[rays] = [
+                part.renderer.fidelity.rays_per_receptor for part in (life.lessons, life.checkpoints, life.finals)
+            ]
+    assert worlds == {"auto": [1, 1, 2], "12": [1, 1, 12]}
+
+
+def test_success_is_what_holds_at_the_end(tmp_path):
+    """A task that is done in its first step, and undone later, is not solved."""
+    began = "return data.time < 0.15"
+    named = written(tmp_path, "return abs(data.mocap_pos[0, 1] - data.qpos[0]) < 0.3", began)
+    config, animal = small(named=named)
+    assert evaluate(animal, config, 3, tmp_path / "early").success_rate == 0
+    config, animal = small(named=written(tmp_path, "return abs(data.mocap_pos[0, 1] - data.qpos[0]) < 0.3", "return 1"))
+    assert evaluate(animal, config, 3, tmp_path / "always").success_rate == 1
+
+
+def test_a_job_carries_the_text_as_it_was(tmp_path):
+    """Whoever edits the file while a run goes on changes nothing in it."""
+    file = tmp_path / "mine.py"
+    file.write_text(BALL.read_text())
+    config, animal = small(named=f"{file}:FindBall")
+    job = Job(0, animal, config, 1, tmp_path / "policy")
+    file.write_text("raise SystemError\n")
+    assert executed_task(job.arguments[1].own_task).episode_steps == 20
+
+
+def test_dask_is_sent_the_text(tmp_path):
+    """A worker elsewhere has neither the run's directory nor the file."""
+    file = tmp_path / "mine.py"
+    file.write_text(BALL.read_text())
+    config, animal = small(named=f"{file}:FindBall")
+    order = dask_worker.encode(Job(0, animal, config, 1, tmp_path / "policy"), to_toml(config), "", "", "")
+    file.unlink()
+    given = []
+
+    def live(phenotype, config, *rest, progress):
+        given.append(executed_task(config.own_task).episode_steps)
+        return Evaluation(fitness=1.0)
+
+    dask_worker._evaluate(live, pickle.loads(pickle.dumps(order)), lambda *_: None)
+    assert given == [20]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("import sim\n", "import sim\nimport nowhere\n", r"mine\.py: line \d+: ModuleNotFoundError: No module named"),
+        ("class FindBall(sim.Task)", "class FindBall", "must be a class that derives from sim.Task"),
+        ("    episode_steps", "    def __init__(self, a): ...\n    episode_steps", "TypeError"),
+        ("<mujoco>", "<mujoko>", "mujoko"),
+        ("episode_steps = 20", "episode_steps = 0", r"episode_steps = 0: must be"),
+        ('sim.Mount("cart"', 'sim.Mount("kart"', "no site or camera or body 'kart' in the model; did you mean 'cart'"),
+        ("offset=(0.26, 0, 0.12)", "offset=(0, 0, 0)", "the eye is inside geom"),
+        ('{"near": ', '{"near": 0 * ', None),
+        ('{"near": -abs(data.mocap_pos[0, 1] - data.qpos[0]) / 10}', "data.qpos", "must be numbers by name"),
+        ("rng.uniform(-2, 2)", "rng.uniform()[3]", r"reset, line \d+ of mine\.py"),
+        ("return data.qvel", "return 1 / 0", "ZeroDivisionError"),
+    ],
+)
+def test_what_would_fail_in_every_animal_is_refused_before_anything_begins(old, new, words, tmp_path):
+    config, _ = small(named=written(tmp_path, old, new))
+    if words is None:
+        try_task(config)
+        return
+    with pytest.raises(ConfigError, match=words) as caught:
+        try_task(config)
+    assert "\n" not in str(caught.value)
+
+
+def test_place_must_give_as_many_eyes_as_the_animal_has(tmp_path):
+    text = (
+        "    def place(self, n_eyes, placement_range_deg, elevation_deg):\n        return self.mounts\n\n    def reset("
+    )
+    config, _ = small(named=written(tmp_path, "    def reset(", text))
+    with pytest.raises(ConfigError, match=r"FindBall: place returned .*: must be 2 of sim\.Mount"):
+        try_task(config)
+
+
+def test_of_a_stranger_nothing_is_executed():
+    config, animal = small()
+    stranger = dataclasses.replace(config, own=None)
+    with pytest.raises(ConfigError, match="runs only if you name it"):
+        worlds_of(animal, stranger, 1, 2)
