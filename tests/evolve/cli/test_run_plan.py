@@ -74,7 +74,7 @@ def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, mon
     out = capsys.readouterr().out
     assert "5 generations x 6 candidates = 30" in out
     assert "optical from generation 1: relative_aperture, refractive_index, doe_00 … doe_33 (16)" in out
-    assert "22 of 33" in out
+    assert "21 of 32" in out
     assert main(["run", "detection", "--preset", "quick", "--dry-run", "--json", *late]) == 0
     plan = json.loads(capsys.readouterr().out)
     assert plan["evaluations"] == 30

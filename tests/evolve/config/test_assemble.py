@@ -45,7 +45,7 @@ def test_navigators_have_one_row_of_receptors_unless_asked_otherwise():
         assert (use.open, use.start) == (False, 1)
     asked = ["genome.resolution_height.open=true", "genome.resolution_height.high=4"]
     assert assemble("navigation", assignments=asked).genome["resolution_height"].open
-    with pytest.raises(ConfigError, match=r"so its eyes are not square; must be false \(preset bifurcation-detection"):
+    with pytest.raises(ConfigError, match=r"only square eyes have this gene.* \(preset bifurcation-detection"):
         assemble("navigation", "bifurcation-detection")
 
 
