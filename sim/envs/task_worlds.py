@@ -87,7 +87,7 @@ class TaskWorlds:
     def step(self, actions: Sequence[np.ndarray]) -> list[StepOfWorld]:
         """Every animal's actions (world, number) in every world; what comes of them for the first that learns in all
         worlds, then for the next."""
-        failures = [self._acted(data, [of_animal[i] for of_animal in actions]) for i, data in enumerate(self.datas)]
+        failures = self._acted(actions)
         moving = [data for data, failure in zip(self.datas, failures, strict=True) if failure is None]
         for _ in (self._pool.map if self._pool else map)(self._moved, moving):
             pass
@@ -99,16 +99,22 @@ class TaskWorlds:
         if self._pool:
             self._pool.shutdown()
 
-    def _acted(self, data: mujoco.MjData, actions: Sequence[np.ndarray]) -> str | None:
-        """What failed, if it did."""
-        for animal, whose, action in zip(self.animals, self._whose, actions, strict=True):
-            if not np.isfinite(action).all():
-                return f"{whose}action is not finite"
-            try:
-                animal.act(data, np.clip(action, -1, 1))
-            except Exception as error:
-                return _told(error)
-        return None
+    def _acted(self, actions: Sequence[np.ndarray]) -> list[str | None]:
+        """What failed in each world, if anything did."""
+        failures: list[str | None] = [None] * len(self.datas)
+        for animal, whose, commanded in zip(self.animals, self._whose, actions, strict=True):
+            finite, limited = np.isfinite(commanded).all(axis=1), np.clip(commanded, -1, 1)
+            for i, data in enumerate(self.datas):
+                if failures[i] is not None:
+                    continue
+                if not finite[i]:
+                    failures[i] = f"{whose}action is not finite"
+                    continue
+                try:
+                    animal.act(data, limited[i])
+                except Exception as error:
+                    failures[i] = _told(error)
+        return failures
 
     def _moved(self, data: mujoco.MjData) -> None:
         mujoco.mj_step(self.model, data, self.animals[0].substeps)
