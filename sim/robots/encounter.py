@@ -33,7 +33,7 @@ class Frozen:
     policy: Any = None
 
     def __post_init__(self) -> None:
-        of_kind("Frozen: task", self.task, Task, "a sim.Task")
+        of_kind("Frozen: task", self.task, Task, "Predator()")
         if self.policy is not None and not callable(getattr(self.policy, "predict", self.policy)):
             raise ValueError(f"Frozen: policy = {self.policy!r:.80}: must be a function, have `predict`, or be None")
 
@@ -116,7 +116,7 @@ def cast(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen, ...]]:
         return task.animals, ()
     where = f"{type(task).__name__}: others"
     for other in task.others:
-        of_kind(where, other, Frozen, "of sim.Frozen, such as sim.Frozen(Predator(), policy)")
+        of_kind(where, other, Frozen, "sim.Frozen(Predator(), policy)")
     together((task, *(other.task for other in task.others)), where)
     return (task,), tuple(task.others)
 
@@ -135,7 +135,7 @@ def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
     if not animals:
         raise ValueError(f"{where}: no animals: must be one sim.Task at least")
     for animal in animals:
-        of_kind(where, animal, Task, "of sim.Task")
+        of_kind(where, animal, Task, "Prey()")
     names = [name_of(animal) for animal in animals]
     first, first_name = animals[0], names[0]
     for number, (name, animal) in enumerate(zip(names, animals, strict=True)):
