@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import copy
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from sim.envs.task_worlds import TaskWorlds
 from sim.render.fidelity import Fidelity
-from sim.robots.encounter import Frozen
+from sim.robots.encounter import Frozen, among
 from sim.robots.model_fidelity import choose_model_fidelity
 from sim.robots.poses import Poses
 from sim.robots.task import Task
@@ -41,11 +42,25 @@ def fidelity_among(animals: Sequence[Task], number: int) -> Fidelity:
     Raises:
         ValueError: see `fidelity_of`.
     """
-    alone = [copy.copy(animal) for animal in animals]
-    for animal in alone:
-        animal.others = ()
-    alone[number].others = tuple(Frozen(other) for k, other in enumerate(alone) if k != number)
-    return fidelity_of(alone[number])
+    others = [Frozen(animal) for k, animal in enumerate(animals) if k != number]
+    return fidelity_of(among(animals[number], others))
+
+
+def with_settled_others(task: Task) -> Task:
+    """The same task, whose others see as finely as they want to: so that it need not be found out in every environment
+    anew.
+
+    Raises:
+        ValueError: see `fidelity_of`.
+    """
+    animals = [task, *(other.task for other in task.others)]
+    settled = []
+    for number, other in enumerate(task.others, start=1):
+        body = copy.copy(other.task)
+        if other.policy is not None:
+            body.fidelity = fidelity_among(animals, number)
+        settled.append(replace(other, task=body))
+    return among(task, settled)
 
 
 def _moments(worlds: TaskWorlds) -> Poses:

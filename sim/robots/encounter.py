@@ -20,7 +20,8 @@ SHARED = ("substeps", "episode_steps")  # what belongs to the world: every anima
 class Frozen:
     """An animal that does not learn, in the world of one that does: one of its task's `others`.
 
-    task: what it is: its eyes, its actions and its endings; its rewards are not asked for
+    task: what it is: its eyes, its actions and its endings; its rewards are not asked for, and others of its own are
+        left out
     policy: what has stable-baselines3's `predict` (a learner, or what `evolve.load_policy` returns), or a function of
         the observations of all worlds at once, as `make_vec_env` has them, that returns actions (world, number); None:
         its actions are zeros, and nobody looks through its eyes
@@ -36,6 +37,7 @@ class Frozen:
         of_kind("Frozen: task", self.task, Task, "Predator()")
         if self.policy is not None and not callable(getattr(self.policy, "predict", self.policy)):
             raise ValueError(f"Frozen: policy = {self.policy!r:.80}: must be a function, have `predict`, or be None")
+        object.__setattr__(self, "task", among(self.task, ()))
 
     @property
     def memory(self) -> int:
@@ -75,6 +77,9 @@ class Encounter:
 
     def __init__(self, *animals: Task) -> None:
         self.animals = together(animals, "Encounter")
+        for animal, name in zip(animals, self.names, strict=True):
+            if animal.others:
+                raise ValueError(f"Encounter: {name} has others of its own: must be a task without any")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -95,10 +100,16 @@ class Encounter:
                 raise ValueError(f"Encounter: no animal {asked!r}{known}")
         if name in policies:
             raise ValueError(f"Encounter: policies: {name!r} is the one that learns: must be left out")
-        learner = copy.copy(self.animals[self.names.index(name)])
         rest = [animal for animal in self.animals if name_of(animal) != name]
-        learner.others = tuple(Frozen(animal, policies.get(name_of(animal))) for animal in rest)
-        return learner
+        frozen = [Frozen(animal, policies.get(name_of(animal))) for animal in rest]
+        return among(self.animals[self.names.index(name)], frozen)
+
+
+def among(task: Task, others: Sequence[Frozen]) -> Task:
+    """The same task with these others."""
+    learner = copy.copy(task)
+    learner.others = tuple(others)
+    return learner
 
 
 def name_of(task: Task) -> str:
@@ -147,8 +158,6 @@ def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
             values = getattr(first, what), getattr(animal, what)
             if values[0] != values[1]:
                 raise ValueError(f"{where}: {what} = {values[0]} of {first_name}, {values[1]} of {name}: must be equal")
-        if animal.others and (number or where == "Encounter"):
-            raise ValueError(f"{where}: {name} has others of its own: must be a task without any")
     return tuple(animals)
 
 
