@@ -11,7 +11,7 @@ import numpy as np
 
 from sim.envs.task_worlds import TaskWorlds
 from sim.render.fidelity import Fidelity
-from sim.robots.encounter import Frozen, among
+from sim.robots.encounter import Frozen, among, cast
 from sim.robots.model_fidelity import choose_model_fidelity
 from sim.robots.poses import Poses
 from sim.robots.task import Task
@@ -53,9 +53,10 @@ def with_settled_others(task: Task) -> Task:
     Raises:
         ValueError: see `fidelity_of`.
     """
-    animals = [task, *(other.task for other in task.others)]
+    _, frozen = cast(task)
+    animals = [task, *(other.task for other in frozen)]
     settled = []
-    for number, other in enumerate(task.others, start=1):
+    for number, other in enumerate(frozen, start=1):
         body = copy.copy(other.task)
         if other.policy is not None:
             body.fidelity = fidelity_among(animals, number)
