@@ -53,6 +53,10 @@ class Waiting:
     def step(self, text: str) -> None:
         """The next step begins."""
         self._done += 1
+        self.within(text, 0.0)
+
+    def within(self, text: str, share: float) -> None:
+        """Of the step that has begun, so much is done."""
         if self._progress is not None:
             shown = printable(text).replace("[", "\\[")
-            self._progress.update(self._bar, completed=self._done, description=shown)
+            self._progress.update(self._bar, completed=self._done + share, description=shown)

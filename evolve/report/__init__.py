@@ -1,6 +1,7 @@
 """What people look at: reports, replays, comparisons, EXR files.
 
 write            the report of a run: one HTML file
+doing            telling who waits what is being made
 page             its sections
 tables           its numbers
 lineup           first and best animal, and those between

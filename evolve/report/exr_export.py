@@ -10,25 +10,31 @@ import numpy as np
 import sim
 from evolve.analysis.episode import Episode, record
 from evolve.analysis.filmed_episode import FilmedEpisode
+from evolve.report.doing import Doing, in_silence
 from evolve.store.directory import Run
 from evolve.store.regular_files import folder, require_regular
 
 __all__ = ["export_episode", "export_run"]
 
 
-def export_run(run: Run, candidate_id: int | None = None, seed: int = 0, out: Path | None = None) -> list[Path]:
+def export_run(
+    run: Run, candidate_id: int | None = None, seed: int = 0, out: Path | None = None, doing: Doing = in_silence
+) -> list[Path]:
     """Record an episode (default: of the best candidate) and write it to the folder `out`, the run's `exr/` if None;
     returns the files.
+
+    doing: is told what is being made, and how much has been, [0, 1]
 
     Raises:
         RunError: there is no such candidate, or no policy of it.
     """
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
-    return export_episode(record(run, candidate_id, seed), out or run.path / "exr")
+    doing("the agent plays an episode", 0.0)
+    return export_episode(record(run, candidate_id, seed), out or run.path / "exr", doing)
 
 
-def export_episode(episode: Episode | FilmedEpisode, directory: Path) -> list[Path]:
+def export_episode(episode: Episode | FilmedEpisode, directory: Path, doing: Doing = in_silence) -> list[Path]:
     """One file per time at which radiance was kept; in it, per eye, one part with the spectral radiance before it
     and one with what its receptors signalled (`left.spectral`, `left.receptors`, ...).
 
@@ -39,6 +45,7 @@ def export_episode(episode: Episode | FilmedEpisode, directory: Path) -> list[Pa
     for frame, t in enumerate(episode.radiance_frames):
         path = directory / f"candidate{episode.candidate_id:06d}_seed{episode.seed}_t{t:04d}.exr"
         require_regular(path)
+        doing(f"writing {path.name}", frame / len(episode.radiance_frames))
         sim.write_exr(path, _views(episode, frame))
         files.append(path)
     return files

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 
 from evolve.analysis.genealogy import descent
 from evolve.analysis.statistics import acuity_cpd, champions, gene_values, generation_statistics, trajectory
-from evolve.analysis.vision import SCENES, vision
+from evolve.analysis.vision import SCENES, Vision, vision
 from evolve.config.own_task import is_own
 from evolve.config.run_config import TASKS
 from evolve.genome.genes import CLUSTERS, Gene
 from evolve.report import tables
+from evolve.report.doing import Doing, in_silence
 from evolve.report.eye_figures import eye_figures
 from evolve.report.figures import (
     fitness_figure,
@@ -170,12 +172,15 @@ def _relief(run: Run, genes: list[Gene]) -> Html:
     return html('<div class="wide">{}</div>\n', figure(relief_figure(paths), caption))
 
 
-def vision_section(run: Run) -> Html:
+def vision_section(run: Run, doing: Doing) -> Html:
     """What the best eyes so far see, over the generations."""
     best = champions(run.candidates)
-    seen = {candidate.id: vision(candidate.phenotype, run.config) for _, candidate in best}
-    if not seen:
+    if not best:
         return Html()
+    seen: dict[int, Vision] = {}
+    for one, candidate in {candidate.id: candidate for _, candidate in best}.items():
+        doing(f"what candidate {one} sees", len(seen) / len(best))
+        seen[one] = vision(candidate.phenotype, run.config)
     generations = [generation for generation, _ in best]
     figures = Html()
     for name, (label, field, meaning) in VISION.items():
@@ -218,14 +223,33 @@ def episode_section(run: Run, episode: AnyEpisode) -> Html:
     return section("episode", "The best animal at its task", content)
 
 
-def render(run: Run, episode: AnyEpisode | None) -> bytes:
-    """The whole page; without an episode where no candidate has succeeded."""
+def _makers(run: Run, episode: AnyEpisode | None) -> Iterator[tuple[str, Callable[[Doing], Html]]]:
+    """The page's sections in their order: what is made, and how."""
     if (best := run.best) is not None and episode is not None:
-        parts = [episode_section(run, episode), animals_section(run), best_section(run, best, episode)]
+        yield "the episode's player", lambda doing: episode_section(run, episode)
+        yield "the first animal and the best", lambda doing: animals_section(run)
+        yield "the best eye", lambda doing: best_section(run, best, episode)
     else:
-        parts = [section("best", "The best eye", html("<p>No candidate has been evaluated successfully.</p>\n"))]
-    parts += [numbers_section(run), fitness_section(run), genes_section(run), vision_section(run)]
-    parts += [candidates_section(run), facts_section(run)]
+        nobody = html("<p>No candidate has been evaluated successfully.</p>\n")
+        yield "the best eye", lambda doing: section("best", "The best eye", nobody)
+    yield "the run in numbers", lambda doing: numbers_section(run)
+    yield "fitness over the generations", lambda doing: fitness_section(run)
+    yield "genes over the generations", lambda doing: genes_section(run)
+    yield "what the best eyes see", lambda doing: vision_section(run, doing)
+    yield "the table of candidates", lambda doing: candidates_section(run)
+    yield "facts of the run", lambda doing: facts_section(run)
+
+
+def render(run: Run, episode: AnyEpisode | None, doing: Doing = in_silence) -> bytes:
+    """The whole page; without an episode where no candidate has succeeded.
+
+    doing: is told what is being made, and how much of the page has been, [0, 1]
+    """
+    makers = list(_makers(run, episode))
+    parts = []
+    for done, (what, make) in enumerate(makers):
+        doing(what, done / len(makers))
+        parts.append(make(lambda text, share, done=done: doing(text, (done + share) / len(makers))))  # type: ignore[misc]
     body = joined(parts)
     title = f"{run.config.task_name} · {run.path.resolve().name}"
     return document(title, joined([header(run), contents(body), body]), ["player.js", "lineup.js"])

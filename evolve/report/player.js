@@ -7,7 +7,7 @@
 
   function colours(element) {
     const style = getComputedStyle(element);
-    const names = ["ink", "muted", "line", "paper", "panel", "accent", "vermillion", "green", "purple"];
+    const names = ["ink", "muted", "line", "paper", "panel", "wall", "accent", "vermillion", "green", "purple"];
     return Object.fromEntries(names.map((name) => [name, style.getPropertyValue("--" + name).trim()]));
   }
 
@@ -56,7 +56,7 @@
     const [x0, y0, x1, y1] = film.bounds;
     c.fillRect(at.x(x0), at.y(y1), at.scale * (x1 - x0), at.scale * (y1 - y0));
     drawRegion(c, film.goal_region, at, colour);
-    c.fillStyle = colour.muted;
+    c.fillStyle = colour.wall;
     for (const [cx, cy, hx, hy] of film.walls)  // half a pixel more, or seams show between neighbours
       c.fillRect(at.x(cx - hx) - 0.25, at.y(cy + hy) - 0.25, 2 * hx * at.scale + 0.5, 2 * hy * at.scale + 0.5);
     drawPath(c, film, film.position.length - 1, at, colour.line, 1.5);

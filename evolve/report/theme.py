@@ -20,9 +20,11 @@ __all__ = [
     "PURPLE",
     "VARIABLES",
     "VERMILLION",
+    "WALL",
 ]
 
 INK, MUTED, LINE, PAPER, PANEL = "#1d2329", "#5c6670", "#d8dde2", "#fefefe", "#f5f6f8"
+WALL = "#59636d"  # of a ground plan; where pages are dark no brighter than it takes to be seen (contrast of 3)
 ACCENT, VERMILLION, GREEN, PURPLE = "#0072b2", "#b34f00", "#007a59", "#a8467f"
 
 LINES = (PURPLE, ACCENT, GREEN, VERMILLION, INK, MUTED)  # of a figure, one after the other
@@ -33,6 +35,7 @@ _DARK = {
     "line": (LINE, "#3a424a"),
     "paper": (PAPER, "#14181c"),
     "panel": (PANEL, "#1d2227"),
+    "wall": (WALL, "#66717c"),
     "accent": (ACCENT, "#56b4e9"),
     "vermillion": (VERMILLION, "#f08a4b"),
     "green": (GREEN, "#2fbf94"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from evolve.report.doing import Doing, in_silence
+
 if TYPE_CHECKING:
     from evolve.report.footage import AnyEpisode
     from evolve.store.directory import Run
@@ -14,10 +16,11 @@ __all__ = ["FILE", "write"]
 FILE = "report.html"
 
 
-def write(run: Run, episode: AnyEpisode | None = None, out: Path | None = None) -> Path:
+def write(run: Run, episode: AnyEpisode | None = None, out: Path | None = None, doing: Doing = in_silence) -> Path:
     """Write `report.html` of a run, whole or not at all, with an episode of the best candidate (default: played now).
 
     out: another file to write to
+    doing: is told what is being made, and how much of the page has been, [0, 1]
 
     The same run gives the same bytes with the same versions of the libraries.
 
@@ -29,8 +32,9 @@ def write(run: Run, episode: AnyEpisode | None = None, out: Path | None = None) 
     from evolve.store.atomic_files import write_whole
 
     if episode is None and run.best is not None:
+        doing("the best agent plays an episode", 0.0)
         episode = record(run)
     path = out or run.path / FILE
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, render(run, episode))
+    write_whole(path, render(run, episode, doing))
     return path

@@ -21,7 +21,7 @@ from optics.numerics.autodiff import Array
 from sim.eyes.eyes import Eyes, eye_positions, eye_rotations
 from sim.eyes.sensor import Sensor
 from sim.render import memory_budget
-from sim.render.fidelity import AREAS, Fidelity
+from sim.render.fidelity import AREAS, EDGES, Fidelity
 from sim.render.fidelity_choice import chosen_fidelity
 from sim.render.frozen_kernels import garbage_kept
 from sim.render.pending_frame import FrameSlot, PendingFrame
@@ -76,6 +76,8 @@ class BatchedRenderer:
         return renderer
 
     def _open(self, scene: PreparedScene, n_envs: int, fidelity: Fidelity) -> None:
+        if fidelity.samples == EDGES:
+            raise ValueError("samples = 'edges': is for sim.ModelRenderer; worlds have 'areas'")
         if fidelity.bands != scene.eyes.bands:
             raise ValueError(f"fidelity.bands = {fidelity.bands}: must be the scene's {scene.eyes.bands}")
         self.world, self.eyes, self.eye = scene.world, scene.eyes, scene.eye

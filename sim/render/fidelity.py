@@ -11,7 +11,7 @@ from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.tracing.lighting import ALL, DIRECT, LEVELS
 
-RAYS, AREAS = SAMPLES = ("rays", "areas")
+RAYS, AREAS, EDGES = SAMPLES = ("rays", "areas", "edges")
 MOST_RAYS = 1e7  # per receptor: what is more was a slip, and its arithmetic overflows
 MOST_BANDS = 4096
 
@@ -37,8 +37,10 @@ class Fidelity:
     light: what of it is followed: "direct"; "bounce", which adds light that is reflected twice; or, with areas, "all"
     samples: what eyes look along: "rays", or "areas", which cut each receptor's square into rays_per_receptor
         rectangles and find the mean of each in closed form, behind a pupil of some around the receptors', too; upright
-        worlds only
-    tolerance: error allowed to a receptor's signal (root mean square); None where nothing was chosen
+        worlds only; or "edges": a few rays per receptor, and rays_per_receptor where these differ; models of one's own
+        through perfect lenses only
+    tolerance: error allowed to a receptor's signal (root mean square); None where nothing was chosen. At edges, rays
+        whose signals are within it of each other do not differ
     levels: what was chosen for each stage, and why
 
     Raises:

@@ -17,8 +17,9 @@ from sim.tracing.lighting import ALL, BOUNCE
 PERFECT_LENS_RAYS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 PUPIL_RAYS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
 NUMBERS_OF_AREAS = (1, 2, 4, 6, 9, 12, 16, 20, 25, 30)
-# What an area costs, in rays: 1.5 to 5.4 of them (docs/measurements/rendering.md); fewer rays than that are tried, too.
-AREA_WORTH = 3
+# What an area costs, in rays (docs/measurements/rendering.md); where fewer will do, they are taken. Behind a pupil its
+# light is spread by the kernel, which rays pay for, too.
+PERFECT_LENS_AREA, PUPIL_AREA = 3, 1.6
 
 
 @dataclass(frozen=True)
@@ -46,19 +47,23 @@ def fewest_samples(
     light: what rays would follow of it · without_light: allowed, where no light is left out
     """
     errors = trials.errors(sampling, light.level)
-    numbers: tuple[float, ...] = PERFECT_LENS_RAYS if isinstance(sampling, BoxSampling) else PUPIL_RAYS
+    perfect = isinstance(sampling, BoxSampling)
+    numbers: tuple[float, ...] = PERFECT_LENS_RAYS if perfect else PUPIL_RAYS
+
+    def cost(number: float) -> float:
+        return (PERFECT_LENS_AREA if perfect else PUPIL_AREA) * trials.areas_seen(sampling, number)
 
     def rays(most: float = math.inf) -> Samples:
         return Samples(RAYS, light, *_fewest(errors, tuple(n for n in numbers if n <= most), allowed, RAYS))
 
-    if (few := rays(AREA_WORTH * trials.areas_seen(sampling, 1))).enough:
+    if (few := rays(cost(1))).enough:
         return few
     areas = _areas(trials, sampling, light, allowed, without_light)
     if areas is None:
         return rays()
     if not areas.enough:
         return min(areas, rays(), key=lambda samples: (not samples.enough, samples.error))
-    cheaper = rays(AREA_WORTH * trials.areas_seen(sampling, areas.number))
+    cheaper = rays(cost(areas.number))
     return cheaper if cheaper.enough else areas
 
 

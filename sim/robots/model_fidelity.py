@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 import optics
 from optics.spectra.spectrum import Spectrum
-from sim.render.fidelity import Fidelity, Level
+from sim.render.fidelity import EDGES, RAYS, Fidelity, Level
 from sim.render.fidelity_choice import FidelityWarning
-from sim.render.fidelity_stages import LEAST_TOLERANCE, SHARE_OF_NOISE
+from sim.robots.edge_rays import FIRST, allowed_error
 from sim.robots.model_renderer import ModelRenderer
 from sim.robots.mounts import Mount
 from sim.robots.poses import Poses
@@ -26,7 +26,7 @@ from sim.scene import source
 from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
 
 # Rays per receptor that are tried, and those that they are held against: behind a pupil all receptors share all rays.
-PERFECT, PERFECT_TRUTH = (1, 2, 4, 8, 16, 32, 64, 128), 512
+PERFECT, PERFECT_TRUTH = (1, 2, 4, 8, 16, 32, 64, 128, 256), 1024
 SHARED, SHARED_TRUTH = (0.25, 0.5, 1, 2, 4, 8, 16), 64
 SPLIT = 0.1  # of what is allowed: a receptor that errs by more with the fewest rays has something to tell apart
 
@@ -62,11 +62,11 @@ def choose_model_fidelity(
     Raises:
         ValueError: a tolerance that is not positive, and what ModelRenderer raises.
     """
-    allowed = _allowed(eye, tolerance)
+    allowed = allowed_error(eye, tolerance)
     compiled, placed = source.load(model), poses if isinstance(poses, Poses) else Poses.of(poses)
 
     def seen(rays: float) -> np.ndarray:
-        fidelity = Fidelity(rays, eye.bands)
+        fidelity = _with(rays, eye, allowed)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MirrorWarning)  # whoever renders in earnest is told
             renderer = ModelRenderer(compiled, eye, mounts, placed.n, fidelity, groups=groups, spectra=spectra)
@@ -88,7 +88,14 @@ def choose_model_fidelity(
         )
         why = f"most that are tried; {allowed:.1e} is allowed"
     bands = Level("bands", f"{eye.bands}", None, "the eye's own")
-    return Fidelity(rays, eye.bands, tolerance=allowed, levels=(bands, Level("rays", f"{rays:g}", error, why)))
+    found = _with(rays, eye, allowed)
+    return replace(found, levels=(bands, Level(found.samples, f"{rays:g} per receptor", error, why)))
+
+
+def _with(rays: float, eye: optics.Eye, allowed: float) -> Fidelity:
+    """So many rays; through a perfect lens, many of them at edges alone."""
+    at_edges = eye.pupil is None and FIRST < rays < PERFECT_TRUTH
+    return Fidelity(rays, eye.bands, tolerance=allowed, samples=EDGES if at_edges else RAYS)
 
 
 def tried(seen: Callable[[float], np.ndarray], ladder: Sequence[float], truth: float, allowed: float) -> Trials:
@@ -110,11 +117,3 @@ def tried(seen: Callable[[float], np.ndarray], ladder: Sequence[float], truth: f
 
 def _truth(eye: optics.Eye) -> float:
     return PERFECT_TRUTH if eye.pupil is None else SHARED_TRUTH
-
-
-def _allowed(eye: optics.Eye, tolerance: float | None) -> float:
-    if tolerance is None:
-        return max(SHARE_OF_NOISE * eye.noise_sigma, LEAST_TOLERANCE * float(eye.throughput))
-    if not 0 < tolerance < np.inf:
-        raise ValueError(f"tolerance = {tolerance!r}: must be positive")
-    return tolerance

@@ -12,9 +12,11 @@ import optics
 from optics.numerics.arguments import of_kind, whole
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.sampling import directions_of, eye_sampling
-from sim.render.fidelity import Fidelity
+from sim.eyes.sensor import BoxSensor
+from sim.render.fidelity import AREAS, EDGES, Fidelity
 from sim.render.memory_budget import Demand, check_memory
 from sim.render.pending_frame import FrameSlot, PendingFrame
+from sim.robots.edge_rays import FIRST, EdgeRays, allowed_error
 from sim.robots.inside import depth_inside
 from sim.robots.model_scene import ModelScene
 from sim.robots.model_tracer import ModelTracer
@@ -37,7 +39,8 @@ class ModelRenderer:
     eye: its optics and retina; with the fidelity's bands
     mounts: where on the model the eyes are
     n_envs: number of worlds
-    fidelity: rays per receptor and bands: `Fidelity(16, bands=4)`; light is direct
+    fidelity: rays per receptor and bands: `Fidelity(16, bands=4)`; light is direct; samples="edges" for that many rays
+        only where a few of them differ
     groups, spectra: see `sim.mirror`
     brightest: signal of a white surface that faced all directional lights at once
 
@@ -63,7 +66,7 @@ class ModelRenderer:
     ) -> None:
         self.n_envs = whole("n_envs", n_envs, 1, MOST_ENVS)
         of_kind("eye", eye, optics.Eye, "optics.Eye(resolution=(15, 15))")
-        _check(fidelity)
+        _check(fidelity, eye)
         self.model, self.mounts, self.fidelity = source.load(model), tuple(mounts), fidelity
         self.eye = replace(eye, bands=fidelity.bands)
         self._places = [_Place(mount, self.model) for mount in self.mounts]
@@ -74,7 +77,8 @@ class ModelRenderer:
         self._scene = ModelScene(self.model, wavelengths, groups, spectra)
         self._refuse_eyes_inside()
         sampling = eye_sampling(self.eye, fidelity.depth)
-        self.sensor = sampling.sensor(fidelity.rays_per_receptor)
+        at_edges = fidelity.samples == EDGES
+        self.sensor = sampling.sensor(FIRST if at_edges else fidelity.rays_per_receptor)
         mixing = self.eye.throughput * self.eye.spectral_bands.weights
         with in_variant(self._scene.variant):
             self._tracer = ModelTracer(self._scene, wavelengths)
@@ -86,6 +90,11 @@ class ModelRenderer:
             self._wavefront = ModelWavefront(self._scene, self._tracer, self.sensor, self.n_envs, len(self.mounts))
             along = {"light": self.sensor.directions, "depth": _centres(self.eye)}
             self._looks = {what: self._wavefront.look(directions) for what, directions in along.items()}
+            self._edges: EdgeRays | None = None
+            if at_edges:
+                fine, noticed = sampling.sensor(fidelity.rays_per_receptor), allowed_error(self.eye, fidelity.tolerance)
+                assert isinstance(fine, BoxSensor)
+                self._edges = EdgeRays(self._wavefront, fine, mixing @ basis.T, noticed, eye.resolution)
         self._slot = FrameSlot()
 
     def signals(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
@@ -138,15 +147,19 @@ class ModelRenderer:
     @property
     def recordings(self) -> int:
         """How often the kernels were recorded: once per kernel in use, up to three times where meshes move."""
-        return int(self._wavefront.light.n_recordings + self._wavefront.depth.n_recordings)
+        edges = 0 if self._edges is None else self._edges.recordings
+        return int(self._wavefront.light.n_recordings + self._wavefront.depth.n_recordings) + edges
 
     def _begin(self, poses: Poses | Sequence[mujoco.MjData], what: str) -> PendingFrame:
         placed = poses if isinstance(poses, Poses) else Poses.of(poses)
         self._check_poses(placed)
         pupils, rotations = self.eye_frames(placed)
         eyes = np.concatenate([pupils[:, :, None], np.swapaxes(rotations, -1, -2)], axis=2)
+        look, edges = self._looks[what], self._edges
+        if edges is not None and what == "light":
+            return self._slot.begin(lambda: edges.launch(look, placed, eyes))
         kernel = getattr(self._wavefront, what)
-        return self._slot.begin(lambda: self._wavefront.launch(kernel, self._looks[what], placed, eyes))
+        return self._slot.begin(lambda: self._wavefront.launch(kernel, look, placed, eyes))
 
     def _signals(self, light: np.ndarray) -> np.ndarray:
         signals = self._sums(self._planes(light))
@@ -207,10 +220,12 @@ def _centres(eye: optics.Eye) -> np.ndarray:
     return directions_of(eye, np.stack([column + 0.5 - width / 2, row + 0.5 - height / 2], axis=-1))
 
 
-def _check(fidelity: Fidelity) -> None:
+def _check(fidelity: Fidelity, eye: optics.Eye) -> None:
     of_kind("fidelity", fidelity, Fidelity, "Fidelity(16, bands=4)")
-    if fidelity.light != lighting.DIRECT or fidelity.samples != "rays":
+    if fidelity.light != lighting.DIRECT or fidelity.samples == AREAS:
         raise ValueError(
             f"fidelity: light = {fidelity.light!r}, samples = {fidelity.samples!r}: models of one's own are seen by "
             "rays in direct light"
         )
+    if fidelity.samples == EDGES and eye.pupil is not None:
+        raise ValueError("fidelity: samples = 'edges': is for perfect lenses; behind a pupil receptors share all rays")

@@ -59,17 +59,29 @@ class ModelWavefront:
         self._buffers["movers"][:] = scene.movers.rows(poses)
         if len(scene.lights):
             self._buffers["lights"][:] = scene.lights.rows(poses).reshape(self._n_envs, -1)
+        return self.again(kernel, look)
+
+    def again(self, kernel: Any, look: dict[str, Array]) -> Callable[[], np.ndarray]:
+        """The same where everything is as at the last launch."""
+        scene = self._scene
         with in_variant(scene.variant), garbage_kept():
             buffers = {name: mi.Float(buffer.reshape(-1)) for name, buffer in self._buffers.items()}
             found = kernel(scene.scene, scene.movers.meshes, buffers, look)
         return lambda: _read(found)
 
+    def components(
+        self, still: MitsubaObject, buffers: dict[str, Array], look: dict[str, Array]
+    ) -> tuple[list[Array], Array]:
+        """Within a kernel: what comes along every lane's ray, and 1 / depth along the eye's axis of what it meets."""
+        ray, axis, cosine, rows = _of_lane(buffers, look)
+        components, distance = self._tracer.radiance(still, ray, axis, rows, look)
+        return components, dr.rcp(distance * cosine)
+
     def _light(
         self, still: MitsubaObject, meshes: list[MitsubaObject], buffers: dict[str, Array], look: dict[str, Array]
     ) -> Array:
-        ray, axis, cosine, rows = _of_lane(buffers, look)
-        components, distance = self._tracer.radiance(still, ray, axis, rows, look)
-        shares = self._sensor.depth.shares(dr.rcp(distance * cosine))
+        components, nearness = self.components(still, buffers, look)
+        shares = self._sensor.depth.shares(nearness)
         layers = [component * share for share in shares for component in components]
         lanes = self._n_envs * self._n_eyes * len(self._sensor.directions)
         out = dr.zeros(mi.Float, lanes * len(layers))
@@ -97,7 +109,7 @@ def _of_lane(buffers: dict[str, Array], look: dict[str, Array]) -> tuple[Array, 
     return ray, ahead, local.z, Rows(buffers["movers"], env * movers, buffers["lights"], env * lights * LIGHT_ROWS)
 
 
-def _read(found: Array) -> np.ndarray:
+def _read(found: Array | tuple[Array, ...]) -> np.ndarray:
     """Waits for the kernel."""
     with garbage_kept():
-        return np.array(found.numpy())
+        return np.stack([one.numpy() for one in found]) if isinstance(found, tuple) else np.array(found.numpy())

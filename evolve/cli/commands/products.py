@@ -56,9 +56,9 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
             wait.step("writing the replay")
             played = write_page(run, best)
         wait.step("writing the report")
-        page = write(run, best)
+        page = write(run, best, doing=wait.within)
         wait.step("writing EXR files")
-        return Products(page, exr_export.export_episode(best, run.path / "exr"), played)
+        return Products(page, exr_export.export_episode(best, run.path / "exr", wait.within), played)
 
 
 def replay(arguments: Namespace) -> int:
@@ -81,10 +81,10 @@ def replay(arguments: Namespace) -> int:
 def report(arguments: Namespace) -> int:
     """Write the report."""
     run = _open(arguments)
-    with _waiting(arguments, "the report is written"):
+    with _waiting(arguments, "the report is written") as wait:
         from evolve.report.write import write
 
-        page = write(run, out=arguments.out)
+        page = write(run, out=arguments.out, doing=wait.within)
     print(json.dumps({"report": str(page)}) if arguments.json else f"report: {page}")
     open_page(page, arguments)
     return 0
@@ -93,10 +93,10 @@ def report(arguments: Namespace) -> int:
 def export(arguments: Namespace) -> int:
     """Write what an agent saw, one EXR file per frame."""
     run = _open(arguments)
-    with _waiting(arguments, "EXR files are written"):
+    with _waiting(arguments, "EXR files are written") as wait:
         from evolve.report.exr_export import export_run
 
-        files = export_run(run, arguments.candidate, arguments.seed, arguments.out)
+        files = export_run(run, arguments.candidate, arguments.seed, arguments.out, wait.within)
     if arguments.json:
         print(json.dumps({"exr": [str(file) for file in files]}, indent=1))
     else:

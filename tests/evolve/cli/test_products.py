@@ -74,6 +74,7 @@ def test_a_wait_shows_what_is_done_on_a_terminal_alone():
         with waiting.Waiting(2, shown, out) as wait:
             wait.step("writing [this]\x1b]0;title\x07")
             wait.step("writing that")
-    assert "writing that" in seen.getvalue()
+            wait.within("its second half", 0.5)
+    assert "its second half" in seen.getvalue()
     assert "\x1b]0;" not in seen.getvalue()
     assert unseen.getvalue() == quiet.getvalue() == ""

@@ -2,6 +2,7 @@
 
 page: test_report_page.py
 write: test_report_page.py
+doing: test_report_page.py
 markup: test_markup.py, test_report_page.py
 tables: test_report_page.py
 lineup: test_lineup.py

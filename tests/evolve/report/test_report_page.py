@@ -187,3 +187,15 @@ def test_a_population_is_drawn_as_its_median_between_its_tenth_and_its_ninetieth
     assert line.get_xydata().tolist() == [[0, 2], [1, 3], [2, 5]]
     (band,) = axes.collections
     assert {tuple(corner) for corner in band.get_paths()[0].vertices} >= {(0, 1), (2, 3), (0, 4), (2, 6)}
+
+
+def test_who_waits_is_told_what_is_made_and_how_much_has_been(run, episode):
+    """Every section once, and each champion whose view is computed."""
+    told = []
+    render(run, episode, lambda what, share: told.append((what, share)))
+    shares = [share for _, share in told]
+    assert shares[0] == 0
+    assert shares == sorted(shares)
+    assert 0.5 < shares[-1] < 1
+    assert {"the best eye", "facts of the run", f"what candidate {BEST} sees"} <= {what for what, _ in told}
+    assert len({what for what, _ in told}) == len(told)

@@ -45,6 +45,8 @@ def test_text_can_be_read_in_light_and_in_dark():
         for background in ("paper", "panel"):
             for text, behind in zip(values[name], values[background], strict=True):
                 assert contrast(text, behind) >= 4.5, (name, background)
+    for wall, behind in zip(values["wall"], values["panel"], strict=True):  # 1.4.11: what is not text
+        assert contrast(wall, behind) >= 3
     assert contrast("#009e73", "#fefefe") < 4.5
     assert contrast("#000000", "#ffffff") == 21
 

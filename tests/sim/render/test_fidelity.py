@@ -11,7 +11,7 @@ import optics
 import sim
 from sim.envs.simulation import Simulation
 from sim.render.fidelity_choice import SHARE_OF_LIGHT
-from sim.render.sample_choice import AREA_WORTH, PERFECT_LENS_RAYS, PUPIL_RAYS
+from sim.render.sample_choice import PERFECT_LENS_AREA, PERFECT_LENS_RAYS, PUPIL_RAYS
 from tests.sim.tracing.area_views import ROW, sees_object, views
 
 DETECTION = sim.Eyes(n_eyes=2, resolution=(9, 11))
@@ -121,7 +121,7 @@ def test_rays_are_kept_where_few_will_do():
     """Each costs less than an area."""
     fidelity = sim.choose_fidelity(sim.build_world("detection"), replace(DETECTION, noise_sigma=0.2), bands="own")
     assert fidelity.samples == "rays"
-    assert fidelity.rays_per_receptor <= AREA_WORTH
+    assert fidelity.rays_per_receptor <= PERFECT_LENS_AREA
 
 
 def test_what_cannot_be_kept_is_said():

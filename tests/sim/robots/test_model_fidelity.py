@@ -93,6 +93,13 @@ def test_more_noise_wants_fewer_rays():
     assert rays[0] > rays[2]
 
 
+def test_perfect_lenses_trace_many_rays_at_edges_alone():
+    one = eye(noise_sigma=0.01)
+    many, few = (sim.choose_model_fidelity(BALL, one, [MOUNT], moments(0), tolerance) for tolerance in (0.01, 0.1))
+    assert (many.samples, few.samples) == ("edges", "rays")
+    assert many.rays_per_receptor > 4 >= few.rays_per_receptor
+
+
 def test_behind_a_pupil_receptors_share_rays():
     blurred = eye(pupil=optics.Pupil(20e-6, thin_lens_focal_length=240e-6))
     shared = sim.choose_model_fidelity(BALL, blurred, [MOUNT], moments(0))
@@ -100,9 +107,9 @@ def test_behind_a_pupil_receptors_share_rays():
 
 
 def test_what_cannot_be_promised_is_said():
-    with pytest.warns(FidelityWarning, match="128 rays per receptor err by .* times what is allowed, 1.0e-05"):
+    with pytest.warns(FidelityWarning, match="256 rays per receptor err by .* times what is allowed, 1.0e-05"):
         chosen = sim.choose_model_fidelity(BALL, eye(), [MOUNT], moments(0), tolerance=1e-5)
-    assert chosen.rays_per_receptor == 128
+    assert chosen.rays_per_receptor == 256
     for tolerance in (0, -1, np.nan, np.inf):
         with pytest.raises(ValueError, match=r"tolerance = .*: must be positive"):
             sim.choose_model_fidelity(BALL, eye(), [MOUNT], moments(0), tolerance=tolerance)
