@@ -112,6 +112,7 @@ def _require_fit(other: Frozen, senses: Senses) -> None:
     learnt = getattr(other.policy, "observation_space", None)
     if learnt is None:
         return
-    wanted, here = ({name: space.shape for name, space in of.items()} for of in (learnt, senses.observation_space))
+    spaces_of = [getattr(space, "spaces", {}) for space in (learnt, senses.observation_space)]
+    wanted, here = ({name: space.shape for name, space in of.items()} for of in spaces_of)
     if wanted != here:
         raise ValueError(f"policy of {name_of(other.task)!r} takes {wanted}, its task gives {here}: must be alike")

@@ -42,8 +42,8 @@ class Frozen:
     @property
     def memory(self) -> int:
         """Frames in the observations that its policy wants."""
-        space = getattr(self.policy, "observation_space", None)
-        return 1 if space is None else int(space["eyes"].shape[0])
+        eyes = getattr(getattr(self.policy, "observation_space", None), "spaces", {}).get("eyes")
+        return 1 if eyes is None else int(eyes.shape[0])
 
     def actions(self, observation: Mapping[str, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
         """What it does in every world, of this shape (world, number).

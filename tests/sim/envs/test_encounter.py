@@ -102,6 +102,9 @@ def test_frozen_eyes_remember_what_their_policy_wants():
     env.reset()
     env.step(np.zeros((5, 2)))
     assert shapes == [(5, 3, 2, 3, 1, 12)]
+    blind = PPO("MlpPolicy", "Pendulum-v1", n_steps=64)
+    with pytest.raises(ValueError, match=r"policy of 'Predator' takes \{\}, its task gives .*'eyes'.*: must be alike"):
+        sim.make_vec_env(hunt().alone("Prey", {"Predator": blind}), n_envs=1)
     other = sim.Frozen(Twin("predator"), learner.policy)
     prey = Prey()
     prey.others = (other,)
