@@ -83,8 +83,8 @@ def _warn_if_worse(found: Fidelity, allowed: float) -> None:
     if worst > allowed * (1 + 1e-9):
         lead = max(found.levels[1:], key=lambda level: level.predicted_error or 0)
         warnings.warn(
-            f"the finest fidelity errs by {worst:.1e} of a signal, {worst / allowed:.1f} times what is allowed, "
-            f"{allowed:.1e}: mostly {lead.stage}, {lead.level} ({lead.why})",
+            f"the best fidelity that pays errs by {worst:.1e} of a signal, {worst / allowed:.1f} times what is "
+            f"allowed, {allowed:.1e}: mostly {lead.stage}, {lead.level} ({lead.why})",
             FidelityWarning,
             stacklevel=3,
         )

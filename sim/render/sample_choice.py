@@ -20,6 +20,7 @@ NUMBERS_OF_AREAS = (1, 2, 4, 6, 9, 12, 16, 20, 25, 30)
 # What an area costs, in rays (docs/measurements/rendering.md); where fewer will do, they are taken. Behind a pupil its
 # light is spread by the kernel, which rays pay for, too.
 PERFECT_LENS_AREA, PUPIL_AREA = 3, 1.6
+HARDLY_MORE = 1.1  # times an error that cannot be lessened: not worth several times the samples
 
 
 @dataclass(frozen=True)
@@ -83,19 +84,23 @@ def _areas(
 def _fewest(
     error: Callable[[float], float], numbers: tuple[float, ...], allowed: float, kind: str
 ) -> tuple[float, Level, bool]:
-    """The lowest of these numbers of samples whose error fits. Errors fall no faster than 1/n: numbers that
-    could not do by that are left out. With its level, and whether it is enough."""
-    at, tried = 0, 0
+    """The lowest of these numbers of samples whose error fits; where none does, the lowest that errs by hardly more
+    than any. Errors fall no faster than 1/n: numbers that could not do by that are left out. With its level, and
+    whether it is enough."""
+    at = 0
+    tried: dict[float, float] = {}
     while True:
-        tried += 1
         try:
             predicted = CAUTION * error(numbers[at])
         except NoRaysError:
             predicted = math.inf
+        tried[numbers[at]] = predicted
         if predicted <= allowed or at == len(numbers) - 1:
             break
         least = numbers[at] * (predicted / allowed if math.isfinite(predicted) else 1)
         at = next((i for i in range(at + 1, len(numbers)) if numbers[i] >= least), len(numbers) - 1)
-    found = "fewest of" if predicted <= allowed else "not enough, but the most of"
-    why = f"{found} {numbers[0]:g} ... {numbers[-1]:g} for {allowed:.1e}, {tried} tried"
-    return numbers[at], Level(kind, f"{numbers[at]:g} per receptor", predicted, why), predicted <= allowed
+    enough = predicted <= allowed
+    number = numbers[at] if enough else next(n for n, e in tried.items() if e <= HARDLY_MORE * min(tried.values()))
+    found = "fewest of" if enough else "not enough, but hardly worse than any of"
+    why = f"{found} {numbers[0]:g} ... {numbers[-1]:g} for {allowed:.1e}, {len(tried)} tried"
+    return number, Level(kind, f"{number:g} per receptor", tried[number], why), enough

@@ -11,7 +11,8 @@ import optics
 import sim
 from sim.envs.simulation import Simulation
 from sim.render.fidelity_choice import SHARE_OF_LIGHT
-from sim.render.sample_choice import PERFECT_LENS_AREA, PERFECT_LENS_RAYS, PUPIL_RAYS
+from sim.render.fidelity_stages import CAUTION
+from sim.render.sample_choice import PERFECT_LENS_AREA, PERFECT_LENS_RAYS, PUPIL_RAYS, _fewest
 from tests.sim.tracing.area_views import ROW, sees_object, views
 
 DETECTION = sim.Eyes(n_eyes=2, resolution=(9, 11))
@@ -245,3 +246,14 @@ def test_it_says_why():
 def test_bad_arguments_are_named(call, named):
     with pytest.raises(ValueError, match=named):
         call(sim.build_world("detection"))
+
+
+def test_what_cannot_be_lessened_costs_no_more_than_it_must():
+    """The error of areas ends at a floor: of those that hardly err by more, the fewest are taken; where it falls, the
+    most are."""
+    floor, falls = {1: 0.6, 2: 0.54, 4: 0.52, 6: 0.505, 9: 0.5}, {1: 0.9, 2: 0.8, 4: 0.7, 6: 0.6, 9: 0.5}
+    for errors, number in ((floor, 2), (falls, 9)):
+        found, level, enough = _fewest(lambda n, errors=errors: errors[n], tuple(errors), 0.49, "areas")
+        assert (found, enough) == (number, False)
+        assert level.predicted_error == CAUTION * errors[number]
+    assert _fewest(lambda n: falls[n], tuple(falls), 0.85 * CAUTION, "areas")[::2] == (2, True)
