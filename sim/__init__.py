@@ -11,6 +11,8 @@ ReferenceRenderer                   the same, slowly: Mitsuba's integrators and 
 ModelRenderer, Mount, Poses         eyes on any model of one's own; fan, ring, both_sides: of several
 choose_model_fidelity               how finely eyes on a model see
 Task                                what a robot of one's own has to do: for make_vec_env
+Encounter, Frozen                   several animals in one world, that see each other
+make_parallel_env                   these as a PettingZoo environment
 make_vec_env, make_env              the environments, natively batched or single
                                     (also gymnasium.make("rhabdom/Detection-v0"), Foraging, Maze ...)
 View, write_exr, read_exr           what was seen, on disk
@@ -26,7 +28,7 @@ from sim.envs.registration import register as register_environments
 from sim.worlds import catalog
 
 if TYPE_CHECKING:
-    from sim.envs.assembly import make_vec_env
+    from sim.envs.assembly import make_parallel_env, make_vec_env
     from sim.envs.env import make_env
     from sim.exr import View, read_exr, write_exr
     from sim.eyes.eyes import Eyes
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
     from sim.render.fidelity import Fidelity
     from sim.render.fidelity_choice import FidelityWarning, choose_fidelity
     from sim.render.reference_renderer import ReferenceRenderer
+    from sim.robots.encounter import Encounter, Frozen
     from sim.robots.model_fidelity import choose_model_fidelity
     from sim.robots.model_renderer import ModelRenderer
     from sim.robots.mounts import Mount, both_sides, fan, ring
@@ -61,11 +64,14 @@ _HOME = {
     "ring": "sim.robots.mounts",
     "Poses": "sim.robots.poses",
     "Task": "sim.robots.task",
+    "Encounter": "sim.robots.encounter",
+    "Frozen": "sim.robots.encounter",
     "Fidelity": "sim.render.fidelity",
     "FidelityWarning": "sim.render.fidelity_choice",
     "choose_fidelity": "sim.render.fidelity_choice",
     "make_env": "sim.envs.env",
     "make_vec_env": "sim.envs.assembly",
+    "make_parallel_env": "sim.envs.assembly",
     "View": "sim.exr",
     "read_exr": "sim.exr",
     "write_exr": "sim.exr",
@@ -75,9 +81,11 @@ __all__ = [
     "TASKS",
     "BatchedRenderer",
     "Course",
+    "Encounter",
     "Eyes",
     "Fidelity",
     "FidelityWarning",
+    "Frozen",
     "Mirror",
     "MirrorWarning",
     "ModelRenderer",
@@ -93,6 +101,7 @@ __all__ = [
     "choose_model_fidelity",
     "fan",
     "make_env",
+    "make_parallel_env",
     "make_vec_env",
     "mirror",
     "read_exr",

@@ -112,7 +112,7 @@ def _play(policy: EyePolicy, worlds: TaskVecEnv) -> tuple[list[Poses], dict[str,
     rows: list[tuple[Any, ...]] = []
     pictures: list[np.ndarray] = []
     observation, info, done = worlds.reset(), dict[str, Any](), False
-    every = max(1, -(-worlds.task.episode_steps // MOST_PICTURES))
+    every = max(1, -(-worlds.worlds.episode_steps // MOST_PICTURES))
     while not done:
         if len(rows) % every == 0:
             pictures.append(worlds.get_images()[0])

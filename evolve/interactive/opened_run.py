@@ -14,7 +14,8 @@ from evolve.interactive.summary import animal_as_html, run_as_html
 from evolve.interactive.table import candidate_table
 from evolve.search.successive_halving import finished
 from evolve.store.candidate import Candidate
-from evolve.store.directory import Run
+from evolve.store.directory import Run, RunError
+from evolve.store.policies import require_policy
 from evolve.store.versions import record_start
 from optics.numerics import device
 
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from sim.robots.encounter import Frozen
+    from sim.robots.task import Task
 
 __all__ = ["OpenedCandidate", "OpenedRun"]
 
@@ -67,6 +71,28 @@ class OpenedRun(Run):
             RunError: it has not been evaluated, or none has succeeded.
         """
         return OpenedCandidate.of_run(super().candidate(candidate_id), self)
+
+    def frozen(self, task: Task, candidate_id: int | None = None) -> Frozen:
+        """A candidate (None: the best) as an animal that learns no more, for the `others` of another task.
+
+        task: its body, as in the run's own task; its eyes are the candidate's
+
+        Raises:
+            RunError: there is no such candidate, or its policy is missing or no policy.
+            ValueError: the task places other eyes than the candidate has.
+        """
+        from evolve.learning.policy import load_policy
+        from evolve.learning.worlds import embodied
+        from sim.robots.encounter import Frozen
+
+        candidate = self.candidate(candidate_id)
+        path = self.policy_path(candidate.id)
+        require_policy(candidate, path)
+        try:
+            policy = load_policy(path)
+        except ValueError as error:
+            raise RunError(str(error)) from error
+        return Frozen(embodied(task, candidate.phenotype, self.config), policy)
 
     def resume(self, callbacks: Sequence[Callback] = (), progress: bool = True) -> None:
         """Carry an interrupted run to its end, and leave a finished one as it is; see `evolve.run` for the

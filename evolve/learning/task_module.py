@@ -9,6 +9,7 @@ from types import ModuleType
 
 from evolve.config.checks import ConfigError
 from evolve.config.own_task import OwnTask
+from sim.envs.task_fidelity import with_settled_others
 from sim.robots.task import Task, compiled
 
 __all__ = ["executed_task"]
@@ -29,9 +30,9 @@ def executed_task(own: OwnTask) -> Task:
     try:
         task = cls()
         compiled(task)
+        return with_settled_others(task)
     except Exception as error:
         raise ConfigError(f"{own.label}: {_told(error, own)}", "task") from error
-    return task
 
 
 def _executed(own: OwnTask) -> ModuleType:

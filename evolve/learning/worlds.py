@@ -17,7 +17,7 @@ from sim.render.fidelity import Fidelity
 from sim.render.fidelity_choice import fidelity_for
 from sim.robots.task import Task, grown
 
-__all__ = ["LifeWorlds", "own_task_for", "worlds_of"]
+__all__ = ["LifeWorlds", "embodied", "own_task_for", "worlds_of"]
 
 
 @dataclass(frozen=True)
@@ -61,15 +61,23 @@ def own_task_for(phenotype: Phenotype, config: RunConfig) -> Task:
         ValueError: it places other eyes than the animal has.
     """
     assert config.own_task is not None
-    task = executed_task(config.own_task)
+    animal = embodied(executed_task(config.own_task), phenotype, config)
+    animal.fidelity = fidelity_of(animal)
+    return animal
+
+
+def embodied(task: Task, phenotype: Phenotype, config: RunConfig) -> Task:
+    """A task with this animal in it, which sees as finely as the run, or else the task, has it.
+
+    Raises:
+        ValueError: it places other eyes than the animal has.
+    """
     animal = grown(task, phenotype.eyes(config.eye), phenotype.elevation_deg or 0.0)
     rays, bands = config.eye.rays_per_receptor, config.eye.bands
     if rays != AUTO:
         animal.fidelity = Fidelity(float(rays), bands)
     elif isinstance(task.fidelity, Fidelity):
         animal.fidelity = replace(task.fidelity, bands=bands)
-    else:
-        animal.fidelity = fidelity_of(animal)
     return animal
 
 

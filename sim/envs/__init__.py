@@ -1,9 +1,13 @@
 """Environments: worlds, tasks and eyes put together.
 
-assembly               make_vec_env: world, task, physics and eyes put together
+assembly               make_vec_env, make_parallel_env: world, task, physics and eyes put together
 vec_env                EyesVecEnv: stable-baselines3
 task_vec_env           TaskVecEnv: the same for tasks of one's own
 task_worlds            their worlds
+task_senses            what an animal in them knows
+task_animals           all animals in them, those who learn and those who do not
+task_pictures          pictures of them
+parallel_env           EncounterEnv: PettingZoo
 task_fidelity          how finely they are seen
 task_state             where these stand, as arrays
 one_environment        what both answer stable-baselines3 alike

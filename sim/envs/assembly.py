@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import numpy as np
@@ -20,14 +20,18 @@ from sim.render.batched_renderer import BatchedRenderer
 from sim.render.fidelity import Fidelity, fidelity_asked
 from sim.render.fidelity_choice import chosen_fidelity
 from sim.render.prepared_scene import PreparedScene
+from sim.robots.encounter import Encounter
 from sim.robots.task import Task
 from sim.tasks.reward import check_mode
 from sim.worlds.course import Course
 from sim.worlds.world import build_world
 
+if TYPE_CHECKING:
+    from sim.envs.parallel_env import EncounterEnv
+
 
 def make_vec_env(
-    task: str | Task,
+    task: str | Task | Encounter,
     eyes: Eyes | None = None,
     n_envs: int = 64,
     seed: int | None = 0,
@@ -47,7 +51,7 @@ def make_vec_env(
     """A batched environment of one task.
 
     task: one of `sim.TASKS`, or a `sim.Task` of one's own, which says all but n_envs, seed, memory and render_mode
-        itself
+        itself; a `sim.Encounter` of animals that are alike learns one policy, with a row for each animal of each world
     eyes: of every agent; default Eyes()
     n_envs: number of worlds
     seed: of episodes and noise; None draws one
@@ -68,7 +72,7 @@ def make_vec_env(
     Raises:
         ValueError: a bad argument.
     """
-    if isinstance(task, Task):
+    if isinstance(task, Task | Encounter):
         _refuse_for_tasks(locals())
         _check(n_envs, seed, memory, mode, render_mode)
         return TaskVecEnv(task, n_envs, seed, memory, render_mode)
@@ -86,6 +90,33 @@ def make_vec_env(
     how: dict[str, Any] = {"memory": memory, "mode": mode, "least_return": least_return, "render_mode": render_mode}
     how["episode_steps"] = episode_steps
     return vec_env_in(scene, asked or chosen_fidelity(scene), n_envs, seed, **how)
+
+
+def make_parallel_env(
+    encounter: Encounter, seed: int | None = 0, *, memory: int = 1, render_mode: str | None = None
+) -> EncounterEnv:
+    """Several animals in one world, as a PettingZoo parallel environment; see `sim.Encounter`.
+
+    seed: of episodes and noise, until `reset` is given one; None draws one
+    memory: frames in an observation
+    render_mode: "rgb_array": the model with all animals' eyes; "eyes": what they report, a picture of each animal
+
+    Raises:
+        ValueError: a bad argument.
+        ImportError: PettingZoo is not installed.
+    """
+    if not isinstance(encounter, Encounter):
+        raise ValueError(
+            f"encounter = {encounter!r:.80}: must be a sim.Encounter, such as sim.Encounter(Prey(), Hunter())"
+        )
+    _check(1, seed, memory, "training", render_mode)
+    try:
+        import pettingzoo  # noqa: F401
+    except ImportError:
+        raise ImportError("make_parallel_env needs PettingZoo: pip install 'rhabdom[pettingzoo]'") from None
+    from sim.envs.parallel_env import EncounterEnv
+
+    return EncounterEnv(encounter, seed, memory, render_mode)
 
 
 def prepared_scene(

@@ -10,6 +10,7 @@ import numpy as np
 from sim.envs.assembly import make_vec_env
 from sim.envs.follow_camera import RENDER_MODES
 from sim.eyes.eyes import Eyes
+from sim.robots.encounter import Encounter
 from sim.worlds.state import WorldState
 
 
@@ -26,6 +27,10 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     metadata = {"render_modes": [*RENDER_MODES], "render_fps": 5}  # noqa: RUF012 (Gymnasium's own declaration)
 
     def __init__(self, task: str, eyes: Eyes | None = None, *, render_mode: str | None = None, **options: Any) -> None:
+        if isinstance(task, Encounter):
+            raise ValueError(
+                "task: several animals learn in a sim.Encounter: must be its `alone`, or make_parallel_env"
+            )
         self._batch = make_vec_env(task, eyes, n_envs=1, seed=None, render_mode=render_mode, **options)
         self.render_mode = render_mode
         self.observation_space = self._batch.observation_space

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import copy
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from sim.envs.task_worlds import TaskWorlds
 from sim.render.fidelity import Fidelity
+from sim.robots.encounter import Frozen, among, cast
 from sim.robots.model_fidelity import choose_model_fidelity
 from sim.robots.poses import Poses
 from sim.robots.task import Task
@@ -29,15 +33,44 @@ def fidelity_of(task: Task) -> Fidelity:
         raise ValueError(f"{type(task).__name__}: fidelity = {asked!r}: must be a sim.Fidelity, or {AUTO!r}")
     with contextlib.closing(TaskWorlds(task, WORLDS, 0)) as worlds:
         datas = _moments(worlds)
-        return choose_model_fidelity(worlds.model, task.eye, task.mounts, datas, spectra=task.spectra)
+        return choose_model_fidelity(worlds.model, task.eye, task.mounts, datas, spectra=worlds.spectra)
+
+
+def fidelity_among(animals: Sequence[Task], number: int) -> Fidelity:
+    """Of one of them, by what it sees of the others.
+
+    Raises:
+        ValueError: see `fidelity_of`.
+    """
+    others = [Frozen(animal) for k, animal in enumerate(animals) if k != number]
+    return fidelity_of(among(animals[number], others))
+
+
+def with_settled_others(task: Task) -> Task:
+    """The same task, whose others see as finely as they want to: so that it need not be found out in every environment
+    anew.
+
+    Raises:
+        ValueError: see `fidelity_of`.
+    """
+    _, frozen = cast(task)
+    animals = [task, *(other.task for other in frozen)]
+    settled = []
+    for number, other in enumerate(frozen, start=1):
+        body = copy.copy(other.task)
+        if other.policy is not None:
+            body.fidelity = fidelity_among(animals, number)
+        settled.append(replace(other, task=body))
+    return among(task, settled)
 
 
 def _moments(worlds: TaskWorlds) -> Poses:
     random, everyone = np.random.default_rng(0), np.arange(WORLDS)
     worlds.reset(everyone)
     first = Poses.of(worlds.datas)
-    for _ in range(min(LATER, worlds.task.episode_steps - 1)):
-        outcomes = worlds.step(random.uniform(-1, 1, (WORLDS, worlds.task.n_actions(worlds.model))))
+    for _ in range(min(LATER, worlds.episode_steps - 1)):
+        sizes = [animal.n_actions(worlds.model) for animal in worlds.animals]
+        outcomes = worlds.step([random.uniform(-1, 1, (WORLDS, size)) for size in sizes])
         ended = [outcome.terminated or outcome.truncated for outcome in outcomes]
         if any(ended):
             worlds.reset(np.flatnonzero(ended))

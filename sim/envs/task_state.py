@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from sim.envs.task_worlds import TaskWorlds
+from sim.robots.encounter import name_of
 
 _ALL = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -21,7 +22,8 @@ def of_worlds(worlds: TaskWorlds) -> dict[str, np.ndarray]:
     for row, data in zip(physics, worlds.datas, strict=True):
         mujoco.mj_getState(worlds.model, data, row, _ALL)
     chance = np.array([json.dumps(rng.bit_generator.state) for rng in worlds.rngs])
-    return {"physics": physics, "chance": chance, "steps": worlds.steps.copy(), "felt": worlds.felt.copy()}
+    felt = {_felt(worlds, k): array.copy() for k, array in enumerate(worlds.felt)}
+    return {"physics": physics, "chance": chance, "steps": worlds.steps.copy(), **felt}
 
 
 def bring_back(worlds: TaskWorlds, state: Mapping[str, np.ndarray], chosen: np.ndarray) -> None:
@@ -33,7 +35,14 @@ def bring_back(worlds: TaskWorlds, state: Mapping[str, np.ndarray], chosen: np.n
         mujoco.mj_forward(worlds.model, data)
         mujoco.mj_setState(worlds.model, data, row, _ALL)  # the solver's warm start, which mj_forward has moved
         worlds.rngs[i].bit_generator.state = json.loads(str(state["chance"][i]))
-        worlds.steps[i], worlds.felt[i] = state["steps"][i], state["felt"][i]
+        worlds.steps[i] = state["steps"][i]
+        for k, felt in enumerate(worlds.felt):
+            felt[i] = state[_felt(worlds, k)][i]
+
+
+def _felt(worlds: TaskWorlds, number: int) -> str:
+    """What an animal's part is called."""
+    return "felt" if number == 0 else f"{name_of(worlds.animals[number])}.felt"
 
 
 def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:

@@ -1,8 +1,9 @@
-"""Many worlds of a task of one's own: physics and the task's own methods, world by world."""
+"""Many worlds of a task of one's own: physics and the own methods of the tasks of all animals, world by world."""
 
 from __future__ import annotations
 
 import traceback
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +13,7 @@ import mujoco
 import numpy as np
 
 from sim.robots import task as task_module
+from sim.robots.encounter import Encounter, cast, name_of, of_world
 from sim.robots.task import Task, compiled, named_terms
 
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
@@ -20,7 +22,8 @@ _OURS = (__file__, task_module.__file__)
 
 @dataclass
 class StepOfWorld:
-    """Of one action in one world. failure: what went wrong in the task's own methods, which ends the episode"""
+    """Of one action in one world, for one animal that learns. failure: what went wrong in the tasks' own methods, which
+    ends the episode"""
 
     terms: dict[str, float] = field(default_factory=dict)
     terminated: bool = False
@@ -32,20 +35,28 @@ class StepOfWorld:
 class TaskWorlds:
     """Their data, and what is done with it.
 
-    task, model · datas: mjData of every world · steps: actions taken in its episode, (n,) int
-    felt: what its animal feels now, (n, numbers) float32
-    rngs: of each world's episodes
+    task: of the animal that learns, with its others; or an Encounter, where all learn
+    learners: tasks of those who learn · frozen: the others · animals: tasks of all, those who learn first
+    model · datas: mjData of every world · steps: actions taken in its episode, (n,) int
+    felt: what each animal feels now, by animal: (n, numbers) float32
+    rngs: of each world's episodes · noise_keys: of every animal's receptors (animal, n)
     entropy: what all random streams come from; seeded with it again, everything happens again
     """
 
-    def __init__(self, task: Task, n: int, seed: int | None, threads: int = 1) -> None:
-        self.task, self.model = task, compiled(task)
+    def __init__(self, task: Task | Encounter, n: int, seed: int | None, threads: int = 1) -> None:
+        self.learners, self.frozen = cast(task)
+        self.animals = (*self.learners, *(other.task for other in self.frozen))
+        self._whose = ["" if len(self.animals) == 1 else f"{name_of(animal)}: " for animal in self.animals]
+        self.model = compiled(self.animals[0])
+        for animal in self.animals[1:]:
+            compiled(animal, self.model)
+        self.spectra, self.episode_steps = of_world(self.animals, "spectra"), self.animals[0].episode_steps
         self.datas = [mujoco.MjData(self.model) for _ in range(n)]
-        self.steps, self.felt = np.zeros(n, int), np.zeros((n, 0), np.float32)
+        self.steps, self.felt = np.zeros(n, int), [np.zeros((n, 0), np.float32) for _ in self.animals]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self.seed(seed)
         self.reset(np.arange(1))  # what an animal feels may want an episode
-        self.felt = np.repeat(self.felt[:1], n, axis=0)
+        self.felt = [np.repeat(felt[:1], n, axis=0) for felt in self.felt]
         self.seed(self.entropy)
 
     def seed(self, seed: Any) -> None:
@@ -53,82 +64,102 @@ class TaskWorlds:
         self.entropy = np.random.SeedSequence(seed).entropy
         children = [np.random.SeedSequence(self.entropy, spawn_key=(i,)) for i in range(len(self.datas))]
         self.rngs = [np.random.default_rng(child) for child in children]
-        self.noise_keys = np.array([child.generate_state(1, np.uint64)[0] for child in children])
+        self.noise_keys = np.array([child.generate_state(len(self.animals), np.uint64) for child in children]).T
 
     def reset(self, worlds: np.ndarray) -> None:
         """Begin these worlds' episodes.
 
         Raises:
-            RuntimeError: the task's own reset fails; by its name, line and message.
+            RuntimeError: a task's own reset fails; by its name, line and message.
         """
         for i in worlds:
             data = self.datas[i]
             mujoco.mj_resetData(self.model, data)
             try:
-                self.task.reset(data, self.rngs[i])
+                for animal in self.animals:
+                    animal.reset(data, self.rngs[i])
                 mujoco.mj_forward(self.model, data)
                 self._feel(i)
             except Exception as error:
                 raise RuntimeError(_told(error)) from error
             self.steps[i] = 0
 
-    def step(self, actions: np.ndarray) -> list[StepOfWorld]:
-        """One action (world, n) in every world."""
-        outcomes = [self._acted(data, action) for data, action in zip(self.datas, actions, strict=True)]
-        moving = [data for data, outcome in zip(self.datas, outcomes, strict=True) if outcome.failure is None]
+    def step(self, actions: Sequence[np.ndarray]) -> list[StepOfWorld]:
+        """Every animal's actions (world, number) in every world; what comes of them for the first that learns in all
+        worlds, then for the next."""
+        failures = self._acted(actions)
+        moving = [data for data, failure in zip(self.datas, failures, strict=True) if failure is None]
         for _ in (self._pool.map if self._pool else map)(self._moved, moving):
             pass
         self.steps += 1
-        for i, (data, outcome) in enumerate(zip(self.datas, outcomes, strict=True)):
-            if outcome.failure is None:
-                self._judge(i, data, outcome)
-            outcome.truncated = not outcome.terminated and (
-                outcome.failure is not None or self.steps[i] >= self.task.episode_steps
-            )
-        return outcomes
+        judged = [self._judged(i, failure) for i, failure in enumerate(failures)]
+        return [outcome for of_learner in zip(*judged, strict=True) for outcome in of_learner]
 
     def close(self) -> None:
         if self._pool:
             self._pool.shutdown()
 
-    def _acted(self, data: mujoco.MjData, action: np.ndarray) -> StepOfWorld:
-        if not np.isfinite(action).all():
-            return StepOfWorld(failure="action is not finite")
-        try:
-            self.task.act(data, np.clip(action, -1, 1))
-        except Exception as error:
-            return StepOfWorld(failure=_told(error))
-        return StepOfWorld()
+    def _acted(self, actions: Sequence[np.ndarray]) -> list[str | None]:
+        """What failed in each world, if anything did."""
+        failures: list[str | None] = [None] * len(self.datas)
+        for animal, whose, commanded in zip(self.animals, self._whose, actions, strict=True):
+            finite, limited = np.isfinite(commanded).all(axis=1), np.clip(commanded, -1, 1)
+            for i, data in enumerate(self.datas):
+                if failures[i] is not None:
+                    continue
+                if not finite[i]:
+                    failures[i] = f"{whose}action is not finite"
+                    continue
+                try:
+                    animal.act(data, limited[i])
+                except Exception as error:
+                    failures[i] = _told(error)
+        return failures
 
     def _moved(self, data: mujoco.MjData) -> None:
-        mujoco.mj_step(self.model, data, self.task.substeps)
+        mujoco.mj_step(self.model, data, self.animals[0].substeps)
         mujoco.mj_forward(self.model, data)
 
     def _feel(self, world: int) -> None:
-        """What the world's animal feels.
+        """What the world's animals feel.
 
         Raises:
             ValueError: these are not as many numbers as ever, or not finite.
         """
-        felt = np.asarray(self.task.feels(self.datas[world]), np.float32)
-        if felt.ndim != 1 or not np.isfinite(felt).all():
-            raise ValueError(f"feels returned {felt!r:.100}: must be finite numbers, (k,)")
-        if not self.felt.shape[1]:
-            self.felt = np.zeros((len(self.datas), len(felt)), np.float32)
-        if len(felt) != self.felt.shape[1]:
-            raise ValueError(f"feels returned {len(felt)} numbers: must be {self.felt.shape[1]}, as before")
-        self.felt[world] = felt
+        for number, (animal, whose) in enumerate(zip(self.animals, self._whose, strict=True)):
+            felt = np.asarray(animal.feels(self.datas[world]), np.float32)
+            if felt.ndim != 1 or not np.isfinite(felt).all():
+                raise ValueError(f"{whose}feels returned {felt!r:.100}: must be finite numbers, (k,)")
+            if not self.felt[number].shape[1]:
+                self.felt[number] = np.zeros((len(self.datas), len(felt)), np.float32)
+            size = self.felt[number].shape[1]
+            if len(felt) != size:
+                raise ValueError(f"{whose}feels returned {len(felt)} numbers: must be {size}, as before")
+            self.felt[number][world] = felt
 
-    def _judge(self, world: int, data: mujoco.MjData, outcome: StepOfWorld) -> None:
-        if any(data.warning[kind].number for kind in _UNSTABLE):  # MuJoCo has begun it anew
-            outcome.failure = "physics is unstable: positions, speeds or accelerations are huge or not finite"
-            return
-        try:
-            outcome.terms = named_terms(self.task, data)
-            outcome.terminated, outcome.success = bool(self.task.terminated(data)), bool(self.task.succeeded(data))
-            self._feel(world)
-        except Exception as error:
-            outcome.terms, outcome.failure = {}, _told(error)
+    def _judged(self, world: int, failure: str | None) -> list[StepOfWorld]:
+        """What the step is worth to each that learns. The episode ends for all as soon as it ends for anybody."""
+        data = self.datas[world]
+        if failure is None and any(data.warning[kind].number for kind in _UNSTABLE):  # MuJoCo has begun it anew
+            failure = "physics is unstable: positions, speeds or accelerations are huge or not finite"
+        outcomes: list[StepOfWorld] = []
+        over = self.steps[world] >= self.episode_steps
+        if failure is None:
+            try:
+                for animal, whose in zip(self.learners, self._whose, strict=False):
+                    terms = named_terms(animal, data, whose)
+                    ended, done = bool(animal.terminated(data)), bool(animal.succeeded(data))
+                    outcomes.append(StepOfWorld(terms, terminated=ended, success=done))
+                    over |= ended
+                over |= any(other.task.terminated(data) for other in self.frozen)
+                self._feel(world)
+            except Exception as error:
+                failure = _told(error)
+        if failure is not None:
+            return [StepOfWorld(truncated=True, failure=failure) for _ in self.learners]
+        for outcome in outcomes:
+            outcome.truncated = bool(over) and not outcome.terminated
+        return outcomes
 
 
 def _told(error: Exception) -> str:

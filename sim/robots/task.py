@@ -5,18 +5,21 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 
 import optics
-from optics.numerics.arguments import whole
+from optics.numerics.arguments import did_you_mean, whole
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.eyes import Eyes
 from sim.render.fidelity import Fidelity
 from sim.robots.mounts import Mount, fan
 from sim.scene import source
+
+if TYPE_CHECKING:
+    from sim.robots.encounter import Frozen
 
 MOST_STEPS = 10**9
 
@@ -31,6 +34,11 @@ class Task:
     substeps: of physics in one action · episode_steps: actions, then an episode is truncated
     spectra: of materials and lights, by name, in the place of their colours
     camera: name of the camera that pictures for people are taken with; None: one that looks at the whole model
+    actuators: names of those that an action drives; None: all
+    name: what it is called among others; None: as its class
+    others: animals in the same world that do not learn, see `sim.Frozen`; each has a body, actuators and eyes of its
+        own in the one model. Then an episode begins with everybody's `reset`, in turn, and ends as soon as anybody's
+        `terminated` says so: it is truncated for those whose own does not
 
     Where the task evolves (`evolve run FILE.py:CLASS`), every animal has eyes of its own, where `place` puts them; a
     class without arguments is needed for that.
@@ -47,15 +55,20 @@ class Task:
     episode_steps: int = 256
     spectra: Mapping[str, Spectrum | str] | None = None
     camera: str | None = None
+    actuators: Sequence[str] | None = None
+    name: str | None = None
+    others: Sequence[Frozen] = ()
 
     def reset(self, data: mujoco.MjData, rng: np.random.Generator) -> None:
         """Begin an episode: change what mj_resetData has left."""
 
     def act(self, data: mujoco.MjData, action: np.ndarray) -> None:
-        """Take an action in [-1, 1], (n_actions,); here: every actuator over the whole of its range."""
-        limited = data.model.actuator_ctrllimited.astype(bool)
-        low, high = np.where(limited[:, None], data.model.actuator_ctrlrange, [-1.0, 1.0]).T
-        data.ctrl[:] = low + (high - low) * (action + 1) / 2
+        """Take an action in [-1, 1], (n_actions,); here: each of its actuators over the whole of its range."""
+        model, named = data.model, self.actuators
+        mine = slice(None) if named is None else [model.actuator(name).id for name in named]
+        limited = model.actuator_ctrllimited[mine].astype(bool)
+        low, high = np.where(limited[:, None], model.actuator_ctrlrange[mine], [-1.0, 1.0]).T
+        data.ctrl[mine] = low + (high - low) * (action + 1) / 2
 
     def rewards(self, data: mujoco.MjData) -> Mapping[str, float]:
         """What the step that led here is worth, by named terms; the reward is their sum."""
@@ -78,12 +91,12 @@ class Task:
         return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)
 
     def n_actions(self, model: mujoco.MjModel) -> int:
-        """Numbers in an action; here: as many as there are actuators."""
-        return int(model.nu)
+        """Numbers in an action; here: as many as it has actuators."""
+        return int(model.nu) if self.actuators is None else len(self.actuators)
 
 
-def compiled(task: Task) -> mujoco.MjModel:
-    """The model of a task whose other settings are right.
+def compiled(task: Task, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
+    """The model of a task whose other settings are right; model: where it has been compiled already.
 
     Raises:
         ValueError: something is missing, or wrong.
@@ -93,7 +106,11 @@ def compiled(task: Task) -> mujoco.MjModel:
         raise ValueError(f"{name}: model: must be set, to an MjModel, a path or MJCF text")
     whole(f"{name}: substeps", task.substeps, 1, MOST_STEPS)
     whole(f"{name}: episode_steps", task.episode_steps, 1, MOST_STEPS)
-    model = source.load(task.model)
+    model = source.load(task.model) if model is None else model
+    known = [model.actuator(i).name for i in range(model.nu)]
+    for actuator in task.actuators or ():
+        if actuator not in known:
+            raise ValueError(f"{name}: actuators: {actuator!r}: must be in the model{did_you_mean(actuator, known)}")
     if task.n_actions(model) < 1:
         raise ValueError(f"{name}: its model has no actuators: n_actions and act must say what an action is")
     return model
@@ -115,16 +132,16 @@ def grown(task: Task, eyes: Eyes, elevation_deg: float = 0.0) -> Task:
     return animal
 
 
-def named_terms(task: Task, data: mujoco.MjData) -> dict[str, float]:
-    """Its rewards.
+def named_terms(task: Task, data: mujoco.MjData, whose: str = "") -> dict[str, float]:
+    """Its rewards; whose: what a message begins with.
 
     Raises:
         ValueError: they are no finite numbers by name.
     """
     terms: Any = task.rewards(data)
     if not isinstance(terms, Mapping):
-        raise ValueError(f"rewards returned {terms!r}: must be numbers by name, such as {{'progress': 0.1}}")
+        raise ValueError(f"{whose}rewards returned {terms!r}: must be numbers by name, such as {{'progress': 0.1}}")
     for name, value in terms.items():
         if not np.isscalar(value) or not np.isfinite(value):
-            raise ValueError(f"rewards: {name!r} is {value!r}: must be one finite number")
+            raise ValueError(f"{whose}rewards: {name!r} is {value!r}: must be one finite number")
     return {str(name): float(value) for name, value in terms.items()}

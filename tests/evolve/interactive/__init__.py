@@ -1,7 +1,7 @@
 """Which test covers which module of evolve/interactive.
 
 begin: test_run_from_python.py
-opened_run: test_opened_run.py, test_run_from_python.py
+opened_run: test_opened_run.py, test_run_from_python.py, learning/test_animals_in_turn.py
 carry_on: test_run_from_python.py
 table: test_opened_run.py
 eye_picture: test_opened_run.py

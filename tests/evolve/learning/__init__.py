@@ -1,8 +1,8 @@
 """Which test covers which module of evolve/learning.
 
 fitness: test_fitness.py
-worlds: test_fitness.py, test_task_module.py
-task_module: test_task_module.py
+worlds: test_fitness.py, test_task_module.py, test_animals_in_turn.py
+task_module: test_task_module.py, test_animals_in_turn.py
 task_trial: test_task_module.py
 ppo: test_ppo.py, test_learning.py, search/test_successive_halving.py
 policy: test_policy.py

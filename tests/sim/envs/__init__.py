@@ -1,9 +1,13 @@
 """What tests hold of environments, module by module.
 
 assembly: test_env.py, test_vec_env.py, test_tasks_page.py
-task_vec_env: test_task_vec_env.py
-task_worlds: test_task_vec_env.py
-task_fidelity: robots/test_model_fidelity.py
+task_vec_env: test_task_vec_env.py, test_encounter.py
+task_worlds: test_task_vec_env.py, test_encounter.py
+task_senses: test_task_vec_env.py, test_task_state.py, test_encounter.py
+task_animals: test_encounter.py, test_parallel_env.py
+task_pictures: test_task_vec_env.py, test_parallel_env.py
+parallel_env: test_parallel_env.py
+task_fidelity: robots/test_model_fidelity.py, test_encounter.py
 task_state: test_task_state.py
 one_environment: test_vec_env.py
 env: test_env.py

@@ -5,7 +5,8 @@ model_wavefront: test_model_renderer.py
 model_fidelity: test_model_fidelity.py
 edge_rays: test_edge_rays.py
 mounts: test_mounts.py
-task: envs/test_task_vec_env.py
+task: envs/test_task_vec_env.py, envs/test_encounter.py
+encounter: envs/test_encounter.py
 eye_marks: test_eye_marks.py
 inside: test_mounts.py
 poses: test_model_renderer.py

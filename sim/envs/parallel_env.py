@@ -1,0 +1,115 @@
+"""One world of several animals as a PettingZoo parallel environment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from pettingzoo import ParallelEnv
+
+from optics.numerics.arguments import did_you_mean
+from sim.envs.follow_camera import RENDER_MODES
+from sim.envs.task_animals import TaskAnimals
+from sim.envs.task_pictures import TaskPictures
+from sim.envs.task_worlds import StepOfWorld
+from sim.robots.encounter import Encounter
+
+
+class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
+    """All animals act at once, each by its own policy. Observations and `info` of each are those of `make_vec_env`.
+
+    encounter: who meets · seed: of episodes and noise until `reset` is given one
+    memory: frames in an observation · render_mode: "rgb_array", "eyes" or None
+    """
+
+    metadata = {"render_modes": [*RENDER_MODES], "name": "rhabdom_encounter"}  # noqa: RUF012 (PettingZoo's declaration)
+
+    def __init__(self, encounter: Encounter, seed: int | None, memory: int, render_mode: str | None) -> None:
+        self.possible_agents, self.agents = list(encounter.names), list[str]()
+        self.render_mode = render_mode
+        self._animals = TaskAnimals(encounter, 1, seed, memory)
+        self._pictures = TaskPictures(self._animals, render_mode)
+        self._only, self._begun = np.arange(1), False
+        self.observation_spaces = self._named([senses.observation_space for senses in self._animals.learners])
+        self.action_spaces = self._named([senses.action_space for senses in self._animals.learners])
+
+    def observation_space(self, agent: str) -> spaces.Dict:
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Box:
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, dict[str, np.ndarray]], dict[str, dict[str, Any]]]:
+        """Begin an episode; there are no options, and PettingZoo's tests want any to be taken."""
+        if seed is not None:
+            self._animals.seed(seed)
+        self.agents, self._begun = list(self.possible_agents), True
+        infos = {name: {"reward_terms": {}, "is_success": False} for name in self.agents}
+        return self._observed(self._animals.reset()), infos
+
+    def step(
+        self, actions: Mapping[str, np.ndarray]
+    ) -> tuple[
+        dict[str, dict[str, np.ndarray]],
+        dict[str, float],
+        dict[str, bool],
+        dict[str, bool],
+        dict[str, dict[str, Any]],
+    ]:
+        """One action of everybody; without agents, after an episode's end, nothing happens.
+
+        Raises:
+            ValueError: an action is missing, or somebody's who is not there, or has another shape.
+            RuntimeError: before the first reset.
+        """
+        if not self._begun:
+            raise RuntimeError("the world has not begun: call reset first")
+        if not self.agents:
+            return {}, {}, {}, {}, {}
+        outcomes = self._named(self._animals.act(self._commanded(actions)))
+        observations = self._observed(self._animals.remember(self._animals.look(self._only), self._only[:0]))
+        terminated = {name: outcome.terminated for name, outcome in outcomes.items()}
+        truncated = {name: outcome.truncated for name, outcome in outcomes.items()}
+        rewards = {name: float(sum(outcome.terms.values())) for name, outcome in outcomes.items()}
+        if any(terminated.values()) or any(truncated.values()):
+            self.agents = []  # an episode ends for all
+        return observations, rewards, terminated, truncated, {name: _info(one) for name, one in outcomes.items()}
+
+    def render(self) -> np.ndarray | list[np.ndarray] | None:
+        """A picture (y, x, 3) uint8 of the world, or what each animal's eyes see, as `render_mode` asks."""
+        pictures = self._pictures.taken()
+        return pictures[0] if self.render_mode == "rgb_array" else pictures or None
+
+    def close(self) -> None:
+        self._animals.worlds.close()
+
+    def _named(self, values: Any) -> dict[str, Any]:
+        return dict(zip(self.possible_agents, values, strict=True))
+
+    def _observed(self, observations: list[dict[str, np.ndarray]]) -> dict[str, dict[str, np.ndarray]]:
+        return self._named([{name: array[0] for name, array in known.items()} for known in observations])
+
+    def _commanded(self, actions: Mapping[str, np.ndarray]) -> list[np.ndarray]:
+        """(1, number) of each."""
+        for name in actions:
+            if name not in self.agents:
+                known = did_you_mean(name, self.agents) or f": there are {', '.join(self.agents)}"
+                raise ValueError(f"actions: no animal {name!r}{known}")
+        found = []
+        for name in self.agents:
+            if name not in actions:
+                raise ValueError(f"actions: {name!r} has none: must be one of each, {', '.join(self.agents)}")
+            action, shape = np.asarray(actions[name], np.float32), self.action_spaces[name].shape
+            if action.shape != shape:
+                raise ValueError(f"actions: {name!r} has shape {action.shape}: must be {shape}")
+            found.append(action[None])
+        return found
+
+
+def _info(outcome: StepOfWorld) -> dict[str, Any]:
+    info: dict[str, Any] = {"reward_terms": outcome.terms, "is_success": outcome.success}
+    return info if outcome.failure is None else {**info, "failure": outcome.failure}

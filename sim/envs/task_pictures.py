@@ -1,0 +1,52 @@
+"""Pictures of tasks of one's own, for people: the model with all animals' eyes in it, or what eyes report."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from sim.envs.retina_images import side_by_side
+from sim.envs.task_animals import TaskAnimals
+from sim.pictures.quick_camera import QuickCamera
+from sim.robots.encounter import of_world
+from sim.robots.eye_marks import with_eyes
+from sim.robots.poses import Poses
+from sim.scene.cameras import Viewpoint
+
+PICTURE = (360, 480)  # pixels (height, width)
+RIMS = 0.15  # of the model's extent: how far the rims of fields of view are drawn
+
+
+class TaskPictures:
+    """As `render_mode` asks: "rgb_array", "eyes" of those who learn, or None."""
+
+    def __init__(self, animals: TaskAnimals, render_mode: str | None) -> None:
+        self._animals, self._mode = animals, render_mode
+        self._camera: QuickCamera | None = None
+
+    def taken(self) -> list[np.ndarray]:
+        """(y, x, 3) uint8: one of every world, or of the eyes of each that learns in every world; none without mode."""
+        if self._mode == "eyes":
+            learners = self._animals.learners
+            return [side_by_side(frame, senses.renderer.eye) for senses in learners for frame in senses.newest]
+        if self._mode == "rgb_array":
+            worlds = self._animals.worlds
+            self._camera = self._camera or QuickCamera(worlds.model, self._animals.learners[0].renderer.spectra)
+            return [self._picture(self._camera, data) for data in worlds.datas]
+        return []
+
+    def _picture(self, camera: QuickCamera, data: mujoco.MjData) -> np.ndarray:
+        worlds = self._animals.worlds
+        named = of_world(worlds.animals, "camera") or _overview(worlds.model)
+        picture, view = camera.picture(data, named, PICTURE[1], PICTURE[0]), camera.mirror.viewpoint(named)
+        reach = RIMS * float(worlds.model.stat.extent)
+        for senses in self._animals.seeing:
+            pupils, frames = senses.renderer.eye_frames(Poses.of([data]))
+            picture = with_eyes(picture, view, (pupils[0], frames[0]), senses.renderer.eye.fov_deg, reach)
+        return picture
+
+
+def _overview(model: mujoco.MjModel) -> Viewpoint:
+    """From the side, above."""
+    centre, extent = np.array(model.stat.center), float(model.stat.extent)
+    return Viewpoint.looking_at(centre + extent * np.array([-0.9, -1.6, 1.2]), centre, 45.0)

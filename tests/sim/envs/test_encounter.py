@@ -1,0 +1,335 @@
+"""Several animals in one world: who sees whom, who learns, when episodes end, and what is refused."""
+
+import numpy as np
+import pytest
+from stable_baselines3 import PPO
+
+import optics
+import sim
+from tests.sim.envs.hunt import Animal, Predator, Prey, Twin, distance, hunt
+
+
+def still(observation):
+    return np.zeros((len(observation["previous_action"]), 2))
+
+
+def ahead(observation):
+    """Along +x, at full speed."""
+    return np.tile([1.0, 0.0], (len(observation["previous_action"]), 1))
+
+
+def seen_last(env, action):
+    """Poses of all worlds, and what the learner saw, after one step."""
+    observation, *_ = env.step(np.tile(np.asarray(action, np.float32), (env.num_envs, 1)))
+    return np.array([data.qpos for data in env.worlds.datas]), observation
+
+
+def test_one_learns_and_the_other_acts_by_its_policy():
+    env = sim.make_vec_env(hunt().alone("Prey", {"Predator": ahead}), n_envs=4)
+    assert env.num_envs == 4
+    assert env.observation_space["eyes"].shape == (1, 3, 3, 2, 8)  # the prey's own
+    assert env.observation_space["feels"].shape == (2,)
+    env.reset()
+    before = np.array([data.qpos for data in env.worlds.datas])
+    after, _ = seen_last(env, [0, 1])
+    moved = after - before
+    assert (moved[:, 2] > 0.04).all()  # predator, along x
+    assert (moved[:, 1] > 0.04).all()  # prey, along y
+    assert np.abs(moved[:, [0, 3]]).max() < 1e-6
+    idle = sim.make_vec_env(hunt().alone("Prey", {}), n_envs=4)
+    idle.reset()
+    assert np.abs(seen_last(idle, [0, 0])[0] - before).max() < 1e-6
+
+
+class Invisible(Predator):
+    """Of a group of geoms that nobody sees."""
+
+    name = "Predator"
+    model = Predator.model.replace('rgba=".9 .1', 'group="3" rgba=".9 .1')
+
+
+class Careful(Prey):
+    model = Invisible.model
+
+
+def test_each_sees_the_other_through_its_own_eyes():
+    """The frozen animal is told what is before its own eyes, and the learner sees it: without it, red is gone."""
+    told = []
+
+    def looks(observation):
+        told.append({name: array.copy() for name, array in observation.items()})
+        return still(observation)
+
+    env = sim.make_vec_env(hunt().alone("Prey", {"Predator": looks}), n_envs=3, seed=2)
+    first = env.reset()
+    env.step(np.zeros((3, 2)))
+    assert told[0]["eyes"].shape == (3, 1, 2, 3, 1, 12)
+    assert told[0].keys() == {"eyes", "previous_action"}
+    frozen = {k: v.copy() for k, v in told[0].items()}
+    red = first["eyes"][:, 0, :, 0] - first["eyes"][:, 0, :, 2]
+    assert (red.max(axis=(1, 2, 3)) > 0.1).all()
+    hidden = sim.make_vec_env(sim.Encounter(Careful(), Invisible()).alone("Careful", {}), n_envs=3, seed=2)
+    unseen = hidden.reset()["eyes"][:, 0]
+    assert (unseen[:, :, 0] - unseen[:, :, 2]).max() < 0.1
+    # The same moment as the predator's own task has it.
+    mirrored = sim.make_vec_env(hunt().alone("Predator", {}), n_envs=3, seed=2)
+    mirrored.reset()
+    for theirs, ours in zip(mirrored.worlds.datas, env.worlds.datas, strict=True):
+        theirs.qpos[:], theirs.qvel[:] = ours.qpos, 0
+    twin = mirrored.renderer.signals(_forward(mirrored))
+    assert np.abs(twin - frozen["eyes"][:, 0]).max() < 0.1  # noise of 0.01, and one step of nobody
+
+
+def _forward(env):
+    import mujoco
+
+    for data in env.worlds.datas:
+        mujoco.mj_forward(env.worlds.model, data)
+    return env.worlds.datas
+
+
+def test_frozen_eyes_remember_what_their_policy_wants():
+    learner = PPO("MultiInputPolicy", sim.make_vec_env(hunt().alone("Predator", {}), n_envs=2, memory=3), n_steps=8)
+    shapes = []
+    predict = learner.policy.predict
+
+    def spied(observation, **options):
+        shapes.append(observation["eyes"].shape)
+        return predict(observation, **options)
+
+    learner.policy.predict = spied
+    env = sim.make_vec_env(hunt().alone("Prey", {"Predator": learner.policy}), n_envs=5)
+    env.reset()
+    env.step(np.zeros((5, 2)))
+    assert shapes == [(5, 3, 2, 3, 1, 12)]
+    blind = PPO("MlpPolicy", "Pendulum-v1", n_steps=64)
+    with pytest.raises(ValueError, match=r"policy of 'Predator' takes \{\}, its task gives .*'eyes'.*: must be alike"):
+        sim.make_vec_env(hunt().alone("Prey", {"Predator": blind}), n_envs=1)
+    other = sim.Frozen(Twin("predator"), learner.policy)
+    prey = Prey()
+    prey.others = (other,)
+    with pytest.raises(ValueError, match=r"policy of 'predator' takes .*, its task gives .*: must be alike"):
+        sim.make_vec_env(prey, n_envs=1)
+
+
+def test_an_episode_ends_for_all_when_it_ends_for_one():
+    """Whose own ending it is, is terminated; for the other it is cut off."""
+
+    class Brave(Prey):
+        name = "Prey"
+
+        def terminated(self, data):
+            return False
+
+    def towards(observation):
+        found = [np.sign(data.qpos[:2] - data.qpos[2:]) for data in env.worlds.datas]
+        return np.array(found)
+
+    env = sim.make_vec_env(sim.Encounter(Brave(), Predator()).alone("Prey", {"Predator": towards}), n_envs=6, seed=1)
+    env.reset()
+    done = np.zeros(6, bool)
+    while not done.any():
+        _, _, done, infos = env.step(np.zeros((6, 2)))
+    assert env.worlds.steps.max() < Prey.episode_steps
+    assert all(info["TimeLimit.truncated"] for info, over in zip(infos, done, strict=True) if over)
+    assert not any("episode" in info for info, over in zip(infos, done, strict=True) if not over)
+
+
+def test_worlds_with_frozen_animals_go_back_bit_for_bit():
+    rng = np.random.default_rng(0)
+    directions = rng.normal(size=(12, 2)).astype(np.float32)
+
+    def swayed(observation):
+        """By what it sees, noise and memory included."""
+        return observation["eyes"].reshape(len(observation["eyes"]), -1)[:, :12] @ directions
+
+    def played(env, steps):
+        return [env.step(np.full((3, 2), np.sin(k), np.float32))[0] for k in range(steps)]
+
+    env = sim.make_vec_env(hunt().alone("Prey", {"Predator": swayed}), n_envs=3, seed=4, memory=2)
+    env.reset()
+    played(env, 5)
+    state = env.get_state()
+    assert {"Predator.remembered", "Predator.noise", "Predator.action", "Predator.felt"} <= state.keys()
+    once = played(env, 25)
+    seen = env.set_state(state)
+    np.testing.assert_array_equal(seen["eyes"], state["remembered"])
+    again = played(env, 25)
+    for one, other in zip(once, again, strict=True):
+        for name, array in one.items():
+            np.testing.assert_array_equal(array, other[name])
+
+
+def test_both_learn_in_turn():
+    """A predator learns before prey that stands still, then the prey before that predator, which is as it was left."""
+    settings = {"n_steps": 32, "batch_size": 256, "learning_rate": 3e-3, "n_epochs": 8, "gamma": 0.9, "seed": 0}
+    hunts = sim.make_vec_env(hunt().alone("Predator", {"Prey": still}), n_envs=32)
+    predator = PPO("MultiInputPolicy", hunts, **settings).learn(12_000)
+
+    def ends_at(policy):
+        observation = hunts.reset()
+        for _ in range(7):  # nobody is caught so soon
+            observation, *_ = hunts.step(policy(observation))
+        return np.mean([distance(data) for data in hunts.worlds.datas])
+
+    apart = ends_at(still)
+    assert ends_at(lambda seen: predator.predict(seen, deterministic=True)[0]) < 0.9 * apart
+    weights = predator.policy.state_dict()["action_net.weight"].clone()
+    flees = sim.make_vec_env(hunt().alone("Prey", {"Predator": predator}), n_envs=32)
+    prey = PPO("MultiInputPolicy", flees, **settings)
+    prey.learn(2048)
+    assert (predator.policy.state_dict()["action_net.weight"] == weights).all()
+    assert prey.num_timesteps == 2048
+
+
+def test_animals_that_are_alike_learn_one_policy():
+    """Rows: the first animal of all worlds, then the second. Each row is its own animal's."""
+    twins = sim.Encounter(Twin("prey"), Twin("predator"))
+    env = sim.make_vec_env(twins, n_envs=4, seed=3, render_mode="eyes")
+    assert env.num_envs == 8
+    first = env.reset()
+    assert first["eyes"].shape == (8, 1, 3, 3, 1, 6)
+    assert len(env.get_images()) == 8
+    actions = np.zeros((8, 2), np.float32)
+    actions[5] = 1, 0  # predator of the second world
+    before = np.array([data.qpos for data in env.worlds.datas])
+    observation, reward, _, infos = env.step(actions)
+    moved = np.array([data.qpos for data in env.worlds.datas]) - before
+    assert moved[1, 2] > 0.04
+    assert np.abs(np.delete(moved.ravel(), 6)).max() < 1e-6
+    np.testing.assert_array_equal(observation["previous_action"], actions)
+    np.testing.assert_allclose(reward[:4], reward[4:])
+    for _ in range(Twin.episode_steps):
+        *_, done, infos = env.step(actions)
+        np.testing.assert_array_equal(done[:4], done[4:])
+        if done.any():
+            assert all(("terminal_observation" in info) == over for info, over in zip(infos, done, strict=True))
+            break
+    state = env.get_state()
+    env.step(actions)
+    np.testing.assert_array_equal(env.set_state(state)["eyes"][:4], state["remembered"])
+    PPO("MultiInputPolicy", env, n_steps=8, batch_size=64).learn(64)
+
+
+def test_automatic_fidelity_is_chosen_among_the_others():
+    """A predator alone has nothing to tell apart but the floor's edge; prey before it wants rays."""
+    careless = Predator()
+    careless.fidelity = "auto"
+    env = sim.make_vec_env(sim.Encounter(Prey(), careless).alone("Predator", {}), n_envs=1)
+    alone = sim.Encounter(careless).alone("Predator", {})
+    assert (
+        env.renderer.fidelity.rays_per_receptor >= sim.make_vec_env(alone, n_envs=1).renderer.fidelity.rays_per_receptor
+    )
+    assert "moments" in env.renderer.fidelity.levels[1].why
+
+
+# --- what is refused
+
+
+class Other(Prey):
+    model = Prey.model.replace(".05", ".04")
+
+
+class Longer(Predator):
+    episode_steps = 30
+
+
+class Accompanied(Predator):
+    def __init__(self):
+        super().__init__()
+        self.others = (sim.Frozen(Prey()),)
+
+
+class Untied(Predator):
+    def __init__(self):
+        super().__init__()
+        self.mounts = (sim.Mount("predatr"),)
+
+
+class Unwired(Predator):
+    def __init__(self):
+        super().__init__()
+        self.actuators = ("predator_x", "predator_z")
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (lambda: sim.Encounter(), "Encounter: no animals: must be one sim.Task at least"),
+        (lambda: sim.Encounter(Prey(), Prey()), "Encounter: two animals are called 'Prey': must differ, give one of "),
+        (lambda: sim.Encounter(Prey(), Predator), "Encounter = .*Predator.*: must be"),
+        (lambda: sim.Encounter(Prey(), Other()), "Encounter: Prey and Other have different models: must be one model"),
+        (lambda: sim.Encounter(Prey(), Longer()), "Encounter: episode_steps = 20 of Prey, 30 of Longer: must be equal"),
+        (lambda: sim.Encounter(Prey(), Accompanied()), "Encounter: Accompanied has others of its own: must be a task "),
+        (lambda: hunt().alone("Pray", {}), "Encounter: no animal 'Pray'; did you mean 'Prey'"),
+        (lambda: hunt().alone("Prey", {"Cat": None}), "Encounter: no animal 'Cat': it has Prey, Predator"),
+        (lambda: hunt().alone("Prey", {"Prey": still}), "Encounter: policies: 'Prey' is the one that learns: must be"),
+        (lambda: hunt().alone("Prey", {"Predator": 3}), "Frozen: policy = 3: must be a function, have `predict`, or"),
+        (lambda: sim.Frozen(3), "Frozen: task = 3: must be a kind of Task"),
+        (lambda: sim.make_vec_env(hunt(), n_envs=1), "Encounter: Prey has .*, Predator has .*: must be alike to learn"),
+        (lambda: sim.make_env(hunt()), "task: several animals learn in a sim.Encounter: must be its `alone`"),
+        (lambda: sim.make_parallel_env(Prey()), "encounter = .*Prey.*: must be a sim.Encounter"),
+        (lambda: sim.make_vec_env(sim.Encounter(Prey(), Untied()).alone("Untied", {})), "Mount: no site or camera or "),
+        (
+            lambda: sim.make_vec_env(sim.Encounter(Prey(), Unwired()).alone("Prey", {})),
+            "Unwired: actuators: 'predator_z'",
+        ),
+    ],
+)
+def test_bad_encounters_are_refused_in_one_line(asked, words):
+    with pytest.raises(ValueError, match=words) as caught:
+        asked()
+    assert "\n" not in str(caught.value)
+
+
+def failing(observation):
+    return 1 / 0
+
+
+def short(observation):
+    return np.zeros(3)
+
+
+@pytest.mark.parametrize(
+    ("policy", "words"),
+    [
+        (failing, "policy of 'Predator': ZeroDivisionError: division by zero"),
+        (short, r"policy of 'Predator' returned actions of shape \(3,\): must be \(2, 2\)"),
+    ],
+)
+def test_policies_that_fail_are_named(policy, words):
+    env = sim.make_vec_env(hunt().alone("Prey", {"Predator": policy}), n_envs=2)
+    env.reset()
+    with pytest.raises(RuntimeError, match=words):
+        env.step(np.zeros((2, 2)))
+
+
+def late(observation):
+    """No number, once it has moved."""
+    return np.where(observation["previous_action"] > 0, np.nan, 1.0)
+
+
+class Priceless(Animal):
+    n_eyes, eye, name = 3, optics.Eye(resolution=(1, 6), fov_deg=100, bands=4), "Prey"
+
+    def __init__(self):
+        self.actuators, self.mounts = ("prey_x", "prey_y"), sim.ring("prey", 3, 240, radius=0.26)
+
+    def rewards(self, data):
+        return {"far": np.inf if data.time > 0.15 else 0.0}
+
+
+@pytest.mark.parametrize(
+    ("encounter", "policy", "words"),
+    [
+        (lambda: sim.Encounter(Priceless(), Predator()), still, "Prey: rewards: 'far' is inf: must be one finite"),
+        (hunt, late, "Predator: action is not finite"),
+    ],
+)
+def test_what_goes_wrong_is_the_animals_of_that_name(encounter, policy, words):
+    env = sim.make_vec_env(encounter().alone("Prey", {"Predator": policy}), n_envs=2)
+    env.reset()
+    env.step(np.zeros((2, 2)))
+    with pytest.warns(UserWarning, match=words):
+        *_, infos = env.step(np.zeros((2, 2)))
+    assert words in infos[0]["failure"]
