@@ -42,7 +42,8 @@ SMALL = (
     "search.generations=2",
     "genome.placement_range_deg.start=60",
 )
-OBLONG = ("genome.resolution_height.start=4", "genome.resolution_width.start=4")  # genes that square eyes have not
+# Genes that square eyes have not.
+OBLONG = ("eye.square=false", "genome.resolution_height.start=4", "genome.resolution_width.start=4")
 PERFECT = ("eye.optics=false",)
 SQUARE = ("eye.square=true", "genome.resolution.start=4", *PERFECT)
 OWN = f"{Path(__file__).parents[1] / 'examples' / 'find_ball.py'}:FindBall"
