@@ -8,21 +8,15 @@ import optics
 import sim
 from sim.robots.edge_rays import FIRST, EdgeRays
 from sim.robots.model_wavefront import ModelWavefront
-from tests.sim.robots.test_model_fidelity import BALL, MOUNT, eye
+from tests.sim.robots.test_model_fidelity import BALL, MOUNT, eye, moments
 
 FINE = 64
 SHARP = eye(noise_sigma=0.01, resolution=(12, 15))
 
 
-def around(seed, n=16):
+def around(seed):
     """The ball somewhere, also half out of view."""
-    random, datas = np.random.default_rng(seed), []
-    for _ in range(n):
-        data = mujoco.MjData(BALL)
-        data.mocap_pos[0] = random.uniform(2, 4), *random.uniform(-1.8, 1.8, 2)
-        mujoco.mj_forward(BALL, data)
-        datas.append(data)
-    return datas
+    return moments(seed, 16, 1.8)
 
 
 def renderer(n, samples="edges", one=SHARP, tolerance=None, rays=FINE):

@@ -21,12 +21,12 @@ BALL = mujoco.MjModel.from_xml_string("""
 MOUNT = sim.Mount("head", offset=(0.2, 0, 0))
 
 
-def moments(seed, n=6):
-    """The ball somewhere in view."""
+def moments(seed, n=6, aside=0.7):
+    """The ball somewhere, so far aside at most."""
     random, datas = np.random.default_rng(seed), []
     for _ in range(n):
         data = mujoco.MjData(BALL)
-        data.mocap_pos[0] = random.uniform(2.5, 4), *random.uniform(-0.7, 0.7, 2)
+        data.mocap_pos[0] = random.uniform(2.5, 4), *random.uniform(-aside, aside, 2)
         mujoco.mj_forward(BALL, data)
         datas.append(data)
     return datas
