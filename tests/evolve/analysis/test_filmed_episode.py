@@ -23,7 +23,8 @@ SETTINGS = (
     *("search.population=2", "search.generations=1", "learning.n_envs=8", "learning.n_steps=16"),
     *("learning.total_steps=128", "learning.batch_size=64", "learning.n_epochs=1", "evaluation.episodes=2"),
     # Eyes that see the ball, wherever the first animals look.
-    *("eye.optics=false", "genome.placement_range_deg.start=40", "genome.fov_deg.start=60", "genome.resolution.start=8"),
+    *("eye.optics=false", "genome.placement_range_deg.start=40", "genome.fov_deg.start=60"),
+    "genome.resolution.start=8",
     *("genome.elevation_deg.open=true", "genome.elevation_deg.low=-5", "genome.elevation_deg.high=5"),
 )
 
