@@ -43,7 +43,10 @@ SMALL = (
     "genome.placement_range_deg.start=60",
 )
 # Genes that square eyes have not.
-OBLONG = ("eye.square=false", "genome.resolution_height.start=4", "genome.resolution_width.start=4")
+OBLONG = (
+    "eye.square=false",
+    *(f"genome.resolution_{side}.{key}" for side in ("height", "width") for key in ("low=2", "start=4")),
+)
 PERFECT = ("eye.optics=false",)
 SQUARE = ("eye.square=true", "genome.resolution.start=4", *PERFECT)
 OWN = f"{Path(__file__).parents[1] / 'examples' / 'find_ball.py'}:FindBall"

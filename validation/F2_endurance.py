@@ -48,7 +48,7 @@ SETTINGS = (
     # Animals of all kinds: the preset's own genome is narrower.
     *("genome.placement_range_deg.low=0", "genome.placement_range_deg.high=180"),
     *("genome.fov_deg.low=1", "genome.fov_deg.high=100"),
-    *(f"genome.resolution_{side}.{end}" for side in ("height", "width") for end in ("low=1", "high=16")),
+    *("genome.resolution.low=1", "genome.resolution.high=16"),
     *("genome.relative_aperture.low=0.1", "genome.relative_aperture.high=1"),
     *("genome.refractive_index.low=1", "genome.refractive_index.high=2"),
     *("genome.doe.open=true", "genome.memory_frames.open=true", "genome.memory_frames.high=5"),

@@ -12,7 +12,7 @@ from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from optics.numerics import backend
 
-EIGHT = [f"genome.resolution_{side}.start=8" for side in ("height", "width")]
+EIGHT = ["genome.resolution.start=8"]
 CONFIG = assemble("detection", "quick", assignments=EIGHT)
 
 
