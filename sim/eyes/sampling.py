@@ -82,6 +82,15 @@ class BoxSampling:
         rays = max(1, round(rays_per_receptor))
         return Trial(*self._rays(rays, receptors), self._means(len(receptors), rays))
 
+    def beyond_rim(self, rays: int) -> np.ndarray:
+        """Directions through squares as large as the receptors', one beyond every one at the field's rim, corners too;
+        row by row, (square * rays, 3)."""
+        rows, columns = (side + 2 for side in self.eye.resolution)
+        row, column = np.nonzero(beyond_rim_of(self.eye.resolution))
+        corners = np.stack([column - columns / 2, row - rows / 2], axis=-1)[:, None]
+        shifts = np.random.default_rng(2).random((len(corners), 1, 2))
+        return directions_of(self.eye, ((low_discrepancy(rays) + shifts) % 1.0 + corners).reshape(-1, 2))
+
     def _means(self, receptors: int, samples: int) -> np.ndarray:
         """Weights of so many samples each, (band, receptor, sample)."""
         weights = np.kron(np.eye(receptors), np.full((1, samples), 1 / samples))
@@ -191,6 +200,11 @@ def _bounce_samples(draw: Draw) -> np.ndarray:
 
 # Makes sensors of one eye, with any number of rays.
 EyeSampling = BoxSampling | FieldSampling
+
+
+def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
+    """Which squares of a field that is wider by one on every side are beyond its rim, (height + 2, width + 2)."""
+    return np.pad(np.zeros(resolution, bool), 1, constant_values=True)
 
 
 def eye_sampling(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> EyeSampling:

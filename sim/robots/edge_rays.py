@@ -2,8 +2,9 @@
 
 Four rays through a receptor's square tell whether all of it looks alike (Whitted 1980 asks a pixel's corners); where
 they differ, all rays are traced. An edge may pass between them and cut off a corner, a quarter of the square at most.
-Whatever is beyond it fills a neighbour, so receptors that are very unlike a neighbour get all rays, too. Missed is what
-reaches into a corner from beyond the field's rim, and what is smaller than the gaps between four rays.
+Whatever is beyond it fills a neighbour, so receptors that are very unlike a neighbour get all rays, too. For that, the
+first rays also look at squares beyond the rim of the field. Missed is what is smaller than the gaps between four rays
+and fills no neighbour.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 
 import optics
 from optics.numerics.autodiff import Array
-from sim.eyes.sensor import BoxSensor
+from sim.eyes.sampling import BoxSampling, beyond_rim_of
 from sim.render.fidelity_stages import LEAST_TOLERANCE, SHARE_OF_NOISE
 from sim.robots.model_wavefront import ModelWavefront
 from sim.robots.poses import Poses
@@ -31,31 +32,27 @@ class EdgeRays:
     """What `ModelWavefront.light` finds with `fine`'s rays, from fewer.
 
     wavefront: of a sensor with FIRST rays per receptor
-    fine: the sensor whose rays are traced at edges
+    sampling: of the receptors · rays: per receptor, at edges
     signals: what a component is worth to each type of receptor, (channel, component)
     noticed: rays whose signals differ by no more are alike
-    resolution: receptors (height, width)
     """
 
     def __init__(
-        self,
-        wavefront: ModelWavefront,
-        fine: BoxSensor,
-        signals: np.ndarray,
-        noticed: float,
-        resolution: tuple[int, int],
+        self, wavefront: ModelWavefront, sampling: BoxSampling, rays: float, signals: np.ndarray, noticed: float
     ) -> None:
+        fine = sampling.sensor(rays)
         self._wavefront, self._rays, self._noticed = wavefront, fine.rays_per_receptor, noticed
-        self._resolution = resolution
+        self._beyond = beyond_rim_of(sampling.eye.resolution)
         self._signals = [[float(worth) for worth in channel] for channel in signals]
         self._coarse: Any = dr.freeze(lambda *args: self._look_once(*args))
         self._fine: Any = dr.freeze(lambda *args: self._look_again(*args))
-        self._along = wavefront.look(fine.directions)
+        first = np.concatenate([sampling.sensor(FIRST).directions, sampling.beyond_rim(FIRST)])
+        self._first, self._along = wavefront.look(first), wavefront.look(fine.directions)
 
-    def launch(self, look: dict[str, Array], poses: Poses, eyes: np.ndarray) -> Callable[[], np.ndarray]:
+    def launch(self, poses: Poses, eyes: np.ndarray) -> Callable[[], np.ndarray]:
         """Start to look; what is returned waits for it: sums over FIRST rays, flat (component, world, eye, receptor),
         as if so many were traced everywhere."""
-        found = self._wavefront.launch(self._coarse, look, poses, eyes)
+        found = self._wavefront.launch(self._coarse, self._first, poses, eyes)
         return lambda: self._refined(found())
 
     @property
@@ -64,8 +61,10 @@ class EdgeRays:
         return int(self._coarse.n_recordings + self._fine.n_recordings)
 
     def _refined(self, found: np.ndarray) -> np.ndarray:
-        light, spread = found[:-1], found[-1]
-        edges = np.flatnonzero((spread > self._noticed) | self._beside_edges(light))
+        cells = found.reshape(len(found), -1, self._beyond.size)  # (component or spread, view, receptor or beyond)
+        receptors = np.count_nonzero(~self._beyond)
+        light, spread = cells[:-1, :, :receptors].reshape(len(found) - 1, -1), cells[-1, :, :receptors].ravel()
+        edges = np.flatnonzero((spread > self._noticed) | self._beside_edges(cells[:-1]))
         if len(edges):
             lanes = (self._rays * edges[:, None] + np.arange(self._rays)).ravel()
             look = {**self._along, "lanes": mi.UInt32(as_whole_numbers(lanes))}
@@ -73,16 +72,19 @@ class EdgeRays:
         return light.ravel()
 
     def _beside_edges(self, light: np.ndarray) -> np.ndarray:
-        """Receptors so unlike a neighbour that an edge may run between the first rays of either, flat."""
-        means = (np.array(self._signals) @ light / FIRST).reshape(len(self._signals), -1, *self._resolution)
+        """Receptors so unlike a neighbour that an edge may run between the first rays of either, flat; light:
+        (component, view, receptor or beyond)."""
+        means = np.tensordot(np.array(self._signals), light, 1) / FIRST
+        field = np.empty((*means.shape[:2], *self._beyond.shape), means.dtype)
+        field[..., ~self._beyond], field[..., self._beyond] = np.split(means, [np.count_nonzero(~self._beyond)], axis=2)
         far = FIRST * self._noticed
-        found = np.zeros(means.shape[1:], bool)
+        found = np.zeros(field.shape[1:], bool)
         for y, x in ((0, 1), (1, 0), (1, 1), (1, -1)):
             one, other = _shifted(y, x), _shifted(-y, -x)
-            apart = (np.abs(means[:, :, *one] - means[:, :, *other]) > far).any(axis=0)
+            apart = (np.abs(field[:, :, *one] - field[:, :, *other]) > far).any(axis=0)
             found[:, *one] |= apart
             found[:, *other] |= apart
-        return found.ravel()
+        return found[:, 1:-1, 1:-1].ravel()
 
     def _look_once(
         self, still: MitsubaObject, meshes: list[MitsubaObject], buffers: dict[str, Array], look: dict[str, Array]
@@ -113,6 +115,12 @@ def _shifted(y: int, x: int) -> tuple[slice, slice]:
 
 def _sums(components: list[Array], rays: int) -> tuple[Array, ...]:
     return tuple(dr.block_reduce(dr.ReduceOp.Add, component, rays) for component in components)
+
+
+def edges_pay(resolution: tuple[int, int], rays: float) -> bool:
+    """Whether the first rays, those beyond the rim among them, are half as many as so many everywhere, or fewer: more
+    save nothing, where a few receptors want all."""
+    return 2 * FIRST * beyond_rim_of(resolution).size <= rays * resolution[0] * resolution[1]
 
 
 def allowed_error(eye: optics.Eye, tolerance: float | None) -> float:

@@ -18,7 +18,7 @@ import optics
 from optics.spectra.spectrum import Spectrum
 from sim.render.fidelity import EDGES, RAYS, Fidelity, Level
 from sim.render.fidelity_choice import FidelityWarning
-from sim.robots.edge_rays import FIRST, allowed_error
+from sim.robots.edge_rays import allowed_error, edges_pay
 from sim.robots.model_renderer import ModelRenderer
 from sim.robots.mounts import Mount
 from sim.robots.poses import Poses
@@ -93,8 +93,8 @@ def choose_model_fidelity(
 
 
 def _with(rays: float, eye: optics.Eye, allowed: float) -> Fidelity:
-    """So many rays; through a perfect lens, many of them at edges alone."""
-    at_edges = eye.pupil is None and FIRST < rays < PERFECT_TRUTH
+    """So many rays; through a perfect lens at edges alone, where that pays. The truth takes no short cuts."""
+    at_edges = eye.pupil is None and rays < PERFECT_TRUTH and edges_pay(eye.resolution, rays)
     return Fidelity(rays, eye.bands, tolerance=allowed, samples=EDGES if at_edges else RAYS)
 
 

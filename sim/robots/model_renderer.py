@@ -11,8 +11,7 @@ import numpy as np
 import optics
 from optics.numerics.arguments import of_kind, whole
 from optics.spectra.spectrum import Spectrum
-from sim.eyes.sampling import directions_of, eye_sampling
-from sim.eyes.sensor import BoxSensor
+from sim.eyes.sampling import BoxSampling, directions_of, eye_sampling
 from sim.render.fidelity import AREAS, EDGES, Fidelity
 from sim.render.memory_budget import Demand, check_memory
 from sim.render.pending_frame import FrameSlot, PendingFrame
@@ -92,9 +91,9 @@ class ModelRenderer:
             self._looks = {what: self._wavefront.look(directions) for what, directions in along.items()}
             self._edges: EdgeRays | None = None
             if at_edges:
-                fine, noticed = sampling.sensor(fidelity.rays_per_receptor), allowed_error(self.eye, fidelity.tolerance)
-                assert isinstance(fine, BoxSensor)
-                self._edges = EdgeRays(self._wavefront, fine, mixing @ basis.T, noticed, eye.resolution)
+                assert isinstance(sampling, BoxSampling)
+                rays, noticed = fidelity.rays_per_receptor, allowed_error(self.eye, fidelity.tolerance)
+                self._edges = EdgeRays(self._wavefront, sampling, rays, mixing @ basis.T, noticed)
         self._slot = FrameSlot()
 
     def signals(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
@@ -157,7 +156,7 @@ class ModelRenderer:
         eyes = np.concatenate([pupils[:, :, None], np.swapaxes(rotations, -1, -2)], axis=2)
         look, edges = self._looks[what], self._edges
         if edges is not None and what == "light":
-            return self._slot.begin(lambda: edges.launch(look, placed, eyes))
+            return self._slot.begin(lambda: edges.launch(placed, eyes))
         kernel = getattr(self._wavefront, what)
         return self._slot.begin(lambda: self._wavefront.launch(kernel, look, placed, eyes))
 

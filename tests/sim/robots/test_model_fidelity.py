@@ -97,7 +97,7 @@ def test_perfect_lenses_trace_many_rays_at_edges_alone():
     one = eye(noise_sigma=0.01)
     many, few = (sim.choose_model_fidelity(BALL, one, [MOUNT], moments(0), tolerance) for tolerance in (0.01, 0.1))
     assert (many.samples, few.samples) == ("edges", "rays")
-    assert many.rays_per_receptor > 4 >= few.rays_per_receptor
+    assert many.rays_per_receptor >= 16 > few.rays_per_receptor
 
 
 def test_behind_a_pupil_receptors_share_rays():
