@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 
 from evolve.analysis.genealogy import descent
 from evolve.analysis.statistics import acuity_cpd, champions, gene_values, generation_statistics, trajectory
@@ -240,6 +241,11 @@ def _makers(run: Run, episode: AnyEpisode | None) -> Iterator[tuple[str, Callabl
     yield "facts of the run", lambda doing: facts_section(run)
 
 
+def _within(doing: Doing, done: int, of: int, what: str, share: float) -> None:
+    """What share of a section has been made, told as one of all sections."""
+    doing(what, (done + share) / of)
+
+
 def render(run: Run, episode: AnyEpisode | None, doing: Doing = in_silence) -> bytes:
     """The whole page; without an episode where no candidate has succeeded.
 
@@ -249,7 +255,7 @@ def render(run: Run, episode: AnyEpisode | None, doing: Doing = in_silence) -> b
     parts = []
     for done, (what, make) in enumerate(makers):
         doing(what, done / len(makers))
-        parts.append(make(lambda text, share, done=done: doing(text, (done + share) / len(makers))))  # type: ignore[misc]
+        parts.append(make(partial(_within, doing, done, len(makers))))
     body = joined(parts)
     title = f"{run.config.task_name} · {run.path.resolve().name}"
     return document(title, joined([header(run), contents(body), body]), ["player.js", "lineup.js"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -76,7 +77,7 @@ def _primitive(knots: np.ndarray, degree: int, at: np.ndarray, times: int) -> np
     return found
 
 
-def _bsplines(knots: np.ndarray, degree: int, at: np.ndarray):  # type: ignore[no-untyped-def]
+def _bsplines(knots: np.ndarray, degree: int, at: np.ndarray) -> Any:
     """(place, B-spline), sparse."""
     from scipy.interpolate import BSpline
 

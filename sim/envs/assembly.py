@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import drjit as dr
@@ -110,10 +111,8 @@ def make_parallel_env(
             f"encounter = {encounter!r:.80}: must be a sim.Encounter, such as sim.Encounter(Prey(), Hunter())"
         )
     _check(1, seed, memory, "training", render_mode)
-    try:
-        import pettingzoo  # noqa: F401
-    except ImportError:
-        raise ImportError("make_parallel_env needs PettingZoo: pip install 'rhabdom[pettingzoo]'") from None
+    if find_spec("pettingzoo") is None:
+        raise ImportError("make_parallel_env needs PettingZoo: pip install 'rhabdom[pettingzoo]'")
     from sim.envs.parallel_env import EncounterEnv
 
     return EncounterEnv(encounter, seed, memory, render_mode)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ __all__ = ["FOCAL", "RADIUS", "UNIT", "WAVE", "Case", "across", "amplitude_acros
 # f/100: closed forms here are paraxial, and the exact integral departs from them by the square of NA 0.005.
 RADIUS, FOCAL, WAVE = 0.5e-3, 0.1, 0.55e-6
 UNIT = WAVE * FOCAL / (2 * RADIUS)  # λ f/D [m]
-ASKED = {"tolerance": 1e-7, "dtype": "float64"}
+ASKED: dict[str, Any] = {"tolerance": 1e-7, "dtype": "float64"}
 
 
 @dataclass(frozen=True)
@@ -29,15 +30,15 @@ class Case:
     bound: float
 
 
-def lens(**more: object) -> optics.Pupil:
-    return optics.Pupil(RADIUS, thin_lens_focal_length=FOCAL, **more)  # type: ignore[arg-type]
+def lens(**more: Any) -> optics.Pupil:
+    return optics.Pupil(RADIUS, thin_lens_focal_length=FOCAL, **more)
 
 
 def across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
     """PSF in the focus at evenly spaced places [λ f/D] along x, over the peak of a perfect opening."""
     dx = float(at[1] - at[0]) * UNIT
     n = 2 * round(float(at[-1]) * UNIT / dx) + 1
-    found = optics.psf(pupil, [WAVE], FOCAL, dx=dx, shape=(1, n), **ASKED).psf[0, 0]  # type: ignore[arg-type]
+    found = optics.psf(pupil, [WAVE], FOCAL, dx=dx, shape=(1, n), **ASKED).psf[0, 0]
     peak = pupil.area / (WAVE * FOCAL) ** 2
     first = n // 2 + round(float(at[0]) * UNIT / dx)
     return np.asarray(found[first : first + len(at)] / peak, dtype=np.float64)
@@ -47,7 +48,7 @@ def amplitude_across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
     """|U| likewise, over the middle's."""
     n = 2 * (len(at) - 1) + 1
     dx = float(at[1] - at[0]) * UNIT
-    result = optics.psf(pupil, [WAVE], FOCAL, dx=dx, shape=(1, n), field=True, **ASKED)  # type: ignore[arg-type]
+    result = optics.psf(pupil, [WAVE], FOCAL, dx=dx, shape=(1, n), field=True, **ASKED)
     assert result.field is not None
     u = result.field[0, 0]
     # Less the sphere e^{ikx²/2f} on which a flat screen is touched by the wave.

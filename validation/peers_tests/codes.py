@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from scipy.special import j1
@@ -196,9 +197,9 @@ def of_poppy() -> Iterator[Case]:
 
     def weighted() -> float:
         waves, shares = [0.5e-6, 0.55e-6, 0.6e-6], np.array([0.3, 0.5, 0.2])
-        asked = {"dx": UNIT / 3, "shape": (33, 33), "tolerance": 1e-5}
-        together = optics.psf(lens(), waves, **asked).mean(shares).psf[0]  # type: ignore[arg-type]
-        apart = sum(s * optics.psf(lens(), [w], **asked).psf[0] for s, w in zip(shares, waves, strict=True))  # type: ignore[arg-type]
+        asked: dict[str, Any] = {"dx": UNIT / 3, "shape": (33, 33), "tolerance": 1e-5}
+        together = optics.psf(lens(), waves, **asked).mean(shares).psf[0]
+        apart = sum(s * optics.psf(lens(), [w], **asked).psf[0] for s, w in zip(shares, waves, strict=True))
         return float(np.abs(together - apart).max() / apart.max())
 
     yield Case(

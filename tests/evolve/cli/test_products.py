@@ -75,6 +75,8 @@ def test_a_wait_shows_what_is_done_on_a_terminal_alone():
             wait.step("writing [this]\x1b]0;title\x07")
             wait.step("writing that")
             wait.within("its second half", 0.5)
+            if wait._progress is not None:
+                assert wait._progress.tasks[0].percentage == 75
     assert "its second half" in seen.getvalue()
     assert "\x1b]0;" not in seen.getvalue()
     assert unseen.getvalue() == quiet.getvalue() == ""

@@ -99,3 +99,8 @@ def distance(data):
 
 def hunt():
     return sim.Encounter(Prey(), Predator())
+
+
+def still(observation):
+    """A policy that does nothing."""
+    return np.zeros((len(observation["previous_action"]), 2))

@@ -125,6 +125,13 @@ def test_rays_are_kept_where_few_will_do():
     assert fidelity.rays_per_receptor <= PERFECT_LENS_AREA
 
 
+def test_behind_a_pupil_an_area_costs_less_than_three_rays():
+    """Three would do here, and did, at .74 of an area's speed (D1)."""
+    eyes = behind_lens(sim.Eyes(n_eyes=2, resolution=(15, 15), noise_sigma=0.01), 0.25)
+    fidelity = sim.choose_fidelity(sim.build_world("detection"), eyes, bands="own")
+    assert (fidelity.samples, fidelity.light, fidelity.rays_per_receptor) == ("areas", "direct", 1)
+
+
 def test_what_cannot_be_kept_is_said():
     """Once, with how much it is missed by, and what misses it."""
     world = sim.build_world("detection")

@@ -6,7 +6,7 @@ model_fidelity: test_model_fidelity.py
 edge_rays: test_edge_rays.py
 mounts: test_mounts.py
 task: envs/test_task_vec_env.py, envs/test_encounter.py
-encounter: envs/test_encounter.py
+encounter: envs/test_encounter.py, envs/test_bad_encounters.py
 eye_marks: test_eye_marks.py
 inside: test_mounts.py
 poses: test_model_renderer.py

@@ -72,6 +72,33 @@ def views(world, n=VIEWS, seed=0) -> WorldState:
     return dataclasses.replace(state, position=position, heading=heading, objects=objects)
 
 
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A world's views, what rays see there, and which receptors see an object."""
+
+    world: sim.World
+    eyes: sim.Eyes
+    state: WorldState
+    truth: np.ndarray
+    on_object: np.ndarray
+
+    @classmethod
+    def of(cls, world, eyes, rays):
+        """rays: per receptor, of the truth"""
+        state = views(world)
+        truth = sim.BatchedRenderer(world, eyes, state.n, sim.Fidelity(rays, eyes.bands)).signals(state)
+        return cls(world, eyes, state, truth, sees_object(world, eyes, state))
+
+    def errors(self, samples, kind="areas"):
+        """Root mean square, of the noise that a perfect lens has beside its signals: over all receptors, and over those
+        that see an object."""
+        fidelity = sim.Fidelity(samples, self.eyes.bands, samples=kind)
+        signals = sim.BatchedRenderer(self.world, self.eyes, self.state.n, fidelity).signals(self.state)
+        error = (signals - self.truth).transpose(0, 1, 3, 4, 2) / SIGMA / self.eyes.eye().throughput
+        seen = error[self.on_object]
+        return np.sqrt(np.mean(error**2)), np.sqrt(np.mean(seen**2)) if seen.size else 0.0
+
+
 def sees_object(world, eyes, state) -> np.ndarray:
     """Which receptors have a part of an object in their square, or nearly, (env, eye, h, w)."""
     height, width = eyes.resolution

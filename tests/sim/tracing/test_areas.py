@@ -12,28 +12,10 @@ import sim
 from sim.eyes.sampling import eye_sampling
 from sim.tracing.areas import columns, illumination, shadows, sphere_areas, stripes
 from sim.tracing.areas.patch import Rectangle
-from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
-from tests.sim.tracing.area_views import BEE, COARSE, EYES, ROW, SIGMA, sees_object, stairs, views
+from tests.sim.tracing.area_views import BEE, COARSE, EYES, ROW, Case, stairs, views
 
 RAYS = 1024  # their own error: 0.03 of the noise
-
-
-@dataclasses.dataclass(frozen=True)
-class Case:
-    world: sim.World
-    eyes: sim.Eyes
-    state: WorldState
-    truth: np.ndarray
-    on_object: np.ndarray
-
-    def errors(self, areas):
-        """Root mean square, in noise: over all receptors, and over those that see an object."""
-        fidelity = sim.Fidelity(areas, self.eyes.bands, samples="areas")
-        signals = sim.BatchedRenderer(self.world, self.eyes, self.state.n, fidelity).signals(self.state)
-        error = (signals - self.truth).transpose(0, 1, 3, 4, 2) / SIGMA
-        seen = error[self.on_object]
-        return np.sqrt(np.mean(error**2)), np.sqrt(np.mean(seen**2)) if seen.size else 0.0
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +31,7 @@ def cases():
         "stairs in detail": (stairs(), EYES),
     }
     for name, (world, eyes) in worlds.items():
-        state = views(world)
-        truth = sim.BatchedRenderer(world, eyes, state.n, sim.Fidelity(RAYS, eyes.bands)).signals(state)
-        found[name] = Case(world, eyes, state, truth, sees_object(world, eyes, state))
+        found[name] = Case.of(world, eyes, RAYS)
     return found
 
 

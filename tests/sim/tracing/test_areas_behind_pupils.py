@@ -8,9 +8,8 @@ import pytest
 import optics
 import sim
 from sim.eyes import field_areas
-from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
-from tests.sim.tracing.area_views import EYES, ROW, SIGMA, sees_object, views
+from tests.sim.tracing.area_views import EYES, ROW, Case, views
 
 BANDS = 4
 
@@ -26,25 +25,6 @@ def behind_lens(eyes, a):
 HOLE = dataclasses.replace(EYES, optics=optics.Pupil(6e-6))
 
 
-@dataclasses.dataclass(frozen=True)
-class Case:
-    world: sim.World
-    eyes: sim.Eyes
-    state: WorldState
-    truth: np.ndarray
-    on_object: np.ndarray
-
-    def errors(self, samples, kind="areas"):
-        """Root mean square, of a perfect lens's noise beside its signals: over all receptors, and over those that see
-        an object."""
-        signals = sim.BatchedRenderer(
-            self.world, self.eyes, self.state.n, sim.Fidelity(samples, BANDS, samples=kind)
-        ).signals(self.state)
-        error = (signals - self.truth).transpose(0, 1, 3, 4, 2) / SIGMA / self.eyes.eye().throughput
-        seen = error[self.on_object]
-        return np.sqrt(np.mean(error**2)), np.sqrt(np.mean(seen**2)) if seen.size else 0.0
-
-
 @pytest.fixture(scope="module")
 def cases():
     worlds = {
@@ -55,10 +35,7 @@ def cases():
     }
     found = {}
     for name, (task, eyes, rays) in worlds.items():
-        world = build_world(task)
-        state = views(world)
-        truth = sim.BatchedRenderer(world, eyes, state.n, sim.Fidelity(rays, BANDS)).signals(state)
-        found[name] = Case(world, eyes, state, truth, sees_object(world, eyes, state))
+        found[name] = Case.of(build_world(task), eyes, rays)
     return found
 
 
