@@ -9,10 +9,10 @@ many areas. The light is the same, so only the sampling differs.
 Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection
 world. They are in units of the receptors' noise, σ = 0.01 of the signal of white behind a wide-open pupil. The pupils
 are: none (the perfect lens), a pinhole (a = 0.04 of the retina's width), open without a lens, a relief drawn at
-random, and a lens in focus (a = 0.25). The last column is what `rays_per_receptor = "auto"` takes, rays or areas, and how
-far it is off; the bound is half of the noise. The perfect lens needs 24 states to show that, because its errors differ much
-between views; pupils need 4. Errors must fall at least like n^-0.5, as with independent rays, down to the 0.01 σ by
-which two tables of one PSF may differ. No slope is given where fewer than three errors are above that.
+random, and a lens in focus (a = 0.25). The last column is what `rays_per_receptor = "auto"` takes, rays or areas, and
+how far it is off; the bound is half of the noise. The perfect lens needs 24 states to show that, because its errors
+differ much between views; pupils need 4. Errors must fall at least like n^-0.5, as with independent rays, down to the
+0.01 σ by which two tables of one PSF may differ. No slope is given where fewer than three errors are above that.
 
     python -m validation.C1_receptive_fields [--out DIR] [--docs DIR]
 """
@@ -156,9 +156,8 @@ def table(series: Sequence[Series]) -> str:
     for s in series:
         errors = "  ".join(f"{n:.3g}: {e:.4f}" for n, e in zip(s.rays, s.errors, strict=True))
         slope = f"{s.slope:.2f}" if math.isfinite(s.slope) else "-"
-        lines.append(
-            f"{s.pupil:<14} {s.retina:<8} {errors:<64} {slope:>5}  {s.auto_error:.3f} at {s.auto_rays:.3g} {s.samples}, {s.light}"
-        )
+        auto = f"{s.auto_error:.3f} at {s.auto_rays:.3g} {s.samples}, {s.light}"
+        lines.append(f"{s.pupil:<14} {s.retina:<8} {errors:<64} {slope:>5}  {auto}")
     return "\n".join(lines)
 
 
