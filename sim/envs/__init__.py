@@ -14,6 +14,7 @@ one_environment        what both answer stable-baselines3 alike
 env                    make_env, EyesEnv: Gymnasium
 vector_env             EyesVectorEnv: Gymnasium's vector environment
 registration           Gymnasium's ids
+registered_env         environments as it makes them by these
 simulation             worlds in motion, unseen
 observation            what an agent knows
 info                   what every step says

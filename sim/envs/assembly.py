@@ -51,8 +51,9 @@ def make_vec_env(
 ) -> EyesVecEnv | TaskVecEnv:
     """A batched environment of one task.
 
-    task: one of `sim.TASKS`, or a `sim.Task` of one's own, which says all but n_envs, seed, memory and render_mode
-        itself; a `sim.Encounter` of animals that are alike learns one policy, with a row for each animal of each world
+    task: one of `sim.TASKS`, or a `sim.Task` of one's own, which says all but n_envs, seed, memory, episode_steps
+        and render_mode itself; a `sim.Encounter` of animals that are alike learns one policy, with a row for each
+        animal of each world
     eyes: of every agent; default Eyes()
     n_envs: number of worlds
     seed: of episodes and noise; None draws one
@@ -73,10 +74,12 @@ def make_vec_env(
     Raises:
         ValueError: a bad argument.
     """
+    if episode_steps is not None:
+        _require_whole("episode_steps", episode_steps, 1)
     if isinstance(task, Task | Encounter):
         _refuse_for_tasks(locals())
         _check(n_envs, seed, memory, mode, render_mode)
-        return TaskVecEnv(task, n_envs, seed, memory, render_mode)
+        return TaskVecEnv(task, n_envs, seed, memory, render_mode, episode_steps)
     eyes = Eyes() if eyes is None else eyes
     if not isinstance(eyes, Eyes):
         raise ValueError(f"eyes = {eyes!r}: must be sim.Eyes or None, the default ones")
@@ -86,8 +89,6 @@ def make_vec_env(
     check_least_return(least_return, mode)
     eyes = eyes if asked is None else replace(eyes, bands=asked.bands)
     scene = prepared_scene(task, eyes, world_seed=world_seed, mazes=mazes, course=course, spectra=spectra)
-    if episode_steps is not None:
-        _require_whole("episode_steps", episode_steps, 1)
     how: dict[str, Any] = {"memory": memory, "mode": mode, "least_return": least_return, "render_mode": render_mode}
     how["episode_steps"] = episode_steps
     return vec_env_in(scene, asked or chosen_fidelity(scene), n_envs, seed, **how)
@@ -159,7 +160,7 @@ def vec_env_in(
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
     """What a task of one's own says itself."""
     defaults = {name: p.default for name, p in inspect.signature(make_vec_env).parameters.items()}
-    for name in set(defaults) - {"task", "n_envs", "seed", "memory", "render_mode"}:
+    for name in set(defaults) - {"task", "n_envs", "seed", "memory", "episode_steps", "render_mode"}:
         if given[name] != defaults[name]:
             raise ValueError(f"{name} = {given[name]!r}: must be left out, a sim.Task says it itself")
 

@@ -18,12 +18,14 @@ from sim.robots.task import Task
 class TaskAnimals:
     """Worlds, and what the animals in them know.
 
-    task, n, seed: see TaskWorlds · memory: frames in the observations of those who learn
+    task, n, seed, episode_steps: see TaskWorlds · memory: frames in the observations of those who learn
     learners: senses of those who learn · seeing: of all who look at anything, those who learn first
     """
 
-    def __init__(self, task: Task | Encounter, n: int, seed: int | None, memory: int) -> None:
-        self.worlds = TaskWorlds(task, n, seed, min(dr.thread_count(), n))
+    def __init__(
+        self, task: Task | Encounter, n: int, seed: int | None, memory: int, episode_steps: int | None = None
+    ) -> None:
+        self.worlds = TaskWorlds(task, n, seed, min(dr.thread_count(), n), episode_steps)
         number = len(self.worlds.learners)
         self.learners = [Senses(self.worlds, k, memory) for k in range(number)]
         self._frozen = [

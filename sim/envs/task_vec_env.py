@@ -31,15 +31,22 @@ class TaskVecEnv(OneEnvironment):
     task: what is done · n_envs: number of worlds · seed: of episodes and noise
     memory: frames in an observation · render_mode: "rgb_array" (with the animals' eyes and the rims of their fields of
         view), "eyes" or None
+    episode_steps: actions, then an episode is truncated; None: as many as the task has
 
     Raises:
         ValueError: animals that learn together are not alike.
     """
 
     def __init__(
-        self, task: Task | Encounter, n_envs: int, seed: int | None, memory: int = 1, render_mode: str | None = None
+        self,
+        task: Task | Encounter,
+        n_envs: int,
+        seed: int | None,
+        memory: int = 1,
+        render_mode: str | None = None,
+        episode_steps: int | None = None,
     ) -> None:
-        self.animals = TaskAnimals(task, n_envs, seed, memory)
+        self.animals = TaskAnimals(task, n_envs, seed, memory, episode_steps)
         self.task, self.render_mode = task, render_mode
         self._pictures = TaskPictures(self.animals, render_mode)
         self._learners, self._everyone = self.animals.learners, np.arange(n_envs)

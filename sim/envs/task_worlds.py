@@ -36,6 +36,7 @@ class TaskWorlds:
     """Their data, and what is done with it.
 
     task: of the animal that learns, with its others; or an Encounter, where all learn
+    episode_steps: actions, then an episode is truncated; None: as many as the task has
     learners: tasks of those who learn · frozen: the others · animals: tasks of all, those who learn first
     model · datas: mjData of every world · steps: actions taken in its episode, (n,) int
     felt: what each animal feels now, by animal: (n, numbers) float32
@@ -43,14 +44,17 @@ class TaskWorlds:
     entropy: what all random streams come from; seeded with it again, everything happens again
     """
 
-    def __init__(self, task: Task | Encounter, n: int, seed: int | None, threads: int = 1) -> None:
+    def __init__(
+        self, task: Task | Encounter, n: int, seed: int | None, threads: int = 1, episode_steps: int | None = None
+    ) -> None:
         self.learners, self.frozen = cast(task)
         self.animals = (*self.learners, *(other.task for other in self.frozen))
         self._whose = ["" if len(self.animals) == 1 else f"{name_of(animal)}: " for animal in self.animals]
         self.model = compiled(self.animals[0])
         for animal in self.animals[1:]:
             compiled(animal, self.model)
-        self.spectra, self.episode_steps = of_world(self.animals, "spectra"), self.animals[0].episode_steps
+        self.spectra = of_world(self.animals, "spectra")
+        self.episode_steps = self.animals[0].episode_steps if episode_steps is None else episode_steps
         self.datas = [mujoco.MjData(self.model) for _ in range(n)]
         self.steps, self.felt = np.zeros(n, int), [np.zeros((n, 0), np.float32) for _ in self.animals]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None

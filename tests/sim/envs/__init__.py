@@ -13,7 +13,8 @@ one_environment: test_vec_env.py
 env: test_env.py
 vec_env: test_vec_env.py, test_env.py
 vector_env: test_vector_env.py
-registration: test_env.py, worlds/test_catalog.py
+registered_env: test_vector_env.py
+registration: test_env.py, test_vector_env.py, worlds/test_catalog.py
 simulation: tasks/test_task.py, test_vec_env.py
 observation: test_vec_env.py, test_tasks_page.py
 info: test_vec_env.py, test_tasks_page.py
