@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -27,6 +28,8 @@ class TaskVecEnv(OneEnvironment):
     channel, height, width), noise included, "previous_action", and "feels", if the task's animal feels anything. `info`
     has reward_terms, is_success, and failure where one of the task's methods fails: that ends the world's episode, and
     the others go on. Of an encounter, the first animal of all worlds comes first, then the second.
+
+    failures: of the tasks' methods, and how many episodes each has ended
 
     task: what is done · n_envs: number of worlds · seed: of episodes and noise
     memory: frames in an observation · render_mode: "rgb_array" (with the animals' eyes and the rims of their fields of
@@ -55,7 +58,7 @@ class TaskVecEnv(OneEnvironment):
         first = self._learners[0]
         super().__init__(n_envs * len(self._learners), first.observation_space, first.action_space)
         self._commanded = np.zeros((self.num_envs, *self.action_space.shape), np.float32)
-        self._returns, self._told = np.zeros(self.num_envs), set[str]()
+        self._returns, self.failures = np.zeros(self.num_envs), Counter[str]()
 
     @property
     def worlds(self) -> TaskWorlds:
@@ -154,7 +157,7 @@ class TaskVecEnv(OneEnvironment):
             info: dict[str, Any] = {"reward_terms": outcome.terms, "is_success": outcome.success}
             if outcome.failure is not None:
                 info["failure"] = outcome.failure
-                self._warn(outcome.failure)
+                self._count(outcome.failure, row)
             if outcome.terminated or outcome.truncated:
                 info["TimeLimit.truncated"] = outcome.truncated
                 steps = self.worlds.steps[row % len(self._everyone)]
@@ -162,10 +165,12 @@ class TaskVecEnv(OneEnvironment):
             infos.append(info)
         return infos
 
-    def _warn(self, failure: str) -> None:
-        """Once of each."""
-        if failure not in self._told:
-            self._told.add(failure)
+    def _count(self, failure: str, row: int) -> None:
+        """And warn once of each. Where several learn, the episode is one of all of them."""
+        if row >= len(self._everyone):
+            return
+        self.failures[failure] += 1
+        if self.failures[failure] == 1:
             warnings.warn(f"{type(self.task).__name__}: {failure}; its episode ends here", stacklevel=4)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ class EyesVecEnv(OneEnvironment):
     Observations, rewards, endings and `info` are in docs/tasks.md. Worlds start anew by themselves; the
     observation returned is then the first of the new episode, and info["terminal_observation"] the last of the
     old one. World i's episodes depend on the seed and i alone, not on the number of worlds.
+
+    failures: what worlds could not go on for, and how many episodes each has ended
     """
 
     def __init__(
@@ -41,6 +44,7 @@ class EyesVecEnv(OneEnvironment):
         super().__init__(simulation.n, space, action_space())
         self._commanded = self._actions = np.zeros((self.num_envs, 2), np.float32)
         self._returns, self._lengths = np.zeros(self.num_envs), np.zeros(self.num_envs, int)
+        self.failures = Counter[str]()
 
     @property
     def state(self) -> WorldState:
@@ -168,4 +172,5 @@ class EyesVecEnv(OneEnvironment):
                 infos[world]["given_up"] = LEAST_RETURN
         for index, reason in step.failure.items():
             infos[index]["failure"] = reason
+            self.failures[reason] += 1
         return infos
