@@ -16,6 +16,7 @@ from evolve.learning.policy import EyePolicy
 from evolve.learning.worlds import own_task_for
 from sim.envs.task_fidelity import fidelity_of
 from sim.envs.task_vec_env import TaskVecEnv
+from sim.robots.eye_kinds import kinds_of
 from sim.robots.poses import Poses
 from sim.robots.task import Task
 
@@ -81,6 +82,7 @@ def film(
 ) -> FilmedEpisode:
     """Let an animal play one episode; same arguments, same episode."""
     task = own_task_for(phenotype, config)
+    (kind,) = kinds_of(task)
     with contextlib.closing(TaskVecEnv(task, 1, seed, phenotype.memory_frames, "rgb_array")) as worlds:
         poses, columns = _play(policy, worlds)
         views = _perfect_views(worlds.worlds.model, task, poses, radiance_every)
@@ -91,8 +93,8 @@ def film(
         seed=seed,
         phenotype=phenotype,
         eye=config.eye,
-        azimuths_deg=np.array([mount.azimuth_deg for mount in task.mounts]),
-        elevations_deg=np.array([mount.elevation_deg for mount in task.mounts]),
+        azimuths_deg=np.array([mount.azimuth_deg for mount in kind.mounts]),
+        elevations_deg=np.array([mount.elevation_deg for mount in kind.mounts]),
         seconds=seconds,
         **columns,
         **views,
@@ -138,13 +140,14 @@ def _play(policy: EyePolicy, worlds: TaskVecEnv) -> tuple[list[Poses], dict[str,
 
 def _perfect_views(model: mujoco.MjModel, task: Task, poses: list[Poses], every: int) -> dict[str, Any]:
     """The same scenes through a perfect lens: by the same receptors, and as radiance on a finer grid."""
-    perfect = replace(task.eye, pupil=None)
+    (kind,) = kinds_of(task)
+    perfect = replace(kind.eye, pupil=None)
     height, width = perfect.resolution
     factor = max(1, -(-FINE_PIXELS // max(height, width)))
     fine = replace(perfect, resolution=(factor * height, factor * width))
     fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
     receptors, pictures = (
-        sim.ModelRenderer(model, eye, task.mounts, 1, fidelity, spectra=task.spectra) for eye in (perfect, fine)
+        sim.ModelRenderer(model, eye, kind.mounts, 1, fidelity, spectra=task.spectra) for eye in (perfect, fine)
     )
     frames = np.arange(0, len(poses), every)
     radiance = [np.moveaxis(pictures.receptor_radiance(poses[t]), 0, 2) for t in frames]

@@ -5,6 +5,7 @@ vec_env                EyesVecEnv: stable-baselines3
 task_vec_env           TaskVecEnv: the same for tasks of one's own
 task_worlds            their worlds
 task_senses            what an animal in them knows
+task_sight             what one kind of its eyes sees
 task_animals           all animals in them, those who learn and those who do not
 task_pictures          pictures of them
 parallel_env           EncounterEnv: PettingZoo

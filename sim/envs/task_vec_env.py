@@ -25,9 +25,10 @@ class TaskVecEnv(OneEnvironment):
 
     Worlds start anew by themselves, as stable-baselines3 has it: what is returned is then the first observation of the
     new episode, and info["terminal_observation"] the last of the old one. Observations are "eyes" (memory, eye,
-    channel, height, width), noise included, "previous_action", and "feels", if the task's animal feels anything. `info`
-    has reward_terms, is_success, and failure where one of the task's methods fails: that ends the world's episode, and
-    the others go on. Of an encounter, the first animal of all worlds comes first, then the second.
+    channel, height, width), noise included (of several kinds of eyes an array each, by their names), "previous_action",
+    and "feels", if the task's animal feels anything. `info` has reward_terms, is_success, and failure where one of the
+    task's methods fails: that ends the world's episode, and the others go on. Of an encounter, the first animal of all
+    worlds comes first, then the second.
 
     failures: of the tasks' methods, and how many episodes each has ended
 
@@ -67,7 +68,7 @@ class TaskVecEnv(OneEnvironment):
 
     @property
     def renderer(self) -> ModelRenderer:
-        """The eyes of the animal that learns; of the first, where several do."""
+        """The eyes of the animal that learns; of the first, where several do, and of the first kind it has."""
         return self._learners[0].renderer
 
     def reset(self) -> dict[str, np.ndarray]:
@@ -105,7 +106,7 @@ class TaskVecEnv(OneEnvironment):
         ended = np.flatnonzero(done[:n])  # an episode ends for all its animals at once
         if len(ended):
             for number, senses in enumerate(self._learners):
-                last = senses.preview(seen[number][ended], ended)
+                last = senses.preview(seen[number], ended)
                 for k, world in enumerate(ended):
                     row = {name: array[k] for name, array in last.items()}
                     infos[number * n + world]["terminal_observation"] = row

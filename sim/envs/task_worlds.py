@@ -14,6 +14,7 @@ import numpy as np
 
 from sim.robots import task as task_module
 from sim.robots.encounter import Encounter, cast, name_of, of_world
+from sim.robots.eye_kinds import kinds_of
 from sim.robots.task import Task, compiled, named_terms
 
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
@@ -40,7 +41,7 @@ class TaskWorlds:
     learners: tasks of those who learn · frozen: the others · animals: tasks of all, those who learn first
     model · datas: mjData of every world · steps: actions taken in its episode, (n,) int
     felt: what each animal feels now, by animal: (n, numbers) float32
-    rngs: of each world's episodes · noise_keys: of every animal's receptors (animal, n)
+    rngs: of each world's episodes · noise_keys: of receptors, by animal: (kind of eyes, n)
     entropy: what all random streams come from; seeded with it again, everything happens again
     """
 
@@ -68,7 +69,17 @@ class TaskWorlds:
         self.entropy = np.random.SeedSequence(seed).entropy
         children = [np.random.SeedSequence(self.entropy, spawn_key=(i,)) for i in range(len(self.datas))]
         self.rngs = [np.random.default_rng(child) for child in children]
-        self.noise_keys = np.array([child.generate_state(len(self.animals), np.uint64) for child in children]).T
+        self.noise_keys = self._noise_keys(children)
+
+    def _noise_keys(self, children: Sequence[np.random.SeedSequence]) -> list[np.ndarray]:
+        """The first kind of everybody has the first ones: a kind more changes nobody else's noise."""
+        kinds = [len(kinds_of(animal)) for animal in self.animals]
+        drawn = np.array([child.generate_state(sum(kinds), np.uint64) for child in children]).T
+        more, found = len(kinds), []
+        for number, count in enumerate(kinds):
+            found.append(np.concatenate([drawn[number : number + 1], drawn[more : more + count - 1]]))
+            more += count - 1
+        return found
 
     def reset(self, worlds: np.ndarray) -> None:
         """Begin these worlds' episodes.

@@ -4,6 +4,7 @@ task                Task: what a robot has to do
 encounter           Encounter: several tasks in one world; Frozen: an animal that does not learn
 model_renderer      ModelRenderer: eyes mounted on any MuJoCo model, in many worlds at once
 model_fidelity      how many rays eyes on a model need
+eye_kinds           kinds of eyes of one animal
 mounts              Mount: where an eye is, on a body, a site or a camera
 eye_marks           eyes on pictures of a model
 inside              eyes that are inside of a geom

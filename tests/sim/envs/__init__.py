@@ -4,6 +4,7 @@ assembly: test_env.py, test_vec_env.py, test_tasks_page.py
 task_vec_env: test_task_vec_env.py, test_encounter.py
 task_worlds: test_task_vec_env.py, test_encounter.py, test_bad_encounters.py
 task_senses: test_task_vec_env.py, test_task_state.py, test_encounter.py
+task_sight: test_eye_kinds.py, test_task_vec_env.py
 task_animals: test_encounter.py, test_parallel_env.py
 task_pictures: test_task_vec_env.py, test_parallel_env.py
 parallel_env: test_parallel_env.py
