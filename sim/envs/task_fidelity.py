@@ -9,13 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 
+import optics
 from sim.envs.task_worlds import TaskWorlds
 from sim.render.fidelity import Fidelity
+from sim.robots.edge_rays import allowed_error
 from sim.robots.encounter import Frozen, among, cast
 from sim.robots.eye_kinds import EYES, kinds_of, several
 from sim.robots.model_fidelity import choose_model_fidelity
 from sim.robots.poses import Poses
 from sim.robots.task import Task
+from sim.robots.variation import Variation
 
 AUTO = "auto"
 WORLDS, LATER = 6, 12  # episodes that are looked into: at their beginnings, and so many random actions later
@@ -37,10 +40,20 @@ def fidelities_of(task: Task) -> dict[str, Fidelity]:
     if len(found) < len(kinds):
         with contextlib.closing(TaskWorlds(task, WORLDS, 0)) as worlds:
             datas, model, spectra = _moments(worlds), worlds.model, worlds.spectra
+            variation = worlds.variation
         for kind in kinds:
             if kind.name not in found:
-                found[kind.name] = choose_model_fidelity(model, kind.eye, kind.mounts, datas, spectra=spectra)
+                tolerance = None if variation is None else _in_brightest(variation, kind.eye)
+                found[kind.name] = choose_model_fidelity(
+                    model, kind.eye, kind.mounts, datas, tolerance, spectra=spectra
+                )
     return found
+
+
+def _in_brightest(variation: Variation, eye: optics.Eye) -> float:
+    """What may be wrong of a signal, where lights are brighter in some episodes, and errors with them."""
+    most = variation.extremes(np.asarray(eye.spectral_bands.wavelengths)).max()
+    return allowed_error(eye, None) / max(float(most), 1.0)
 
 
 def fidelity_of(task: Task) -> Fidelity:

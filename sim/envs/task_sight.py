@@ -27,6 +27,7 @@ class Sight:
         self.renderer = ModelRenderer(
             worlds.model, kind.eye, kind.mounts, len(worlds.datas), fidelity, spectra=worlds.spectra
         )
+        self._worlds, self._wavelengths = worlds, np.asarray(self.renderer.eye.spectral_bands.wavelengths)
         self.memory, self._noise = Memory(memory), NoiseModel.of(self.renderer.eye)
         frame = (len(kind.mounts), self.renderer.eye.channels, *self.renderer.eye.resolution)
         self._normals = Normals(keys, frame)
@@ -38,7 +39,8 @@ class Sight:
 
     def begin(self, poses: Poses, worlds: np.ndarray) -> PendingFrame:
         """Begin to see these worlds, noise included: no other world's noise goes on."""
-        looking, normals = self.renderer.begin(poses), self._normals.begin(worlds)
+        looking = self.renderer.begin(poses, self._worlds.light(self._wavelengths))
+        normals = self._normals.begin(worlds)
 
         def noisy(seen: np.ndarray) -> np.ndarray:
             return seen[worlds] if self._noise is None else self._noise(seen[worlds], normals.wait())
@@ -55,10 +57,17 @@ class Sight:
         self._normals.go_on_from(noise)
 
     def _space(self, frames: tuple[int, ...]) -> spaces.Box:
-        brightest, spread = self.renderer.brightest, 0.0
+        brightest, spread = self._brightest(), 0.0
         if self._noise is not None:
             spread = self._noise.largest(brightest)
         margin = SIGMAS * spread + ROUNDING * brightest
         # Lights at points are brighter the nearer they are.
         high = 2 * brightest + margin if self.renderer.only_directional else np.inf
         return spaces.Box(-margin if np.isfinite(high) else -np.inf, high, frames, np.float32)
+
+    def _brightest(self) -> float:
+        """Signal of a white surface that faced all directional lights at once, in the brightest of episodes."""
+        variation = self._worlds.variation
+        if variation is None:
+            return self.renderer.brightest
+        return max(self.renderer.brightest_in(light) for light in variation.extremes(self._wavelengths))

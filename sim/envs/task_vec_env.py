@@ -26,9 +26,9 @@ class TaskVecEnv(OneEnvironment):
     Worlds start anew by themselves, as stable-baselines3 has it: what is returned is then the first observation of the
     new episode, and info["terminal_observation"] the last of the old one. Observations are "eyes" (memory, eye,
     channel, height, width), noise included (of several kinds of eyes an array each, by their names), "previous_action",
-    and "feels", if the task's animal feels anything. `info` has reward_terms, is_success, and failure where one of the
-    task's methods fails: that ends the world's episode, and the others go on. Of an encounter, the first animal of all
-    worlds comes first, then the second.
+    and "feels", if the task's animal feels anything. `info` has reward_terms, is_success, varied (if the task varies
+    anything), and failure where one of the task's methods fails: that ends the world's episode, and the others go on.
+    Of an encounter, the first animal of all worlds comes first, then the second.
 
     failures: of the tasks' methods, and how many episodes each has ended
 
@@ -77,8 +77,11 @@ class TaskVecEnv(OneEnvironment):
         self._reset_seeds()
         self._reset_options()
         self._returns[:] = 0.0
-        self.reset_infos = [{"reward_terms": {}, "is_success": False} for _ in range(self.num_envs)]
-        return _rows(self.animals.reset())
+        observations = self.animals.reset()
+        self.reset_infos = [
+            {"reward_terms": {}, "is_success": False, **self._varied(row)} for row in range(self.num_envs)
+        ]
+        return _rows(observations)
 
     def step_async(self, actions: np.ndarray) -> None:
         actions = np.asarray(actions, np.float32)
@@ -159,12 +162,19 @@ class TaskVecEnv(OneEnvironment):
             if outcome.failure is not None:
                 info["failure"] = outcome.failure
                 self._count(outcome.failure, row)
+            if self.worlds.variation is not None:
+                info |= self._varied(row)
             if outcome.terminated or outcome.truncated:
                 info["TimeLimit.truncated"] = outcome.truncated
                 steps = self.worlds.steps[row % len(self._everyone)]
                 info["episode"] = {"r": float(self._returns[row]), "l": int(steps)}
             infos.append(info)
         return infos
+
+    def _varied(self, row: int) -> dict[str, Any]:
+        """How the world of a row differs from others, if they differ."""
+        varied = {name: float(values[row % len(self._everyone)]) for name, values in self.worlds.varied.items()}
+        return {"varied": varied} if varied else {}
 
     def _count(self, failure: str, row: int) -> None:
         """And warn once of each. Where several learn, the episode is one of all of them."""

@@ -16,6 +16,7 @@ from sim.robots import task as task_module
 from sim.robots.encounter import Encounter, cast, name_of, of_world
 from sim.robots.eye_kinds import kinds_of
 from sim.robots.task import Task, compiled, named_terms
+from sim.robots.variation import Variation
 
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 _OURS = (__file__, task_module.__file__)
@@ -40,6 +41,7 @@ class TaskWorlds:
     episode_steps: actions, then an episode is truncated; None: as many as the task has
     learners: tasks of those who learn · frozen: the others · animals: tasks of all, those who learn first
     model · datas: mjData of every world · steps: actions taken in its episode, (n,) int
+    variation: what differs between episodes; None: nothing · varied: how it is now, by name: (n,)
     felt: what each animal feels now, by animal: (n, numbers) float32
     rngs: of each world's episodes · noise_keys: of receptors, by animal: (kind of eyes, n)
     entropy: what all random streams come from; seeded with it again, everything happens again
@@ -56,6 +58,9 @@ class TaskWorlds:
             compiled(animal, self.model)
         self.spectra = of_world(self.animals, "spectra")
         self.episode_steps = self.animals[0].episode_steps if episode_steps is None else episode_steps
+        vary = of_world(self.animals, "vary")
+        self.variation = Variation(vary) if vary else None
+        self.varied = {name: np.ones(n) for name in vary or ()}
         self.datas = [mujoco.MjData(self.model) for _ in range(n)]
         self.steps, self.felt = np.zeros(n, int), [np.zeros((n, 0), np.float32) for _ in self.animals]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
@@ -90,6 +95,9 @@ class TaskWorlds:
         for i in worlds:
             data = self.datas[i]
             mujoco.mj_resetData(self.model, data)
+            if self.variation is not None:
+                for name, value in self.variation.draw(self.rngs[i]).items():
+                    self.varied[name][i] = value
             try:
                 for animal in self.animals:
                     animal.reset(data, self.rngs[i])
@@ -109,6 +117,10 @@ class TaskWorlds:
         self.steps += 1
         judged = [self._judged(i, failure) for i, failure in enumerate(failures)]
         return [outcome for of_learner in zip(*judged, strict=True) for outcome in of_learner]
+
+    def light(self, wavelengths: np.ndarray) -> np.ndarray | None:
+        """What lights are multiplied by now, (n, band); None: nothing."""
+        return None if self.variation is None else self.variation.light(self.varied, wavelengths)
 
     def close(self) -> None:
         if self._pool:

@@ -1,6 +1,7 @@
 """Eyes on any robot: models that are not one of our worlds.
 
 task                Task: what a robot has to do
+variation           what differs between episodes: light
 encounter           Encounter: several tasks in one world; Frozen: an animal that does not learn
 model_renderer      ModelRenderer: eyes mounted on any MuJoCo model, in many worlds at once
 model_fidelity      how many rays eyes on a model need

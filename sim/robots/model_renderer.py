@@ -82,7 +82,8 @@ class ModelRenderer:
         with in_variant(self._scene.variant):
             self._tracer = ModelTracer(self._scene, wavelengths)
             suns = [light.level for light in self._scene.lights.found if light.kind == "directional"]
-            self.brightest = float((mixing @ np.sum(suns, axis=0)).max() / np.pi) if suns else 0.0
+            self._sunlight = mixing * np.sum([np.zeros(len(wavelengths)), *suns], axis=0) / np.pi
+            self.brightest = self.brightest_in(np.ones(len(wavelengths)))
             basis = self._tracer.basis
             self._sums = self.sensor.receptor_sums(mixing, basis)
             self._radiance_sums = self.sensor.receptor_sums(np.eye(len(wavelengths)), basis)
@@ -96,19 +97,36 @@ class ModelRenderer:
                 self._edges = EdgeRays(self._wavefront, sampling, rays, mixing @ basis.T, noticed)
         self._slot = FrameSlot()
 
-    def signals(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+    def signals(self, poses: Poses | Sequence[mujoco.MjData], light: np.ndarray | None = None) -> np.ndarray:
         """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32.
 
         poses: of every world, after mj_forward or mj_step: its data, or arrays stacked over worlds
+        light: what all lights of each world are multiplied by, (env, band); None: nothing
 
         Raises:
-            ValueError: another number of worlds, another model's data, or poses that are not finite.
+            ValueError: another number of worlds, another model's data, poses that are not finite, or light of another
+                shape.
         """
-        return self.begin(poses).wait()
+        return self.begin(poses, light).wait()
 
-    def begin(self, poses: Poses | Sequence[mujoco.MjData]) -> PendingFrame:
+    def begin(self, poses: Poses | Sequence[mujoco.MjData], light: np.ndarray | None = None) -> PendingFrame:
         """Begin to see; it runs beside whatever comes next, until the signals are waited for."""
-        return self._begin(poses, "light").then(self._signals)
+        if light is None:
+            return self._begin(poses, "light").then(self._signals)
+        shape = self.n_envs, len(self._tracer.basis)
+        if np.shape(light) != shape:
+            raise ValueError(f"light has shape {np.shape(light)}: must be (env, band), {shape}")
+        per_view = np.repeat(np.asarray(light, np.float32).T, len(self.mounts), axis=1)[..., None]  # (band, view, 1)
+
+        def lit(found: np.ndarray) -> np.ndarray:
+            layers = found.reshape(-1, *per_view.shape[:2], found.size // (self.sensor.depth.count * per_view.size))
+            return self._signals(layers * per_view)
+
+        return self._begin(poses, "light").then(lit)
+
+    def brightest_in(self, light: np.ndarray) -> float:
+        """`brightest` where all lights are multiplied by this, (band,)."""
+        return float((self._sunlight @ light).max())
 
     def receptor_radiance(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
         """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""

@@ -35,6 +35,9 @@ class Task:
         `sim.choose_model_fidelity`; of several kinds alike, or a dictionary, too
     substeps: of physics in one action · episode_steps: actions, then an episode is truncated
     spectra: of materials and lights, by name, in the place of their colours
+    vary: what is drawn anew for each episode, as (low, high) by name: "light", a factor of all lights, evenly over its
+        logarithm, and "color_temperature" [K] of what is white, evenly over its reciprocal. Sizes, surfaces and starts
+        are `reset`'s own, as far as mjData has them
     camera: name of the camera that pictures for people are taken with; None: one that looks at the whole model
     actuators: names of those that an action drives; None: all
     name: what it is called among others; None: as its class
@@ -56,6 +59,7 @@ class Task:
     substeps: int = 5
     episode_steps: int = 256
     spectra: Mapping[str, Spectrum | str] | None = None
+    vary: Mapping[str, tuple[float, float]] | None = None
     camera: str | None = None
     actuators: Sequence[str] | None = None
     name: str | None = None
