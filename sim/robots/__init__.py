@@ -11,6 +11,7 @@ eye_marks           eyes on pictures of a model
 inside              eyes that are inside of a geom
 poses               Poses: where everything is, in all worlds
 model_wavefront     its kernels
+optic_flow          where what eyes look at moves on their retinas
 edge_rays           many rays where a receptor sees an edge, few elsewhere
 model_scene         what stands still, as a Mitsuba scene, and what moves
 model_lights        lights, that may move
