@@ -55,7 +55,8 @@ def test_ids_are_those_that_mujocos_rays_meet(model):
 
 
 def test_ids_where_nothing_stands_still_and_where_nothing_moves():
-    free = '<mujoco><visual><headlight active="0"/></visual><worldbody><light type="directional" dir="0 0 -1"/>{}</worldbody></mujoco>'
+    lit = '<visual><headlight active="0"/></visual><worldbody><light type="directional" dir="0 0 -1"/>'
+    free = f"<mujoco>{lit}{{}}</worldbody></mujoco>"
     ball = '<body name="b"><freejoint/><geom size=".1" pos="1 0 0"/><geom size=".1" pos="1 .3 0"/></body>'
     post = '<body name="b"/><geom type="box" size=".1 .1 .1" pos="1 0 0"/><geom size=".1" pos="1 .3 0"/>'
     for text in (ball, post):
