@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 
 from sim.envs.task_fidelity import fidelities_among
-from sim.envs.task_sight import Sight
+from sim.envs.task_sight import EyesOfKind
 from sim.envs.task_worlds import TaskWorlds
 from sim.render.pending_frame import PendingFrame
 from sim.robots.eye_kinds import kinds_of
@@ -32,7 +32,7 @@ class Senses:
         n, kinds, fidelities = len(worlds.datas), kinds_of(task), fidelities_among(worlds.animals, number)
         keys = worlds.noise_keys[number]
         self.sights = {
-            kind.name: Sight(worlds, kind, fidelities[kind.name], keys[k], memory) for k, kind in enumerate(kinds)
+            kind.name: EyesOfKind(worlds, kind, fidelities[kind.name], keys[k], memory) for k, kind in enumerate(kinds)
         }
         self.action_space = spaces.Box(-1.0, 1.0, (task.n_actions(worlds.model),), np.float32)
         self.observation_space = self._space()

@@ -15,7 +15,7 @@ from sim.robots.model_renderer import ModelRenderer
 from sim.robots.poses import Poses
 
 
-class Sight:
+class EyesOfKind:
     """Of these worlds.
 
     kind: of eyes · fidelity: how finely they see · keys: of their noise, one of each world

@@ -12,7 +12,7 @@ task_fidelity: robots/test_model_fidelity.py, test_encounter.py
 task_state: test_task_state.py
 one_environment: test_vec_env.py
 env: test_env.py
-vec_env: test_vec_env.py, test_env.py
+vec_env: test_vec_env.py, test_env.py, test_light_levels.py
 vector_env: test_vector_env.py
 registered_env: test_vector_env.py
 registration: test_env.py, test_vector_env.py, worlds/test_catalog.py
