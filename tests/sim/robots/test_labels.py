@@ -25,7 +25,8 @@ WALL = """
     <geom name="wall" type="plane" size="50 50 .1" pos="{far} 0 0" zaxis="-1 0 0"/>
     <body name="eye"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
       <joint type="hinge" axis="0 0 1"/><geom size=".01" pos="-1 0 0"/></body>
-    <body name="ball" pos="1.2 0 0"><joint type="slide" axis="0 0 1"/><geom name="ball" size=".15"/></body>
+    <body name="ball" pos="1.2 0 0"><joint type="slide" axis="0 0 1"/><joint type="hinge" axis="1 0 0"/>
+      <geom name="ball" size=".15"/></body>
   </worldbody>
 </mujoco>"""
 FAR = 2.0
@@ -69,9 +70,9 @@ def test_ids_where_nothing_stands_still_and_where_nothing_moves():
         assert np.argwhere(seen == 1)[:, 1].max() < 10  # to the left
 
 
-def at(model, ahead=0.0, left=0.0, turned=0.0, ball=0.0):
+def at(model, ahead=0.0, left=0.0, turned=0.0, ball=0.0, spin=0.0):
     data = mujoco.MjData(model)
-    data.qpos[:] = ahead, left, turned, ball
+    data.qpos[:] = ahead, left, turned, ball, spin
     mujoco.mj_forward(model, data)
     return data
 
@@ -121,6 +122,18 @@ def test_what_moves_by_itself_is_carried_along(wall):
     np.testing.assert_allclose(found[1][on_ball], expected, rtol=1e-3)
     assert on_ball.sum() > 20
     np.testing.assert_allclose(found[:, ~on_ball], 0, atol=1e-4)
+
+
+def test_what_spins_goes_round(wall):
+    """A ball before the eye turns about the eye's own axis."""
+    model, renderer = wall
+    before, after = at(model), at(model, spin=-0.4)
+    found, on_ball = renderer.flow([before], [after])[0, 0], renderer.ids([before])[0, 0] == model.geom("ball").id
+    x, y = receptor_centres(EYE).T.reshape(2, *EYE.resolution)
+    c, s = np.cos(0.4), np.sin(0.4)
+    expected = np.array([c * x + s * y - x, c * y - s * x - y])
+    np.testing.assert_allclose(found[:, on_ball], expected[:, on_ball], atol=1e-3)
+    assert np.abs(expected[:, on_ball]).max() > 0.5
 
 
 def test_there_is_no_flow_of_nothing_or_behind(wall, model):
