@@ -23,7 +23,7 @@ from evolve.store.atomic_files import unfinished, write_whole
 
 __all__ = ["require_ffmpeg", "write_gif", "write_mp4"]
 
-HEIGHT, ASIDE, GAP = 320, 150, 10  # pixels: of the picture, of the eyes' column, between
+HEIGHT, ASIDE, GAP = 320, 150, 10  # pixels: of the picture, most of the eyes' column, between
 SMOOTH = 2  # drawn so many times as large, then reduced
 SPEED = 2.0  # times as fast as it was
 LONGEST = 150  # frames: noise hardly compresses
@@ -117,10 +117,10 @@ def _world(episode: AnyEpisode, plan: Stage, time: int) -> Image.Image:
 def _frame(world: Image.Image, seen: np.ndarray) -> Image.Image:
     """One moment: the world on the left, an eye below the other on the right."""
     width = world.width
-    picture = Image.new("RGB", (width + GAP + ASIDE, HEIGHT), PAPER)
-    picture.paste(world, (0, 0))
     room = (HEIGHT - GAP * (len(seen) - 1)) / len(seen)
     size = min(ASIDE / seen.shape[2], room / seen.shape[1])
+    picture = Image.new("RGB", (width + GAP + round(seen.shape[2] * size), HEIGHT), PAPER)
+    picture.paste(world, (0, 0))
     for number, one in enumerate(seen):
         shape = max(1, round(one.shape[1] * size)), max(1, round(one.shape[0] * size))
         grown = Image.fromarray(np.ascontiguousarray(one)).resize(shape, Image.Resampling.NEAREST)
