@@ -79,7 +79,7 @@ def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, mon
     plan = json.loads(capsys.readouterr().out)
     assert plan["evaluations"] == 30
     assert plan["steps"] == 30 * 131_072
-    assert "up to 102,400 (100,000 rounded up to rollouts of 4,096) each, 3,072,000 in all" in out
+    assert "up to 131,072 each, 3,932,160 in all" in out
     assert plan["genes"]["doe_00"] == 1
     assert plan["hours"].keys() == {"start", "middle"}
     assert list(tmp_path.iterdir()) == []
