@@ -112,16 +112,18 @@ def _rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most
     test = half * np.linspace(-1, 1, TRIED)
     # On the axis both directions are alike, and so are both sides.
     on_axis = problem.window.centre == (0.0, 0.0)
-    places = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
+    lines = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
 
-    def along(at: np.ndarray) -> np.ndarray:
-        return np.stack([_rest(problem, rim, directions, _line(axis, at, across)) for axis, across in places])
+    def rest(at: np.ndarray) -> np.ndarray:
+        """(line, place on the rim, place on the line)"""
+        u, v = np.stack([_line(axis, at, across) for axis, across in lines], axis=1)[:, :, None, :]
+        return _rest(problem, rim, directions, (u, v))
 
-    exact = along(test)
+    exact = rest(test)
     for rank in RANKS:
         if rank > most:
             return None
-        known = along(half * chebyshev_points(rank))
+        known = rest(half * chebyshev_points(rank))
         if np.abs(exact - known @ _between(rank)).max() < RANK_RIPPLE * problem.tolerance:
             return rank
     return None
