@@ -185,7 +185,7 @@ def check_evolve(arguments, capsys):
         main([arguments[0], "--help"])
     assert stop.value.code == 0
     options = {word for word in arguments if word.startswith("--")}
-    assert options <= set(re.findall(r"--[a-z-]+", capsys.readouterr().out)), arguments
+    assert options <= set(re.findall(r"--[a-z][a-z0-9-]*", capsys.readouterr().out)), arguments
     if arguments[0] == "run" and not {"TASK", "NAME"} & set(arguments):
         named = {word: arguments[i + 1] for i, word in enumerate(arguments[:-1]) if word in ("--preset", "--scale")}
         task = None if arguments[1].startswith("--") else arguments[1]

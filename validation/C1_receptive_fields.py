@@ -3,16 +3,16 @@
 Behind a pupil, all receptors of an eye share one set of rays, drawn from the mixture of their receptive fields, and
 the signal of a receptor is a weighted sum. The reference is the published way: a picture of the tangent plane, wider
 than the retina by the reach of the kernel, convolved with the PSF (`Eye.see`). Its cells are another grid than the
-one on which the fields of the rays are tabulated, and each has many rays of its own. The light is the same, so only
-the sampling differs.
+one on which the fields of the rays are tabulated, and each has many rays of its own, or, where all light is followed,
+many areas. The light is the same, so only the sampling differs.
 
 Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection
 world. They are in units of the receptors' noise, σ = 0.01 of the signal of white behind a wide-open pupil. The pupils
 are: none (the perfect lens), a pinhole (a = 0.04 of the retina's width), open without a lens, a relief drawn at
-random, and a lens in focus (a = 0.25). The last column is what `rays_per_receptor = "auto"` takes and how far it is
-off; the bound is half of the noise. The perfect lens needs 24 states to show that, because its errors differ much
-between views; pupils need 4. Errors must fall at least like n^-0.5, as with independent rays, down to the 0.01 σ by
-which two tables of one PSF may differ. No slope is given where fewer than three errors are above that.
+random, and a lens in focus (a = 0.25). The last column is what `rays_per_receptor = "auto"` takes, rays or areas, and
+how far it is off; the bound is half of the noise. The perfect lens needs 24 states to show that, because its errors
+differ much between views; pupils need 4. Errors must fall at least like n^-0.5, as with independent rays, down to the
+0.01 σ by which two tables of one PSF may differ. No slope is given where fewer than three errors are above that.
 
     python -m validation.C1_receptive_fields [--out DIR] [--docs DIR]
 """
@@ -43,7 +43,8 @@ STATES, PERFECT_STATES = 4, 24
 APERTURE, PINHOLE = 0.25, 0.04  # radius of pupil beside half of the retina's width
 RELIEF_HEIGHT = 20e-6  # [m]
 CELLS = 3  # of the reference's pictures along a receptor's side; the rays' fields have 2 or 4 and more
-CELL_RAYS = 48
+CELL_RAYS, PERFECT_RAYS = 48, 1024
+CELL_AREAS, PERFECT_AREAS = 4, 64
 HALF = 0.5  # of the noise
 SLOPE = -0.5
 TABULATION = 0.01  # [σ] below which errors are not the rays': PSFs to 1 % on two grids, and signals of about 1 σ
@@ -60,6 +61,7 @@ class Series:
     auto_rays: float
     auto_error: float
     light: str
+    samples: str
 
     @property
     def slope(self) -> float:
@@ -95,17 +97,25 @@ def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -
     camera = replace(
         eyes, optics=None, resolution=(height, width), fov_deg=math.degrees(2 * math.atan(half / eye.sensor_distance))
     )
-    rays = CELL_RAYS if cells > 1 else 1024
+    fidelity = reference_fidelity(eyes, light)
     found = []
     for i in range(state.n):
-        renderer = sim.BatchedRenderer(world, camera, 1, sim.Fidelity(rays, eyes.bands, light=light))
+        renderer = sim.BatchedRenderer(world, camera, 1, fidelity)
         picture = renderer.receptor_radiance(state.take(np.array([i])))[:, 0, 0]
         found.append(eye.see(picture, cells, sight=sight))
     return np.array(found)
 
 
+def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
+    """Of the picture's cells, which through a perfect lens are whole receptors."""
+    perfect = eyes.optics is None
+    if light == "all":
+        return sim.Fidelity(PERFECT_AREAS if perfect else CELL_AREAS, eyes.bands, light=light, samples="areas")
+    return sim.Fidelity(PERFECT_RAYS if perfect else CELL_RAYS, eyes.bands, light=light)
+
+
 def sampled(world: sim.World, eyes: sim.Eyes, state: WorldState, fidelity: sim.Fidelity) -> tuple[np.ndarray, float]:
-    """The same by rays, and how many there were per receptor."""
+    """The same by rays or areas, and how many there were per receptor."""
     renderer = sim.BatchedRenderer(world, eyes, 1, fidelity)
     rays = len(renderer.sensor.directions) / math.prod(eyes.resolution)
     return np.concatenate([renderer.signals(state.take(np.array([i]))) for i in range(state.n)])[:, 0], rays
@@ -126,6 +136,7 @@ def measure(pupil: str, resolution: tuple[int, int], world: sim.World, state: Wo
         auto_rays,
         rms(signals - truth[auto.light]) / SIGMA,
         auto.light,
+        auto.samples,
     )
 
 
@@ -145,9 +156,8 @@ def table(series: Sequence[Series]) -> str:
     for s in series:
         errors = "  ".join(f"{n:.3g}: {e:.4f}" for n, e in zip(s.rays, s.errors, strict=True))
         slope = f"{s.slope:.2f}" if math.isfinite(s.slope) else "-"
-        lines.append(
-            f"{s.pupil:<14} {s.retina:<8} {errors:<64} {slope:>5}  {s.auto_error:.3f} at {s.auto_rays:.3g}, {s.light}"
-        )
+        auto = f"{s.auto_error:.3f} at {s.auto_rays:.3g} {s.samples}, {s.light}"
+        lines.append(f"{s.pupil:<14} {s.retina:<8} {errors:<64} {slope:>5}  {auto}")
     return "\n".join(lines)
 
 
@@ -159,15 +169,17 @@ def draw(series: Sequence[Series], path: Path) -> None:
     from matplotlib.figure import Figure
 
     retinas = list(dict.fromkeys(s.retina for s in series))
-    figure = Figure(figsize=(4 * len(retinas), 4), layout="constrained")
+    figure = Figure(figsize=(4 * len(retinas) + 1, 4.3), layout="constrained")
     for axes, retina in zip(figure.subplots(1, len(retinas), sharey=True, squeeze=False)[0], retinas, strict=True):
         for s in (s for s in series if s.retina == retina):
             axes.loglog(s.rays, s.errors, "o-", ms=4, lw=1, color=COLORS[s.pupil], label=s.pupil)
             axes.loglog([s.auto_rays], [s.auto_error], "*", ms=13, mfc="none", color=COLORS[s.pupil])
         axes.axhline(HALF, color="black", ls=":", lw=1)
-        axes.set(title=f"{retina} receptors", xlabel="rays per receptor")
+        axes.set(title=f"{retina} receptors", xlabel="rays (star: or areas) per receptor")
     figure.axes[0].set_ylabel("error [σ of the receptors' noise]")
-    figure.axes[-1].legend(frameon=False, fontsize=8, title="star: auto; dotted: σ/2", title_fontsize=8)
+    handles, labels = figure.axes[-1].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside right", title="star: auto\ndotted: σ/2", frameon=False)
+    figure.suptitle("What is chosen by itself errs by less than half of the noise, behind every pupil")
     figure.savefig(path, dpi=110)
 
 

@@ -204,6 +204,7 @@ def _add_products(commands: Commands) -> None:
         if name == "replay":
             product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
             product.add_argument("--gif", action="store_true", help="also write a moving picture, for slides and pages")
+            product.add_argument("--mp4", action="store_true", help="also write a film, every action a frame")
         if name != "export":
             product.add_argument("--open", action="store_true", help="open the page in a browser")
         product.add_argument("--out", type=Path, metavar=out, help="where to write (default: in the run directory)")

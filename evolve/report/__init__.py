@@ -18,7 +18,7 @@ svg              figures that follow the page's theme
 theme            its colours
 markup           pieces of HTML
 comparison       runs side by side
-moving_picture   an episode as a GIF
+moving_picture   an episode as a GIF or film
 replay           an episode once more
 exr_export       what an agent saw, as EXR files
 rerun_recording  an episode for rerun

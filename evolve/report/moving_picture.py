@@ -1,24 +1,27 @@
-"""An episode as a GIF: the world from above with the agent's path, and beside it what its eyes report."""
+"""An episode as a moving picture: the world from above with the agent's path, and beside it what its eyes report."""
 
 from __future__ import annotations
 
 import io
 import math
+from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw
 
 from evolve.analysis.episode import Episode
 from evolve.analysis.filmed_episode import FilmedEpisode
+from evolve.config.run_config import ConfigError
 from evolve.report.footage import AnyEpisode, Stage, stage_of
 from evolve.report.ground_plan import GroundPlan
 from evolve.report.picture import display
 from evolve.report.theme import ACCENT, GREEN, INK, MUTED, PANEL, PAPER, VERMILLION
-from evolve.store.atomic_files import write_whole
+from evolve.store.atomic_files import unfinished, write_whole
 
-__all__ = ["write_gif"]
+__all__ = ["require_ffmpeg", "write_gif", "write_mp4"]
 
 HEIGHT, ASIDE, GAP = 320, 150, 10  # pixels: of the picture, of the eyes' column, between
 SMOOTH = 2  # drawn so many times as large, then reduced
@@ -31,17 +34,60 @@ LEVELS = (0, 51, 102, 153, 204, 255)  # of red, green and blue that eyes' pictur
 
 def write_gif(episode: AnyEpisode, path: Path) -> Path:
     """Write an episode as an animated GIF that repeats, whole or not at all; returns its path."""
-    plan = stage_of(episode)
     stride = max(1, -(-len(episode) // LONGEST))
-    eyes = display(episode.signals, plan.gain)
-    pictures = [_frame(_world(episode, plan, time), eyes[time]) for time in range(0, len(episode), stride)]
     palette = _palette()
-    first, *rest = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
+    first, *rest = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in _frames(episode, stride))
     content = io.BytesIO()
-    pause = round(1000 * stride * plan.seconds / SPEED)
+    pause = round(1000 * stride * stage_of(episode).seconds / SPEED)
     first.save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
     write_whole(path, content.getvalue())
     return path
+
+
+def require_ffmpeg() -> Any:
+    """The package imageio_ffmpeg, which runs ffmpeg as a program.
+
+    Raises:
+        ConfigError: it is not installed.
+    """
+    try:
+        import imageio_ffmpeg
+    except ImportError:
+        raise ConfigError("--mp4 needs ffmpeg: pip install 'rhabdom[video]'") from None
+    return imageio_ffmpeg
+
+
+def write_mp4(episode: AnyEpisode, path: Path) -> Path:
+    """Write an episode as an H.264 film with a frame for each action, whole or not at all; returns its path.
+
+    Raises:
+        ConfigError: ffmpeg is not installed.
+    """
+    first, *rest = _frames(episode, stride=1)
+    # Colours are stored for squares of four pixels, so a film has an even number both ways.
+    width, height = (2 * (n // 2) for n in first.size)
+    with unfinished(path) as neighbour:
+        film = require_ffmpeg().write_frames(
+            str(neighbour),
+            (width, height),
+            fps=SPEED / stage_of(episode).seconds,
+            quality=8,
+            codec="libx264",
+            macro_block_size=2,
+            output_params=["-f", "mp4", "-movflags", "+faststart"],  # an unfinished file's name tells no format
+        )
+        film.send(None)
+        for picture in (first, *rest):
+            film.send(picture.crop((0, 0, width, height)).tobytes())
+        film.close()
+    return path
+
+
+def _frames(episode: AnyEpisode, stride: int) -> Iterator[Image.Image]:
+    """Every stride-th moment."""
+    plan = stage_of(episode)
+    eyes = display(episode.signals, plan.gain)
+    return (_frame(_world(episode, plan, time), eyes[time]) for time in range(0, len(episode), stride))
 
 
 def _palette() -> Image.Image:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,42 +11,38 @@ from evolve.analysis.filmed_episode import FilmedEpisode
 from evolve.config.own_task import is_own
 from evolve.config.run_config import ConfigError
 from evolve.report.footage import AnyEpisode
-from evolve.report.moving_picture import write_gif
+from evolve.report.moving_picture import require_ffmpeg, write_gif, write_mp4
 from evolve.report.player import write_player
 from evolve.report.rerun_recording import require_rerun, write_recording
 from evolve.store.directory import Run
 
-__all__ = ["episode_facts", "episode_table", "write_page", "write_replay"]
+__all__ = ["BESIDE", "episode_facts", "episode_table", "write_page", "write_replay"]
+
+BESIDE: Mapping[str, Callable[[Any, Path], Path]] = {"rrd": write_recording, "gif": write_gif, "mp4": write_mp4}
 
 
 def write_replay(
-    run: Run,
-    candidate_id: int | None = None,
-    seed: int = 0,
-    rrd: bool = False,
-    gif: bool = False,
-    out: Path | None = None,
+    run: Run, candidate_id: int | None = None, seed: int = 0, also: Collection[str] = (), out: Path | None = None
 ) -> tuple[AnyEpisode, list[Path]]:
-    """Record an episode (default: of the best candidate) and write a page that plays it; with `rrd` a recording for
-    rerun as well, with `gif` a moving picture.
+    """Record an episode (default: of the best candidate) and write a page that plays it.
 
+    also: of BESIDE, beside the page: "rrd", a recording for rerun, and the moving pictures "gif" and "mp4"
     out: the page's file; in the run directory if None
     Returns the episode, and the paths.
 
     Raises:
         RunError: there is no such candidate, or no policy of it.
-        ConfigError: rerun is asked for, but not installed, or for a task of one's own.
+        ConfigError: rerun or ffmpeg are needed, but not installed, or rerun for a task of one's own.
     """
-    if rrd:
+    if "rrd" in also:
         require_rerun()
         if is_own(run.config.task):
-            raise ConfigError("--rrd is for rhabdom's own tasks; --gif is for all")
+            raise ConfigError("--rrd is for rhabdom's own tasks; --gif and --mp4 are for all")
+    if "mp4" in also:
+        require_ffmpeg()
     episode = record(run, candidate_id, seed)
     page = write_page(run, episode, out)
-    paths = [page]
-    paths += [write_recording(episode, page.with_suffix(".rrd"))] if rrd and isinstance(episode, Episode) else []
-    paths += [write_gif(episode, page.with_suffix(".gif"))] if gif else []
-    return episode, paths
+    return episode, [page, *(BESIDE[form](episode, page.with_suffix(f".{form}")) for form in BESIDE if form in also)]
 
 
 def write_page(run: Run, episode: AnyEpisode, out: Path | None = None) -> Path:

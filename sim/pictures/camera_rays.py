@@ -37,6 +37,9 @@ SRGB = np.array(  # linear sRGB per radiance at these, (3, wavelength); fitted s
 SAMPLES = np.array([[0, 0], [0.2, 0.4], [0.4, -0.2], [-0.2, -0.4], [-0.4, 0.2]])
 CODES = 8  # per pixel
 NESTED = 64  # bodies in each other that a camera may be inside of
+# Rays of a packet go through neighbouring pixels, and on towards one sun: Embree walks its tree once for all of them.
+COHERENT = True
+WANTED = int(mi.RayFlags.UV) | int(mi.RayFlags.ShadingFrame)  # no texture of a mirror asks for derivatives
 _VIEW = 5  # rows of four of a view: position, columns of the rotation, (half, near, width, height)
 
 
@@ -99,7 +102,7 @@ class CameraRays:
         self, inside: bool, scene: MitsubaObject, codes: Array, pose: Array, inputs: dict[str, Array]
     ) -> tuple[Array, ...]:
         ray, axes = _ray(codes, pose, inputs["samples"])
-        si = scene.ray_intersect(ray)
+        si = scene.ray_intersect(ray, WANTED, COHERENT)
         if inside:
             si = _looked_out_of(scene, si, ray, inputs["closed"])
         si.wavelengths = mi.Spectrum(*WAVELENGTHS_NM)
@@ -132,7 +135,7 @@ class CameraRays:
             else:
                 value = bsdf.eval(mi.BSDFContext(), si, si.to_local(towards), reaches)
                 reaches = reaches & (dr.max(value) > 0)
-            reaches = reaches & ~scene.ray_test(shadow, reaches)
+            reaches = reaches & ~scene.ray_test(shadow, COHERENT, reaches)
             total += dr.select(reaches, value * weight, 0)
         return total
 
@@ -149,7 +152,7 @@ def _looked_out_of(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -
         # As `sim.scene.rays` has it: along the ray alone.
         step = si.t * (1 + 1e-5) + 4e-6 * (1 + dr.max(dr.abs(ray.o)))
         onwards = mi.Ray3f(ray(step), ray.d)
-        return scene.ray_intersect(onwards), onwards, turn + 1
+        return scene.ray_intersect(onwards, WANTED, COHERENT), onwards, turn + 1
 
     return dr.while_loop((si, ray, mi.UInt32(0)), leaving, further, label="inner sides")[0]
 

@@ -65,10 +65,10 @@ def replay(arguments: Namespace) -> int:
     """Let an agent play one episode again: a table here, and a page that plays it."""
     run = _open(arguments)
     with _waiting(arguments, "an episode is played and written"):
-        from evolve.report.replay import episode_facts, episode_table, write_replay
+        from evolve.report.replay import BESIDE, episode_facts, episode_table, write_replay
 
-        chosen = (arguments.candidate, arguments.seed, arguments.rrd, arguments.gif, arguments.out)
-        episode, paths = write_replay(run, *chosen)
+        also = [form for form in BESIDE if getattr(arguments, form)]
+        episode, paths = write_replay(run, arguments.candidate, arguments.seed, also, arguments.out)
     if arguments.json:
         print(json.dumps({**episode_facts(episode), "files": [str(path) for path in paths]}, indent=1))
     else:

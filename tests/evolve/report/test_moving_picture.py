@@ -1,13 +1,16 @@
 """A moving picture shows the episode: where the agent was, what its eyes reported, for as long as it took."""
 
 import dataclasses
+import sys
 
+import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from evolve.config.run_config import ConfigError
 from evolve.report.ground_plan import GroundPlan
-from evolve.report.moving_picture import ASIDE, HEIGHT, LONGEST, SPEED, write_gif
+from evolve.report.moving_picture import ASIDE, HEIGHT, LONGEST, SPEED, write_gif, write_mp4
 from evolve.report.theme import INK
 
 
@@ -52,3 +55,30 @@ def test_the_eyes_are_beside_it(short, frames):
     left, right = picture[: HEIGHT // 2 - 10], picture[HEIGHT // 2 + 10 :]
     assert np.abs(left.astype(float).mean() - right.astype(float).mean()) > 1 or (left != right[: len(left)]).any()
     assert picture.std() > 5
+
+
+def test_a_film_has_a_frame_for_every_action(short, frames, tmp_path):
+    """It shows the same as the GIF, as far as its compression lets it, and takes as long."""
+    path = write_mp4(short, tmp_path / "episode.mp4")
+    assert [file.name for file in tmp_path.iterdir()] == ["episode.mp4"], "nothing half written is left"
+    film = imageio_ffmpeg.read_frames(str(path))
+    told = next(film)
+    width, height = told["source_size"]
+    assert told["codec"].startswith("h264")
+    assert told["pix_fmt"].startswith("yuv420p"), "players know no other"
+    shown = [np.frombuffer(frame, np.uint8).reshape(height, width, 3) for frame in film]
+    assert len(shown) == len(short)
+    assert told["duration"] == pytest.approx(len(short) * GroundPlan.of(short).seconds / SPEED, rel=0.02)
+    for time in (0, 12, 23):
+        still = np.asarray(frames[time][0])[:height, :width].astype(float)
+        other = np.asarray(frames[23 - time][0])[:height, :width].astype(float)
+        errors = [np.sqrt(np.mean((shown[time] - picture) ** 2)) for picture in (still, other)]
+        assert errors[0] < 12, "the palette's steps of 51 levels, and the compression"
+        assert time == 12 or errors[0] < 0.9 * errors[1], "frames are in order"
+
+
+def test_a_film_without_ffmpeg_names_the_extra(monkeypatch, short, tmp_path):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(ConfigError, match=r"--mp4 needs ffmpeg: pip install 'rhabdom\[video\]'"):
+        write_mp4(short, tmp_path / "episode.mp4")
+    assert list(tmp_path.iterdir()) == []

@@ -93,7 +93,7 @@ def test_time_is_the_worlds(columns, episode):
 
 
 def test_replay_writes_page_and_recording(run, columns, capsys):
-    _, (page, recording) = replay.write_replay(run, seed=3, rrd=True)
+    _, (page, recording) = replay.write_replay(run, seed=3, also=["rrd"])
     assert (page.suffix, recording.suffix) == (".html", ".rrd")
     assert recording.stat().st_size > 100_000
     assert [path.suffix for path in replay.write_replay(run, seed=3)[1]] == [".html"]
