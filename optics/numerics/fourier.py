@@ -50,12 +50,8 @@ def fast_length(least: float) -> int:
 @lru_cache(maxsize=1)
 def _smooth_numbers() -> list[int]:
     """2^a 3^b 5^c up to LONGEST_FFT, rising."""
-    found = [1]
-    for factor in (2, 3, 5):
-        for number in found:  # grows as it is read
-            if number * factor <= LONGEST_FFT:
-                found.append(number * factor)
-    return sorted(set(found))
+    threes_and_fives = [3**b * 5**c for b in range(20) for c in range(14)]
+    return sorted(n << a for n in threes_and_fives for a in range(32) if n << a <= LONGEST_FFT)
 
 
 def dft2(
