@@ -118,7 +118,7 @@ def prediction(store: Store) -> str:
 
 def draw(store: Store, path: Path) -> None:
     """A panel per quantity, a line per seed; the last panel is the key."""
-    figure, axes = new_figure(15, 5.2, columns=(len(QUANTITIES) + 2) // 2, rows=2, sharex=True)
+    figure, axes = new_figure(15, 5.6, columns=(len(QUANTITIES) + 2) // 2, rows=2, sharex=True)
     for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=False):
         for group, color in store.colors.items():
             rows = store.group(group)
@@ -138,7 +138,11 @@ def draw(store: Store, path: Path) -> None:
     axes[-1, -1].set_axis_off()
     for group, color in store.colors.items():
         axes[-1, -1].plot([], [], color=color, lw=2, label=group)
+    axes[-1, -1].fill_between([], [], [], color="#777777", alpha=0.2, label="null model")
+    axes[-1, -1].plot([], [], color="#777777", ls="--", label="best hole for stripes")
+    axes[-1, -1].plot([], [], color="#777777", ls=":", label="from here glass may change")
     axes[-1, -1].legend(loc="center", frameon=False)
+    figure.suptitle("A pupil that evolves alone closes; where glass may become a lens, it opens again")
     save(figure, path)
 
 
@@ -154,7 +158,7 @@ def extremes(rows: Sequence[Row]) -> tuple[Row, Row] | tuple[()]:
 def draw_reliefs(store: Store, path: Path) -> None:
     """Height maps, two per seed, all on one scale."""
     runs = [(g, s) for g in store.groups for s in sorted({row.seed for row in store.group(g)})]
-    figure, axes = new_figure(max(4.0, 1.7 * len(runs)), 3.8, columns=len(runs), rows=2)
+    figure, axes = new_figure(max(4.0, 1.7 * len(runs)), 4.2, columns=len(runs), rows=2)
     chosen = {run: extremes([row for row in store.group(run[0]) if row.seed == run[1]]) for run in runs}
     maps = {(run, i): longer(row, store) for run, rows in chosen.items() for i, row in enumerate(rows)}
     most = max((float(np.nanmax(one)) for one in maps.values()), default=1.0) or 1.0
@@ -167,6 +171,7 @@ def draw_reliefs(store: Store, path: Path) -> None:
             axes[i, column].set_title(title, fontsize=7)
     if maps:
         figure.colorbar(shown, ax=axes, shrink=0.7, label="optical path through the relief [µm]")
+    figure.suptitle("Where it may bend light, the glass becomes thickest in the middle: a lens")
     save(figure, path)
 
 

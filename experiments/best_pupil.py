@@ -39,6 +39,7 @@ RESOLUTION, FOV_DEG = 15, 45.0
 SCENE = (materials.WHITE - materials.BLACK) / 2  # standard deviation of the signal of black and white stripes
 GREEN = 550e-9
 ZERO = 0.25  # an MTF that dips below it has one there: averaged over directions, its dips do not reach 0
+STRENGTHS = (0.35, 0.65, 1.0)  # of lines, by noise
 COLORS = {"hole": "#D55E00", "lens": "#0072B2"}
 
 
@@ -192,10 +193,10 @@ def shades(noises: Sequence[float]) -> tuple[float, float, float]:
 
 def draw(rows: Sequence[Row], path: Path) -> None:
     """Contrast and bits over the pupil's width, and the best width over noise."""
-    figure, axes = new_figure(11, 3.6, columns=3)
+    figure, axes = new_figure(11, 3.9, columns=3)
     noises = sorted({row.noise_sigma for row in rows})
     for place, measure in zip(axes[0], ("contrast", "bits"), strict=False):
-        for sigma, strength in zip(shades(noises), (0.35, 0.65, 1.0), strict=True):
+        for sigma, strength in zip(shades(noises), STRENGTHS, strict=True):
             for pupil in PUPILS:
                 chosen = [row for row in rows if row.pupil == pupil and math.isclose(row.noise_sigma, sigma)]
                 x, y = np.array([(row.relative_aperture, getattr(row, measure)) for row in chosen]).T
@@ -212,6 +213,10 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     right.axhline(rayleigh(), color="#777777", ls=":", lw=1)
     right.text(noises[-1], rayleigh() * 0.93, "Rayleigh's pinhole", color="#777777", ha="right", va="top")
     right.set(xlabel="noise σ of a receptor", ylabel="a of most contrast", ylim=(0.06, 1.2))
+    for sigma, strength in zip(shades(noises), STRENGTHS, strict=True):
+        left.plot([], [], color="#222222", alpha=strength, label=f"σ = {sigma:g}")
+    left.legend(frameon=False, fontsize=8, loc="center right")
+    figure.suptitle("Less light asks for a wider hole; behind a lens the widest pupil is best in any light")
     save(figure, path)
 
 

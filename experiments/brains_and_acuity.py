@@ -155,7 +155,21 @@ def draw(store: Store, path: Path) -> None:
         label(place.yaxis, place.get_ylim())
     for place in axes[1]:
         label(place.xaxis, place.get_xlim())
+    figure.legend(handles=_key(), loc="outside lower center", ncols=3, frameon=False)
+    figure.suptitle("Finer eyes lower the ceiling of error; larger brains do not")
     save(figure, path)
+
+
+def _key() -> list[Any]:
+    """What dots, shades and lines mean."""
+    from matplotlib.lines import Line2D
+
+    dots = {"marker": "o", "ls": "", "color": "#555555"}
+    return [
+        Line2D([], [], alpha=0.3, label="an animal, small in the other size", **dots),
+        Line2D([], [], alpha=0.95, label="one that is large in it", **dots),
+        Line2D([], [], color="#222222", label="above: power law; below: best quarter of a class"),
+    ]
 
 
 def label(axis: Any, ends: tuple[float, float]) -> None:

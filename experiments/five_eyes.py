@@ -144,12 +144,15 @@ def draw(views: Sequence[View], perfect: View, path: Path) -> None:
         *(f"{s.name}\na = {s.relative_aperture:g}, SSIM {v.ssim:.2f}" for s, v in zip(STAGES, views, strict=True)),
         "perfect lens\n",
     ]
-    figure, axes = new_figure(12, 4.3, columns=6, rows=2)
+    figure, axes = new_figure(12, 4.7, columns=6, rows=2)
     for column, (name, one) in enumerate(zip(names, [*views, perfect], strict=True)):
         for place, signals in zip(axes[:, column], (one.fine, one.coarse), strict=True):
             place.imshow(display(signals), interpolation="nearest")
             place.set_axis_off()
         axes[0, column].set_title(name, fontsize=11)
+    for place, name in zip(axes[:, 0], ("90 x 90 receptors", "30 x 30, with noise"), strict=True):
+        place.text(-0.06, 0.5, name, rotation=90, ha="right", va="center", transform=place.transAxes)
+    figure.suptitle("A hole is sharp and dark, a lens is sharp and bright")
     save(figure, path)
 
 

@@ -130,7 +130,7 @@ def draw(store: Store, path: Path) -> None:
     """Success over the pupil's width."""
     from matplotlib.lines import Line2D
 
-    figure, axes = new_figure(6.4, 4.0)
+    figure, axes = new_figure(6.4, 4.3)
     place = axes[0, 0]
     for group, color in store.colors.items():
         at, value = _samples(store.group(group))
@@ -150,6 +150,7 @@ def draw(store: Store, path: Path) -> None:
     lines.append(Line2D([], [], color="#999999", lw=0.8, ls="-.", label="chance"))
     figure.legend(handles=lines, frameon=False, fontsize=8, loc="outside lower center", ncols=3)
     place.set(xlabel="relative aperture a", ylabel="goal reached before any adversary", ylim=(0, 1))
+    figure.suptitle("More light: animals learn best behind narrower holes")
     save(figure, path)
 
 

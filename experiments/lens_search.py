@@ -108,7 +108,7 @@ def table(rows: Sequence[Row]) -> str:
 
 def draw(rows: Sequence[Row], path: Path) -> None:
     """Strehl ratio over pictures and over time."""
-    figure, axes = new_figure(10, 3.8, columns=2, sharey=True)
+    figure, axes = new_figure(10, 4.1, columns=2, sharey=True)
     for method, color in zip(METHODS, COLORS, strict=True):
         for number, search in enumerate(searches(rows, method)):
             strehl = np.array([row.strehl for row in search])
@@ -120,6 +120,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     axes[0, 0].set(xlabel="pictures computed", ylabel="Strehl ratio", ylim=(0, 1.03))
     axes[0, 1].set(xlabel="time of one core [s]", xlim=(0.3, None))
     axes[0, 0].legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(0.0, 0.77))
+    figure.suptitle("A gradient finds a lens with a fraction of the pictures, where it has a slope to follow")
     save(figure, path)
 
 

@@ -69,6 +69,7 @@ def longest(row: Row) -> float:
     return max(peaks(row), default=NO_NUMBER)
 
 
+NAMES = ("shortest peak", "middle peak", "longest peak")
 COLORS = {shortest: "#6A3D9A", middle: "#009E73", longest: "#D55E00"}
 QUANTITIES = {
     "shortest peak [nm]": shortest,
@@ -134,7 +135,7 @@ def table_by_peak(rows: Sequence[Row]) -> str:
 def draw(store: Store, path: Path) -> None:
     """What can be seen where, where the pigments went, and what it was good for."""
     rows = store.rows
-    figure, axes = new_figure(11, 3.4, columns=3)
+    figure, axes = new_figure(11, 4.0, columns=3)
     seen, moved, worth = axes[0]
     nm = np.linspace(330, 650, 65)
     seen.semilogy(nm, [difference(float(peak)) for peak in nm], color="#222222", lw=1.2)
@@ -153,6 +154,9 @@ def draw(store: Store, path: Path) -> None:
     moved.set(xlabel="generation", title="peaks [nm]")
     worth.axhline(1 / 3, color="#999999", lw=0.8, ls=":")
     worth.set(xlabel="generation", title="goal reached before any adversary", ylim=(0, 1))
+    lines = [moved.plot([], [], color=color, label=name)[0] for name, color in zip(NAMES, COLORS.values(), strict=True)]
+    figure.legend(handles=lines, loc="outside lower center", ncols=3, frameon=False)
+    figure.suptitle("The shortest peak moves into the ultraviolet, where goal and adversary differ")
     save(figure, path)
 
 

@@ -15,6 +15,7 @@ Encounter, Frozen                   several animals in one world, that see each 
 make_parallel_env                   these as a PettingZoo environment
 make_vec_env, make_env              the environments, natively batched or single
                                     (also gymnasium.make("rhabdom/Detection-v0"), Foraging, Maze ...)
+register_task                       an id of one's own for gymnasium.make
 View, write_exr, read_exr           what was seen, on disk
 """
 
@@ -30,6 +31,7 @@ from sim.worlds import catalog
 if TYPE_CHECKING:
     from sim.envs.assembly import make_parallel_env, make_vec_env
     from sim.envs.env import make_env
+    from sim.envs.registration import register_task
     from sim.exr import View, read_exr, write_exr
     from sim.eyes.eyes import Eyes
     from sim.render.batched_renderer import BatchedRenderer
@@ -72,6 +74,7 @@ _HOME = {
     "make_env": "sim.envs.env",
     "make_vec_env": "sim.envs.assembly",
     "make_parallel_env": "sim.envs.assembly",
+    "register_task": "sim.envs.registration",
     "View": "sim.exr",
     "read_exr": "sim.exr",
     "write_exr": "sim.exr",
@@ -105,6 +108,7 @@ __all__ = [
     "make_vec_env",
     "mirror",
     "read_exr",
+    "register_task",
     "ring",
     "write_exr",
 ]

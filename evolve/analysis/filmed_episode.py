@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +17,7 @@ from evolve.learning.policy import EyePolicy
 from evolve.learning.worlds import own_task_for
 from sim.envs.task_fidelity import fidelity_of
 from sim.envs.task_vec_env import TaskVecEnv
+from sim.robots.eye_kinds import kinds_of
 from sim.robots.poses import Poses
 from sim.robots.task import Task
 
@@ -24,6 +26,8 @@ __all__ = ["FilmedEpisode", "film", "moments"]
 FINE_PIXELS = 60  # least pixels along the longer side of the radiance pictures
 RAYS = 16  # per receptor and pixel, of what nobody has to be quick with
 MOST_PICTURES = 128  # for people: they are kept at even times
+
+Lit = Callable[[np.ndarray], np.ndarray]  # wavelengths [m] -> what lights were multiplied by, (1, band)
 
 
 @dataclass(frozen=True)
@@ -81,9 +85,10 @@ def film(
 ) -> FilmedEpisode:
     """Let an animal play one episode; same arguments, same episode."""
     task = own_task_for(phenotype, config)
+    (kind,) = kinds_of(task)
     with contextlib.closing(TaskVecEnv(task, 1, seed, phenotype.memory_frames, "rgb_array")) as worlds:
-        poses, columns = _play(policy, worlds)
-        views = _perfect_views(worlds.worlds.model, task, poses, radiance_every)
+        poses, columns, lit = _play(policy, worlds)
+        views = _perfect_views(worlds.worlds.model, task, poses, radiance_every, lit)
         seconds = task.substeps * float(worlds.worlds.model.opt.timestep)
     return FilmedEpisode(
         task=config.task,
@@ -91,8 +96,8 @@ def film(
         seed=seed,
         phenotype=phenotype,
         eye=config.eye,
-        azimuths_deg=np.array([mount.azimuth_deg for mount in task.mounts]),
-        elevations_deg=np.array([mount.elevation_deg for mount in task.mounts]),
+        azimuths_deg=np.array([mount.azimuth_deg for mount in kind.mounts]),
+        elevations_deg=np.array([mount.elevation_deg for mount in kind.mounts]),
         seconds=seconds,
         **columns,
         **views,
@@ -106,12 +111,13 @@ def moments(task: Task, n: int, seed: int) -> tuple[mujoco.MjModel, Poses]:
         return worlds.worlds.model, Poses.of(worlds.worlds.datas)
 
 
-def _play(policy: EyePolicy, worlds: TaskVecEnv) -> tuple[list[Poses], dict[str, Any]]:
-    """Where everything was before each action, and the columns that playing fills."""
+def _play(policy: EyePolicy, worlds: TaskVecEnv) -> tuple[list[Poses], dict[str, Any], Lit]:
+    """Where everything was before each action, the columns that playing fills, and the episode's light."""
     poses: list[Poses] = []
     rows: list[tuple[Any, ...]] = []
     pictures: list[np.ndarray] = []
     observation, info, done = worlds.reset(), dict[str, Any](), False
+    variation, varied = worlds.worlds.variation, {name: v.copy() for name, v in worlds.worlds.varied.items()}
     every = max(1, -(-worlds.worlds.episode_steps // MOST_PICTURES))
     while not done:
         if len(rows) % every == 0:
@@ -124,7 +130,7 @@ def _play(policy: EyePolicy, worlds: TaskVecEnv) -> tuple[list[Poses], dict[str,
         rows.append((np.clip(action[0], -1, 1), reward[0], info["reward_terms"], seen))
     action, reward, terms, signals = zip(*rows, strict=True)
     names = list(dict.fromkeys(name for of_step in terms for name in of_step))
-    return poses, {
+    columns = {
         "action": np.array(action),
         "reward": np.array(reward),
         "reward_terms": {name: np.array([of_step.get(name, 0.0) for of_step in terms]) for name in names},
@@ -135,22 +141,31 @@ def _play(policy: EyePolicy, worlds: TaskVecEnv) -> tuple[list[Poses], dict[str,
         "failure": info.get("failure"),
     }
 
+    def lit(wavelengths: np.ndarray) -> np.ndarray:
+        return np.ones((1, len(wavelengths))) if variation is None else variation.light(varied, wavelengths)
 
-def _perfect_views(model: mujoco.MjModel, task: Task, poses: list[Poses], every: int) -> dict[str, Any]:
+    return poses, columns, lit
+
+
+def _perfect_views(model: mujoco.MjModel, task: Task, poses: list[Poses], every: int, lit: Lit) -> dict[str, Any]:
     """The same scenes through a perfect lens: by the same receptors, and as radiance on a finer grid."""
-    perfect = replace(task.eye, pupil=None)
+    (kind,) = kinds_of(task)
+    perfect = replace(kind.eye, pupil=None)
     height, width = perfect.resolution
     factor = max(1, -(-FINE_PIXELS // max(height, width)))
     fine = replace(perfect, resolution=(factor * height, factor * width))
     fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
     receptors, pictures = (
-        sim.ModelRenderer(model, eye, task.mounts, 1, fidelity, spectra=task.spectra) for eye in (perfect, fine)
+        sim.ModelRenderer(model, eye, kind.mounts, 1, fidelity, spectra=task.spectra) for eye in (perfect, fine)
     )
-    frames = np.arange(0, len(poses), every)
-    radiance = [np.moveaxis(pictures.receptor_radiance(poses[t]), 0, 2) for t in frames]
+    wavelengths = np.asarray(receptors.eye.spectral_bands.wavelengths)
+    frames, light = np.arange(0, len(poses), every), lit(wavelengths)
+    radiance = [
+        np.moveaxis(pictures.receptor_radiance(poses[t]) * light[0, :, None, None, None, None], 0, 2) for t in frames
+    ]
     return {
-        "perfect_signals": np.concatenate([receptors.signals(moment) for moment in poses]),
-        "wavelengths_nm": 1e9 * np.asarray(receptors.eye.spectral_bands.wavelengths),
+        "perfect_signals": np.concatenate([receptors.signals(moment, light) for moment in poses]),
+        "wavelengths_nm": 1e9 * wavelengths,
         "radiance_frames": frames,
         "radiance": np.concatenate(radiance),
     }

@@ -17,6 +17,7 @@ from evolve.config.run_config import RunConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.worlds import own_task_for
 from sim.envs.task_fidelity import fidelity_of
+from sim.robots.eye_kinds import kinds_of
 
 __all__ = ["Vision", "ssim", "vision"]
 
@@ -77,10 +78,11 @@ def _own_views(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
     """The same in a task of somebody's own."""
     task = own_task_for(animal, config)
     model, poses = moments(task, SCENES, 0)
+    (kind,) = kinds_of(task)
     fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
     seen, sharp = (
-        sim.ModelRenderer(model, eye, task.mounts, SCENES, fidelity, spectra=task.spectra).signals(poses)
-        for eye in (task.eye, replace(task.eye, pupil=None))
+        sim.ModelRenderer(model, eye, kind.mounts, SCENES, fidelity, spectra=task.spectra).signals(poses)
+        for eye in (kind.eye, replace(kind.eye, pupil=None))
     )
     return np.asarray(seen), np.asarray(sharp)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from evolve.learning.policy import Brain, TrainingDiverged, save_policy
 from evolve.learning.ppo import Episodes, Progress, Training, Worlds, play, train
 from evolve.learning.training_stage import TrainingStage
 from evolve.learning.worlds import worlds_of
-from evolve.store.evaluation import Evaluation
+from evolve.store.evaluation import Evaluation, most_frequent
 
 __all__ = ["evaluate"]
 
@@ -41,9 +42,9 @@ def evaluate(
     began = time.perf_counter()
     try:
         if stage is None:
-            training, episodes = _live(phenotype, config, seed, progress)
+            training, episodes, failures = _live(phenotype, config, seed, progress)
         else:
-            training, episodes = _live_until(stage, phenotype, config, seed, progress)
+            training, episodes, failures = _live_until(stage, phenotype, config, seed, progress)
     except TrainingDiverged as error:
         return Evaluation.failed(str(error), time.perf_counter() - began)
     save_policy(training.policy, policy_path)
@@ -54,14 +55,15 @@ def evaluate(
         steps=training.steps,
         seconds=time.perf_counter() - began,
         curve=training.curve,
+        mishaps=most_frequent(failures),
     )
 
 
 def _live_until(
     stage: TrainingStage, phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress | None
-) -> tuple[Training, Episodes]:
-    """Through all stages up to this one, from the latest whose checkpoint there is."""
-    begun, first = None, 0
+) -> tuple[Training, Episodes, Counter[str]]:
+    """Through all stages up to this one, from the latest whose checkpoint there is; failures are those since then."""
+    begun, first, failures = None, 0, Counter[str]()
     for earlier in reversed(range(stage.number)):
         if begun is None and (begun := load_checkpoint(stage.checkpoints[earlier])) is not None:
             first = earlier + 1
@@ -70,10 +72,10 @@ def _live_until(
         # A stage has none itself: a little budget, divided once more, may be too little for one.
         life = replace(config, learning=learning, search=replace(config.search, rungs=1))
         entropy = [seed, number] if number else seed  # the first stage begins as a whole training does
-        training, episodes = _live(phenotype, life, entropy, progress, begun)
-        begun = training.end
+        training, episodes, more = _live(phenotype, life, entropy, progress, begun)
+        begun, failures = training.end, failures + more
         save_checkpoint(begun, stage.checkpoints[number])
-    return training, episodes
+    return training, episodes, failures
 
 
 def _live(
@@ -82,9 +84,9 @@ def _live(
     entropy: int | list[int],
     progress: Progress | None,
     begun: Checkpoint | None = None,
-) -> tuple[Training, Episodes]:
+) -> tuple[Training, Episodes, Counter[str]]:
     """Training, and the evaluation episodes after it, from starts and objects' places never seen before. Mazes are
-    the same for all of a run, and of all runs."""
+    the same for all of a run, and of all runs. What failed in any of them."""
     weights, *seeds = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     places = worlds_of(phenotype, config, *seeds)
     with (
@@ -94,4 +96,5 @@ def _live(
     ):
         brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder)
         training = train(Worlds(lessons, checkpoints), brain, config.learning, weights, progress, begun)
-        return training, play(training.policy, finals, seeds[1])
+        episodes = play(training.policy, finals, seeds[1])
+        return training, episodes, lessons.failures + checkpoints.failures + finals.failures

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -19,13 +19,14 @@ AHEAD = math.radians(205)  # direction that the head is seen from: a little to i
 LARGEST_EYE = math.radians(24)  # half angle of the head that an eye's disk takes, at most
 
 
-def agent_figure(eyes: sim.Eyes, name: str) -> Html:
+def agent_figure(eyes: sim.Eyes, name: str, placed: Sequence[float] | None = None) -> Html:
     """A drawing of the head, seen from in front and above; eyes as disks, as wide as their room on the head allows.
 
     name: keeps the ids in the drawing apart from those of others on the page
+    placed: azimuths [rad] of eyes that are elsewhere than evenly over their range
     """
-    azimuths = [float(azimuth) for azimuth in eyes.azimuths()]
-    between = math.radians(eyes.placement_range_deg) / max(eyes.n_eyes - 1, 1)
+    azimuths = [float(azimuth) for azimuth in (eyes.azimuths() if placed is None else placed)]
+    between = math.radians(eyes.placement_range_deg) / max(eyes.n_eyes - 1, 1) if placed is None else _closest(azimuths)
     half = min(LARGEST_EYE, 0.45 * between) if eyes.n_eyes > 1 and between > 0 else LARGEST_EYE
     fields = joined(_field(azimuth, math.radians(eyes.fov_deg)) for azimuth in azimuths)
     behind = joined(_eye(azimuth, half) for azimuth in azimuths if not _faces(azimuth))
@@ -39,6 +40,12 @@ def agent_figure(eyes: sim.Eyes, name: str) -> Html:
         '<g class="fields">{}</g>{}<circle r="{}" fill="url(#{}-skin)"/>{}</svg>',
         *(says, name, fields, behind, RADIUS, name, before),
     )
+
+
+def _closest(azimuths: Sequence[float]) -> float:
+    """Between neighbours that do not look the same way, all round; 0 where there are none."""
+    around = np.unique(np.round(np.mod(azimuths, 2 * math.pi), 6))
+    return float(np.diff([*around, around[0] + 2 * math.pi]).min()) if len(around) > 1 else 0.0
 
 
 def _projected(points: np.ndarray) -> np.ndarray:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 from evolve.analysis.statistics import acuity_cpd, champions
+from evolve.config.run_config import RunConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.learning.task_module import executed_task
+from evolve.learning.worlds import embodied
 from evolve.report.agent_figure import agent_figure
 from evolve.report.markup import Html, html, joined, rounded
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
+from sim.robots.eye_kinds import kinds_of
 
-__all__ = ["lineup"]
+__all__ = ["azimuths", "lineup"]
 
 MOST = 60  # animals: a page of thousands of generations shows as many of them, evenly spread
 
@@ -39,6 +46,15 @@ def _thinned(best: list[tuple[int, Candidate]]) -> list[tuple[int, Candidate]]:
     return [best[round(i * (len(best) - 1) / (MOST - 1))] for i in range(MOST)]
 
 
+def azimuths(animal: Phenotype, config: RunConfig) -> list[float] | None:
+    """Where a task of somebody's own places the animal's eyes [rad]; None: as rhabdom's own tasks do."""
+    own = config.own_task
+    if own is None:
+        return None
+    (kind,) = kinds_of(embodied(executed_task(own), animal, config))
+    return [math.radians(mount.azimuth_deg) for mount in kind.mounts]
+
+
 def _card(run: Run, generation: int, candidate: Candidate, name: str) -> Html:
     animal = candidate.phenotype
     height, width = animal.resolution
@@ -51,5 +67,5 @@ def _card(run: Run, generation: int, candidate: Candidate, name: str) -> Html:
         "brain": f"{animal.neurons} neurons, {animal.memory_frames} frames",
     }
     rows = joined(html("<dt>{}</dt><dd>{}</dd>", key, value) for key, value in facts.items())
-    drawn = agent_figure(animal.eyes(run.config.eye), name)
+    drawn = agent_figure(animal.eyes(run.config.eye), name, azimuths(animal, run.config))
     return html('<div class="card" data-generation="{}">{}<dl>{}</dl></div>', generation, drawn, rows)

@@ -201,7 +201,8 @@ def candidates_section(run: Run) -> Html:
     intro = html(
         "<p>Fitness is the mean return of the evaluation episodes; lowest and highest are single episodes.</p>\n"
     )
-    return section("candidates", "Candidates", intro + tables.all_candidates(run) + tables.failures(run))
+    everybody = tables.all_candidates(run) + tables.failures(run)
+    return section("candidates", "Candidates", intro + everybody + tables.mishaps(run))
 
 
 def facts_section(run: Run) -> Html:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from evolve.analysis.mishaps import mishaps_of
 from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, gene_values, succeeded
 from evolve.config.assemble import to_toml
 from evolve.genome.genes import ALL_GENES
@@ -12,7 +13,7 @@ from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.versions import recorded
 
-__all__ = ["all_candidates", "best_genes", "failures", "headline", "run_facts"]
+__all__ = ["all_candidates", "best_genes", "failures", "headline", "mishaps", "run_facts"]
 
 
 def headline(run: Run) -> Html:
@@ -117,6 +118,19 @@ def failures(run: Run) -> Html:
         return Html()
     rows = [[str(c.id), str(c.generation), c.failure or f"fitness is {c.fitness}"] for c in failed]
     return html("<h3>Failed candidates</h3>\n{}", table(["no.", "generation", "reason"], rows, "failures"))
+
+
+def mishaps(run: Run) -> Html:
+    """What ended episodes in the middle of candidates' lives, how often and whose; "" if nothing did."""
+    found = mishaps_of(run.candidates)
+    if not found:
+        return Html()
+    rows = [[one.said, str(one.episodes), str(one.candidates)] for one in found]
+    return html(
+        "<h3>Episodes that failed</h3>\n<p>Each of these ended where it was, in training or evaluation, and the "
+        "candidate's life went on.</p>\n{}",
+        table(["what failed", "episodes", "candidates"], rows, "mishaps"),
+    )
 
 
 def run_facts(run: Run) -> Html:

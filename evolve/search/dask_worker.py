@@ -114,6 +114,7 @@ def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:
     record = json.loads(text)
     record["returns"] = tuple(record["returns"])
     record["curve"] = tuple((int(steps), float(value)) for steps, value in record["curve"])
+    record["mishaps"] = tuple((said, int(episodes)) for said, episodes in record["mishaps"])
     return Evaluation(**record), policy, checkpoint
 
 

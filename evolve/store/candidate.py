@@ -45,6 +45,7 @@ class Candidate:
     parents: tuple[int, ...] = ()
     rung: int = 0
     policy: str | None = None
+    mishaps: tuple[tuple[str, int], ...] = ()
 
     def __repr__(self) -> str:
         """Short: a record holds thousands."""
@@ -80,6 +81,8 @@ class Candidate:
     def to_line(self) -> str:
         """One line of JSON; numbers are written so that they read back bit for bit, and what is no number as null."""
         record = {**vars(self), "phenotype": self.phenotype.to_json()}
+        if not self.mishaps:
+            del record["mishaps"]
         return json.dumps(_finite(record), allow_nan=False) + "\n"
 
     @classmethod
@@ -91,7 +94,13 @@ class Candidate:
         """
         record = parsed(line)
         if isinstance(record, dict):
-            record = {"parents": [], "rung": 0, "policy": None, **record}  # not written by the first runs
+            record = {
+                "parents": [],
+                "rung": 0,
+                "policy": None,
+                "mishaps": [],
+                **record,
+            }  # left out, or of the first runs
         names = [f.name for f in fields(cls)]
         if not isinstance(record, dict) or sorted(record) != sorted(names):
             raise ValueError(f"wrong fields: must hold exactly {', '.join(names)}")
@@ -107,6 +116,7 @@ class Candidate:
                 curve=tuple(_point(entry) for entry in listed(record["curve"], "curve", 0, _LONGEST)),
                 failure=_text(record["failure"], "failure"),
                 policy=_checksum(record["policy"]),
+                mishaps=tuple(_mishap(entry) for entry in listed(record["mishaps"], "mishaps", 0, _LONGEST)),
                 parents=tuple(
                     whole_number(one, "parents", 0, _COUNTS["id"])
                     for one in listed(record["parents"], "parents", 0, _LONGEST)
@@ -145,6 +155,14 @@ def _real_or_none(value: Any, name: str, valid: Interval) -> float:
 def _point(entry: Any) -> tuple[int, float]:
     steps, value = listed(entry, "curve", 2, 2)
     return whole_number(steps, "curve", 0, _COUNTS["steps"]), _real_or_none(value, "curve", _ANY)
+
+
+def _mishap(entry: Any) -> tuple[str, int]:
+    said, episodes = listed(entry, "mishaps", 2, 2)
+    text = _text(said, "mishaps")
+    if text is None:
+        raise ValueError("mishaps: must say what went wrong")
+    return text, whole_number(episodes, "mishaps", 1, _COUNTS["steps"])
 
 
 def _text(value: Any, name: str) -> str | None:

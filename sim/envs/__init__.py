@@ -5,6 +5,7 @@ vec_env                EyesVecEnv: stable-baselines3
 task_vec_env           TaskVecEnv: the same for tasks of one's own
 task_worlds            their worlds
 task_senses            what an animal in them knows
+task_sight             what one kind of its eyes sees
 task_animals           all animals in them, those who learn and those who do not
 task_pictures          pictures of them
 parallel_env           EncounterEnv: PettingZoo
@@ -14,6 +15,7 @@ one_environment        what both answer stable-baselines3 alike
 env                    make_env, EyesEnv: Gymnasium
 vector_env             EyesVectorEnv: Gymnasium's vector environment
 registration           Gymnasium's ids
+registered_env         environments as it makes them by these
 simulation             worlds in motion, unseen
 observation            what an agent knows
 info                   what every step says

@@ -23,6 +23,7 @@ from sim.render.fidelity_choice import chosen_fidelity
 from sim.render.prepared_scene import PreparedScene
 from sim.robots.encounter import Encounter
 from sim.robots.task import Task
+from sim.robots.variation import Variation
 from sim.tasks.reward import check_mode
 from sim.worlds.course import Course
 from sim.worlds.world import build_world
@@ -47,12 +48,14 @@ def make_vec_env(
     least_return: float | None = None,
     episode_steps: int | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
+    vary: Mapping[str, tuple[float, float]] | None = None,
     render_mode: str | None = None,
 ) -> EyesVecEnv | TaskVecEnv:
     """A batched environment of one task.
 
-    task: one of `sim.TASKS`, or a `sim.Task` of one's own, which says all but n_envs, seed, memory and render_mode
-        itself; a `sim.Encounter` of animals that are alike learns one policy, with a row for each animal of each world
+    task: one of `sim.TASKS`, or a `sim.Task` of one's own, which says all but n_envs, seed, memory, episode_steps
+        and render_mode itself; a `sim.Encounter` of animals that are alike learns one policy, with a row for each
+        animal of each world
     eyes: of every agent; default Eyes()
     n_envs: number of worlds
     seed: of episodes and noise; None draws one
@@ -65,6 +68,8 @@ def make_vec_env(
     least_return: in training, an episode whose rewards add up to no more is truncated; None: none is
     episode_steps: actions after which an episode is truncated; None: as many as the task has
     spectra: of materials and lights, by name, in the place of their colours: see `sim.build_world`
+    vary: {"light": (low, high)}: each episode has its own level of light, drawn evenly over its logarithm; full
+        daylight is 1, and the most
     render_mode: "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye reports,
         side by side
 
@@ -73,10 +78,12 @@ def make_vec_env(
     Raises:
         ValueError: a bad argument.
     """
+    if episode_steps is not None:
+        _require_whole("episode_steps", episode_steps, 1)
     if isinstance(task, Task | Encounter):
         _refuse_for_tasks(locals())
         _check(n_envs, seed, memory, mode, render_mode)
-        return TaskVecEnv(task, n_envs, seed, memory, render_mode)
+        return TaskVecEnv(task, n_envs, seed, memory, render_mode, episode_steps)
     eyes = Eyes() if eyes is None else eyes
     if not isinstance(eyes, Eyes):
         raise ValueError(f"eyes = {eyes!r}: must be sim.Eyes or None, the default ones")
@@ -84,12 +91,11 @@ def make_vec_env(
     _require_whole("world_seed", world_seed, 0)
     _check(n_envs, seed, memory, mode, render_mode)
     check_least_return(least_return, mode)
+    variation = _dimmed(vary)
     eyes = eyes if asked is None else replace(eyes, bands=asked.bands)
     scene = prepared_scene(task, eyes, world_seed=world_seed, mazes=mazes, course=course, spectra=spectra)
-    if episode_steps is not None:
-        _require_whole("episode_steps", episode_steps, 1)
     how: dict[str, Any] = {"memory": memory, "mode": mode, "least_return": least_return, "render_mode": render_mode}
-    how["episode_steps"] = episode_steps
+    how |= {"episode_steps": episode_steps, "variation": variation}
     return vec_env_in(scene, asked or chosen_fidelity(scene), n_envs, seed, **how)
 
 
@@ -142,6 +148,7 @@ def vec_env_in(
     least_return: float | None = None,
     episode_steps: int | None = None,
     render_mode: str | None = None,
+    variation: Variation | None = None,
 ) -> EyesVecEnv:
     """A batched environment in a scene that has been prepared, rendered as finely as is said; arguments as
     `make_vec_env` has them.
@@ -153,13 +160,26 @@ def vec_env_in(
     threads = min(dr.thread_count(), n_envs)
     world = scene.world if episode_steps is None else replace(scene.world, episode_steps=episode_steps)
     simulation = Simulation(world, n_envs, seed, mode, threads, least_return)
-    return EyesVecEnv(simulation, BatchedRenderer.of(scene, n_envs, fidelity), memory, render_mode)
+    return EyesVecEnv(simulation, BatchedRenderer.of(scene, n_envs, fidelity), memory, render_mode, variation)
+
+
+def _dimmed(vary: Mapping[str, tuple[float, float]] | None) -> Variation | None:
+    """What varies between episodes of rhabdom's own tasks."""
+    if not vary:
+        return None
+    variation = Variation(vary)
+    for name, (_, high) in variation.ranges.items():
+        if name != "light":
+            raise ValueError(f"vary: {name!r}: is for a sim.Task; rhabdom's own tasks vary 'light' alone")
+        if high > 1:
+            raise ValueError(f"vary: light = {vary[name]!r}: must be at most 1, full daylight")
+    return variation
 
 
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
     """What a task of one's own says itself."""
     defaults = {name: p.default for name, p in inspect.signature(make_vec_env).parameters.items()}
-    for name in set(defaults) - {"task", "n_envs", "seed", "memory", "render_mode"}:
+    for name in set(defaults) - {"task", "n_envs", "seed", "memory", "episode_steps", "render_mode"}:
         if given[name] != defaults[name]:
             raise ValueError(f"{name} = {given[name]!r}: must be left out, a sim.Task says it itself")
 

@@ -11,6 +11,7 @@ from sim.envs.assembly import make_vec_env
 from sim.envs.follow_camera import RENDER_MODES
 from sim.eyes.eyes import Eyes
 from sim.robots.encounter import Encounter
+from sim.robots.task import Task
 from sim.worlds.state import WorldState
 
 
@@ -26,7 +27,9 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     metadata = {"render_modes": [*RENDER_MODES], "render_fps": 5}  # noqa: RUF012 (Gymnasium's own declaration)
 
-    def __init__(self, task: str, eyes: Eyes | None = None, *, render_mode: str | None = None, **options: Any) -> None:
+    def __init__(
+        self, task: str | Task, eyes: Eyes | None = None, *, render_mode: str | None = None, **options: Any
+    ) -> None:
         if isinstance(task, Encounter):
             raise ValueError(
                 "task: several animals learn in a sim.Encounter: must be its `alone`, or make_parallel_env"
@@ -69,7 +72,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         self._batch.close()
 
 
-def make_env(task: str, eyes: Eyes | None = None, **options: Any) -> EyesEnv:
+def make_env(task: str | Task, eyes: Eyes | None = None, **options: Any) -> EyesEnv:
     """A single environment; see `EyesEnv`."""
     return EyesEnv(task, eyes, **options)
 

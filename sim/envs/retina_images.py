@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from optics import Eye
@@ -27,6 +29,13 @@ def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:
     large = pixels.repeat(scale, axis=1).repeat(scale, axis=2)
     gap = np.full((height * scale, GAP, 3), BETWEEN, np.uint8)
     return np.concatenate([part for image in large for part in (gap, image)][1:], axis=1)
+
+
+def one_above_another(pictures: Sequence[np.ndarray]) -> np.ndarray:
+    """Rows of one width, filled up with gaps' grey."""
+    width = max(picture.shape[1] for picture in pictures)
+    rows = [np.pad(p, ((GAP, 0), (0, width - p.shape[1]), (0, 0)), constant_values=BETWEEN) for p in pictures]
+    return np.concatenate(rows)[GAP:]
 
 
 def _palette(eye: Eye) -> np.ndarray:

@@ -12,10 +12,10 @@ from sim.physics.physics import Agents, Motion, Physics
 from sim.tasks.random_streams import Streams
 from sim.tasks.reward import MODES, TERMS, check_mode, reward_terms
 from sim.tasks.task import respawned, task_of
+from sim.worlds.catalog import EPISODE_STEPS
 from sim.worlds.state import WorldState, wrap_angle
 from sim.worlds.world import MAX_SPEED, World
 
-EPISODE_STEPS = 256  # actions, then the episode is truncated; as published
 MAX_TURN = np.pi / 4  # [rad] change of heading per action; chosen
 
 UNSTABLE = "unstable physics"

@@ -8,7 +8,7 @@ import drjit as dr
 import numpy as np
 
 from sim.envs import task_state
-from sim.envs.task_senses import Senses
+from sim.envs.task_senses import Seen, Senses
 from sim.envs.task_worlds import StepOfWorld, TaskWorlds
 from sim.robots.encounter import Encounter, Frozen, name_of
 from sim.robots.poses import Poses
@@ -18,12 +18,14 @@ from sim.robots.task import Task
 class TaskAnimals:
     """Worlds, and what the animals in them know.
 
-    task, n, seed: see TaskWorlds · memory: frames in the observations of those who learn
+    task, n, seed, episode_steps: see TaskWorlds · memory: frames in the observations of those who learn
     learners: senses of those who learn · seeing: of all who look at anything, those who learn first
     """
 
-    def __init__(self, task: Task | Encounter, n: int, seed: int | None, memory: int) -> None:
-        self.worlds = TaskWorlds(task, n, seed, min(dr.thread_count(), n))
+    def __init__(
+        self, task: Task | Encounter, n: int, seed: int | None, memory: int, episode_steps: int | None = None
+    ) -> None:
+        self.worlds = TaskWorlds(task, n, seed, min(dr.thread_count(), n), episode_steps)
         number = len(self.worlds.learners)
         self.learners = [Senses(self.worlds, k, memory) for k in range(number)]
         self._frozen = [
@@ -64,21 +66,22 @@ class TaskAnimals:
                 senses.acted(commanded)
         return self.worlds.step(everyones)
 
-    def look(self, worlds: np.ndarray) -> list[np.ndarray]:
+    def look(self, worlds: np.ndarray) -> list[Seen]:
         """What all who look see in these worlds; all eyes are begun before any is waited for."""
         poses = Poses.of(self.worlds.datas)
         begun = [senses.begin(poses, worlds) for senses in self.seeing]
-        return [looking.wait() for looking in begun]
+        return [{name: looking.wait() for name, looking in kinds.items()} for kinds in begun]
 
-    def begin_again(self, ended: np.ndarray, seen: Sequence[np.ndarray]) -> None:
+    def begin_again(self, ended: np.ndarray, seen: Sequence[Seen]) -> None:
         """New episodes in these worlds; what is seen there takes the place of what was."""
         for senses in self.seeing:
             senses.action[ended] = 0.0
         self.worlds.reset(ended)
         for frames, fresh in zip(seen, self.look(ended), strict=True):
-            frames[ended] = fresh
+            for name, of_kind in frames.items():
+                of_kind[ended] = fresh[name]
 
-    def remember(self, seen: Sequence[np.ndarray], fresh: np.ndarray) -> list[dict[str, np.ndarray]]:
+    def remember(self, seen: Sequence[Seen], fresh: np.ndarray) -> list[dict[str, np.ndarray]]:
         """Observations of those who learn; fresh: worlds that have just begun."""
         known = [senses.observation(frames, fresh) for senses, frames in zip(self.seeing, seen, strict=True)]
         return known[: len(self.learners)]

@@ -9,41 +9,71 @@ from dataclasses import replace
 
 import numpy as np
 
+import optics
 from sim.envs.task_worlds import TaskWorlds
 from sim.render.fidelity import Fidelity
+from sim.robots.edge_rays import allowed_error
 from sim.robots.encounter import Frozen, among, cast
+from sim.robots.eye_kinds import EYES, kinds_of, several
 from sim.robots.model_fidelity import choose_model_fidelity
 from sim.robots.poses import Poses
 from sim.robots.task import Task
+from sim.robots.variation import Variation
 
 AUTO = "auto"
 WORLDS, LATER = 6, 12  # episodes that are looked into: at their beginnings, and so many random actions later
 
 
-def fidelity_of(task: Task) -> Fidelity:
-    """The task's own, or, "auto", what `sim.choose_model_fidelity` finds; same task, same fidelity.
+def fidelities_of(task: Task) -> dict[str, Fidelity]:
+    """Of each kind of eyes, the task's own, or, "auto", what `sim.choose_model_fidelity` finds; same task, same
+    fidelity.
 
     Raises:
         ValueError: it is neither, and what the task's model and eyes raise.
     """
-    asked = task.fidelity
-    if isinstance(asked, Fidelity):
-        return asked
-    if asked != AUTO:
-        raise ValueError(f"{type(task).__name__}: fidelity = {asked!r}: must be a sim.Fidelity, or {AUTO!r}")
-    with contextlib.closing(TaskWorlds(task, WORLDS, 0)) as worlds:
-        datas = _moments(worlds)
-        return choose_model_fidelity(worlds.model, task.eye, task.mounts, datas, spectra=worlds.spectra)
+    kinds = kinds_of(task)
+    for kind in kinds:
+        if not isinstance(kind.fidelity, Fidelity) and kind.fidelity != AUTO:
+            said = f"fidelity = {kind.fidelity!r}"
+            raise ValueError(f"{type(task).__name__}: {said}: must be a sim.Fidelity, or {AUTO!r}")
+    found = {kind.name: kind.fidelity for kind in kinds if isinstance(kind.fidelity, Fidelity)}
+    if len(found) < len(kinds):
+        with contextlib.closing(TaskWorlds(task, WORLDS, 0)) as worlds:
+            datas, model, spectra = _moments(worlds), worlds.model, worlds.spectra
+            variation = worlds.variation
+        for kind in kinds:
+            if kind.name not in found:
+                tolerance = None if variation is None else _in_brightest(variation, kind.eye)
+                found[kind.name] = choose_model_fidelity(
+                    model, kind.eye, kind.mounts, datas, tolerance, spectra=spectra
+                )
+    return found
 
 
-def fidelity_among(animals: Sequence[Task], number: int) -> Fidelity:
+def _in_brightest(variation: Variation, eye: optics.Eye) -> float:
+    """What may be wrong of a signal, where lights are brighter in some episodes, and errors with them."""
+    most = variation.extremes(np.asarray(eye.spectral_bands.wavelengths)).max()
+    return allowed_error(eye, None) / max(float(most), 1.0)
+
+
+def fidelity_of(task: Task) -> Fidelity:
+    """Of a task with eyes of one kind.
+
+    Raises:
+        ValueError: see `fidelities_of`.
+    """
+    (found,) = fidelities_of(task).values()
+    return found
+
+
+def fidelities_among(animals: Sequence[Task], number: int) -> dict[str, Fidelity]:
     """Of one of them, by what it sees of the others.
 
     Raises:
-        ValueError: see `fidelity_of`.
+        ValueError: see `fidelities_of`.
     """
     others = [Frozen(animal) for k, animal in enumerate(animals) if k != number]
-    return fidelity_of(among(animals[number], others))
+    return fidelities_of(among(animals[number], others))
 
 
 def with_settled_others(task: Task) -> Task:
@@ -51,7 +81,7 @@ def with_settled_others(task: Task) -> Task:
     anew.
 
     Raises:
-        ValueError: see `fidelity_of`.
+        ValueError: see `fidelities_of`.
     """
     _, frozen = cast(task)
     animals = [task, *(other.task for other in frozen)]
@@ -59,7 +89,8 @@ def with_settled_others(task: Task) -> Task:
     for number, other in enumerate(frozen, start=1):
         body = copy.copy(other.task)
         if other.policy is not None:
-            body.fidelity = fidelity_among(animals, number)
+            found = fidelities_among(animals, number)
+            body.fidelity = found if several(body) else found[EYES]
         settled.append(replace(other, task=body))
     return among(task, settled)
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from sim.envs.retina_images import side_by_side
+from sim.envs.retina_images import one_above_another, side_by_side
 from sim.envs.task_animals import TaskAnimals
+from sim.envs.task_senses import Senses
 from sim.pictures.quick_camera import QuickCamera
 from sim.robots.encounter import of_world
 from sim.robots.eye_marks import with_eyes
@@ -28,7 +29,7 @@ class TaskPictures:
         """(y, x, 3) uint8: one of every world, or of the eyes of each that learns in every world; none without mode."""
         if self._mode == "eyes":
             learners = self._animals.learners
-            return [side_by_side(frame, senses.renderer.eye) for senses in learners for frame in senses.newest]
+            return [picture for senses in learners for picture in _of_all_kinds(senses)]
         if self._mode == "rgb_array":
             worlds = self._animals.worlds
             self._camera = self._camera or QuickCamera(worlds.model, self._animals.learners[0].renderer.spectra)
@@ -40,10 +41,19 @@ class TaskPictures:
         named = of_world(worlds.animals, "camera") or _overview(worlds.model)
         picture, view = camera.picture(data, named, PICTURE[1], PICTURE[0]), camera.mirror.viewpoint(named)
         reach = RIMS * float(worlds.model.stat.extent)
-        for senses in self._animals.seeing:
-            pupils, frames = senses.renderer.eye_frames(Poses.of([data]))
-            picture = with_eyes(picture, view, (pupils[0], frames[0]), senses.renderer.eye.fov_deg, reach)
+        poses = Poses.of([data])
+        for renderer in (sight.renderer for senses in self._animals.seeing for sight in senses.sights.values()):
+            pupils, frames = renderer.eye_frames(poses)
+            picture = with_eyes(picture, view, (pupils[0], frames[0]), renderer.eye.fov_deg, reach)
         return picture
+
+
+def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
+    """A picture of each world: a row for each kind of eyes."""
+    rows = [
+        [side_by_side(frame, sight.renderer.eye) for frame in sight.memory.newest] for sight in senses.sights.values()
+    ]
+    return [one_above_another(pictures) for pictures in zip(*rows, strict=True)]
 
 
 def _overview(model: mujoco.MjModel) -> Viewpoint:

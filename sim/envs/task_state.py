@@ -23,7 +23,8 @@ def of_worlds(worlds: TaskWorlds) -> dict[str, np.ndarray]:
         mujoco.mj_getState(worlds.model, data, row, _ALL)
     chance = np.array([json.dumps(rng.bit_generator.state) for rng in worlds.rngs])
     felt = {_felt(worlds, k): array.copy() for k, array in enumerate(worlds.felt)}
-    return {"physics": physics, "chance": chance, "steps": worlds.steps.copy(), **felt}
+    varied = {_varied(name): array.copy() for name, array in worlds.varied.items()}
+    return {"physics": physics, "chance": chance, "steps": worlds.steps.copy(), **felt, **varied}
 
 
 def bring_back(worlds: TaskWorlds, state: Mapping[str, np.ndarray], chosen: np.ndarray) -> None:
@@ -38,11 +39,17 @@ def bring_back(worlds: TaskWorlds, state: Mapping[str, np.ndarray], chosen: np.n
         worlds.steps[i] = state["steps"][i]
         for k, felt in enumerate(worlds.felt):
             felt[i] = state[_felt(worlds, k)][i]
+        for name, values in worlds.varied.items():
+            values[i] = state[_varied(name)][i]
 
 
 def _felt(worlds: TaskWorlds, number: int) -> str:
     """What an animal's part is called."""
     return "felt" if number == 0 else f"{name_of(worlds.animals[number])}.felt"
+
+
+def _varied(name: str) -> str:
+    return f"varied.{name}"
 
 
 def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:

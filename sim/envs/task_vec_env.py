@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -24,22 +25,32 @@ class TaskVecEnv(OneEnvironment):
 
     Worlds start anew by themselves, as stable-baselines3 has it: what is returned is then the first observation of the
     new episode, and info["terminal_observation"] the last of the old one. Observations are "eyes" (memory, eye,
-    channel, height, width), noise included, "previous_action", and "feels", if the task's animal feels anything. `info`
-    has reward_terms, is_success, and failure where one of the task's methods fails: that ends the world's episode, and
-    the others go on. Of an encounter, the first animal of all worlds comes first, then the second.
+    channel, height, width), noise included (of several kinds of eyes an array each, by their names), "previous_action",
+    and "feels", if the task's animal feels anything. `info` has reward_terms, is_success, varied (if the task varies
+    anything), and failure where one of the task's methods fails: that ends the world's episode, and the others go on.
+    Of an encounter, the first animal of all worlds comes first, then the second.
+
+    failures: of the tasks' methods, and how many episodes each has ended
 
     task: what is done · n_envs: number of worlds · seed: of episodes and noise
     memory: frames in an observation · render_mode: "rgb_array" (with the animals' eyes and the rims of their fields of
         view), "eyes" or None
+    episode_steps: actions, then an episode is truncated; None: as many as the task has
 
     Raises:
         ValueError: animals that learn together are not alike.
     """
 
     def __init__(
-        self, task: Task | Encounter, n_envs: int, seed: int | None, memory: int = 1, render_mode: str | None = None
+        self,
+        task: Task | Encounter,
+        n_envs: int,
+        seed: int | None,
+        memory: int = 1,
+        render_mode: str | None = None,
+        episode_steps: int | None = None,
     ) -> None:
-        self.animals = TaskAnimals(task, n_envs, seed, memory)
+        self.animals = TaskAnimals(task, n_envs, seed, memory, episode_steps)
         self.task, self.render_mode = task, render_mode
         self._pictures = TaskPictures(self.animals, render_mode)
         self._learners, self._everyone = self.animals.learners, np.arange(n_envs)
@@ -48,7 +59,7 @@ class TaskVecEnv(OneEnvironment):
         first = self._learners[0]
         super().__init__(n_envs * len(self._learners), first.observation_space, first.action_space)
         self._commanded = np.zeros((self.num_envs, *self.action_space.shape), np.float32)
-        self._returns, self._told = np.zeros(self.num_envs), set[str]()
+        self._returns, self.failures = np.zeros(self.num_envs), Counter[str]()
 
     @property
     def worlds(self) -> TaskWorlds:
@@ -57,7 +68,7 @@ class TaskVecEnv(OneEnvironment):
 
     @property
     def renderer(self) -> ModelRenderer:
-        """The eyes of the animal that learns; of the first, where several do."""
+        """The eyes of the animal that learns; of the first, where several do, and of the first kind it has."""
         return self._learners[0].renderer
 
     def reset(self) -> dict[str, np.ndarray]:
@@ -66,8 +77,11 @@ class TaskVecEnv(OneEnvironment):
         self._reset_seeds()
         self._reset_options()
         self._returns[:] = 0.0
-        self.reset_infos = [{"reward_terms": {}, "is_success": False} for _ in range(self.num_envs)]
-        return _rows(self.animals.reset())
+        observations = self.animals.reset()
+        self.reset_infos = [
+            {"reward_terms": {}, "is_success": False, **self._varied(row)} for row in range(self.num_envs)
+        ]
+        return _rows(observations)
 
     def step_async(self, actions: np.ndarray) -> None:
         actions = np.asarray(actions, np.float32)
@@ -95,7 +109,7 @@ class TaskVecEnv(OneEnvironment):
         ended = np.flatnonzero(done[:n])  # an episode ends for all its animals at once
         if len(ended):
             for number, senses in enumerate(self._learners):
-                last = senses.preview(seen[number][ended], ended)
+                last = senses.preview(seen[number], ended)
                 for k, world in enumerate(ended):
                     row = {name: array[k] for name, array in last.items()}
                     infos[number * n + world]["terminal_observation"] = row
@@ -147,7 +161,9 @@ class TaskVecEnv(OneEnvironment):
             info: dict[str, Any] = {"reward_terms": outcome.terms, "is_success": outcome.success}
             if outcome.failure is not None:
                 info["failure"] = outcome.failure
-                self._warn(outcome.failure)
+                self._count(outcome.failure, row)
+            if self.worlds.variation is not None:
+                info |= self._varied(row)
             if outcome.terminated or outcome.truncated:
                 info["TimeLimit.truncated"] = outcome.truncated
                 steps = self.worlds.steps[row % len(self._everyone)]
@@ -155,10 +171,17 @@ class TaskVecEnv(OneEnvironment):
             infos.append(info)
         return infos
 
-    def _warn(self, failure: str) -> None:
-        """Once of each."""
-        if failure not in self._told:
-            self._told.add(failure)
+    def _varied(self, row: int) -> dict[str, Any]:
+        """How the world of a row differs from others, if they differ."""
+        varied = {name: float(values[row % len(self._everyone)]) for name, values in self.worlds.varied.items()}
+        return {"varied": varied} if varied else {}
+
+    def _count(self, failure: str, row: int) -> None:
+        """And warn once of each. Where several learn, the episode is one of all of them."""
+        if row >= len(self._everyone):
+            return
+        self.failures[failure] += 1
+        if self.failures[failure] == 1:
             warnings.warn(f"{type(self.task).__name__}: {failure}; its episode ends here", stacklevel=4)
 
 

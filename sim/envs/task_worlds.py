@@ -14,7 +14,9 @@ import numpy as np
 
 from sim.robots import task as task_module
 from sim.robots.encounter import Encounter, cast, name_of, of_world
+from sim.robots.eye_kinds import kinds_of
 from sim.robots.task import Task, compiled, named_terms
+from sim.robots.variation import Variation
 
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 _OURS = (__file__, task_module.__file__)
@@ -36,21 +38,29 @@ class TaskWorlds:
     """Their data, and what is done with it.
 
     task: of the animal that learns, with its others; or an Encounter, where all learn
+    episode_steps: actions, then an episode is truncated; None: as many as the task has
     learners: tasks of those who learn · frozen: the others · animals: tasks of all, those who learn first
     model · datas: mjData of every world · steps: actions taken in its episode, (n,) int
+    variation: what differs between episodes; None: nothing · varied: how it is now, by name: (n,)
     felt: what each animal feels now, by animal: (n, numbers) float32
-    rngs: of each world's episodes · noise_keys: of every animal's receptors (animal, n)
+    rngs: of each world's episodes · noise_keys: of receptors, by animal: (kind of eyes, n)
     entropy: what all random streams come from; seeded with it again, everything happens again
     """
 
-    def __init__(self, task: Task | Encounter, n: int, seed: int | None, threads: int = 1) -> None:
+    def __init__(
+        self, task: Task | Encounter, n: int, seed: int | None, threads: int = 1, episode_steps: int | None = None
+    ) -> None:
         self.learners, self.frozen = cast(task)
         self.animals = (*self.learners, *(other.task for other in self.frozen))
         self._whose = ["" if len(self.animals) == 1 else f"{name_of(animal)}: " for animal in self.animals]
         self.model = compiled(self.animals[0])
         for animal in self.animals[1:]:
             compiled(animal, self.model)
-        self.spectra, self.episode_steps = of_world(self.animals, "spectra"), self.animals[0].episode_steps
+        self.spectra = of_world(self.animals, "spectra")
+        self.episode_steps = self.animals[0].episode_steps if episode_steps is None else episode_steps
+        vary = of_world(self.animals, "vary")
+        self.variation = Variation(vary) if vary else None
+        self.varied = {name: np.ones(n) for name in vary or ()}
         self.datas = [mujoco.MjData(self.model) for _ in range(n)]
         self.steps, self.felt = np.zeros(n, int), [np.zeros((n, 0), np.float32) for _ in self.animals]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
@@ -64,7 +74,17 @@ class TaskWorlds:
         self.entropy = np.random.SeedSequence(seed).entropy
         children = [np.random.SeedSequence(self.entropy, spawn_key=(i,)) for i in range(len(self.datas))]
         self.rngs = [np.random.default_rng(child) for child in children]
-        self.noise_keys = np.array([child.generate_state(len(self.animals), np.uint64) for child in children]).T
+        self.noise_keys = self._noise_keys(children)
+
+    def _noise_keys(self, children: Sequence[np.random.SeedSequence]) -> list[np.ndarray]:
+        """The first kind of everybody has the first ones: a kind more changes nobody else's noise."""
+        kinds = [len(kinds_of(animal)) for animal in self.animals]
+        drawn = np.array([child.generate_state(sum(kinds), np.uint64) for child in children]).T
+        more, found = len(kinds), []
+        for number, count in enumerate(kinds):
+            found.append(np.concatenate([drawn[number : number + 1], drawn[more : more + count - 1]]))
+            more += count - 1
+        return found
 
     def reset(self, worlds: np.ndarray) -> None:
         """Begin these worlds' episodes.
@@ -75,6 +95,9 @@ class TaskWorlds:
         for i in worlds:
             data = self.datas[i]
             mujoco.mj_resetData(self.model, data)
+            if self.variation is not None:
+                for name, value in self.variation.draw(self.rngs[i]).items():
+                    self.varied[name][i] = value
             try:
                 for animal in self.animals:
                     animal.reset(data, self.rngs[i])
@@ -94,6 +117,10 @@ class TaskWorlds:
         self.steps += 1
         judged = [self._judged(i, failure) for i, failure in enumerate(failures)]
         return [outcome for of_learner in zip(*judged, strict=True) for outcome in of_learner]
+
+    def light(self, wavelengths: np.ndarray) -> np.ndarray | None:
+        """What lights are multiplied by now, (n, band); None: nothing."""
+        return None if self.variation is None else self.variation.light(self.varied, wavelengths)
 
     def close(self) -> None:
         if self._pool:

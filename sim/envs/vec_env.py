@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from sim.envs.simulation import LEAST_RETURN, NOWHERE, Simulation, Step
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.noisy_signals import NoisySignals
 from sim.render.pending_frame import PendingFrame
+from sim.robots.variation import Variation
 from sim.worlds.state import WorldState
 
 _STANDING = np.array(STANDING, np.float32)
@@ -27,20 +29,31 @@ class EyesVecEnv(OneEnvironment):
     Observations, rewards, endings and `info` are in docs/tasks.md. Worlds start anew by themselves; the
     observation returned is then the first of the new episode, and info["terminal_observation"] the last of the
     old one. World i's episodes depend on the seed and i alone, not on the number of worlds.
+
+    failures: what worlds could not go on for, and how many episodes each has ended
     """
 
     def __init__(
-        self, simulation: Simulation, renderer: BatchedRenderer, memory: int, render_mode: str | None = None
+        self,
+        simulation: Simulation,
+        renderer: BatchedRenderer,
+        memory: int,
+        render_mode: str | None = None,
+        variation: Variation | None = None,
     ) -> None:
         self.simulation, self.renderer, self.eyes = simulation, renderer, renderer.eyes
         self.render_mode = render_mode
         self._follow_camera: FollowCamera | None = None
         self._memory = Memory(memory)
         self._signals = NoisySignals(renderer, simulation.streams.noise_keys)
+        self._variation = variation
+        if variation is not None:
+            self._signals.level = np.ones(simulation.n)
         space = observation_space(self.eyes, renderer.eye.channels, memory, renderer.brightest, self._signals.spread)
         super().__init__(simulation.n, space, action_space())
         self._commanded = self._actions = np.zeros((self.num_envs, 2), np.float32)
         self._returns, self._lengths = np.zeros(self.num_envs), np.zeros(self.num_envs, int)
+        self.failures = Counter[str]()
 
     @property
     def state(self) -> WorldState:
@@ -52,10 +65,11 @@ class EyesVecEnv(OneEnvironment):
             self.simulation.seed(self._seeds[0])
             self._signals.restart(self.simulation.streams.noise_keys)
         self.simulation.reset()
+        self._light_anew(np.arange(self.num_envs))
         self._reset_seeds()
         self._reset_options()
         self._returns[:], self._lengths[:] = 0.0, 0
-        self.reset_infos = first_infos(self.state)
+        self.reset_infos = self._with_light(first_infos(self.state))
         untouched = np.zeros(self.num_envs, bool)
         return self._observation(self._signals.begin(self.state).wait(), np.arange(self.num_envs), untouched)
 
@@ -94,6 +108,7 @@ class EyesVecEnv(OneEnvironment):
     def _begin_anew(self, ended: np.ndarray) -> PendingFrame:
         """Start the episodes of these worlds anew, and look at them."""
         self._returns[ended], self._lengths[ended] = 0.0, 0
+        self._light_anew(ended)
         return self._signals.begin_some(self.simulation.restart(ended), ended)
 
     def _advance(self) -> tuple[Step, PendingFrame]:
@@ -155,10 +170,24 @@ class EyesVecEnv(OneEnvironment):
                 "previous_action": self._actions[world].copy(),
             }
 
+    # --- light
+
+    def _light_anew(self, worlds: np.ndarray) -> None:
+        """What the next episodes of these worlds have."""
+        variation, level = self._variation, self._signals.level
+        if variation is not None and level is not None:
+            level[worlds] = [variation.draw(self.simulation.streams.light[world])["light"] for world in worlds]
+
+    def _with_light(self, infos: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        if self._signals.level is not None:
+            for info, level in zip(infos, self._signals.level.tolist(), strict=True):
+                info["varied"] = {"light": level}
+        return infos
+
     # --- info
 
     def _infos(self, step: Step, reward: np.ndarray, ended: np.ndarray) -> list[dict[str, Any]]:
-        infos = infos_of(step)
+        infos = self._with_light(infos_of(step))
         self._returns += reward
         self._lengths += 1
         for world in ended:
@@ -168,4 +197,5 @@ class EyesVecEnv(OneEnvironment):
                 infos[world]["given_up"] = LEAST_RETURN
         for index, reason in step.failure.items():
             infos[index]["failure"] = reason
+            self.failures[reason] += 1
         return infos

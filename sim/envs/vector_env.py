@@ -21,7 +21,6 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     observation of the new episode, and info["final_obs"] has the last of the old one.
 
     task, eyes, memory, mode ...: as in `sim.make_vec_env`
-    max_episode_steps: Gymnasium's name of `episode_steps`
 
     Raises:
         ValueError: a bad argument.
@@ -34,8 +33,6 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     }
 
     def __init__(self, num_envs: int = 1, *, task: str | Task, eyes: Eyes | None = None, **options: Any) -> None:
-        if "max_episode_steps" in options:
-            options["episode_steps"] = options.pop("max_episode_steps")
         self._batch = make_vec_env(task, eyes, n_envs=num_envs, seed=None, **options)
         self.num_envs, self.render_mode = num_envs, self._batch.render_mode
         self.single_observation_space = self._batch.observation_space

@@ -18,6 +18,7 @@ class NoisySignals:
     renderer: of all worlds
     keys: of their noise, (n,) uint64
     spread: largest standard deviation of a signal's noise
+    level: of the light in each world, (n,), of which signals are as large a share; None: 1 everywhere
 
     Frames hold signals (env, eye, channel, height, width) float32.
     """
@@ -25,6 +26,7 @@ class NoisySignals:
     def __init__(self, renderer: BatchedRenderer, keys: np.ndarray) -> None:
         self.renderer = renderer
         self._noise = NoiseModel.of(renderer.eye)
+        self.level: np.ndarray | None = None
         self.spread = self._noise.largest(renderer.brightest) if self._noise else 0.0
         frame = (renderer.eyes.n_eyes, renderer.eye.channels, *renderer.eyes.resolution)
         self._normals = Normals(keys, frame) if self._noise else None
@@ -52,6 +54,12 @@ class NoisySignals:
 
     def _noisy(self, signals: PendingFrame, rows: np.ndarray | slice, worlds: np.ndarray) -> PendingFrame:
         """These rows of the signals, and on them the noise of these worlds."""
+        if self.level is not None:
+            level = self.level[worlds].astype(np.float32)[:, None, None, None, None]
+            return self._with_noise(signals.then(lambda seen: seen[rows] * level), slice(None), worlds)
+        return self._with_noise(signals, rows, worlds)
+
+    def _with_noise(self, signals: PendingFrame, rows: np.ndarray | slice, worlds: np.ndarray) -> PendingFrame:
         noise = self._noise
         if noise is None or self._normals is None:
             return signals.then(lambda seen: seen[rows])

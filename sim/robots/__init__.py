@@ -1,14 +1,17 @@
 """Eyes on any robot: models that are not one of our worlds.
 
 task                Task: what a robot has to do
+variation           what differs between episodes: light
 encounter           Encounter: several tasks in one world; Frozen: an animal that does not learn
 model_renderer      ModelRenderer: eyes mounted on any MuJoCo model, in many worlds at once
 model_fidelity      how many rays eyes on a model need
+eye_kinds           kinds of eyes of one animal
 mounts              Mount: where an eye is, on a body, a site or a camera
 eye_marks           eyes on pictures of a model
 inside              eyes that are inside of a geom
 poses               Poses: where everything is, in all worlds
 model_wavefront     its kernels
+optic_flow          where what eyes look at moves on their retinas
 edge_rays           many rays where a receptor sees an edge, few elsewhere
 model_scene         what stands still, as a Mitsuba scene, and what moves
 model_lights        lights, that may move

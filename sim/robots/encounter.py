@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import did_you_mean, of_kind
+from sim.robots.eye_kinds import TAKEN
 from sim.robots.task import Task
 
 SHARED = ("substeps", "episode_steps")  # what belongs to the world: every animal must say the same of it
@@ -42,8 +43,8 @@ class Frozen:
     @property
     def memory(self) -> int:
         """Frames in the observations that its policy wants."""
-        eyes = getattr(getattr(self.policy, "observation_space", None), "spaces", {}).get("eyes")
-        return 1 if eyes is None else int(eyes.shape[0])
+        known = getattr(getattr(self.policy, "observation_space", None), "spaces", {})
+        return max((int(space.shape[0]) for name, space in known.items() if name not in TAKEN), default=1)
 
     def actions(self, observation: Mapping[str, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
         """What it does in every world, of this shape (world, number).

@@ -21,6 +21,7 @@ from sim.robots.model_scene import ModelScene
 from sim.robots.model_tracer import ModelTracer
 from sim.robots.model_wavefront import ModelWavefront
 from sim.robots.mounts import Mount
+from sim.robots.optic_flow import flow_between, receptor_centres
 from sim.robots.poses import Poses
 from sim.scene import source
 from sim.scene.mirror import VISIBLE_GROUPS
@@ -82,12 +83,14 @@ class ModelRenderer:
         with in_variant(self._scene.variant):
             self._tracer = ModelTracer(self._scene, wavelengths)
             suns = [light.level for light in self._scene.lights.found if light.kind == "directional"]
-            self.brightest = float((mixing @ np.sum(suns, axis=0)).max() / np.pi) if suns else 0.0
+            self._sunlight = mixing * np.sum([np.zeros(len(wavelengths)), *suns], axis=0) / np.pi
+            self.brightest = self.brightest_in(np.ones(len(wavelengths)))
             basis = self._tracer.basis
             self._sums = self.sensor.receptor_sums(mixing, basis)
             self._radiance_sums = self.sensor.receptor_sums(np.eye(len(wavelengths)), basis)
             self._wavefront = ModelWavefront(self._scene, self._tracer, self.sensor, self.n_envs, len(self.mounts))
-            along = {"light": self.sensor.directions, "depth": _centres(self.eye)}
+            centres = directions_of(self.eye, receptor_centres(self.eye))
+            along = {"light": self.sensor.directions, "depth": centres, "which": centres}
             self._looks = {what: self._wavefront.look(directions) for what, directions in along.items()}
             self._edges: EdgeRays | None = None
             if at_edges:
@@ -96,19 +99,36 @@ class ModelRenderer:
                 self._edges = EdgeRays(self._wavefront, sampling, rays, mixing @ basis.T, noticed)
         self._slot = FrameSlot()
 
-    def signals(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+    def signals(self, poses: Poses | Sequence[mujoco.MjData], light: np.ndarray | None = None) -> np.ndarray:
         """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32.
 
         poses: of every world, after mj_forward or mj_step: its data, or arrays stacked over worlds
+        light: what all lights of each world are multiplied by, (env, band); None: nothing
 
         Raises:
-            ValueError: another number of worlds, another model's data, or poses that are not finite.
+            ValueError: another number of worlds, another model's data, poses that are not finite, or light of another
+                shape.
         """
-        return self.begin(poses).wait()
+        return self.begin(poses, light).wait()
 
-    def begin(self, poses: Poses | Sequence[mujoco.MjData]) -> PendingFrame:
+    def begin(self, poses: Poses | Sequence[mujoco.MjData], light: np.ndarray | None = None) -> PendingFrame:
         """Begin to see; it runs beside whatever comes next, until the signals are waited for."""
-        return self._begin(poses, "light").then(self._signals)
+        if light is None:
+            return self._begin(poses, "light").then(self._signals)
+        shape = self.n_envs, len(self._tracer.basis)
+        if np.shape(light) != shape:
+            raise ValueError(f"light has shape {np.shape(light)}: must be (env, band), {shape}")
+        per_view = np.repeat(np.asarray(light, np.float32).T, len(self.mounts), axis=1)[..., None]  # (band, view, 1)
+
+        def lit(found: np.ndarray) -> np.ndarray:
+            layers = found.reshape(-1, *per_view.shape[:2], found.size // (self.sensor.depth.count * per_view.size))
+            return self._signals(layers * per_view)
+
+        return self._begin(poses, "light").then(lit)
+
+    def brightest_in(self, light: np.ndarray) -> float:
+        """`brightest` where all lights are multiplied by this, (band,)."""
+        return float((self._sunlight @ light).max())
 
     def receptor_radiance(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
         """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
@@ -121,6 +141,21 @@ class ModelRenderer:
         infinite where there is nothing."""
         found = self._begin(poses, "depth").wait()
         return found.reshape(self.n_envs, len(self.mounts), *self.eye.resolution)
+
+    def ids(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+        """Which geom each receptor's centre looks at, (env, eye, height, width) int32; -1 where there is nothing."""
+        found = self._begin(poses, "which").wait().astype(int)
+        geoms = np.concatenate([self._scene.movers.geoms, self._scene.told_apart[1], [-1]])
+        return geoms[found].astype(np.int32).reshape(self.n_envs, len(self.mounts), *self.eye.resolution)
+
+    def flow(self, poses: Poses | Sequence[mujoco.MjData], later: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+        """Optic flow from one moment to another: by how much what each receptor's centre looks at has moved on the
+        retina, to the right and down [receptors], (env, eye, 2, height, width) float32; NaN where there is nothing, or
+        where it is no longer before the eye."""
+        moments = _placed(poses), _placed(later)
+        self._check_poses(moments[1])
+        frames = self.eye_frames(moments[0]), self.eye_frames(moments[1])
+        return flow_between(self.eye, self.depth(moments[0]), self.ids(moments[0]), moments, frames)
 
     def eye_frames(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
         """Pupils [m] (world, eye, 3) and eyes' frames (world, eye, 3, 3), columns (right, up, ahead)."""
@@ -147,10 +182,11 @@ class ModelRenderer:
     def recordings(self) -> int:
         """How often the kernels were recorded: once per kernel in use, up to three times where meshes move."""
         edges = 0 if self._edges is None else self._edges.recordings
-        return int(self._wavefront.light.n_recordings + self._wavefront.depth.n_recordings) + edges
+        kernels = self._wavefront.light, self._wavefront.depth, self._wavefront.which
+        return sum(int(kernel.n_recordings) for kernel in kernels) + edges
 
     def _begin(self, poses: Poses | Sequence[mujoco.MjData], what: str) -> PendingFrame:
-        placed = poses if isinstance(poses, Poses) else Poses.of(poses)
+        placed = _placed(poses)
         self._check_poses(placed)
         pupils, rotations = self.eye_frames(placed)
         eyes = np.concatenate([pupils[:, :, None], np.swapaxes(rotations, -1, -2)], axis=2)
@@ -212,11 +248,8 @@ class _Place:
         return origins + rotations @ self._origin, rotations @ self._rotation
 
 
-def _centres(eye: optics.Eye) -> np.ndarray:
-    """Directions of the receptors' centres, (ray, 3)."""
-    height, width = eye.resolution
-    row, column = (index.ravel() for index in np.indices((height, width)))
-    return directions_of(eye, np.stack([column + 0.5 - width / 2, row + 0.5 - height / 2], axis=-1))
+def _placed(poses: Poses | Sequence[mujoco.MjData]) -> Poses:
+    return poses if isinstance(poses, Poses) else Poses.of(poses)
 
 
 def _check(fidelity: Fidelity, eye: optics.Eye) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 
 import mitsuba as mi
 import mujoco
@@ -16,7 +17,7 @@ from optics.spectra.spectrum import Spectrum
 from sim.robots.model_lights import Lights, model_lights
 from sim.robots.movers import Movers, kind_of
 from sim.scene import bsdfs, inventory, lights, shapes, sky, surfaces
-from sim.scene.merged_parts import merged
+from sim.scene.merged_parts import PlacedPart, merged
 from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
 from sim.scene.spectra import Spectra, of_geom, resolve
 from sim.scene.variant import Description, MitsubaObject, default_variant
@@ -58,7 +59,8 @@ class ModelScene:
             self.bsdfs = [matt[int(g)] for g in self.movers.geoms]
             found, left_out = model_lights(model, self.spectra, wavelengths)
             self.lights = Lights(found)
-            self.scene = self._still({g: matt[g] for g in self.geoms if g not in moving})
+            self._matt_still = {g: matt[g] for g in self.geoms if g not in moving}
+            self.scene = self._still()
             self.has_sky = self.scene.environment() is not None
         left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, self.geoms)]
         if left_out:
@@ -74,15 +76,25 @@ class ModelScene:
         built = {f"part_{k}": shapes.build(part, np.eye(4), f"part_{k}", bsdf, None) for k, part in parts}
         return mi.load_dict({"type": "scene", **built}, optimize=False)
 
-    def _still(self, matt: Mapping[int, MitsubaObject]) -> MitsubaObject:
+    @cached_property
+    def told_apart(self) -> tuple[MitsubaObject, np.ndarray]:
+        """What stands still, each geom by itself, and the geoms of the scene's shapes, (shape,)."""
+        with in_variant(self.variant):
+            built = {name: shapes.build(part, pose, name, bsdf, None) for name, part, pose, bsdf in self._still_parts()}
+            scene = mi.load_dict({"type": "scene", **built}, optimize=False)
+        return scene, np.array([int(shape.id().split("_")[1]) for shape in scene.shapes()], int)
+
+    def _still_parts(self) -> list[PlacedPart]:
         data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, data)
-        parts = [
+        return [
             (f"geom_{g}_{k}", part, shapes.pose(data, g), bsdf)
-            for g, bsdf in matt.items()
+            for g, bsdf in self._matt_still.items()
             for k, part in enumerate(shapes.parts(self.model, g))
         ]
-        description: Description = {"type": "scene", **merged(parts, "still")}
+
+    def _still(self) -> MitsubaObject:
+        description: Description = {"type": "scene", **merged(self._still_parts(), "still")}
         heaven = sky.description(self.model, lights.white())
         if heaven is not None:
             description["sky"] = heaven

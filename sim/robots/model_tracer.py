@@ -73,6 +73,17 @@ class ModelTracer:
         far = dr.select(si.is_valid(), si.t, dr.inf)
         return self._scene.movers.nearest(ray, far, rows.movers, rows.first_mover, inputs).t
 
+    def which(self, told_apart: MitsubaObject, ray: Array, rows: Rows, inputs: dict[str, Array]) -> Array:
+        """What each ray meets: a mover by its number, after all movers the shapes of what stands still by theirs, and
+        nothing at last."""
+        movers, still = len(self._scene.movers), len(told_apart.shapes())
+        si = told_apart.ray_intersect_preliminary(ray) if still else _nothing()
+        hit = self._scene.movers.nearest(
+            ray, dr.select(si.is_valid(), si.t, dr.inf), rows.movers, rows.first_mover, inputs
+        )
+        standing = dr.select(si.is_valid(), movers + si.shape_index, movers + still) if still else mi.UInt32(movers)
+        return dr.select(hit.which < movers, hit.which, standing)
+
     def _irradiance(
         self,
         still: MitsubaObject,

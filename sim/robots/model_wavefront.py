@@ -28,7 +28,7 @@ class ModelWavefront:
     """Launches kernels. Everything in them is traced once; only arrays passed as arguments may change.
 
     light: sums of components over receptors' rays, flat (layer, component, world, eye, receptor)
-    depth: along the eye's axis [m], of single directions
+    depth: along the eye's axis [m], of single directions · which: what these meet, see ModelTracer
     """
 
     def __init__(self, scene: ModelScene, tracer: ModelTracer, sensor: Sensor, n_envs: int, n_eyes: int) -> None:
@@ -42,6 +42,7 @@ class ModelWavefront:
         self._buffers = {name: aligned(n_envs * n * 4, np.float32).reshape(n_envs, n * 4) for name, n in rows.items()}
         self.light: Any = dr.freeze(lambda *args: self._light(*args))
         self.depth: Any = dr.freeze(lambda *args: self._depth(*args))
+        self.which: Any = dr.freeze(lambda *args: self._which(*args))
 
     def look(self, directions: np.ndarray) -> dict[str, Array]:
         """What a kernel reads to look along these directions (ray, 3) with every eye."""
@@ -66,7 +67,8 @@ class ModelWavefront:
         scene = self._scene
         with in_variant(scene.variant), garbage_kept():
             buffers = {name: mi.Float(buffer.reshape(-1)) for name, buffer in self._buffers.items()}
-            found = kernel(scene.scene, scene.movers.meshes, buffers, look)
+            still = scene.told_apart[0] if kernel is self.which else scene.scene
+            found = kernel(still, scene.movers.meshes, buffers, look)
         return lambda: _read(found)
 
     def components(
@@ -94,6 +96,12 @@ class ModelWavefront:
     ) -> Array:
         ray, _, cosine, rows = _of_lane(buffers, look)
         return self._tracer.distance(still, ray, rows, look) * cosine
+
+    def _which(
+        self, told_apart: MitsubaObject, meshes: list[MitsubaObject], buffers: dict[str, Array], look: dict[str, Array]
+    ) -> Array:
+        ray, _, _, rows = _of_lane(buffers, look)
+        return self._tracer.which(told_apart, ray, rows, look)
 
 
 def _of_lane(buffers: dict[str, Array], look: dict[str, Array]) -> tuple[Array, Array, Array, Rows]:

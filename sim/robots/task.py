@@ -15,6 +15,7 @@ from optics.numerics.arguments import did_you_mean, whole
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.eyes import Eyes
 from sim.render.fidelity import Fidelity
+from sim.robots.eye_kinds import kinds_of, several
 from sim.robots.mounts import Mount, fan
 from sim.scene import source
 
@@ -28,11 +29,15 @@ class Task:
     """What a subclass says about itself; only `model`, `mounts` and `rewards` have no default.
 
     model: an MjModel, or what compiles to one (`sim.mirror`)
-    eye: optics and retina of every eye · mounts: where the eyes are
+    eye: optics and retina of every eye · mounts: where the eyes are; of several kinds of eyes both are dictionaries,
+        such as {"wide": ..., "sharp": ...}, and an observation has an array for each kind in the place of "eyes"
     fidelity: how finely they see, see `sim.ModelRenderer`; "auto": as a few moments of its episodes want, see
-        `sim.choose_model_fidelity`
+        `sim.choose_model_fidelity`; of several kinds alike, or a dictionary, too
     substeps: of physics in one action · episode_steps: actions, then an episode is truncated
     spectra: of materials and lights, by name, in the place of their colours
+    vary: what is drawn anew for each episode, as (low, high) by name: "light", a factor of all lights, evenly over its
+        logarithm, and "color_temperature" [K] of what is white, evenly over its reciprocal. Sizes, surfaces and starts
+        are `reset`'s own, as far as mjData has them
     camera: name of the camera that pictures for people are taken with; None: one that looks at the whole model
     actuators: names of those that an action drives; None: all
     name: what it is called among others; None: as its class
@@ -48,12 +53,13 @@ class Task:
     """
 
     model: mujoco.MjModel | mujoco.MjSpec | str | Path
-    eye: optics.Eye = optics.Eye()
-    mounts: Sequence[Mount] = ()
-    fidelity: Fidelity | str = "auto"
+    eye: optics.Eye | Mapping[str, optics.Eye] = optics.Eye()
+    mounts: Sequence[Mount] | Mapping[str, Sequence[Mount]] = ()
+    fidelity: Fidelity | str | Mapping[str, Fidelity | str] = "auto"
     substeps: int = 5
     episode_steps: int = 256
     spectra: Mapping[str, Spectrum | str] | None = None
+    vary: Mapping[str, tuple[float, float]] | None = None
     camera: str | None = None
     actuators: Sequence[str] | None = None
     name: str | None = None
@@ -88,6 +94,7 @@ class Task:
 
     def place(self, n_eyes: int, placement_range_deg: float, elevation_deg: float) -> Sequence[Mount]:
         """Where an evolving animal has its eyes; here: the first of `mounts`, fanned out, see `sim.fan`."""
+        assert not isinstance(self.mounts, Mapping)
         return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)
 
     def n_actions(self, model: mujoco.MjModel) -> int:
@@ -104,6 +111,7 @@ def compiled(task: Task, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
     name = type(task).__name__
     if not hasattr(task, "model"):
         raise ValueError(f"{name}: model: must be set, to an MjModel, a path or MJCF text")
+    kinds_of(task)
     whole(f"{name}: substeps", task.substeps, 1, MOST_STEPS)
     whole(f"{name}: episode_steps", task.episode_steps, 1, MOST_STEPS)
     model = source.load(task.model) if model is None else model
@@ -120,9 +128,11 @@ def grown(task: Task, eyes: Eyes, elevation_deg: float = 0.0) -> Task:
     """The same task for an animal with such eyes, where the task places them.
 
     Raises:
-        ValueError: the task places another number of eyes, or none, since it has no mounts.
+        ValueError: the task places another number of eyes, or none, since it has no mounts, or has several kinds.
     """
     name, animal = type(task).__name__, copy.copy(task)
+    if several(task):
+        raise ValueError(f"{name}: eye and mounts have several kinds of eyes: must have one, where eyes evolve")
     if not task.mounts and type(task).place is Task.place:
         raise ValueError(f"{name}: mounts = {task.mounts!r}: must hold one sim.Mount at least, where the eyes are")
     animal.eye = eyes.eye()

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 AHEAD = 64  # actions: a call per world and action costs more than the numbers
 
 
 class Streams:
-    """For every world i: `placement[i]`, a part of `motion` and a key for its noise, children of one seed that depend
-    on the seed, i and the purpose alone; never on the number of worlds.
+    """For every world i: `placement[i]`, `light[i]`, a part of `motion` and a key for its noise, children of one seed
+    that depend on the seed, i and the purpose alone; never on the number of worlds.
 
     noise_keys: (n,) uint64, for sim.render.receptor_noise
     """
@@ -25,7 +27,13 @@ class Streams:
             [np.random.Generator(np.random.PCG64(child)) for child in children(purpose)] for purpose in (0, 1)
         )
         self.motion = MotionNoise(motion)
+        self._of_light = children(3)
         self.noise_keys = np.array([child.generate_state(1, np.uint64)[0] for child in children(2)])
+
+    @cached_property
+    def light(self) -> list[np.random.Generator]:
+        """Of what light an episode has."""
+        return [np.random.Generator(np.random.PCG64(child)) for child in self._of_light]
 
 
 class MotionNoise:

@@ -19,4 +19,5 @@ TASKS: Mapping[str, str] = MappingProxyType(
     }
 )
 
+EPISODE_STEPS = 256  # actions, then the episode is truncated; as published
 COURSES = ("short", "long")  # of navigation: names of the drawings in `sim.worlds.navigation`

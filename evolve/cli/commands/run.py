@@ -8,6 +8,7 @@ from argparse import Namespace
 from contextlib import nullcontext
 from typing import Any
 
+from evolve.analysis.mishaps import mishaps_of, mishaps_told
 from evolve.cli.commands import INTERRUPTED
 from evolve.cli.commands.products import REPORT, Products, finished_products, open_page
 from evolve.cli.progress import Bar, Events, Lines, Silent, Watchers, watcher
@@ -184,12 +185,14 @@ def _finished_event(run: Run, best: Candidate, made: Products) -> dict[str, Any]
 
 
 def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
-    """The best candidate, how many failed, and how many genomes did not fit together as they were."""
+    """The best candidate, how many failed, what failed in episodes, and how many genomes did not fit together as they
+    were."""
     lines = [f"best: candidate {best.id}, fitness {best.fitness:.4g}, success rate {best.success_rate:.0%}"]
     if failures:
         lines.append(
             f"failed: {len(failures)} of {len(run.candidates)} candidates; the last one: {failures[-1].failure}"
         )
+    lines += mishaps_told(mishaps_of(run.candidates))
     changed = [names for candidate in run.candidates if (names := repaired(candidate.vector, run.config))]
     if changed:
         genes = ", ".join(sorted({name for names in changed for name in names}))

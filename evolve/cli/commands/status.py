@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from evolve.analysis.mishaps import mishaps_of, mishaps_told
 from evolve.cli.output import as_it_is
 from evolve.search.successive_halving import finished
 from evolve.store.candidate import Candidate
@@ -45,7 +46,7 @@ def listing(arguments: Namespace) -> int:
     folders = [path for path in arguments.directory.iterdir() if (path / "config.toml").exists()]
     found = [_standing_or_reason(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime)]
     if arguments.json:
-        print(json.dumps(found, indent=1, allow_nan=False))
+        print(json.dumps(found, indent=1, allow_nan=False, default=vars))
         return 0
     if not found:
         print(f"{arguments.directory}: holds no runs")
@@ -73,7 +74,7 @@ def _in_one_line(one: dict[str, Any]) -> str:
 def _show(arguments: Namespace, now: dict[str, Any]) -> None:
     """As text; as JSON indented, or one line each where it is repeated. A terminal is cleared before each look."""
     if arguments.json:
-        print(json.dumps(now, indent=None if arguments.watch else 2, allow_nan=False), flush=True)
+        print(json.dumps(now, indent=None if arguments.watch else 2, allow_nan=False, default=vars), flush=True)
         return
     if now["notice"]:
         print(f"note: {now['notice']}", file=sys.stderr)
@@ -99,6 +100,7 @@ def standing(run: Run) -> dict[str, Any]:
             "planned": run.config.candidates,
         },
         "last_failure": next((c.failure for c in reversed(run.in_order_of_finish) if c.failure), None),
+        "mishaps": mishaps_of(run.candidates),
         "steps": sum(candidate.steps for candidate in run.candidates),
         "best": None
         if best is None
@@ -134,6 +136,7 @@ def standing_lines(now: dict[str, Any]) -> list[str]:
     ]
     if now["last_failure"]:
         lines.append(f"last failure: {now['last_failure']}")
+    lines += mishaps_told(now["mishaps"])
     if best is not None:
         lines.append(f"best: candidate {best['id']}, fitness {best['fitness']:.4g}")
     told = [(number, g) for number, g in enumerate(now["generations"]) if g["best"] is not None]

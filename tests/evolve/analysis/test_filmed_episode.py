@@ -10,12 +10,16 @@ from PIL import Image
 
 import sim
 from evolve.analysis.episode import record
-from evolve.analysis.filmed_episode import moments
+from evolve.analysis.filmed_episode import film, moments
 from evolve.analysis.vision import vision
 from evolve.cli.main import main
+from evolve.learning.fitness import evaluate
+from evolve.learning.policy import load_policy
 from evolve.learning.worlds import own_task_for
 from evolve.report.footage import Footage, stage_of
 from evolve.store.directory import Run
+from sim.robots.variation import DAYLIGHT, filter_to
+from tests.evolve.learning.test_task_module import small, written
 
 BALL = Path(__file__).parents[3] / "examples" / "find_ball.py"
 NAMED = f"{BALL}:FindBall"
@@ -139,3 +143,21 @@ def test_another_task_is_refused(path, call, tmp_path):
     code, _, complaint = call("replay", path, "--task", f"{other}:FindBall")
     assert code == 2
     assert "has changed since the run began" in complaint
+
+
+def test_light_that_varies_is_in_what_is_recorded(tmp_path):
+    """Dim light, and reddish: the scene as it is recorded is as dim, and the eyes report what is recorded."""
+    films = []
+    for level, kelvins in ((0.3, 2500), (1, DAYLIGHT)):
+        vary = f'vary = {{"light": ({level}, {level}), "color_temperature": ({kelvins}, {kelvins})}}'
+        named = written(tmp_path, "    episode_steps", f"    {vary}\n    episode_steps")
+        config, animal = small("genome.placement_range_deg.start=40", "genome.fov_deg.start=60", named=named)
+        if not films:
+            evaluate(animal, config, 3, tmp_path / "policy")
+        films.append(film(animal, config, load_policy(tmp_path / "policy"), 0, 1, 8))
+    dim, plain = films
+    assert np.square(dim.signals - dim.perfect_signals).mean() ** 0.5 < 0.02
+    red, blue = (dim.perfect_signals[0, :, c].mean() / plain.perfect_signals[0, :, c].mean() for c in (0, 2))
+    assert red > 1.5 * blue
+    shares = dim.radiance[0].mean(axis=(0, 2, 3)) / plain.radiance[0].mean(axis=(0, 2, 3))
+    np.testing.assert_allclose(shares, 0.3 * filter_to(2500, 1e-9 * dim.wavelengths_nm), rtol=1e-4)

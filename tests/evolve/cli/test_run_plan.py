@@ -78,7 +78,7 @@ def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, mon
     assert main(["run", "detection", "--preset", "quick", "--dry-run", "--json", *late]) == 0
     plan = json.loads(capsys.readouterr().out)
     assert plan["evaluations"] == 30
-    assert plan["steps"] == 30 * 102_400
+    assert plan["steps"] == 30 * 131_072
     assert "up to 102,400 (100,000 rounded up to rollouts of 4,096) each, 3,072,000 in all" in out
     assert plan["genes"]["doe_00"] == 1
     assert plan["hours"].keys() == {"start", "middle"}

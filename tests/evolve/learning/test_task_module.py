@@ -2,6 +2,7 @@
 
 import dataclasses
 import pickle
+import re
 from contextlib import closing
 from pathlib import Path
 
@@ -93,6 +94,27 @@ def test_success_is_what_holds_at_the_end(tmp_path):
     assert evaluate(animal, config, 3, tmp_path / "early").success_rate == 0
     config, animal = small(named=written(tmp_path, "return abs(data.mocap_pos[0, 1] - data.qpos[0]) < 0.3", "return 1"))
     assert evaluate(animal, config, 3, tmp_path / "always").success_rate == 1
+
+
+def test_what_fails_in_the_middle_of_a_life_is_counted(tmp_path):
+    """Every episode ends with its 11th action: 2 in each of 8 worlds within 32 actions of learning, and those of two
+    evaluations on the way and of the last one, 3 each."""
+    config, animal = small(named=written(tmp_path, "    def succeeded", FAILING))
+    with pytest.warns(UserWarning, match=r"terminated, line \d+ of mine.py: KeyError: 'ball'; its episode ends here"):
+        outcome = evaluate(animal, config, 3, tmp_path / "policy")
+    assert outcome.failure is None
+    assert outcome.steps == 256
+    ((said, episodes),) = outcome.mishaps
+    assert re.fullmatch(r"terminated, line \d+ of mine.py: KeyError: 'ball'", said)
+    assert episodes == 8 * 2 + (1 + 1 + 1) * 3
+    reply = dask_worker._text(outcome), b"", b""
+    assert dask_worker.decode(reply)[0] == outcome
+
+
+FAILING = """    def terminated(self, data):
+        return {}["ball"] if data.time > 1.05 else False
+
+    def succeeded"""
 
 
 def test_a_job_carries_the_text_as_it_was(tmp_path):

@@ -8,9 +8,11 @@ import pytest
 
 import sim
 from evolve.analysis.statistics import champions
+from evolve.config.run_config import RunConfig
 from evolve.report import lineup as cards
 from evolve.report.agent_figure import agent_figure
 from evolve.report.markup import duration
+from tests.evolve.learning.test_task_module import BALL, small, written
 from tests.evolve.report.reported import BEST
 
 
@@ -83,3 +85,29 @@ def test_the_family_tree_leads_to_the_table(run, content):
 )
 def test_durations_are_said_as_people_say_them(seconds, said):
     assert duration(seconds) == said
+
+
+def test_eyes_are_drawn_where_a_task_of_ones_own_has_them(tmp_path):
+    """A `place` that puts them at the sides and behind; `fan`, which all others have, is as rhabdom's own."""
+    eyes_at = "[sim.Mount('cart', a, offset=(9, 0, 9)) for a in (90, -170)]"
+    place = f"    def place(self, n, *where):\n        return {eyes_at}\n\n"
+    drawn = []
+    for named in (f"{BALL}:FindBall", written(tmp_path, "    def succeeded", f"{place}    def succeeded")):
+        config, animal = small("genome.n_eyes.start=2", named=named)
+        found, eyes = cards.azimuths(animal, config), animal.eyes(config.eye)
+        drawn.append(polygons(agent_figure(eyes, "a", found), 'class="eye"'))
+        if not drawn[1:]:
+            np.testing.assert_allclose(found, eyes.azimuths(), atol=1e-9)
+            np.testing.assert_allclose(drawn[0], polygons(agent_figure(eyes, "a"), 'class="eye"'), atol=0.11)
+    assert found == pytest.approx(np.radians([90, -170]))
+    lone = polygons(agent_figure(replace(eyes, n_eyes=1), "a", [np.pi / 2]), 'class="eye"')
+    assert any(np.allclose(lone[0], one, atol=0.11) for one in drawn[1])
+    assert cards.azimuths(animal, RunConfig("detection")) is None
+
+
+def test_eyes_that_are_close_are_drawn_small():
+    eyes = sim.Eyes(n_eyes=3)
+    wide, close = (
+        area(polygons(agent_figure(eyes, "a", placed), 'class="eye"')[0]) for placed in ([0, 2, 4], [0, 0.2, 4])
+    )
+    assert close < wide / 4

@@ -4,6 +4,7 @@ assembly: test_env.py, test_vec_env.py, test_tasks_page.py
 task_vec_env: test_task_vec_env.py, test_encounter.py
 task_worlds: test_task_vec_env.py, test_encounter.py, test_bad_encounters.py
 task_senses: test_task_vec_env.py, test_task_state.py, test_encounter.py
+task_sight: test_eye_kinds.py, test_task_vec_env.py
 task_animals: test_encounter.py, test_parallel_env.py
 task_pictures: test_task_vec_env.py, test_parallel_env.py
 parallel_env: test_parallel_env.py
@@ -11,9 +12,10 @@ task_fidelity: robots/test_model_fidelity.py, test_encounter.py
 task_state: test_task_state.py
 one_environment: test_vec_env.py
 env: test_env.py
-vec_env: test_vec_env.py, test_env.py
+vec_env: test_vec_env.py, test_env.py, test_light_levels.py
 vector_env: test_vector_env.py
-registration: test_env.py, worlds/test_catalog.py
+registered_env: test_vector_env.py
+registration: test_env.py, test_vector_env.py, worlds/test_catalog.py
 simulation: tasks/test_task.py, test_vec_env.py
 observation: test_vec_env.py, test_tasks_page.py
 info: test_vec_env.py, test_tasks_page.py

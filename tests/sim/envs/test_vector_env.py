@@ -52,15 +52,59 @@ def test_worlds_start_anew_in_the_step_that_ends_them():
 
 @pytest.mark.parametrize("steps", [3, 300])
 def test_episodes_last_as_long_as_gymnasium_is_told(steps):
-    """Shorter than the task's 256 actions, and longer; in one world, `episode_steps` says so."""
-    env = gymnasium.make_vec("rhabdom/Detection-v0", num_envs=2, max_episode_steps=steps, mode="evaluation", **OPTIONS)
-    env.reset(seed=0)
-    ended = [env.step(np.tile(np.float32([-1, 0]), (2, 1)))[3].all() for _ in range(steps)]
-    assert ended == [False] * (steps - 1) + [True]
-    one = gymnasium.make("rhabdom/Detection-v0", episode_steps=steps, mode="evaluation", **OPTIONS)
+    """Shorter than the task's 256 actions, and longer."""
+    how = {"max_episode_steps": steps, "mode": "evaluation", **OPTIONS}
+    assert lengths("rhabdom/Detection-v0", [-1, 0], 301, **how) == [steps, steps]
+
+
+def lengths(id_, action, most, **how):
+    """Actions in the first episode of one world and of the first of two, up to `most`; None: it lasts longer."""
+    one, two = gymnasium.make(id_, **how), gymnasium.make_vec(id_, num_envs=2, **how)
     one.reset(seed=0)
-    ended = [one.step(np.float32([-1, 0]))[3] for _ in range(steps)]
-    assert ended == [False] * (steps - 1) + [True]
+    two.reset(seed=0)
+    acts = ((one, np.float32(action)), (two, np.tile(np.float32(action), (2, 1))))
+    return [next((k + 1 for k in range(most) if np.all(env.step(taken)[3])), None) for env, taken in acts]
+
+
+@pytest.mark.parametrize(
+    ("how", "steps"), [({}, 256), ({"max_episode_steps": -1}, None)], ids=["as the task has it", "without end"]
+)
+def test_who_says_no_length_gets_the_tasks(how, steps):
+    assert lengths("rhabdom/Detection-v0", [-1, 0], 260, mode="evaluation", **how, **OPTIONS) == [steps, steps]
+    assert gymnasium.spec("rhabdom/Detection-v0").max_episode_steps == 256
+
+
+@pytest.mark.parametrize(("told", "steps"), [(None, 128), (90, 90), (300, 128)])
+def test_a_course_keeps_its_own_length(told, steps):
+    how = {} if told is None else {"max_episode_steps": told}
+    assert lengths("rhabdom/Navigation-v0", [-1, 0], 130, course="long", **how, **OPTIONS) == [steps, steps]
+
+
+@pytest.mark.parametrize("task", [Face, Face()], ids=["class", "task"])
+@pytest.mark.parametrize(("told", "steps"), [(None, 40), (3, 3), (50, 50)])
+def test_tasks_of_ones_own_have_ids_too(task, told, steps):
+    sim.register_task("Face-v0", task, memory=2)
+    how = {} if told is None else {"max_episode_steps": told}
+    assert lengths("Face-v0", [0], 60, **how) == [steps, steps]
+    assert gymnasium.make("Face-v0").observation_space["eyes"].shape[0] == 2
+    batch = sim.make_vec_env(Face(), n_envs=1, episode_steps=steps)
+    batch.reset()
+    assert [bool(batch.step(np.zeros((1, 1)))[2][0]) for _ in range(steps)] == [False] * (steps - 1) + [True]
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: gymnasium.make("rhabdom/Maze-v0", episode_steps=9), "episode_steps = 9: must be left out where Gymn"),
+        (lambda: gymnasium.make_vec("rhabdom/Maze-v0", episode_steps=9), "episode_steps = 9: must be left out where"),
+        (lambda: gymnasium.make_vec("rhabdom/Maze-v0", max_episode_steps=0), "max_episode_steps = 0: must be a whole"),
+        (lambda: sim.make_vec_env(Face(), episode_steps=0), "episode_steps = 0: must be a whole number"),
+        (lambda: sim.register_task("Face-v0", "detection"), "task = 'detection': must be a sim.Task, or its class"),
+    ],
+)
+def test_bad_lengths_are_refused(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()
 
 
 def test_pictures_of_all_worlds():
@@ -86,4 +130,4 @@ def test_gymnasium_finds_it_by_the_name_of_the_module():
         "import gymnasium; print(type(gymnasium.make_vec('sim:rhabdom/Navigation-v0', rays_per_receptor=1).unwrapped))"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "EyesVectorEnv" in found.stdout
+    assert "RegisteredVectorEnv" in found.stdout

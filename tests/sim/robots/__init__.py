@@ -4,9 +4,12 @@ model_renderer: test_model_renderer.py
 model_wavefront: test_model_renderer.py
 model_fidelity: test_model_fidelity.py
 edge_rays: test_edge_rays.py
+eye_kinds: envs/test_eye_kinds.py
 mounts: test_mounts.py
 task: envs/test_task_vec_env.py, envs/test_encounter.py
 encounter: envs/test_encounter.py, envs/test_bad_encounters.py
+variation: test_variation.py
+optic_flow: test_labels.py
 eye_marks: test_eye_marks.py
 inside: test_mounts.py
 poses: test_model_renderer.py

@@ -1,0 +1,59 @@
+"""Environments as Gymnasium makes them by their ids: how long an episode lasts is what Gymnasium is told.
+
+`gymnasium.make` tells its own wrapper `TimeLimit` alone, which can end an episode earlier than the environment and not
+later. So the environment within does not end any, but where a course says its own number of actions.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from optics.numerics.arguments import whole
+from sim.envs.env import EyesEnv
+from sim.envs.vector_env import EyesVectorEnv
+from sim.robots.task import MOST_STEPS, Task
+from sim.worlds.course import Course
+from sim.worlds.navigation import course_named
+
+ENDLESS = -1  # Gymnasium's word for episodes that are not truncated
+
+
+class RegisteredEnv(EyesEnv):
+    """An `EyesEnv` within Gymnasium's `TimeLimit`.
+
+    Raises:
+        ValueError: a bad argument, and `episode_steps`, which Gymnasium calls `max_episode_steps`.
+    """
+
+    def __init__(self, task: str | Task | type[Task], *args: Any, **options: Any) -> None:
+        super().__init__(_begun(task), *args, **options, episode_steps=_steps(ENDLESS, options))
+
+
+class RegisteredVectorEnv(EyesVectorEnv):
+    """An `EyesVectorEnv`, whose episodes are as long.
+
+    Raises:
+        ValueError: a bad argument, and `episode_steps`, which Gymnasium calls `max_episode_steps`.
+    """
+
+    def __init__(
+        self, num_envs: int = 1, *, task: str | Task | type[Task], max_episode_steps: int = ENDLESS, **options: Any
+    ) -> None:
+        super().__init__(num_envs, task=_begun(task), **options, episode_steps=_steps(max_episode_steps, options))
+
+
+def _begun(task: str | Task | type[Task]) -> str | Task:
+    return task() if isinstance(task, type) else task
+
+
+def _steps(asked: int, options: dict[str, Any]) -> int:
+    """Actions in an episode: as many as were asked for, but no more than the course has."""
+    if "episode_steps" in options:
+        raise ValueError(
+            f"episode_steps = {options['episode_steps']!r}: must be left out where Gymnasium makes the environment; it "
+            "calls it max_episode_steps"
+        )
+    course: str | Course | None = options.get("course")
+    own = None if course is None else course_named(course).episode_steps
+    steps = MOST_STEPS if asked == ENDLESS else whole("max_episode_steps", asked, 1, MOST_STEPS)
+    return min(steps, own or MOST_STEPS)

@@ -1,0 +1,71 @@
+"""Kinds of eyes of one animal: two that are wide and coarse, say, and one that is narrow and sharp."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import optics
+from optics.numerics.arguments import of_kind
+from sim.render.fidelity import Fidelity
+from sim.robots.mounts import Mount
+
+if TYPE_CHECKING:
+    from sim.robots.task import Task
+
+EYES = "eyes"  # what an only kind is called
+TAKEN = ("previous_action", "feels")  # what else an observation holds
+
+
+@dataclass(frozen=True)
+class EyeKind:
+    """name: of what they see in an observation · eye: optics and retina · mounts: where they are · fidelity: how finely
+    they see, or "auto" """
+
+    name: str
+    eye: optics.Eye
+    mounts: tuple[Mount, ...]
+    fidelity: Fidelity | str
+
+
+def several(task: Task) -> bool:
+    """Whether a task says eyes of more kinds than one, by name."""
+    return isinstance(task.eye, Mapping) or isinstance(task.mounts, Mapping)
+
+
+def kinds_of(task: Task) -> tuple[EyeKind, ...]:
+    """In the task's order.
+
+    Raises:
+        ValueError: names that do not go together, or are no names.
+    """
+    if not several(task):
+        return (EyeKind(EYES, task.eye, tuple(task.mounts), task.fidelity),)  # type: ignore[arg-type]
+    where = type(task).__name__
+    eyes, mounts = _by_name(f"{where}: eye", task.eye, ()), _by_name(f"{where}: mounts", task.mounts, ())
+    if eyes.keys() != mounts.keys():
+        raise ValueError(f"{where}: eye has kinds {_listed(eyes)}, mounts {_listed(mounts)}: must be the same")
+    fidelities = _by_name(f"{where}: fidelity", task.fidelity, eyes)
+    if fidelities.keys() != eyes.keys():
+        raise ValueError(f"{where}: fidelity has kinds {_listed(fidelities)}, eye {_listed(eyes)}: must be the same")
+    for name in eyes:
+        if not (isinstance(name, str) and name.isidentifier()) or name in TAKEN:
+            raise ValueError(
+                f"{where}: eye: kind {name!r}: must be a name such as 'sharp', and not {' or '.join(TAKEN)}"
+            )
+        of_kind(f"{where}: eye[{name!r}]", eyes[name], optics.Eye, "optics.Eye(resolution=(15, 15))")
+    return tuple(EyeKind(name, eyes[name], tuple(mounts[name]), fidelities[name]) for name in eyes)
+
+
+def _by_name(where: str, said: Any, names: Mapping[str, Any] | Sequence[str]) -> Mapping[str, Any]:
+    """What is said of each kind; one word for all where `names` says which there are."""
+    if isinstance(said, Mapping) and said:
+        return said
+    if names and not isinstance(said, Mapping):
+        return dict.fromkeys(names, said)
+    raise ValueError(f"{where} = {said!r:.80}: must have an entry for each kind of eyes, {{'wide': ..., 'sharp': ...}}")
+
+
+def _listed(names: Mapping[str, Any]) -> str:
+    return ", ".join(map(repr, names))
