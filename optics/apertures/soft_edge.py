@@ -13,6 +13,7 @@ from math import log10, pi
 
 import numpy as np
 
+from optics.numerics.bessel import bessel_j
 from optics.numerics.quadrature import gauss_legendre
 
 __all__ = ["SoftEdge", "kaiser_beta"]
@@ -68,10 +69,9 @@ class SoftEdge:
         return float(np.sum(weight * self.reach * self._bare(self.reach * u)))
 
     def _bare(self, r: np.ndarray) -> np.ndarray:
-        from scipy.special import i0, j1
-
         cutoff = (self.passband + self.stopband) / 2
-        return j1(2 * pi * cutoff * r) * i0(self.beta * np.sqrt(np.maximum(1 - (r / self.reach) ** 2, 0)))
+        window = np.i0(self.beta * np.sqrt(np.maximum(1 - (r / self.reach) ** 2, 0)))
+        return bessel_j(1, 2 * pi * cutoff * r) * window
 
 
 def _positive_root(a: float, b: float, c: float, d: float) -> float:

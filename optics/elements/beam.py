@@ -46,8 +46,11 @@ class Beam:
         return self.pupil.path(x, y, self.wavelength, self.source, types) * opaque(types, 1 / self.wavelength)
 
     def behind(self, soft: SoftAperture, grid: Grid, types: Precision) -> Field:
-        """Field just behind the pupil, aperture softened."""
-        x, y = grid.coordinates(types)
+        """Field just behind the pupil on a grid [m], aperture softened."""
+        return self.at(soft, *grid.coordinates(types), grid, types)
+
+    def at(self, soft: SoftAperture, x: Array, y: Array, grid: Grid, types: Precision) -> Field:
+        """The same at any points (x, y) [m], which the grid stands for."""
         scale = 1 / opaque(types, self.radius)
         size = soft.transmittance(x * scale, y * scale, types)
         if self.pupil.mask is not None:

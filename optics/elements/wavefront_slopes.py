@@ -14,13 +14,30 @@ from optics.numerics.grid import Grid
 __all__ = ["Slopes"]
 
 
+AROUND = 16  # choice: points around the window that paths are looked at to
+# Differences of fourth order at a row's first two places (Fornberg, Mathematics of Computation 51 (1988) 699, table 3).
+AT_END = np.array([-25, 48, -36, 16, -3]) / 12
+BESIDE_END = np.array([-3, -10, 18, -6, 1]) / 12
+
+
 def _derivative(values: np.ndarray, step: float) -> np.ndarray:
-    """Along axis 0, by central differences of fourth order (second order near the ends)."""
+    """Along axis 0, by differences of fourth order: the ends lie on the soft edge's rim and count, too."""
     slope = np.empty_like(values)
-    slope[[0, -1]] = (values[[1, -1]] - values[[0, -2]]) / step
-    slope[[1, -2]] = (values[[2, -1]] - values[[0, -3]]) / (2 * step)
+    for place, weights in ((0, AT_END), (1, BESIDE_END)):
+        slope[place] = weights @ values[:5] / step
+        slope[-1 - place] = -(weights @ values[:-6:-1]) / step
     slope[2:-2] = (8 * (values[3:-1] - values[1:-3]) - values[4:] + values[:-4]) / (12 * step)
     return slope
+
+
+def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) -> np.ndarray:
+    """|∇L + n (ξ - x) / D| at points (x, y, ∂L/∂x, ∂L/∂y), on the way to places (x, y), (place, point); bend: n, z."""
+    x, y, px, py = points
+    dx, dy = x - to[0], y - to[1]
+    scale = np.float32(bend[0]) / np.sqrt(dx * dx + dy * dy + np.float32(bend[1] ** 2))
+    dx, dy = px + dx * scale, py + dy * scale
+    found: np.ndarray = np.sqrt(dx * dx + dy * dy)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +73,26 @@ class Slopes:
         soft = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
         x, y = np.broadcast_arrays(self.grid.x[None, :], self.grid.y[:, None])
         # Seven digits do: SLOPE_MARGIN is much more.
-        x, y, px, py = (part[soft].astype(np.float32) for part in (x, y, self.along_x, self.along_y))
-        angle = np.linspace(0, 2 * np.pi, 16, endpoint=False)
-        (cx, cy), outermost = window.centre, window.own_half_diagonal
-        targets = [(cx, cy), *zip(cx + outermost * np.cos(angle), cy + outermost * np.sin(angle), strict=True)]
-        squared = np.zeros_like(x)
-        for tx, ty in targets:
-            dx, dy = x - np.float32(tx), y - np.float32(ty)
-            scale = np.float32(medium_n) / np.sqrt(dx * dx + dy * dy + np.float32(distance**2))
-            dx, dy = px + dx * scale, py + dy * scale
-            np.maximum(squared, dx * dx + dy * dy, out=squared)
+        points = np.stack([part[soft].astype(np.float32) for part in (x, y, self.along_x, self.along_y)])
         # A cell more than the disk, so that its rim is not missed.
         inside = self.distance_from_axis[soft] <= self.radius + self.grid.dx
-        return math.sqrt(squared.max()), math.sqrt(squared[inside].max())
+        (cx, cy), outermost = window.centre, window.own_half_diagonal
+        angle = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
+        around = [
+            np.append(middle, middle + outermost * at).astype(np.float32)[:, None]
+            for middle, at in ((cx, np.cos(angle)), (cy, np.sin(angle)))
+        ]
+        bend = medium_n, distance
+        to_centre = _total(points, [at[0] for at in around], bend)
+        # To another place of the window the path's slope differs by no more than n times their distance over z.
+        most = medium_n * outermost / distance
+        found = []
+        for some in (slice(None), inside):
+            points, to_centre = points[:, some], to_centre[some]
+            steepest = _total(points[:, [to_centre.argmax()]], around, bend).max()
+            rest = points[:, to_centre + most >= steepest]
+            found.append(max(steepest, _total(rest, around, bend).max(initial=0)))
+        return float(found[0]), float(found[1])
 
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
         """Where rays from the disk's points meet a plane at `distance` [m]; evanescent ones end at infinity."""

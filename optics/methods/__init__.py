@@ -18,5 +18,6 @@ geometric            approximate: density of rays; the pinhole
 richards_wolf        the vector focus of symmetric pupils, and how wrong scalar theory is
 rays                 where geometrical optics sends the light
 pupil_sampling       where matrix products sample the pupil
+sine_samples         the same, evenly spaced as seen from the window
 spectral_taper       how a spectrum ends before grazing incidence
 """

@@ -7,7 +7,7 @@ from optics.methods.problem import Problem
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.precision import opaque, precision
-from optics.numerics.radial_profile import RadialProfile
+from optics.numerics.radial_profile import DistinctRadii, RadialProfile
 
 __all__ = ["on_line", "on_window", "with_sphere"]
 
@@ -28,7 +28,7 @@ def on_window(field: Field, beam: Beam, problem: Problem) -> Field:
     return with_sphere(field, x, y, beam, problem, +1)
 
 
-def on_line(profile: Field, line: RadialProfile, beam: Beam, problem: Problem) -> Field:
+def on_line(profile: Field, line: RadialProfile | DistinctRadii, beam: Beam, problem: Problem) -> Field:
     """A symmetric field, known on the radii of a line, over the window: without its sphere it is as smooth as the
     intensity."""
     types, window = precision(problem.dtype), problem.window

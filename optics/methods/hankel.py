@@ -24,11 +24,10 @@ from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
-from optics.numerics.radial_profile import RadialProfile
+from optics.numerics.radial_profile import DistinctRadii, RadialProfile
 
 __all__ = ["HankelSampling", "hankel"]
 
-MOST_NODES = 3000  # choice: beyond, a transform of so many pairs is no longer cheap
 # Choice. From this tolerance on J₀ need not be right to the last digit.
 LOOSE = 1e-8
 
@@ -40,7 +39,7 @@ class HankelSampling:
     taper: Taper
     radii: tuple[int, ...]
     angles: int
-    line: RadialProfile
+    line: RadialProfile | DistinctRadii
     seconds: float
     method: str = "hankel"
     model_error: float = 0.0
@@ -66,16 +65,15 @@ class HankelSampling:
 
     @property
     def largest(self) -> int:
-        return max(sum(self.radii), self.angles, self.line.points)
+        """No array is square but the matrix that refines the line."""
+        return math.isqrt(max(self.line.entries, sum(self.radii), self.angles, self.line.points))
 
 
 def hankel(problem: Problem) -> list[HankelSampling]:
     """Nodes for the turns that each phase goes through; nothing unless the problem is rotationally symmetric."""
     if not problem.symmetric:
         return []
-    found = [_sampling(problem, taper) for taper in tapers(problem)]
-    outputs = math.prod(problem.window.shape)
-    return [sampling for sampling in found if sampling.largest <= MOST_NODES and sampling.line.pays(outputs)]
+    return [_sampling(problem, taper) for taper in tapers(problem)]
 
 
 def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
@@ -87,9 +85,10 @@ def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
     steepest = math.hypot(problem.distance, problem.radius + outermost) / problem.wavelength
     angles = gauss_legendre_count(steepest * math.asin(min(1.0, taper.end * problem.wavelength)), digits)
     band = min(2 * taper.end, 2 * problem.radius / (problem.wavelength * problem.distance) + 2 / taper.blur)
-    line = RadialProfile.resolving(outermost, band, problem.distance, problem.ripple)
+    profile = RadialProfile.resolving(outermost, band, problem.distance, problem.ripple)
+    line = profile if profile.pays(math.prod(problem.window.shape)) else DistinctRadii(problem.window)
     pairs = sum(radii) * angles + angles * line.points
-    seconds = CALL["hankel"] + pairs * BESSEL_PAIR + line.points * line.table * PROFILE_ENTRY
+    seconds = CALL["hankel"] + pairs * BESSEL_PAIR + line.entries * PROFILE_ENTRY
     seconds += math.prod(problem.window.shape) * PROFILE_SAMPLE
     return HankelSampling(taper, radii, _round_up(angles), line, seconds)
 

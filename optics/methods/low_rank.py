@@ -12,10 +12,11 @@ from optics.elements.beam import Beam
 from optics.methods.carrier import on_window
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples, samples_of
+from optics.methods.sine_samples import SineSamples, sine_samples
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import CALL, FOURIER_ENTRY, KERNEL_ENTRY, MATMUL_FLOPS
 from optics.numerics.field import Field
-from optics.numerics.grid import Grid
+from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 from optics.numerics.matrices import complex_matmul
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
@@ -26,14 +27,13 @@ __all__ = ["LowRankSampling", "low_rank"]
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
 RANK_RIPPLE = 0.4  # choice: error of the rest at the pupil's rim, of the tolerance; test_low_rank.py
 TRIED = 41  # choice: places along a line through the window
-MOST_ENTRIES = 4_000_000  # choice, by memory: of the matrix between pupil and window
-MOST_PIXEL_ENTRIES = 16_000_000  # for them only the direct sum is left
+MOST_ENTRIES = 16_000_000  # choice, by memory: of the matrix between pupil and window
 
 
 @dataclass(frozen=True)
 class LowRankSampling:
     """Pupil samples; `rank` Chebyshev points per axis of the window, `half_width` [m] about its centre, and the
-    distance c [m] of Fourier's kernel e^{-ik ξ·x/c}."""
+    distance c [m] of Fourier's kernel e^{-ik ξ·u/c}, u the place in the window; 1 where samples are sines already."""
 
     pupil: PupilSamples
     rank: int
@@ -54,7 +54,13 @@ class LowRankSampling:
 
     def plane(self, problem: Problem) -> float:
         """Width [m] over which rounding spreads the pupil's light."""
-        return problem.wavelength * problem.distance / float(np.diff(self.pupil.at).mean())
+        return problem.wavelength * self.scale / float(np.diff(self.pupil.at).mean())
+
+    @property
+    def directions(self) -> np.ndarray:
+        """s of the samples along either axis."""
+        found: np.ndarray = self.pupil.at / self.scale
+        return found
 
     @property
     def samples(self) -> tuple[int, int]:
@@ -66,17 +72,25 @@ class LowRankSampling:
 
 
 def low_rank(problem: Problem) -> list[LowRankSampling]:
-    """As few pupil samples as the turns of pupil and path together allow, and the rank that the slow rest needs."""
-    pupil = samples_of(problem)
-    if pupil is None:
-        return []
+    """As few pupil samples as the turns of pupil and path together allow, and the rank that the slow rest needs: with
+    samples in sines, or where these crowd, on a grid of places; pixels have nodes of their own."""
     half = max(problem.window.own_half_width, problem.window.dx)
+    if problem.pixelated is None:
+        sines = sine_samples(problem)
+        found = None if sines is None else _sampling(problem, sines, half, 1.0)
+        if found is not None:
+            return [found]
+    pupil = samples_of(problem)
     # Fourier's kernel for a distance between that to the window's centre and that to its sides. Choice: where between.
     scale = math.hypot(problem.distance, 0.6 * half, *problem.window.centre)
-    most = math.isqrt(MOST_ENTRIES if problem.pixelated is None else MOST_PIXEL_ENTRIES) // len(pupil.at)
-    rank = _rank(problem, pupil.outermost, half, scale, most)
+    found = None if pupil is None else _sampling(problem, pupil, half, scale)
+    return [] if found is None else [found]
+
+
+def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) -> LowRankSampling | None:
+    rank = _rank(problem, pupil, half, scale, math.isqrt(MOST_ENTRIES) // len(pupil.at))
     if rank is None:
-        return []
+        return None
     inner = rank * len(pupil.at)
     height, width = problem.window.shape
     flops = 8 * (inner * inner * width + height * inner * width)
@@ -87,23 +101,29 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
         + pupil.seconds
         + inner * (height + width) * FOURIER_ENTRY
     )
-    return [LowRankSampling(pupil, rank, half, scale, seconds)]
+    return LowRankSampling(pupil, rank, half, scale, seconds)
 
 
-def _rank(problem: Problem, outermost: float, half: float, scale: float, most: int) -> int | None:
+def _rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
     """Chebyshev points along an axis that interpolate the slow rest, tried on the soft aperture's rim."""
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
-    rim = outermost * np.cos(angle), outermost * np.sin(angle)
+    rim = pupil.outermost * np.cos(angle), pupil.outermost * np.sin(angle)
+    directions = pupil.directions(*rim) if isinstance(pupil, SineSamples) else (rim[0] / scale, rim[1] / scale)
     test = half * np.linspace(-1, 1, TRIED)
-    centre = problem.window.centre
     # On the axis both directions are alike, and so are both sides.
-    places = [(0, 0.0), (0, half)] if centre == (0.0, 0.0) else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
-    exact = np.stack([_rest(problem, scale, rim, _line(centre, along, test, across)) for along, across in places])
+    on_axis = problem.window.centre == (0.0, 0.0)
+    lines = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
+
+    def rest(at: np.ndarray) -> np.ndarray:
+        """(line, place on the rim, place on the line)"""
+        u, v = np.stack([_line(axis, at, across) for axis, across in lines], axis=1)[:, :, None, :]
+        return _rest(problem, rim, directions, (u, v))
+
+    exact = rest(test)
     for rank in RANKS:
         if rank > most:
             return None
-        points = half * chebyshev_points(rank)
-        known = np.stack([_rest(problem, scale, rim, _line(centre, along, points, across)) for along, across in places])
+        known = rest(half * chebyshev_points(rank))
         if np.abs(exact - known @ _between(rank)).max() < RANK_RIPPLE * problem.tolerance:
             return rank
     return None
@@ -115,39 +135,42 @@ def _between(rank: int) -> np.ndarray:
     return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(rank))
 
 
-def _line(centre: tuple[float, float], along: int, at: np.ndarray, across: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points (x, y) of a line through the window, along x (0) or y (1)."""
-    place = [centre[0] + 0 * at, centre[1] + 0 * at]
-    place[along] = place[along] + at
-    place[1 - along] = place[1 - along] + across
-    return place[0], place[1]
+def _line(along: int, at: np.ndarray, across: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (x, y) of a line through the window, along x (0) or y (1), from its centre."""
+    beside = np.full_like(at, across)
+    return (at, beside) if along == 0 else (beside, at)
 
 
 def _rest(
-    problem: Problem, scale: float, pupil: tuple[np.ndarray, np.ndarray], window: tuple[np.ndarray, np.ndarray]
+    problem: Problem,
+    pupil: tuple[np.ndarray, np.ndarray],
+    directions: tuple[np.ndarray, np.ndarray],
+    window: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """(z/D)² e^{ik(D - ρ + ξ·x/c)} between points of pupil and window."""
-    (xi, eta), (x, y) = pupil, window
+    """(z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and u of the window, s those of Fourier's kernel."""
+    (xi, eta), (u, v), (s, t) = pupil, window, directions
+    x, y = u + problem.window.centre[0], v + problem.window.centre[1]
     z = problem.distance
     rho2 = x * x + y * y + z * z
     excess = xi**2 + eta**2 - 2 * (x * xi + y * eta)
     distance = np.sqrt(rho2 + excess)
-    waves = (excess / (distance + np.sqrt(rho2)) + (x * xi + y * eta) / scale) / problem.wavelength
+    waves = (excess / (distance + np.sqrt(rho2)) + u * s + v * t) / problem.wavelength
     return z * z / distance**2 * np.exp(2j * np.pi * waves)
 
 
 def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> Field:
-    """U(x) = Σ_ab L_a(x) L_b(y) Σ_ξ P(ξ) G(ξ; x_a, y_b) e^{-ik ξ·x/c}, up to a phase that intensity forgets:
+    """U(x) = Σ_ab L_a(u) L_b(v) Σ_ξ P(ξ) G(ξ; x_a, y_b) e^{-ik s·u}, up to a phase that intensity forgets:
 
-        G(ξ; x) = z/(λD²) (1/(kD) - i) e^{ik(D - ρ + ξ·x/c)},   D = |(x - ξ, z)|, ρ = |(x, z)|,
+        G(ξ; x) = z/(λD²) (1/(kD) - i) e^{ik(D - ρ + s·u)},   D = |(x - ξ, z)|, ρ = |(x, z)|,
 
-    which varies slowly with x. Sums over a and ξ along one axis are one: A_y W A_xᵀ, two matrix products.
+    which varies slowly with x; u is the place in the window, from its centre, and s = ξ/c or the sines of the samples.
+    Sums over a and ξ along one axis are one: A_y W A_xᵀ, two matrix products.
     """
     window = problem.window
     inner = _kernel(beam, problem, how, types)
-    across_x = across_y = _fourier(window.x, window.centre[0], problem, how, types)
-    if window.shape[0] != window.shape[1] or window.centre[0] != window.centre[1]:
-        across_y = _fourier(window.y, window.centre[1], problem, how, types)
+    across_x = across_y = _fourier(window.shape[1], problem, how, types)
+    if window.shape[0] != window.shape[1]:
+        across_y = _fourier(window.shape[0], problem, how, types)
     re, im = complex_matmul(across_y, complex_matmul(inner, across_x, transposed=True))
     return Field(re.array, im.array, window, types)
 
@@ -163,17 +186,18 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
     middle = dr.opaque(types.Float64, (n * rank) // 2)
     (a, i), (b, j) = (_split(place + middle, n, types) for place in (column, row))
     points = types.Float64(how.half_width * chebyshev_points(rank))
-    x, y = (dr.gather(types.Float64, points, types.Index(index)) for index in (a, b))
-    x, y = x + opaque(types, problem.window.centre[0]), y + opaque(types, problem.window.centre[1])
-    xi, eta = (how.pupil.places(index, beam, types) for index in (i, j))
+    from_centre = [dr.gather(types.Float64, points, types.Index(index)) for index in (a, b)]
+    x, y = (u + opaque(types, middle) for u, middle in zip(from_centre, problem.window.centre, strict=True))
+    xi, eta = how.pupil.places(i, j, beam, types)
     z, wavelength = opaque(types, beam.distance), opaque(types, problem.wavelength)
     rho2 = x * x + y * y + z * z
-    along = x * xi + y * eta
-    excess = xi * xi + eta * eta - 2 * along
+    excess = xi * xi + eta * eta - 2 * (x * xi + y * eta)
     distance = dr.sqrt(rho2 + excess)
     # Fourier's kernel stays where it is while nodes move with the radius; what they move by is the rest's.
-    fixed = x * dr.detach(xi) + y * dr.detach(eta)
-    waves = (excess / (distance + dr.sqrt(rho2)) + fixed * opaque(types, 1 / how.scale)) / wavelength
+    directions = types.Float64(padded_for_packets(how.directions))
+    s, t = (dr.gather(types.Float64, directions, types.Index(index)) for index in (i, j))
+    fixed = from_centre[0] * s + from_centre[1] * t
+    waves = (excess / (distance + dr.sqrt(rho2)) + fixed) / wavelength
     slow = Field.from_waves(z / (wavelength * distance * distance), waves, Grid.square(n * rank, 1.0), types)
     near = types.Float(wavelength / (2 * math.pi * distance))
     slow = slow * Field(near, types.Float(-1), slow.grid, types)
@@ -191,13 +215,12 @@ def _split(index: Array, n: int, types: Precision) -> tuple[Array, Array]:
     return quotient, dr.fma(-quotient, by, index)
 
 
-def _fourier(
-    at: np.ndarray, middle: float, problem: Problem, how: LowRankSampling, types: Precision
-) -> tuple[Array, Array]:
-    """A[x, (a, ξ)] = L_a(x) e^{-ik ξ x/c} as two tensors."""
-    waves = np.outer(at, how.pupil.at) / (-problem.wavelength * how.scale)
+def _fourier(n: int, problem: Problem, how: LowRankSampling, types: Precision) -> tuple[Array, Array]:
+    """A[x, (a, ξ)] = L_a(u) e^{-ik s u} as two tensors, at n samples of the window along an axis."""
+    at = sample_positions(n, problem.window.dx)
+    waves = np.outer(at, how.directions) / -problem.wavelength
     angle = (2 * np.pi * (waves - np.rint(waves))).astype(types.dtype)
-    weight = lagrange_basis(at - middle, how.half_width * chebyshev_points(how.rank)).T.astype(types.dtype)
+    weight = lagrange_basis(at, how.half_width * chebyshev_points(how.rank)).T.astype(types.dtype)
     shape = len(at), weight.shape[1] * angle.shape[1]
     re, im = (weight[:, :, None] * part[:, None, :] for part in (np.cos(angle), np.sin(angle)))
     return types.Tensor(padded_for_packets(re), shape), types.Tensor(padded_for_packets(im), shape)

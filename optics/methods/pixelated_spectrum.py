@@ -104,7 +104,7 @@ def _spectrum(u: Field, beam: Beam, how: PixelSpectrum, types: Precision) -> Fie
     nodes, grid = len(how.pupil.at), how.spectrum
     index = types.Float64(dr.arange(types.Index, grid.shape[0] * nodes))
     row = dr.floor((index + 0.5) / dr.opaque(types.Float64, nodes))
-    place = how.pupil.places(dr.fma(-row, dr.opaque(types.Float64, nodes), index), beam, types)
+    place = how.pupil.along(dr.fma(-row, dr.opaque(types.Float64, nodes), index), beam, types)
     waves = place * (row - grid.shape[0] // 2) * dr.opaque(types.Float64, -grid.dx)
     fourier = Field.from_waves(types.Float(1), waves, Grid((grid.shape[0], nodes), 1.0), types)
     matrix = types.Tensor(fourier.re, fourier.grid.shape), types.Tensor(fourier.im, fourier.grid.shape)

@@ -31,7 +31,7 @@ class PupilSamples(Protocol):
 
     @property
     def at(self) -> np.ndarray:
-        """Places [m] along either axis."""
+        """Places along either axis [m], or sines."""
 
     @property
     def outermost(self) -> float:
@@ -41,8 +41,9 @@ class PupilSamples(Protocol):
     def seconds(self) -> float:
         """What `field` takes, roughly."""
 
-    def places(self, index: Array, beam: Beam, types: Precision) -> Array:
-        """at[index] for float64 indices, with the derivatives that the beam's radius carries."""
+    def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
+        """Points (x, y) [m] of samples i along x and j along y, float64 indices, with the derivatives that the beam's
+        radius carries."""
 
     def field(self, beam: Beam, types: Precision) -> Field:
         """Behind the pupil, times the samples' areas [m²]."""
@@ -67,10 +68,11 @@ class GridSamples:
     def seconds(self) -> float:
         return self.grid.shape[0] ** 2 * self.edge.seconds_per_point
 
-    def places(self, index: Array, beam: Beam, types: Precision) -> Array:
+    def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
         import drjit as dr
 
-        return (index - dr.opaque(types.Float64, self.grid.shape[0] // 2)) * opaque(types, self.grid.dx)
+        middle, pitch = dr.opaque(types.Float64, self.grid.shape[0] // 2), opaque(types, self.grid.dx)
+        return (i - middle) * pitch, (j - middle) * pitch
 
     def field(self, beam: Beam, types: Precision) -> Field:
         return beam.behind(self.edge.aperture, self.grid, types).scaled(self.grid.dx**2)
@@ -97,7 +99,11 @@ class PixelSamples:
     def seconds(self) -> float:
         return (self.aperture.count * self.across) ** 2 * PIXEL_NODE_GEOMETRY
 
-    def places(self, index: Array, beam: Beam, types: Precision) -> Array:
+    def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
+        return self.along(i, beam, types), self.along(j, beam, types)
+
+    def along(self, index: Array, beam: Beam, types: Precision) -> Array:
+        """The same along one axis."""
         import drjit as dr
 
         return dr.gather(types.Float64, types.Float64(self.aperture.rows(self.across)), types.Index(index)) * opaque(

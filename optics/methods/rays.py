@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -20,16 +21,27 @@ MARGIN = 1.4
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays from points (x, y) of the aperture to points (to_x, to_y) of the plane behind it [m], and how the map
-    between the two stretches there: singular values `least` <= `most`, and the sign of its determinant."""
+    """Rays from points (x, y) of the aperture to points (to_x, to_y) of the plane behind it [m]; and of the map between
+    the two half the squared norm of its gradient, and the gradient's determinant."""
 
     x: np.ndarray
     y: np.ndarray
     to_x: np.ndarray
     to_y: np.ndarray
-    least: np.ndarray
-    most: np.ndarray
-    sign: np.ndarray
+    norm: np.ndarray
+    determinant: np.ndarray
+
+    @cached_property
+    def most(self) -> np.ndarray:
+        """How far the map stretches at each ray: the larger singular value of its gradient."""
+        root = np.sqrt(np.maximum(np.square(self.norm) - np.square(self.determinant), 0))
+        found: np.ndarray = np.sqrt(self.norm + root)
+        return found
+
+    @cached_property
+    def least(self) -> np.ndarray:
+        """The smaller one."""
+        return np.abs(self.determinant) / np.maximum(self.most, 1e-30)
 
     @classmethod
     def of(cls, slopes: Slopes, aperture: Aperture, distance: float, medium_n: float) -> Rays:
@@ -38,16 +50,14 @@ class Rays:
         centred = slice(slopes.grid.shape[0] // 2 % step, None, step)
         x, y = np.meshgrid(slopes.grid.x[centred], slopes.grid.y[centred])
         px, py = (slope[centred, centred] / medium_n for slope in (slopes.along_x, slopes.along_y))
-        axial = np.sqrt(np.maximum(1 - px**2 - py**2, 1e-6))
-        to_x, to_y = x + distance * px / axial, y + distance * py / axial
+        squared = px * px + py * py
+        tangent = distance / np.sqrt(np.maximum(1 - squared, 1e-6))
+        to_x, to_y = x + tangent * px, y + tangent * py
+        inside = aperture.contains(x / slopes.radius, y / slopes.radius) & (squared < 1 - 1e-6)
         pitch = step * slopes.grid.dx
-        (yx, xx), (yy, xy) = np.gradient(to_x, pitch), np.gradient(to_y, pitch)
-        determinant, frobenius = xx * yy - xy * yx, (xx**2 + yy**2 + xy**2 + yx**2) / 2
-        root = np.sqrt(np.maximum(frobenius**2 - determinant**2, 0))
-        most = np.sqrt(frobenius + root)
-        least = np.abs(determinant) / np.maximum(most, 1e-30)
-        inside = aperture.contains(x / slopes.radius, y / slopes.radius) & (px**2 + py**2 < 1 - 1e-6)
-        return cls(*(values[inside] for values in (x, y, to_x, to_y, least, most, np.sign(determinant))))
+        (yx, xx), (yy, xy) = ([part[inside] for part in np.gradient(to, pitch)] for to in (to_x, to_y))
+        norm = (xx * xx + yy * yy + xy * xy + yx * yx) / 2
+        return cls(x[inside], y[inside], to_x[inside], to_y[inside], norm, xx * yy - xy * yx)
 
     def __len__(self) -> int:
         return len(self.x)
@@ -55,7 +65,7 @@ class Rays:
     @property
     def folded(self) -> bool:
         """Whether some places of the plane may be reached by several rays."""
-        return len(self) > 0 and float(self.sign.min()) < float(self.sign.max())
+        return len(self) > 0 and float(np.sign(self.determinant.min())) < float(np.sign(self.determinant.max()))
 
     @property
     def image_area(self) -> float:
@@ -66,7 +76,7 @@ class Rays:
         """`most` of the rays or all, evenly: steps of the golden section fall into step with no row."""
         turns = (np.arange(min(most, len(self))) + 0.5) * (math.sqrt(5) - 1) / 2
         chosen = ((turns % 1) * len(self)).astype(int) if most < len(self) else slice(None)
-        parts = (self.x, self.y, self.to_x, self.to_y, self.least, self.most, self.sign)
+        parts = (self.x, self.y, self.to_x, self.to_y, self.norm, self.determinant)
         return Rays(*(part[chosen] for part in parts))
 
 

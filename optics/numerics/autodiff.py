@@ -16,7 +16,7 @@ Scalar = Any  # a number, or a Dr.Jit array of one element that carries a deriva
 
 def is_differentiable(value: Any) -> bool:
     """Whether value is a Dr.Jit array (or tensor), not a Python or NumPy number."""
-    return type(value).__module__.startswith("drjit")
+    return type(value) is not float and type(value).__module__.startswith("drjit")
 
 
 def number(value: Any) -> float:
@@ -26,6 +26,8 @@ def number(value: Any) -> float:
         TypeError: of a type that is no number's.
         ValueError: an array of more than one element.
     """
+    if type(value) is float:
+        return value  # asked for thousands of times in planning
     if is_differentiable(value):
         return float(plain(value).reshape(()))
     return float(value)

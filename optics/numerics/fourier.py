@@ -11,6 +11,7 @@ SciPy's FFT needs fewer, so matrices win for small windows and the FFT for large
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from functools import lru_cache
 from math import ceil, log2
 from typing import Any
@@ -40,11 +41,17 @@ AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples that are transformed toge
 
 def fast_length(least: float) -> int:
     """Smallest 5-smooth integer >= least: the FFT is fast there."""
-    from scipy.fft import next_fast_len
-
     if least > LONGEST_FFT:
         return ceil(least)  # no FFT will be that long
-    return int(next_fast_len(max(1, ceil(least)), real=True))
+    lengths = _smooth_numbers()
+    return lengths[bisect_left(lengths, max(1, ceil(least)))]
+
+
+@lru_cache(maxsize=1)
+def _smooth_numbers() -> list[int]:
+    """2^a 3^b 5^c up to LONGEST_FFT, rising."""
+    threes_and_fives = [3**b * 5**c for b in range(20) for c in range(14)]
+    return sorted(n << a for n in threes_and_fives for a in range(32) if n << a <= LONGEST_FFT)
 
 
 def dft2(

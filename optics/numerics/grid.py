@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optics.numerics.arguments import point_2d, positive, shape_2d, without_derivative
+from optics.numerics.arguments import LARGEST, SMALLEST, point_2d, positive, shape_2d, without_derivative
 from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision, opaque
 
@@ -27,11 +27,27 @@ class Grid:
     centre: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
+        if self._is_plain:
+            return  # planning makes hundreds of grids, of numbers that need no care
         object.__setattr__(self, "shape", shape_2d("shape", self.shape))
         object.__setattr__(
             self, "dx", positive("dx", without_derivative("dx", self.dx))
         )  # a NumPy scalar would take a Dr.Jit array for its own
         object.__setattr__(self, "centre", point_2d("centre", self.centre))
+
+    @property
+    def _is_plain(self) -> bool:
+        """Whether all numbers are of Python's own types and in range."""
+        height, width = self.shape if type(self.shape) is tuple and len(self.shape) == 2 else (None, None)
+        return (
+            type(height) is int
+            and type(width) is int
+            and min(height, width) >= 1
+            and type(self.dx) is float
+            and SMALLEST <= self.dx <= LARGEST
+            and self.centre == (0.0, 0.0)
+            and type(self.centre) is tuple
+        )
 
     @classmethod
     def square(cls, n: int, dx: float) -> Grid:

@@ -56,6 +56,17 @@ def test_slopes_and_rays_of_a_prism():
     assert y.mean() == pytest.approx(0, abs=1e-9)
 
 
+def test_slopes_of_a_lens_hold_out_to_the_rim_of_its_soft_edge():
+    """A lens turns by thousands of waves; a slope of first order at the grid's ends would add its own to what is left
+    of them in the focus, and samples with it."""
+    f = 100e-6
+    slopes = Pupil(30e-6, thin_lens_focal_length=f).slopes(550e-9, PointSource())
+    x, y = slopes.grid.x[None, :], slopes.grid.y[:, None]
+    exact = -x / np.sqrt(x * x + y * y + f * f)
+    np.testing.assert_allclose(slopes.along_x, exact, atol=1e-5)
+    np.testing.assert_allclose(slopes.along_y, exact.T, atol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

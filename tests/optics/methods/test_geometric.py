@@ -83,8 +83,10 @@ def test_auto_takes_rays_only_within_the_tolerance():
     coarse = optics.plan(Pupil(2e-3), WAVELENGTH, 2e-3, **wide, tolerance=0.5)
     assert coarse.method == "geometric"
     assert coarse.predicted_error <= 0.5
+    assert optics.plan(Pupil(2e-3), WAVELENGTH, 2e-3, **wide, tolerance=1e-2).method == "hankel"
+    hexagon = Pupil(2e-3, aperture=optics.Polygon.regular(6))
     with pytest.raises(optics.AccuracyError):  # no method can, and none is taken that errs by more
-        optics.plan(Pupil(2e-3), WAVELENGTH, 2e-3, **wide, tolerance=1e-2)
+        optics.plan(hexagon, WAVELENGTH, 2e-3, **wide, tolerance=1e-2)
 
 
 class TestPinhole:

@@ -1,10 +1,11 @@
-"""J₀ against SciPy's."""
+"""Bessel functions against SciPy's."""
 
 import numpy as np
 import pytest
-from scipy.special import j0
+from scipy.special import j0, jv
 
-from optics.numerics.bessel import bessel_j0
+from optics.numerics import bessel
+from optics.numerics.bessel import bessel_j, bessel_j0
 from optics.numerics.precision import precision
 
 
@@ -25,3 +26,14 @@ def test_what_is_not_exact_is_cheaper_for_a_reason():
     types, waves = precision("float64"), np.linspace(0, 2, 1001)
     exact, near = (bessel_j0(types.Float64(waves), types, exactly).numpy() for exactly in (True, False))
     assert np.abs(exact - near).max() > 1e-15
+
+
+@pytest.mark.parametrize("few", [bessel.FEW, 0])
+def test_whole_orders(few, monkeypatch):
+    """By cosines, and by SciPy where these are many."""
+    monkeypatch.setattr(bessel, "FEW", few)
+    x = np.concatenate([[0.0, 1e-9], np.linspace(0.1, 150, 400)])
+    for order in (0, 1, 2, 17, 180):
+        assert np.abs(bessel_j(order, x) - jv(order, x)).max() < 5e-15
+    orders = np.arange(402.0) // 3
+    assert np.abs(bessel_j(orders, x) - jv(orders, x)).max() < 5e-15

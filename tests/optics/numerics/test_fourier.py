@@ -3,6 +3,7 @@
 import drjit as dr
 import numpy as np
 import pytest
+from scipy.fft import next_fast_len
 
 from optics.numerics import fourier
 from optics.numerics.field import Field
@@ -67,3 +68,10 @@ def test_small_windows_go_by_matrix_and_large_ones_by_fft():
     assert not fourier._fft_wins((400, 400), 800, (20, 20))
     assert fourier._fft_wins((1000, 1000), 2000, (2000, 2000))
     assert not fourier._fft_wins((1000, 1000), 2000.5, (2000, 2000))
+
+
+def test_fast_lengths_are_the_next_without_large_factors():
+    lengths = [*range(1, 3000), 999_999, 2**31 - 1]
+    assert [fourier.fast_length(n) for n in lengths] == [next_fast_len(n, real=True) for n in lengths]
+    assert fourier.fast_length(7.2) == 8
+    assert fourier.fast_length(2.0**40 - 0.5) == 2**40

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.special import jv
+from scipy.special import jv, roots_legendre
 
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics, stepped_up
 
@@ -38,3 +38,14 @@ def test_steps_up_are_few_small_and_never_down():
     assert len(set(stepped)) < 220  # 13.3 octaves of 16 steps, where 2000 were asked
     assert all(stepped_up(each) == pytest.approx(each, rel=1e-9) for each in set(stepped))
     assert stepped_up(0.0) == 0.0
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 10, 51, 300, 3000])
+def test_gauss_legendre_is_exact(n):
+    """Nodes are SciPy's; and polynomials of degree 2n - 1 come out right, those of degree 2n do not."""
+    x, weight = gauss_legendre(n)
+    np.testing.assert_allclose(x, (roots_legendre(n)[0] + 1) / 2, atol=4e-16)
+    for degree in {0, 1, min(n, 40), 2 * n - 1}:
+        assert weight @ x**degree == pytest.approx(1 / (degree + 1), rel=1e-12)
+    if n <= 10:
+        assert weight @ x ** (2 * n) != pytest.approx(1 / (2 * n + 1), rel=1e-12)

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 import optics
-from optics import Pupil
-from optics.numerics.radial_profile import RadialProfile
+from optics import PointSource, Pupil
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem
+from optics.methods.rayleigh_sommerfeld import direct_sum, node_rule
+from optics.numerics import radial_profile
+from optics.numerics.grid import Grid
+from optics.numerics.precision import precision
+from optics.numerics.radial_profile import DistinctRadii, RadialProfile
 from validation.reference import circular_aperture_on_axis, ideal_lens_field, relative_l2
 
 
@@ -48,3 +54,48 @@ def test_a_profile_costs_no_more_than_its_wave_turns():
     near, far = (RadialProfile.resolving(1e-4, 1e5, distance, 1e-4) for distance in (2e-3, 2e-1))
     assert 30 < far.points <= near.points < 150
     assert 60 < far.table <= near.table < 1.05 * far.table
+
+
+HOLE = {"radius": 1e-3, "distance": 1e-6 / (1000 * 550e-9)}  # of Fresnel number 1,000: rays are as steep as 1/2
+
+
+def test_a_hole_of_a_thousand_zones():
+    """Its whole shadow on few samples, against the direct sum at some of them; and on the axis against Osterberg and
+    Smith's closed form."""
+    samples = 65
+    radius, distance = HOLE["radius"], HOLE["distance"]
+    asked = {"dx": 2.2 * radius / samples, "tolerance": 1e-3}
+    result = optics.psf(Pupil(radius), [550e-9], distance, shape=(samples, samples), **asked)
+    assert result.plan.method == "hankel"
+    middle = circular_aperture_on_axis(radius, distance, 550e-9) / (math.pi * radius**2)
+    assert result.psf[0, samples // 2, samples // 2] == pytest.approx(middle, rel=1e-3)
+    places = np.linspace(0, samples - 1, 7).astype(int)
+    beam = Beam(Pupil(radius), PointSource(), 550e-9, distance)
+    problem = Problem.of(beam, Grid(result.psf.shape[1:], asked["dx"]), 1e-4, "float64")
+    types, rule = precision("float64"), (beam.pupil.aperture, *node_rule(problem), True)
+    x = types.Float64(np.abs(result.x[places]))
+    exact = direct_sum(beam, rule, x, 0 * x, types).intensity.numpy() / beam.pupil.area
+    assert relative_l2(result.psf[0, samples // 2, places], exact) < 1e-3
+
+
+def test_long_lines_are_their_own_table(monkeypatch):
+    """The same picture without the matrix from Chebyshev points."""
+    asked = {"dx": 1e-6, "shape": (101, 101), "tolerance": 1e-5, "dtype": "float64", "method": "hankel"}
+    by_points = optics.psf(Pupil(30e-6), [550e-9], 1e-3, **asked).psf[0]
+    monkeypatch.setattr(radial_profile, "LARGEST_MATRIX", 1)
+    line = RadialProfile.resolving(1e-4, 1e5, 1e-3, 1e-5)
+    assert line.is_table
+    assert line.entries == 0
+    by_table = optics.psf(Pupil(30e-6), [550e-9], 1e-3, **asked | {"tolerance": 0.99e-5}).psf[0]
+    assert 0 < relative_l2(by_table, by_points) < 1e-5
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (2e-6, 0.3e-6)])
+def test_every_sample_has_its_own_radius(centre):
+    window = Grid((9, 12), 0.5e-6, centre)
+    line = DistinctRadii(window)
+    types = precision("float64")
+    found = line.onto(types.Float64(line.positions), window, types).numpy()
+    np.testing.assert_allclose(found, np.hypot(window.x[None, :], window.y[:, None]).ravel(), rtol=1e-6, atol=1e-15)
+    if centre == (0.0, 0.0):
+        assert line.points < 9 * 12 / 3

@@ -1,5 +1,8 @@
 """What becomes of a picture that the spot check finds wrong."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -9,6 +12,7 @@ from optics.point_spread import pictures
 
 LENS = optics.Pupil(20e-6, thin_lens_focal_length=400e-6)
 PLAIN = optics.Pupil(20e-6)
+WIDE = optics.Pupil(200e-6, aperture=optics.Polygon.regular(6))
 WINDOW = {"dx": 1e-6, "shape": (21, 21)}
 TOLERANCE = 1e-3
 
@@ -49,13 +53,13 @@ def test_an_exact_method_tries_again_for_a_smaller_tolerance(told):
 
 
 def test_an_approximation_gives_way_to_an_exact_method(told):
-    ask = {"sensor_distance": 40e-3, "tolerance": 1e-2, "dx": 40e-6, "shape": (21, 21)}
-    assert optics.plan(PLAIN, **ask).method in ("fresnel", "fraunhofer")
+    ask = {"sensor_distance": 40e-3, "tolerance": 1e-2, "dx": 4e-6, "shape": (201, 201)}
+    assert optics.plan(WIDE, **ask).method in ("fresnel", "fraunhofer")
     checked = told(0.5, 1e-3)
-    result = optics.psf(PLAIN, **ask)
+    result = optics.psf(WIDE, **ask)
     assert result.plan.method not in ("fresnel", "fraunhofer")
     assert [problem.tolerance for problem in checked] == [1e-2, 1e-2]
-    exact = optics.psf(PLAIN, **ask | {"method": "exact"}) if told(1e-3) == [] else None
+    exact = optics.psf(WIDE, **ask | {"method": "exact"}) if told(1e-3) == [] else None
     np.testing.assert_array_equal(result.psf, exact.psf)
 
 
@@ -88,3 +92,17 @@ def test_where_no_check_was_made_the_picture_tells_how_dark_it_is(told):
     assert optics.psf(LENS, **ask).plan.predicted_error < 2e-5
     with pytest.raises(optics.AccuracyError, match="so dark that float32 rounding"):
         optics.psf(LENS, **ask, centre=(150e-6, 0.0))
+
+
+def test_the_first_small_picture_waits_for_no_import_of_scipy():
+    """That alone would take more than `import numpy, scipy`; a pupil that bends light is computed without."""
+    small = """
+import sys
+import optics
+relief = optics.BSplineRelief.paraboloid(0.0, 1 / 120e-6, 25e-6)
+pupil = optics.Pupil(25e-6, relief)
+optics.psf(pupil, [550e-9], 240e-6, dx=0.25e-6, shape=(65, 65), tolerance=1e-2).psf
+print(sorted(name for name in sys.modules if name.split(".")[0] == "scipy"))
+"""
+    found = subprocess.run([sys.executable, "-c", small], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"

@@ -1,0 +1,133 @@
+"""Samples of a pupil that are evenly spaced as seen from the window: in the sines of the rays to its centre.
+
+A point ξ of the pupil sends its light to points x = c + u of a window about c over the distance
+
+    |x - ξ| = √(D² - 2 u·(ξ - c) + u²) = D - u·s + (u² - (u·s)²)/2D + ...,   s = (ξ - c)/D,   D = |(ξ - c, z)|.
+
+In s what is linear in u is Fourier's kernel to all orders of the aperture. What is left falls with the distance: the
+curvature that the rays' obliquity gives to the window, of about u²NA²/λD turns.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem, PupilEdge
+from optics.numerics.autodiff import Array
+from optics.numerics.cost import PUPIL_SAMPLE
+from optics.numerics.field import Field
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, opaque, padded_for_packets
+
+__all__ = ["SineSamples", "sine_samples"]
+
+MOST_STRETCH = 3.0  # choice: of the pupil against an even spacing, beyond which it needs too many samples
+RIM = 64  # points of it that tell how far the sines reach
+
+
+@dataclass(frozen=True)
+class SineSamples:
+    """A grid of sines about those of the pupil's middle; it carries a soft aperture.
+
+    grid: of s - s₀, s₀ the sines of the pupil's middle. centre: of the window (x, y) [m]; distance: to its plane [m].
+    steepest: |s| of the farthest sample that counts.
+    """
+
+    edge: PupilEdge
+    grid: Grid
+    centre: tuple[float, float]
+    distance: float
+    steepest: float
+
+    @property
+    def at(self) -> np.ndarray:
+        """Places along either axis: sines, less those of the pupil's middle."""
+        return self.grid.x
+
+    @property
+    def outermost(self) -> float:
+        """Distance from the axis [m] beyond which nothing counts."""
+        return self.edge.outermost
+
+    @property
+    def seconds(self) -> float:
+        """What `field` takes, roughly."""
+        return self.grid.shape[0] ** 2 * (self.edge.seconds_per_point + PUPIL_SAMPLE / 5)
+
+    @cached_property
+    def _middle(self) -> tuple[float, float]:
+        return _middle(self.centre, self.distance)
+
+    def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """s - s₀ of points of the pupil [m]."""
+        sx, sy = _sines(x, y, self.centre, self.distance)
+        return sx - self._middle[0], sy - self._middle[1]
+
+    def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
+        """ξ = c + z s/√(1 - s²) [m] of sample i along x and j along y, float64 indices."""
+        import drjit as dr
+
+        at = types.Float64(padded_for_packets(self.at))
+        sx, sy = (
+            dr.gather(types.Float64, at, types.Index(index)) + opaque(types, middle)
+            for index, middle in zip((i, j), self._middle, strict=True)
+        )
+        slant = opaque(types, self.distance) / self._cosine(sx, sy, types)
+        return sx * slant + opaque(types, self.centre[0]), sy * slant + opaque(types, self.centre[1])
+
+    def _cosine(self, sx: Array, sy: Array, types: Precision) -> Array:
+        """Of the ray's angle to the axis; beyond all that counts it stays what it is there."""
+        import drjit as dr
+
+        return dr.sqrt(1 - dr.minimum(sx * sx + sy * sy, opaque(types, self.steepest**2)))
+
+    def field(self, beam: Beam, types: Precision) -> Field:
+        """Behind the pupil, times the samples' areas dξ dη = z²/cos⁴θ ds dt [m²]."""
+        import drjit as dr
+
+        column, row = self.grid.coordinates(types)
+        sx, sy = (part + opaque(types, middle) for part, middle in zip((column, row), self._middle, strict=True))
+        cosine, z = self._cosine(sx, sy, types), opaque(types, self.distance)
+        x = sx * z / cosine + opaque(types, self.centre[0])
+        y = sy * z / cosine + opaque(types, self.centre[1])
+        area = dr.square(z * opaque(types, self.grid.dx) / dr.square(cosine))
+        behind = beam.at(self.edge.aperture, x, y, self.grid, types)
+        return Field(behind.re * types.Float(area), behind.im * types.Float(area), self.grid, types)
+
+
+def _sines(x: np.ndarray, y: np.ndarray, centre: tuple[float, float], distance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of the rays from the window's centre to points (x, y) of the pupil."""
+    x, y = x - centre[0], y - centre[1]
+    slant = np.sqrt(x * x + y * y + distance * distance)
+    return x / slant, y / slant
+
+
+def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]:
+    """s₀, of the ray from the pupil's middle."""
+    slant = math.hypot(*centre, distance)
+    return -centre[0] / slant, -centre[1] / slant
+
+
+def sine_samples(problem: Problem) -> SineSamples | None:
+    """As few as the turns of pupil and path together allow; None where sines crowd too much towards the rim.
+
+    The map from sines to the pupil stretches by z/cos³θ at most, and turns per sine are as many times those per metre.
+    """
+    edge = problem.soft_edge(problem.turning)
+    angle = np.linspace(0, 2 * np.pi, RIM, endpoint=False)
+    centre = problem.window.centre
+    rim = _sines(edge.outermost * np.cos(angle), edge.outermost * np.sin(angle), centre, problem.distance)
+    middle = _middle(centre, problem.distance)
+    steepest = float(np.hypot(*rim).max())
+    stretch = (1 - steepest**2) ** -1.5
+    if stretch > MOST_STRETCH * (1 - math.hypot(*middle) ** 2) ** -1.5:
+        return None
+    pitch = 1 / (stretch * problem.distance * (problem.turning + edge.stopband))
+    half = max(float(np.abs(at - middle_at).max()) for at, middle_at in zip(rim, middle, strict=True))
+    grid = Grid.square(2 * math.ceil(half / pitch) + 1, pitch)
+    return SineSamples(edge, grid, centre, problem.distance, steepest)

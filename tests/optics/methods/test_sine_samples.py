@@ -1,0 +1,105 @@
+"""Samples in sines: every aperture, on and off the axis, to the tolerance asked; and few where zones are many."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from optics import Annulus, BSplineRelief, Circle, Grid, PointSource, Polygon, Pupil, Slit, Zernike
+from optics.elements.beam import Beam
+from optics.methods import low_rank as low_rank_module
+from optics.methods.low_rank import low_rank
+from optics.methods.problem import Problem
+from optics.methods.pupil_sampling import GridSamples
+from optics.methods.rayleigh_sommerfeld import nodes
+from optics.methods.sine_samples import SineSamples, sine_samples
+from optics.numerics.precision import precision
+
+WAVE = 550e-9
+APERTURES = {"circle": Circle(), "ring": Annulus(0.6), "hexagon": Polygon.regular(6), "slit": Slit(0.8, 0.3)}
+
+
+def error(beam, window, tolerance):
+    """Actual, of low_rank's picture against the sum over nodes; float64."""
+    problem, exactly = (Problem.of(beam, window, each, "float64") for each in (tolerance, 1e-3 * tolerance))
+    (how,), (reference,) = low_rank(problem), nodes(exactly)
+    assert isinstance(how.pupil, SineSamples)
+    exact = reference.intensity(beam, exactly).numpy()
+    return np.linalg.norm(how.intensity(beam, problem).numpy() - exact) / np.linalg.norm(exact)
+
+
+def bent(radius, distance, aperture, seed):
+    rng = np.random.default_rng(seed)
+    return Pupil(
+        radius, BSplineRelief(2e-6 * rng.random((4, 4))), thin_lens_focal_length=distance, aperture=aperture, n=1.5
+    )
+
+
+@pytest.mark.parametrize("name", APERTURES)
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-7])
+@pytest.mark.parametrize("place", [0.0, 0.7])
+def test_half_the_tolerance_holds_for_every_aperture_on_and_off_the_axis(name, tolerance, place):
+    """At half a right angle, too, where a sine's step is several times as long on the pupil as on its axis."""
+    distance = 100e-6
+    source = PointSource(300e-6, (math.atan(place), -math.atan(place / 2)))
+    centre = (place * distance, -place / 2 * distance)
+    for seed, radius in enumerate((8e-6, 25e-6)):
+        beam = Beam(bent(radius, distance, APERTURES[name], seed), source, WAVE, distance)
+        window = Grid((33, 25), 0.4e-6, centre)
+        assert error(beam, window, tolerance) < tolerance / 2
+
+
+def test_many_zones_take_no_more_samples_than_their_aberrations():
+    """About the focus of a lens of Fresnel number N: the samples are those of Zernike's waves and of the window,
+    whatever N, and the picture that of the direct sum."""
+    counts = []
+    for zones in (1e2, 1e3, 1e4):
+        for aperture in (0.1, 0.3):
+            radius = zones * WAVE / aperture
+            distance = radius / aperture
+            pupil = Pupil(
+                radius, wavefront=Zernike({(2, 2): 0.1, (3, 1): 0.2, (4, 0): 0.1}), thin_lens_focal_length=distance
+            )
+            beam = Beam(pupil, PointSource(), WAVE, distance)
+            problem = Problem.of(beam, Grid.square(129, WAVE / aperture / 8), 1e-3)
+            counts.append(len(sine_samples(problem).at))
+            assert error(beam, Grid.square(65, WAVE / aperture / 8), 1e-4) < 0.5e-4
+    assert max(counts) < 1.15 * min(counts)
+
+
+def test_samples_spaced_for_the_middle_alias_at_the_rim(monkeypatch):
+    """Sines are spaced for the map's stretch at the rim; without it the promise breaks."""
+    beam = Beam(bent(40e-6, 60e-6, Circle(), 1), PointSource(), WAVE, 60e-6)
+    window = Grid.square(33, 0.3e-6)
+    assert error(beam, window, 1e-6) < 0.5e-6
+
+    def too_coarse(problem):
+        found = sine_samples(problem)
+        stretch = (1 - found.steepest**2) ** -1.5
+        across = 2 * math.ceil(found.grid.half_width / (found.grid.dx * stretch)) + 1
+        return dataclasses.replace(found, grid=Grid.square(across, found.grid.dx * stretch))
+
+    monkeypatch.setattr(low_rank_module, "sine_samples", too_coarse)
+    assert error(beam, window, 1e-6) > 0.5e-6
+
+
+def test_sines_that_crowd_leave_the_pupil_to_an_even_grid():
+    near = Beam(bent(12e-6, 5e-6, Circle(), 0), PointSource(), WAVE, 5e-6)
+    problem = Problem.of(near, Grid.square(9, 0.2e-6), 1e-2)
+    assert sine_samples(problem) is None
+    (how,) = low_rank(problem)
+    assert isinstance(how.pupil, GridSamples)
+
+
+def test_every_sample_stands_for_its_area():
+    """Behind an open hole samples add up to the hole's area, times the pupil's field; in sines areas differ by
+    1/cos⁴."""
+    distance, radius = 50e-6, 30e-6
+    beam = Beam(Pupil(radius), PointSource(), WAVE, distance)
+    for centre in ((0.0, 0.0), (20e-6, -10e-6)):
+        problem = Problem.of(beam, Grid((9, 9), 1e-6, centre), 1e-6, "float64")
+        samples = sine_samples(problem)
+        assert float(np.sum(samples.field(beam, precision("float64")).re.numpy())) == pytest.approx(
+            beam.pupil.area, rel=1e-6
+        )
