@@ -15,6 +15,7 @@ from evolve.store import versions
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 MODULES = {"stable-baselines3": "stable_baselines3", "scikit-image": "skimage", "tomli-w": "tomli_w", "pillow": "PIL"}
+MODULES |= {"imageio-ffmpeg": "imageio_ffmpeg"}
 OPTICS_ALONE = {"numpy", "scipy", "drjit"}
 
 

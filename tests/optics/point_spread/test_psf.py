@@ -254,8 +254,10 @@ class TestRefusals:
             optics.psf(LENS, [550e-9], tolerance=1e-7)
 
     def test_a_pupil_of_millimetres_and_a_wide_window_are_too_much(self):
+        """Lit from aside, where no transform along one radius can carry it."""
+        pupil, window = Pupil(2e-3, thin_lens_focal_length=4e-3), {"dx": 20e-6, "shape": (201, 201)}
         with pytest.raises(AccuracyError, match="samples across"):
-            optics.psf(Pupil(2e-3, thin_lens_focal_length=4e-3), [550e-9], 4e-3, dx=20e-6, shape=(201, 201))
+            optics.psf(pupil, [550e-9], 4e-3, **window, source_angle=(0.1, 0.0))
 
     def test_a_dark_window_is_less_accurate_and_says_so(self):
         """The focus of a tilted wave lies far outside: what edge light is here drowns sooner in float32's rounding."""
