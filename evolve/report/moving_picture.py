@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 from typing import Any
 
@@ -48,11 +48,13 @@ def require_ffmpeg() -> Any:
     """The package imageio_ffmpeg, which runs ffmpeg as a program.
 
     Raises:
-        ConfigError: it is not installed.
+        ConfigError: it is not installed, or has no ffmpeg for this system.
     """
     try:
         import imageio_ffmpeg
-    except ImportError:
+
+        imageio_ffmpeg.get_ffmpeg_exe()
+    except (ImportError, RuntimeError):
         raise ConfigError("--mp4 needs ffmpeg: pip install 'rhabdom[video]'") from None
     return imageio_ffmpeg
 
@@ -63,7 +65,8 @@ def write_mp4(episode: AnyEpisode, path: Path) -> Path:
     Raises:
         ConfigError: ffmpeg is not installed.
     """
-    first, *rest = _frames(episode, stride=1)
+    frames = _frames(episode, stride=1)
+    first = next(frames)
     # Colours are stored for squares of four pixels, so a film has an even number both ways.
     width, height = (2 * (n // 2) for n in first.size)
     with unfinished(path) as neighbour:
@@ -77,7 +80,7 @@ def write_mp4(episode: AnyEpisode, path: Path) -> Path:
             output_params=["-f", "mp4", "-movflags", "+faststart"],  # an unfinished file's name tells no format
         )
         film.send(None)
-        for picture in (first, *rest):
+        for picture in chain([first], frames):
             film.send(picture.crop((0, 0, width, height)).tobytes())
         film.close()
     return path

@@ -94,13 +94,8 @@ class Candidate:
         """
         record = parsed(line)
         if isinstance(record, dict):
-            record = {
-                "parents": [],
-                "rung": 0,
-                "policy": None,
-                "mishaps": [],
-                **record,
-            }  # left out, or of the first runs
+            # The first runs wrote none of these, and no run writes that nothing went wrong.
+            record = {"parents": [], "rung": 0, "policy": None, "mishaps": [], **record}
         names = [f.name for f in fields(cls)]
         if not isinstance(record, dict) or sorted(record) != sorted(names):
             raise ValueError(f"wrong fields: must hold exactly {', '.join(names)}")

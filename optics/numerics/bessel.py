@@ -20,8 +20,8 @@ from optics.numerics.precision import Precision
 __all__ = ["bessel_j", "bessel_j0"]
 
 SPLIT = 8.0
-# Where the series fall below rounding; and, in float64, below 1e-12, where no more is asked.
 FEW = 2_000_000  # choice: cosines that are quicker than the import of scipy.special, a tenth of a second
+# Where the series fall below rounding; and, in float64, below 1e-12, where no more is asked.
 TERMS = {"float32": (12, 5), "float64": (16, 11), "float64 to 1e-12": (14, 7)}
 
 

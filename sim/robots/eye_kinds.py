@@ -40,13 +40,15 @@ def kinds_of(task: Task) -> tuple[EyeKind, ...]:
     Raises:
         ValueError: names that do not go together, or are no names.
     """
-    if not several(task):
-        return (EyeKind(EYES, task.eye, tuple(task.mounts), task.fidelity),)  # type: ignore[arg-type]
-    where = type(task).__name__
-    eyes, mounts = _by_name(f"{where}: eye", task.eye, ()), _by_name(f"{where}: mounts", task.mounts, ())
-    if eyes.keys() != mounts.keys():
-        raise ValueError(f"{where}: eye has kinds {_listed(eyes)}, mounts {_listed(mounts)}: must be the same")
-    fidelities = _by_name(f"{where}: fidelity", task.fidelity, eyes)
+    where, eye, mounts, fidelity = type(task).__name__, task.eye, task.mounts, task.fidelity
+    if not isinstance(eye, Mapping) and not isinstance(mounts, Mapping):
+        if isinstance(fidelity, Mapping):
+            raise ValueError(f"{where}: fidelity has kinds {_listed(fidelity)}: eye and mounts must have the same")
+        return (EyeKind(EYES, eye, tuple(mounts), fidelity),)
+    eyes, places = _by_name(f"{where}: eye", eye, ()), _by_name(f"{where}: mounts", mounts, ())
+    if eyes.keys() != places.keys():
+        raise ValueError(f"{where}: eye has kinds {_listed(eyes)}, mounts {_listed(places)}: must be the same")
+    fidelities = _by_name(f"{where}: fidelity", fidelity, eyes)
     if fidelities.keys() != eyes.keys():
         raise ValueError(f"{where}: fidelity has kinds {_listed(fidelities)}, eye {_listed(eyes)}: must be the same")
     for name in eyes:
@@ -55,7 +57,7 @@ def kinds_of(task: Task) -> tuple[EyeKind, ...]:
                 f"{where}: eye: kind {name!r}: must be a name such as 'sharp', and not {' or '.join(TAKEN)}"
             )
         of_kind(f"{where}: eye[{name!r}]", eyes[name], optics.Eye, "optics.Eye(resolution=(15, 15))")
-    return tuple(EyeKind(name, eyes[name], tuple(mounts[name]), fidelities[name]) for name in eyes)
+    return tuple(EyeKind(name, eyes[name], tuple(places[name]), fidelities[name]) for name in eyes)
 
 
 def _by_name(where: str, said: Any, names: Mapping[str, Any] | Sequence[str]) -> Mapping[str, Any]:

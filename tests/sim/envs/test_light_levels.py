@@ -41,8 +41,25 @@ def test_signals_are_as_large_a_share_in_every_episode():
     assert np.log(levels).std() > 0.5
 
 
-def test_few_worlds_that_begin_anew_have_their_own_light():
-    """Others go on as they were lit: one world's agent is sent into an object's arms, the others stand."""
+def test_a_world_that_begins_anew_is_lit_anew_and_others_stay_as_they_were():
+    """Episodes are given up when their agents have touched too much, and so at different times."""
+    seen, told = {}, {}
+    for vary in (None, {"light": (0.05, 1.0)}):
+        env = sim.make_vec_env("detection", EYES, vary=vary, least_return=-1.0, **OPTIONS)
+        env.reset()
+        random, looks, levels, ended = np.random.default_rng(3), [], [], []
+        for _ in range(80):
+            observation, _, done, infos = env.step(random.uniform(0, 1, (env.num_envs, 2)).astype(np.float32))
+            looks.append(observation["eyes"].sum(axis=(1, 2, 3, 4, 5)))
+            levels.append([info.get("varied", {}).get("light") for info in infos])
+            ended.append(done)
+        seen[vary is None], told = np.array(looks), np.array(levels)
+    assert any(0 < done.sum() < 6 for done in ended), "few at a time"
+    # An info tells what its action was taken in; what is seen with it belongs to the next.
+    np.testing.assert_allclose(seen[False][:-1], seen[True][:-1] * told[1:].astype(float), rtol=1e-4)
+
+
+def test_light_depends_on_the_world_and_the_seed_alone():
     few = played(vary={"light": (0.05, 1.0)}, n_envs=1)[0]
     many = played(vary={"light": (0.05, 1.0)}, n_envs=12)[0]
     np.testing.assert_array_equal(few[:, 0], many[:, 0])
