@@ -198,7 +198,7 @@ def draw_figure(rows: list[Row], path: Path) -> None:
         axes.set(xlabel="worlds at once", title=name)
     panels[0].set_ylabel("steps of a world per CPU second")
     panels[0].legend(frameon=False)
-    figure.suptitle("Many worlds at once are stepped faster than one, and sight takes half of a step or more")
+    figure.suptitle("Many worlds at once are stepped faster than one, and sight takes about half of a step or more")
     figure.savefig(path, dpi=110)
 
 
