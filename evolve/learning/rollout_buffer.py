@@ -90,12 +90,12 @@ class FrameRolloutBuffer(RolloutBuffer):
         per_batch = max(1, (batch_size or self.buffer_size * self.n_envs) // self.segment_steps)
         for first in range(0, len(order), per_batch):
             chosen = order[first : first + per_batch]
-            yield self._segments(worlds[chosen, None], starts[chosen, None])
+            yield self._segments(worlds[chosen], starts[chosen])
 
     def _segments(self, worlds: np.ndarray, starts: np.ndarray) -> DictRolloutBufferSamples:
-        """The samples of segments, (segment, step) flattened; worlds and starts (segment, 1)."""
-        steps = starts + np.arange(self.segment_steps)
-        frames = starts + np.arange(self.memory - 1 + self.segment_steps)
+        """The samples of segments, (step, segment) flattened; worlds and starts (segment,)."""
+        steps = starts + np.arange(self.segment_steps)[:, None]
+        frames = starts + np.arange(self.memory - 1 + self.segment_steps)[:, None]
 
         def samples(array: np.ndarray) -> Tensor:
             return torch.from_numpy(array[steps, worlds].reshape(-1, *array.shape[2:]))

@@ -23,6 +23,9 @@ from evolve.store.evaluation import Evaluation
 
 __all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "refusal", "work"]
 
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # names of settings in glibc's malloc.h
+LARGEST_THRESHOLD = 2**25  # bytes of an array; glibc refuses more
+KEPT = 2**30  # bytes: more than a training's arrays take at once
 NO_MEMORY = ("allocate memory", "out of memory", "bad_alloc", "bad allocation")  # as PyTorch's and Dr.Jit's errors say
 
 
@@ -57,7 +60,8 @@ def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: C
 
 
 def prepare_device() -> None:
-    """Make Dr.Jit ready for work beside other workers: a proven LLVM library, or a GPU; one thread.
+    """Make Dr.Jit ready for work beside other workers: a proven LLVM library, or a GPU; one thread. Arrays that are
+    given back are kept for the next ones.
 
     Raises:
         BackendError: Dr.Jit cannot work here.
@@ -68,6 +72,16 @@ def prepare_device() -> None:
     import drjit
 
     drjit.set_thread_count(1)
+    _keep_freed_memory()
+
+
+def _keep_freed_memory() -> None:
+    """Until a candidate is done. glibc maps arrays of some 100 kB and more anew each time, and the system zeroes their
+    pages: a tenth of what an update of a many-eyed brain takes. Other systems' libraries are left alone."""
+    allocator = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
+    if allocator is not None:
+        allocator(M_MMAP_THRESHOLD, LARGEST_THRESHOLD)
+        allocator(M_TRIM_THRESHOLD, KEPT)
 
 
 def evaluate_candidate(

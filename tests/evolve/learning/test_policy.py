@@ -16,7 +16,8 @@ from evolve.config.assemble import assemble
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning import policy as policy_module
-from evolve.learning.eye_features import CONTRAST, UNITS
+from evolve.learning.eye_features import UNITS
+from evolve.learning.per_eye_layers import CONTRAST
 from evolve.learning.policy import EyePolicy, PolicyConfig, build_policy, learnt, load_policy, save_policy
 from evolve.store.regular_files import StrangeFileError
 

@@ -1,0 +1,110 @@
+"""Linear layers with weights of their own for every eye: plain ones, one whose inputs adapt, one over memory.
+
+Samples come last: W x is then one batched GEMM with no copy; x Wᵀ with so few outputs took three times as long,
+forward and backward.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+__all__ = ["CONTRAST", "AdaptedLinear", "MemoryLinear", "PerEyeLinear"]
+
+DARK = 1e-6  # spread of signals that all are the same: keeps weights finite
+CONTRAST = 0.4  # what a signal one spread off its mean counts, where 675 move a unit together; 1 learnt no faster
+
+
+class PerEyeLinear(nn.Module):
+    """A linear layer with weights per eye: (eye, inputs, sample) -> (eye, outputs, sample)."""
+
+    def __init__(self, n_eyes: int, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self.weight = nn.Parameter(torch.empty(n_eyes, outputs, inputs))
+        self.bias = nn.Parameter(torch.zeros(n_eyes, outputs, 1))
+        for weight in self.weight.data:
+            nn.init.orthogonal_(weight, gain=math.sqrt(2))
+
+    def forward(self, x: Tensor) -> Tensor:
+        return torch.baddbmm(self.bias, self.weight, x)
+
+
+class AdaptedLinear(PerEyeLinear):
+    """The same over signals less each receptor's running mean, in units of their eye's spread about it.
+
+    Signals of one scene are mostly alike from moment to moment, and behind a small pupil they are small numbers: raw,
+    their means would saturate the units and their changes hardly move them. Folded into weight and bias, it is free.
+    """
+
+    def __init__(self, n_eyes: int, inputs: int, outputs: int) -> None:
+        super().__init__(n_eyes, inputs, outputs)
+        self.register_buffer("mean", torch.zeros(n_eyes, inputs, 1))
+        self.register_buffer("variance", torch.ones(n_eyes, 1, 1))
+        self.register_buffer("seen", torch.zeros(1))  # frames
+
+    def forward(self, x: Tensor) -> Tensor:
+        weight = CONTRAST * self.weight * torch.rsqrt(self.variance + DARK**2)
+        return torch.baddbmm(self.bias - weight @ self.mean, weight, x)
+
+    @torch.no_grad()
+    def adapt(self, x: Tensor) -> None:
+        """Take signals (eye, inputs, sample) into mean and spread (Chan, Golub and LeVeque 1983, eq. 2.1)."""
+        share = x.shape[2] / (self.seen + x.shape[2])
+        deviation = x - self.mean
+        step = deviation.mean(dim=2, keepdim=True)
+        variance = deviation.square().mean(dim=2, keepdim=True) - share * step**2
+        self.variance.lerp_(variance.mean(dim=1, keepdim=True), share)
+        self.mean.add_(share * step)
+        self.seen.add_(x.shape[2])
+
+
+class MemoryLinear(PerEyeLinear):
+    """The same over the codes of `memory` frames: (eye, code, memory, sample) -> (eye, outputs, sample)."""
+
+    def __init__(self, n_eyes: int, memory: int, code: int, outputs: int) -> None:
+        super().__init__(n_eyes, code * memory, outputs)
+        self.memory = memory
+
+    def forward(self, codes: Tensor) -> Tensor:
+        return super().forward(codes.flatten(1, 2))
+
+    def slide(self, codes: Tensor) -> Tensor:
+        """Over the last `memory` frames at each step: (eye, code, memory - 1 + step, segment) -> (eye, outputs,
+        sample), samples (step, segment) flattened."""
+        return _Slide.apply(codes, self.weight.unflatten(2, (-1, self.memory)), self.bias)
+
+
+class _Slide(torch.autograd.Function):
+    """Σ W[lag] codes[lag : lag + steps] over lags. Every sum is a GEMM on codes where they lie: copies of all windows
+    of frames took four times as long, forward and backward."""
+
+    @staticmethod
+    def forward(ctx: Any, codes: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
+        """Codes (eye, code, frame, segment), weight (eye, output, code, lag), bias (eye, output, 1)."""
+        weights = weight.permute(3, 0, 1, 2).contiguous()
+        total, *pieces = _slices(codes, len(weights))
+        result = torch.baddbmm(bias, weights[0], total)
+        for one, piece in zip(weights[1:], pieces, strict=True):
+            result.baddbmm_(one, piece)
+        ctx.save_for_backward(codes, weights)
+        return result
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        codes, weights = ctx.saved_tensors
+        of_codes, of_weights = torch.zeros_like(codes), torch.empty_like(weights)
+        pieces = zip(_slices(codes, len(weights)), _slices(of_codes, len(weights)), strict=True)
+        for lag, (piece, of_piece) in enumerate(pieces):
+            of_piece.baddbmm_(weights[lag].transpose(1, 2), gradient)
+            torch.bmm(gradient, piece.transpose(1, 2), out=of_weights[lag])
+        return of_codes, of_weights.permute(1, 2, 3, 0), gradient.sum(2, keepdim=True)
+
+
+def _slices(codes: Tensor, memory: int) -> list[Tensor]:
+    """Views of codes (eye, code, frame, segment): by lag, (eye, code, sample), of the frames seen at every step."""
+    segments, frames = codes.shape[3], codes.flatten(2)
+    samples = frames.shape[2] - (memory - 1) * segments
+    return [frames[:, :, lag * segments :][:, :, :samples] for lag in range(memory)]
