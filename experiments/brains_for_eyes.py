@@ -1,0 +1,215 @@
+"""Brains for eyes: every width of eye with every size of brain, in three tasks
+
+python -m experiments.brains_for_eyes [--compute] [--workers N] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evolve.analysis.statistics import acuity_cpd
+from experiments.brains_and_acuity import label
+from experiments.designed import Design, Trained, train_all
+from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
+from experiments.powers import PowerLaw, power_law
+from experiments.store import Origin, read_rows
+
+__all__ = ["DEFINITIONS", "best_brains", "designs", "frontier", "missed", "over_both", "page", "shortfall"]
+
+NAME = "brains_for_eyes"
+WIDTHS = (1, 2, 4, 8, 16, 24)
+BRAINS = (1, 4, 16, 64, 256)  # units of a hidden layer; encoders are a quarter as wide
+SEEDS = range(3)
+SIGMA = 0.01
+# Eyes and the arc over which they are spread: who cannot do a task at all tells nothing of brains.
+EYES = {"detection": (2, 45.0), "tracking": (2, 45.0), "navigation": (10, 135.0)}
+PUBLISHED = {"navigation": 0.69, "detection": 0.74, "tracking": 0.59}
+# One evaluation on the way: of 320 episodes each takes a sixth of the training's steps.
+SETTINGS = ("learning.total_steps=500000", "learning.eval_interval=500000", "evaluation.episodes=320")
+SHADES = ("#c6dbef", "#9ecae1", "#6baed6", "#2171b5", "#08306b")  # of brains, small to large
+Errors = dict[tuple[int, int], float]  # by width and brain
+Definition = Callable[[Sequence[Trained]], Errors]
+
+
+def designs() -> list[Design]:
+    """All trainings, one life of every animal first."""
+    return [
+        Design(task, n_eyes, 1 if task == "navigation" else w, w, arc, SIGMA, seed, neurons=brain)
+        for seed in SEEDS
+        for task, (n_eyes, arc) in EYES.items()
+        for w in WIDTHS
+        for brain in BRAINS
+    ]
+
+
+def _means(rows: Iterable[Trained], value: Callable[[Trained], float]) -> Errors:
+    """Over the lives of each animal."""
+    found: dict[tuple[int, int], list[float]] = {}
+    for row in rows:
+        if not row.failed:
+            found.setdefault((row.width, row.neurons), []).append(value(row))
+    return {animal: float(np.mean(values)) for animal, values in found.items()}
+
+
+def missed(rows: Sequence[Trained]) -> Errors:
+    """Share of episodes in which the goal did not come first, (k + 1/2) / (n + 1), so that no error has no logarithm
+    (Jeffreys' mean)."""
+    return _means(rows, lambda row: ((1 - row.success_rate) * row.episodes + 0.5) / (row.episodes + 1))
+
+
+def shortfall(rows: Sequence[Trained]) -> Errors:
+    """Share of what separates the worst from the best life that an animal's lives are short of on average, with half a
+    life more for each, as in `missed`."""
+    fitness = [row.fitness for row in rows if not row.failed]
+    low, high = min(fitness, default=0.0), max(fitness, default=0.0)
+    lives, scale = len(SEEDS), max(high - low, 1e-9)
+    return {a: (lives * (high - f) / scale + 0.5) / (lives + 1) for a, f in _means(rows, lambda r: r.fitness).items()}
+
+
+DEFINITIONS: dict[str, Definition] = {"episodes missed": missed, "fitness missed": shortfall}
+
+
+def best_brains(errors: Errors) -> dict[int, tuple[int, float]]:
+    """Of each width, the brain that errs least, and its error: how far that acuity carries."""
+    found = {}
+    for width in sorted({w for w, _ in errors}):
+        brain = min((b for w, b in errors if w == width), key=lambda b: errors[width, b])
+        found[width] = brain, errors[width, brain]
+    return found
+
+
+def frontier(rows: Sequence[Trained], definition: Definition) -> PowerLaw | None:
+    """Power law of the least error over acuity; None where there is none."""
+    least = best_brains(definition(rows))
+    return _law([error for _, error in least.values()], [_acuities(rows)[width] for width in least])
+
+
+def over_both(rows: Sequence[Trained], definition: Definition) -> PowerLaw | None:
+    """Power law of every animal's error over acuity and the units of its brain; None where there is none."""
+    errors, acuity = definition(rows), _acuities(rows)
+    return _law(list(errors.values()), [acuity[w] for w, _ in errors], [float(b) for _, b in errors])
+
+
+def _law(errors: Sequence[float], *sizes: Sequence[float]) -> PowerLaw | None:
+    try:
+        return power_law(np.array(errors), *map(np.array, sizes))
+    except ValueError:
+        return None
+
+
+def _acuities(rows: Iterable[Trained]) -> dict[int, float]:
+    """Of each width [cycles/degree]."""
+    return {row.width: acuity_cpd(row.animal) for row in rows}
+
+
+def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
+    """The page of stored rows."""
+    return Page(
+        name=NAME,
+        command=f"python -m experiments.{NAME} --compute",
+        values={
+            "answer": answer,
+            "steps": f"{max(row.steps for row in rows):,}",
+            "episodes": str(min(row.episodes for row in rows)),
+            "errors": _errors_table(rows),
+            "exponents": _exponents(rows),
+            "lives": ", ".join(f"{len(_of(rows, task))} in {task}" for task in _tasks(rows)),
+        },
+        figures=[Figure(NAME, lambda path: draw(rows, path))],
+        origin=origin,
+    )
+
+
+def _of(rows: Iterable[Trained], task: str) -> list[Trained]:
+    return [row for row in rows if row.task == task]
+
+
+def _tasks(rows: Iterable[Trained]) -> list[str]:
+    return [task for task in EYES if _of(rows, task)]
+
+
+def _errors_table(rows: Sequence[Trained]) -> str:
+    """A row per task and brain, a column per width."""
+    lines = []
+    for task in _tasks(rows):
+        errors = missed(_of(rows, task))
+        for brain in BRAINS:
+            shown = [f"{errors[w, brain]:.3f}" if (w, brain) in errors else "-" for w in WIDTHS]
+            lines.append([task, str(brain), *shown])
+    return markdown_table(["task", "units", *(f"{w} across" for w in WIDTHS)], lines)
+
+
+def _exponents(rows: Sequence[Trained]) -> str:
+    """A row per task and definition of the error."""
+    lines = []
+    for task in _tasks(rows):
+        for name, definition in DEFINITIONS.items():
+            best, both = frontier(_of(rows, task), definition), over_both(_of(rows, task), definition)
+            found = ["-", "-", "-"] if both is None else [*map(str, both.exponents), f"{both.explained:.2f}"]
+            lines.append([task, name, "-" if best is None else str(best.exponents[0]), *found, f"{PUBLISHED[task]:g}"])
+    of_all = ("of acuity", "of units", "variance explained")
+    return markdown_table(["task", "error", "of acuity, best brains", *of_all, "published, of a product"], lines)
+
+
+def draw(rows: Sequence[Trained], path: Path) -> None:
+    """A panel per task: error over acuity, a line per brain, and what the best brains come to."""
+    tasks = _tasks(rows)
+    figure, axes = new_figure(3.6 * len(tasks) + 0.5, 4.2, columns=len(tasks), sharey=True)
+    for place, task in zip(axes[0], tasks, strict=True):
+        mine = _of(rows, task)
+        errors, acuity = missed(mine), _acuities(mine)
+        for brain, shade in zip(BRAINS, SHADES, strict=True):
+            widths = [w for w in WIDTHS if (w, brain) in errors]
+            ends = [errors[w, brain] for w in widths]
+            place.loglog([acuity[w] for w in widths], ends, "o-", color=shade, ms=4, lw=1)
+        _draw_frontier(place, mine)
+        place.set(title=task, xlabel="acuity [cycles/°]")
+        label(place.xaxis, place.get_xlim())
+        label(place.yaxis, place.get_ylim())
+    axes[0, 0].set_ylabel("share of episodes missed")
+    figure.legend(handles=_key(), loc="outside lower center", ncols=6, frameon=False)
+    figure.suptitle("How far each acuity carries, and how large a brain it wants")
+    save(figure, path)
+
+
+def _draw_frontier(place: Any, rows: Sequence[Trained]) -> None:
+    law, acuity = frontier(rows, missed), np.array(sorted(_acuities(rows).values()))
+    if law is not None:
+        place.loglog(acuity, law.error(acuity), color="#D55E00", lw=1.4, ls="--")
+
+
+def _key() -> list[Any]:
+    from matplotlib.lines import Line2D
+
+    brains = [
+        Line2D([], [], color=shade, marker="o", ms=4, label=f"{brain} unit{'s' * (brain > 1)}")
+        for brain, shade in zip(BRAINS, SHADES, strict=True)
+    ]
+    return [*brains, Line2D([], [], color="#D55E00", ls="--", label="power law of the best")]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train what is missing if asked; make the page from the store."""
+    options = parser(__doc__ or "")
+    options.add_argument("--compute", action="store_true", help="train the animals that the stored numbers lack")
+    options.add_argument("--workers", type=int, default=0, help="processes; 0: one per core")
+    options.add_argument("--answer", help="the page's answer; kept from now on")
+    chosen = options.parse_args(arguments)
+    data = chosen.docs / "data" / f"{NAME}.csv"
+    said = data.with_suffix(".txt")
+    if chosen.compute:
+        train_all(designs(), SETTINGS, data, chosen.workers)
+    if chosen.answer:
+        said.write_text(chosen.answer + "\n", encoding="utf-8")
+    answer = said.read_text(encoding="utf-8").strip() if said.exists() else "(not written yet)"
+    page(read_rows(Trained, data), Origin.read(data.with_suffix(".json")), answer).publish(chosen.docs)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,93 @@
+"""Every width with every brain: errors are what they say, ceilings and exponents those of made-up laws."""
+
+import math
+
+import pytest
+
+from experiments.brains_for_eyes import (
+    BRAINS,
+    DEFINITIONS,
+    EYES,
+    SEEDS,
+    WIDTHS,
+    best_brains,
+    designs,
+    frontier,
+    missed,
+    over_both,
+    page,
+    shortfall,
+)
+from experiments.designed import Trained
+from experiments.store import Origin
+
+
+def lived(design, success_rate, fitness=0.0, episodes=10**6):
+    outcome = {"success_rate": success_rate, "fitness": fitness, "episodes": episodes, "steps": 500_000, "seconds": 1.0}
+    return Trained(**vars(design), **outcome)
+
+
+def of_law(law):
+    """Lives in detection whose share of missed episodes is law(acuity, units)."""
+    mine = [design for design in designs() if design.task == "detection"]
+    return [lived(design, 1 - law(design.width / 90, design.neurons)) for design in mine]
+
+
+def test_every_brain_has_every_eye_in_every_task():
+    asked = designs()
+    assert len(asked) == len(set(asked)) == len(EYES) * len(WIDTHS) * len(BRAINS) * len(SEEDS)
+    assert {design.height for design in asked if design.task == "navigation"} == {1}
+    assert all(design.height == design.width for design in asked if design.task != "navigation")
+    assert {design.seed for design in asked[: len(asked) // len(SEEDS)]} == {SEEDS[0]}, "one life of each first"
+    assert asked[0].animal.encoder == math.ceil(asked[0].neurons / 4)
+
+
+def test_misses_are_counted_and_never_none():
+    animal = designs()[0]
+    one, other = lived(animal, 1.0, episodes=319), lived(animal, 0.5, episodes=319)
+    assert missed([one]) == {(1, 1): 0.5 / 320}
+    assert missed([one, other]) == {(1, 1): pytest.approx((0.5 / 320 + 160 / 320) / 2)}
+
+
+def test_a_shortfall_is_between_the_worst_and_the_best_life():
+    animals = designs()[:3]
+    found = shortfall([lived(a, 0.5, fitness) for a, fitness in zip(animals, (10.0, 30.0, 50.0), strict=True)])
+    assert list(found.values()) == pytest.approx([3.5 / 4, 2.0 / 4, 0.5 / 4])
+
+
+def test_a_failed_life_says_nothing():
+    from dataclasses import replace
+
+    rows = of_law(lambda acuity, units: 0.5)
+    assert missed([*rows, replace(rows[0], failed=1, success_rate=0.0)]) == missed(rows)
+
+
+def test_the_best_brain_of_each_eye_is_found():
+    found = best_brains({(2, 1): 0.5, (2, 16): 0.3, (2, 64): 0.4, (8, 1): 0.2, (8, 16): 0.25})
+    assert found == {2: (16, 0.3), 8: (1, 0.2)}
+
+
+def test_exponents_of_a_law_are_found():
+    """Error falls with acuity, and with a brain up to 16 units: the best brains show the exponent of acuity alone."""
+    rows = of_law(lambda acuity, units: 0.02 * acuity**-0.4 * min(units, 16) ** -0.1)
+    law = frontier(rows, missed)
+    assert law.exponents[0].mean == pytest.approx(0.4, abs=1e-4)
+    exact = of_law(lambda acuity, units: 0.02 * acuity**-0.4 * units**-0.1)
+    assert [one.mean for one in over_both(exact, missed).exponents] == pytest.approx([0.4, 0.1], abs=1e-4)
+
+
+def test_no_law_of_two_eyes():
+    few = [row for row in of_law(lambda acuity, units: 0.3 + acuity) if row.width < 4]
+    assert frontier(few, missed) is None
+
+
+def test_the_page_shows_every_cell_and_what_is_missing(tmp_path):
+    rows = [row for row in of_law(lambda acuity, units: 0.02 * acuity**-0.4) if (row.width, row.neurons) != (24, 256)]
+    made = page(rows, Origin.here(1.0, "worker"), "Yes.")
+    largest = next(line for line in made.markdown.splitlines() if line.startswith("| detection | 256 |"))
+    assert largest.endswith("| - |")
+    assert made.markdown.count("| detection | episodes missed | 0.4") == 1
+    for name in DEFINITIONS:
+        assert name in made.markdown
+    made.publish(tmp_path)
+    assert (tmp_path / "figures/brains_for_eyes.png").stat().st_size > 10_000
