@@ -155,6 +155,7 @@ def record(
         memory=candidate.phenotype.memory_frames,
         mode="evaluation",
         rays_per_receptor=run.config.eye.rays_per_receptor,
+        vary=run.config.world.vary,
         **run.config.world.evaluation,
     )
     try:

@@ -32,9 +32,16 @@ class TaskPictures:
             return [picture for senses in learners for picture in _of_all_kinds(senses)]
         if self._mode == "rgb_array":
             worlds = self._animals.worlds
-            self._camera = self._camera or QuickCamera(worlds.model, self._animals.learners[0].renderer.spectra)
-            return [self._picture(self._camera, data) for data in worlds.datas]
+            return [self._picture(self._camera_of(data), data) for data in worlds.datas]
         return []
+
+    def _camera_of(self, data: mujoco.MjData) -> QuickCamera:
+        """The one for all; where sizes or colours differ, each world's own, made anew."""
+        worlds, spectra = self._animals.worlds, self._animals.learners[0].renderer.spectra
+        if worlds.bodies.varied:
+            return QuickCamera(data.model, spectra)
+        self._camera = self._camera or QuickCamera(worlds.model, spectra)
+        return self._camera
 
     def _picture(self, camera: QuickCamera, data: mujoco.MjData) -> np.ndarray:
         worlds = self._animals.worlds

@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -51,6 +52,7 @@ def choose_model_fidelity(
     *,
     groups: Sequence[int] = VISIBLE_GROUPS,
     spectra: Mapping[str, Spectrum | str] | None = None,
+    varied: Sequence[str] = (),
 ) -> Fidelity:
     """The fewest rays for `ModelRenderer` whose error, tried at these poses, is within the tolerance; a FidelityWarning
     says where there are none. Bands are the eye's own.
@@ -59,17 +61,21 @@ def choose_model_fidelity(
     tolerance: of a signal (root mean square), over receptors that do not see the same in all of their field; None: half
         of the receptors' noise, but no less than LEAST_TOLERANCE of what white is worth behind the eye's pupil
 
+    groups, spectra, varied: see `ModelRenderer`
+
     Raises:
         ValueError: a tolerance that is not positive, and what ModelRenderer raises.
     """
     allowed = allowed_error(eye, tolerance)
     compiled, placed = source.load(model), poses if isinstance(poses, Poses) else Poses.of(poses)
 
+    seen_how: dict[str, Any] = {"groups": groups, "spectra": spectra, "varied": varied}
+
     def seen(rays: float) -> np.ndarray:
         fidelity = _with(rays, eye, allowed)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MirrorWarning)  # whoever renders in earnest is told
-            renderer = ModelRenderer(compiled, eye, mounts, placed.n, fidelity, groups=groups, spectra=spectra)
+            renderer = ModelRenderer(compiled, eye, mounts, placed.n, fidelity, **seen_how)
         return renderer.signals(placed)
 
     trials = tried(seen, PERFECT if eye.pupil is None else SHARED, _truth(eye), allowed)

@@ -42,6 +42,7 @@ class ModelRenderer:
     fidelity: rays per receptor and bands: `Fidelity(16, bands=4)`; light is direct; samples="edges" for that many rays
         only where a few of them differ
     groups, spectra: see `sim.mirror`
+    varied: names of geoms whose size or colour may differ from world to world: as `poses` say, by the worlds' mjModels
     brightest: signal of a white surface that faced all directional lights at once
 
     Warns (`sim.MirrorWarning`) once of what eyes do not see of the model.
@@ -63,6 +64,7 @@ class ModelRenderer:
         *,
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
+        varied: Sequence[str] = (),
     ) -> None:
         self.n_envs = whole("n_envs", n_envs, 1, MOST_ENVS)
         of_kind("eye", eye, optics.Eye, "optics.Eye(resolution=(15, 15))")
@@ -74,7 +76,7 @@ class ModelRenderer:
             raise ValueError("mounts = []: must be one sim.Mount at least")
         wavelengths = self.eye.spectral_bands.wavelengths
         self._check_memory()
-        self._scene = ModelScene(self.model, wavelengths, groups, spectra)
+        self._scene = ModelScene(self.model, wavelengths, groups, spectra, varied)
         self._refuse_eyes_inside()
         sampling = eye_sampling(self.eye, fidelity.depth)
         at_edges = fidelity.samples == EDGES
@@ -218,6 +220,7 @@ class ModelRenderer:
             raise ValueError(f"poses of {poses.n} worlds, this renderer was built for n_envs = {self.n_envs}")
         if poses.geom_xpos.shape[1] != self.model.ngeom or poses.xpos.shape[1] != self.model.nbody:
             raise ValueError("poses of another model")
+        self._scene.refuse_differences(poses)
         if not np.isfinite(poses.geom_xpos).all():
             world = int(np.flatnonzero(~np.isfinite(poses.geom_xpos).all(axis=(1, 2)))[0])
             raise ValueError(f"poses of world {world} are not finite")

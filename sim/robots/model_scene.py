@@ -13,9 +13,12 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
+from optics.numerics.arguments import did_you_mean
 from optics.spectra.spectrum import Spectrum
 from sim.robots.model_lights import Lights, model_lights
 from sim.robots.movers import Movers, kind_of
+from sim.robots.paint import Paint
+from sim.robots.poses import Poses
 from sim.scene import bsdfs, inventory, lights, shapes, sky, surfaces
 from sim.scene.merged_parts import PlacedPart, merged
 from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
@@ -30,12 +33,13 @@ class ModelScene:
     model · variant: of Mitsuba · geoms: ids of all that are seen
     scene: mi.Scene of what stands still, and the sky · movers: what moves · lights: all of them
     spectra: measured ones of materials and lights, by name · has_sky: whether there is something to see at infinity
+    paint: of what differs from world to world, `varied` by name: it is met like a mover, though it may stand still
     bsdfs: of every mover, in their order; kept here, since a BSDFPtr does not keep its objects alive
 
     Warns (`sim.MirrorWarning`) once of what has no counterpart.
 
     Raises:
-        ValueError: a model without visible geoms, and spectra of what it does not have.
+        ValueError: a model without visible geoms, and spectra or variation of what it does not have.
     """
 
     def __init__(
@@ -44,18 +48,22 @@ class ModelScene:
         wavelengths: np.ndarray,
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
+        varied: Sequence[str] = (),
     ) -> None:
         self.model, self.variant = model, default_variant()
+        self._as_built = {"size": model.geom_size.copy(), "colour": model.geom_rgba.copy()}
         self.spectra: Spectra = resolve(model, spectra)
         seen = [g for g in range(model.ngeom) if model.geom_group[g] in groups and surfaces.rgba(model, g)[3] > 0]
         self.geoms = [g for g in seen if shapes.has_shape(model, g)]
         if not self.geoms:
             raise ValueError("the model has no visible geom of a kind that can be mirrored")
         with in_variant(self.variant):
-            matt = {g: self._matt(g) for g in self.geoms}
-            moving = [g for g in self.geoms if _moves(model, g)]
+            painted = varied_geoms(model, self.geoms, varied, self.spectra)
+            matt = {g: self._matt(g, g in painted) for g in self.geoms}
+            moving = [g for g in self.geoms if _moves(model, g) or g in painted]
             meshes = {g: self._mesh(g, matt[g]) for g in moving if kind_of(model, g) is None}
             self.movers = Movers(model, moving, meshes)
+            self.paint = Paint(model, painted, self.movers.geoms, wavelengths)
             self.bsdfs = [matt[int(g)] for g in self.movers.geoms]
             found, left_out = model_lights(model, self.spectra, wavelengths)
             self.lights = Lights(found)
@@ -66,8 +74,10 @@ class ModelScene:
         if left_out:
             warnings.warn(f"eyes do not see: {'; '.join(left_out)}", MirrorWarning, stacklevel=4)
 
-    def _matt(self, geom: int) -> MitsubaObject:
+    def _matt(self, geom: int, white: bool) -> MitsubaObject:
         to_uv = shapes.uv_transform(self.model, geom)
+        if white:
+            return bsdfs.matt_white(self.model, geom, to_uv)
         return bsdfs.matt(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
 
     def _mesh(self, geom: int, bsdf: MitsubaObject) -> MitsubaObject:
@@ -84,6 +94,30 @@ class ModelScene:
             scene = mi.load_dict({"type": "scene", **built}, optimize=False)
         return scene, np.array([int(shape.id().split("_")[1]) for shape in scene.shapes()], int)
 
+    def refuse_differences(self, poses: Poses) -> None:
+        """Sizes and colours that differ from the model's where they cannot.
+
+        Raises:
+            ValueError: they do.
+        """
+        free = self.movers.geoms[: self.movers.n_primitives]
+        for what, here, may in (("size", poses.geom_size, free), ("colour", poses.geom_rgba, self.paint.geoms)):
+            if here is None:
+                continue
+            own = self._as_built[what]
+            alike = here[:1] if here.strides[0] == 0 else here
+            if np.array_equal(np.broadcast_to(own, alike.shape), alike):
+                continue
+            differs = (alike != own).any(axis=(0, 2))
+            differs[may] = False
+            wrong = [g for g in np.flatnonzero(differs) if g in self.geoms]
+            if wrong:
+                name = self.model.geom(int(wrong[0])).name or str(wrong[0])
+                more = ", and be a primitive without a texture" if what == "size" else ""
+                raise ValueError(
+                    f"geom {name!r} has another {what} than in the renderer's model: must be in `varied`{more}"
+                )
+
     def _still_parts(self) -> list[PlacedPart]:
         data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, data)
@@ -99,6 +133,22 @@ class ModelScene:
         if heaven is not None:
             description["sky"] = heaven
         return mi.load_dict(description, optimize=False)
+
+
+def varied_geoms(model: mujoco.MjModel, seen: Sequence[int], names: Sequence[str], spectra: Spectra) -> list[int]:
+    """Those whose size or colour differs from world to world.
+
+    Raises:
+        ValueError: there is none of that name to be seen, or its reflectance is measured.
+    """
+    known = {model.geom(g).name: g for g in seen if model.geom(g).name}
+    for name in names:
+        if name not in known:
+            hint = did_you_mean(name, known) or f"; it has {', '.join(map(repr, known))}"
+            raise ValueError(f"varied: the model has no visible geom {name!r}{hint}")
+        if of_geom(model, known[name], spectra) is not None:
+            raise ValueError(f"varied: geom {name!r} has a measured spectrum: must have a colour, or not vary")
+    return sorted({known[name] for name in names})
 
 
 def _moves(model: mujoco.MjModel, geom: int) -> bool:

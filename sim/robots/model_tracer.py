@@ -16,12 +16,14 @@ from sim.tracing import lighting
 
 @dataclass(frozen=True)
 class Rows:
-    """Where the kernel finds one world's movers and lights: their rows, and which is its first."""
+    """Where the kernel finds one world's movers, lights and colours: their rows, and which is its first."""
 
     movers: Array
     first_mover: Array
     lights: Array
     first_light: Array
+    paint: Array
+    first_paint: Array
 
 
 class ModelTracer:
@@ -38,7 +40,7 @@ class ModelTracer:
         self._any_still = len(shapes) > 0
         # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.
         known = [*scene.bsdfs, *(shape.bsdf() for shape in shapes[:1])]
-        self.inputs = {"bsdfs": mi.BSDFPtr(known), **scene.movers.inputs}
+        self.inputs = {"bsdfs": mi.BSDFPtr(known), **scene.movers.inputs, **scene.paint.inputs}
         if self._sky:
             self.inputs["sky"] = mi.EmitterPtr([scene.scene.environment()])
 
@@ -62,6 +64,9 @@ class ModelTracer:
         mine = dr.gather(mi.BSDFPtr, inputs["bsdfs"], dr.minimum(hit.which, len(inputs["bsdfs"]) - 1), on_mover)
         bsdf = dr.select(on_mover, mine, si.bsdf()) if self._any_still else mine
         arrives = self._irradiance(still, point, normal, seen, axis, rows, inputs)
+        if len(self._scene.paint):
+            paint = self._scene.paint.of(dr.minimum(hit.which, len(movers)), rows.paint, rows.first_paint, inputs, seen)
+            arrives = [e * color for e, color in zip(arrives, paint, strict=True)]
         spectra = self._sent_on(si, bsdf, seen, arrives)
         if self._sky:
             spectra = [s + self._heaven(still, ray, ~seen, band) for s, band in zip(spectra, self._bands, strict=True)]

@@ -21,7 +21,7 @@ from sim.scene.variant import MitsubaObject
 from sim.scene.variant import variant as in_variant
 
 EYE_ROWS = 4  # of four floats: the pupil, right, up and ahead
-SIZES = 4  # numbers of rays, eyes, rows of movers and lights
+SIZES = 5  # numbers of rays, eyes, rows of movers, lights and colours
 
 
 class ModelWavefront:
@@ -38,6 +38,7 @@ class ModelWavefront:
             "eyes": n_eyes * EYE_ROWS,
             "movers": scene.movers.n_rows,
             "lights": max(len(scene.lights), 1) * LIGHT_ROWS,
+            "paint": scene.paint.n_rows,
         }
         self._buffers = {name: aligned(n_envs * n * 4, np.float32).reshape(n_envs, n * 4) for name, n in rows.items()}
         self.light: Any = dr.freeze(lambda *args: self._light(*args))
@@ -48,7 +49,8 @@ class ModelWavefront:
         """What a kernel reads to look along these directions (ray, 3) with every eye."""
         fours = np.zeros((len(directions), 4), np.float32)
         fours[:, :3] = directions
-        sizes = [len(directions), self._n_eyes, self._scene.movers.n_rows, max(len(self._scene.lights), 1)]
+        scene = self._scene
+        sizes = [len(directions), self._n_eyes, scene.movers.n_rows, max(len(scene.lights), 1), scene.paint.n_rows]
         lanes = dr.arange(mi.UInt32, self._n_envs * self._n_eyes * len(directions))
         dr.eval(lanes)
         return {"directions": floats(fours), "sizes": whole_numbers(sizes), "lanes": lanes, **self._tracer.inputs}
@@ -58,6 +60,9 @@ class ModelWavefront:
         scene = self._scene
         self._buffers["eyes"].reshape(self._n_envs, -1, EYE_ROWS, 4)[..., :3] = eyes
         self._buffers["movers"][:] = scene.movers.rows(poses)
+        if len(scene.paint):
+            with in_variant(scene.variant):
+                self._buffers["paint"][:] = scene.paint.rows(poses)
         if len(scene.lights):
             self._buffers["lights"][:] = scene.lights.rows(poses).reshape(self._n_envs, -1)
         return self.again(kernel, look)
@@ -108,13 +113,14 @@ def _of_lane(buffers: dict[str, Array], look: dict[str, Array]) -> tuple[Array, 
     """The lane's ray, its eye's axis, the cosine between them, and the rows of its world."""
     lane = look["lanes"]
     # Lanes that only fill up a packet read 0, and to divide by that ends the process.
-    rays, eyes, movers, lights = (dr.maximum(dr.gather(mi.UInt32, look["sizes"], i), 1) for i in range(SIZES))
+    rays, eyes, movers, lights, paint = (dr.maximum(dr.gather(mi.UInt32, look["sizes"], i), 1) for i in range(SIZES))
     view = lane // rays
     env = view // eyes
     pupil, right, up, ahead = (three(buffers["eyes"], view * EYE_ROWS + i) for i in range(EYE_ROWS))
     local = dr.gather(mi.Vector4f, look["directions"], lane - view * rays)
     ray = mi.Ray3f(mi.Point3f(pupil), right * local.x + up * local.y + ahead * local.z)
-    return ray, ahead, local.z, Rows(buffers["movers"], env * movers, buffers["lights"], env * lights * LIGHT_ROWS)
+    at = buffers["movers"], env * movers, buffers["lights"], env * lights * LIGHT_ROWS, buffers["paint"], env * paint
+    return ray, ahead, local.z, Rows(*at)
 
 
 def _read(found: Array | tuple[Array, ...]) -> np.ndarray:

@@ -155,3 +155,14 @@ def test_signals_are_tensors_without_a_copy(model):
         assert tensor.shape == signals.shape
     tensor += 1
     assert signals.min() >= 1
+    kept = signals.copy()
+    renderer.signals([posed(model, 1.0)])  # later frames do not write into earlier ones
+    np.testing.assert_array_equal(signals, kept)
+
+
+def test_what_environments_return_are_tensors_without_a_copy():
+    env = sim.make_vec_env("detection", sim.Eyes(n_eyes=1), n_envs=2, rays_per_receptor=1, auxiliary=("depth", "flow"))
+    for name, array in env.reset().items():
+        assert torch.from_dlpack(array).data_ptr() == array.ctypes.data, name
+    signals = env.renderer.signals(env.state)
+    assert torch.from_dlpack(signals).data_ptr() == signals.ctypes.data
