@@ -1,6 +1,6 @@
 """A model taken apart: what stands still becomes one Mitsuba scene, and what moves is met by itself.
 
-Surfaces are matt here, and opaque: what of a material is gloss, mirror, glow or glass is left out, and said so.
+Surfaces are matt here, and opaque: what of a material is gloss, mirror or glass is left out, and said so.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
 from sim.scene.spectra import Spectra, of_geom, resolve
 from sim.scene.variant import Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
+from sim.tracing.lighting import DIRECT
 
 
 class ModelScene:
@@ -33,6 +34,7 @@ class ModelScene:
     model · variant: of Mitsuba · geoms: ids of all that are seen
     scene: mi.Scene of what stands still, and the sky · movers: what moves · lights: all of them
     spectra: measured ones of materials and lights, by name · has_sky: whether there is something to see at infinity
+    glows: BSDFs whose reflectance is the radiance of geoms that glow, by id; these are met like movers
     paint: of what differs from world to world, `varied` by name: it is met like a mover, though it may stand still
     bsdfs: of every mover, in their order; kept here, since a BSDFPtr does not keep its objects alive
 
@@ -49,6 +51,7 @@ class ModelScene:
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
         varied: Sequence[str] = (),
+        light: str = DIRECT,
     ) -> None:
         self.model, self.variant = model, default_variant()
         self._as_built = {"size": model.geom_size.copy(), "colour": model.geom_rgba.copy()}
@@ -58,19 +61,20 @@ class ModelScene:
         if not self.geoms:
             raise ValueError("the model has no visible geom of a kind that can be mirrored")
         with in_variant(self.variant):
+            self.glows = {g: glow for g in self.geoms if (glow := self._glow(g)) is not None}
             painted = varied_geoms(model, self.geoms, varied, self.spectra)
             matt = {g: self._matt(g, g in painted) for g in self.geoms}
-            moving = [g for g in self.geoms if _moves(model, g) or g in painted]
+            moving = [g for g in self.geoms if _moves(model, g) or g in painted or g in self.glows]
             meshes = {g: self._mesh(g, matt[g]) for g in moving if kind_of(model, g) is None}
             self.movers = Movers(model, moving, meshes)
             self.paint = Paint(model, painted, self.movers.geoms, wavelengths)
             self.bsdfs = [matt[int(g)] for g in self.movers.geoms]
-            found, left_out = model_lights(model, self.spectra, wavelengths)
+            found, left_out = model_lights(model, self.spectra, wavelengths, light)
             self.lights = Lights(found)
             self._matt_still = {g: matt[g] for g in self.geoms if g not in moving}
             self.scene = self._still()
             self.has_sky = self.scene.environment() is not None
-        left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, self.geoms)]
+        left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, self.geoms, light)]
         if left_out:
             warnings.warn(f"eyes do not see: {'; '.join(left_out)}", MirrorWarning, stacklevel=4)
 
@@ -79,6 +83,14 @@ class ModelScene:
         if white:
             return bsdfs.matt_white(self.model, geom, to_uv)
         return bsdfs.matt(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
+
+    def _glow(self, geom: int) -> MitsubaObject | None:
+        """A BSDF whose reflectance is the radiance of a geom that glows: the kernel asks for it as for the others."""
+        to_uv = shapes.uv_transform(self.model, geom)
+        radiance = lights.glow(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
+        if radiance is None:
+            return None
+        return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": radiance}})
 
     def _mesh(self, geom: int, bsdf: MitsubaObject) -> MitsubaObject:
         """A geom in its own frame."""
@@ -156,16 +168,15 @@ def _moves(model: mujoco.MjModel, geom: int) -> bool:
     return bool(model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0)
 
 
-def _not_matt(model: mujoco.MjModel, geoms: Iterable[int]) -> list[str]:
+def _not_matt(model: mujoco.MjModel, geoms: Iterable[int], light: str) -> list[str]:
     """What surfaces do that is left out, in words."""
     materials = sorted({int(model.geom_matid[g]) for g in geoms if model.geom_matid[g] >= 0})
     geoms = list(geoms)
-    kinds = {
-        "gloss": [m for m in materials if bsdfs.has_gloss(model, m)],
-        "glow": [m for m in materials if model.mat_emission[m] > 0],
-    }
-    words = [f"{what} of {inventory.listed_materials(model, found)}" for what, found in kinds.items() if found]
+    glossy = [m for m in materials if bsdfs.has_gloss(model, m)]
+    glowing = [m for m in materials if model.mat_emission[m] > 0 and light == DIRECT]
     mirrors = [g for g in geoms if bsdfs.mirror_share(model, g) > 0]
     glass = [g for g in geoms if surfaces.rgba(model, g)[3] < 1]
+    words = [f"gloss of {inventory.listed_materials(model, glossy)}"] if glossy else []
+    words += [f"light of {inventory.listed_materials(model, glowing)} on surfaces"] if glowing else []
     words += [f"reflections in {inventory.listed_geoms(model, mirrors)}"] if mirrors else []
     return words + ([f"what is behind the transparent {inventory.listed_geoms(model, glass)}"] if glass else [])

@@ -19,8 +19,10 @@ from sim.robots.poses import Poses
 from sim.scene.device_arrays import aligned, floats, three, whole_numbers
 from sim.scene.variant import MitsubaObject
 from sim.scene.variant import variant as in_variant
+from sim.tracing import lighting
 
 EYE_ROWS = 4  # of four floats: the pupil, right, up and ahead
+SECOND = 3  # seed
 SIZES = 5  # numbers of rays, eyes, rows of movers, lights and colours
 
 
@@ -45,15 +47,20 @@ class ModelWavefront:
         self.depth: Any = dr.freeze(lambda *args: self._depth(*args))
         self.which: Any = dr.freeze(lambda *args: self._which(*args))
 
-    def look(self, directions: np.ndarray) -> dict[str, Array]:
-        """What a kernel reads to look along these directions (ray, 3) with every eye."""
+    def look(self, directions: np.ndarray, bounce_samples: np.ndarray | None = None) -> dict[str, Array]:
+        """What a kernel reads to look along these directions (ray, 3) with every eye; bounce_samples: (ray, 2), for
+        light that bounces."""
         fours = np.zeros((len(directions), 4), np.float32)
         fours[:, :3] = directions
         scene = self._scene
         sizes = [len(directions), self._n_eyes, scene.movers.n_rows, max(len(scene.lights), 1), scene.paint.n_rows]
         lanes = dr.arange(mi.UInt32, self._n_envs * self._n_eyes * len(directions))
         dr.eval(lanes)
-        return {"directions": floats(fours), "sizes": whole_numbers(sizes), "lanes": lanes, **self._tracer.inputs}
+        inputs = {"directions": floats(fours), "sizes": whole_numbers(sizes), "lanes": lanes, **self._tracer.inputs}
+        if self._tracer.light == lighting.BOUNCE and bounce_samples is not None:
+            more = np.random.default_rng(SECOND).random(bounce_samples.shape)  # for a reflection further on
+            inputs["bounce_samples"] = floats(np.concatenate([bounce_samples, more], axis=1))
+        return inputs
 
     def launch(self, kernel: Any, look: dict[str, Array], poses: Poses, eyes: np.ndarray) -> Callable[[], np.ndarray]:
         """Start a kernel; what is returned waits for it. eyes: rows (world, eye, EYE_ROWS, 3)."""
@@ -81,7 +88,10 @@ class ModelWavefront:
     ) -> tuple[list[Array], Array]:
         """Within a kernel: what comes along every lane's ray, and 1 / depth along the eye's axis of what it meets."""
         ray, axis, cosine, rows = _of_lane(buffers, look)
-        components, distance = self._tracer.radiance(still, ray, axis, rows, look)
+        ray_of_eye = look["lanes"] % dr.maximum(dr.gather(mi.UInt32, look["sizes"], 0), 1)
+        bounces = self._tracer.light == lighting.BOUNCE
+        samples = dr.gather(mi.Vector4f, look["bounce_samples"], ray_of_eye) if bounces else mi.Vector4f(0)
+        components, distance = self._tracer.radiance(still, ray, axis, rows, look, samples)
         return components, dr.rcp(distance * cosine)
 
     def _light(
