@@ -25,10 +25,10 @@ STRIDE, LIFT, STANCE = 0.52, 0.3, 1.1  # [rad] of the hip to either side; of the
 NEAR = 1.0  # [m] from the ball's centre: the ant's feet touch it
 
 
-def ant_and_ball() -> mujoco.MjSpec:
+def ant_and_ball(seen: bool = True) -> mujoco.MjSpec:
     """Gymnasium's ant with joints that are led to angles, on a plain floor, and a ball."""
     spec = mujoco.MjSpec.from_file(str(ANT))
-    spec.nuserdata = 2
+    spec.nuserdata, spec.option.timestep = 2, 0.02
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.visual.headlight.active = 0
     for actuator in list(spec.actuators):
@@ -36,11 +36,14 @@ def ant_and_ball() -> mujoco.MjSpec:
     for name in [f"{joint}_{leg}" for leg in range(1, 5) for joint in ("hip", "ankle")]:
         motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         motor.set_to_position(kp=60.0, kv=6.0)
+    for texture in list(spec.textures):
+        if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
+            spec.delete(texture)
     floor = spec.geom("floor")
     floor.material, floor.rgba = "", [0.3, 0.3, 0.3, 1]
     spec.lights[0].dir = [-0.3, -0.4, -1]
     ball = spec.worldbody.add_body(name="ball", mocap=True, pos=[2, 0, 0.5])
-    ball.add_geom(name="ball", size=[0.5, 0, 0], rgba=[0.9, 0.15, 0.1, 1], contype=0, conaffinity=0)
+    ball.add_geom(name="ball", size=[0.5, 0, 0], rgba=[0.9, 0.15, 0.1, float(seen)], contype=0, conaffinity=0)
     return spec
 
 
@@ -50,7 +53,7 @@ class AntSeeks(sim.Task):
     model = ant_and_ball()
     mounts = (sim.Mount("torso", offset=(0.27, 0, 0.1)),)
     fidelity = sim.Fidelity(2, bands=4)
-    substeps, episode_steps = 10, 80  # of 0.01 s, and of 0.1 s
+    substeps, episode_steps = 5, 80  # of 0.02 s, and of 0.1 s
 
     def n_actions(self, model):
         return 2
@@ -83,6 +86,12 @@ class AntSeeks(sim.Task):
     def apart(self, data):
         """How far the ball is [m]."""
         return float(np.linalg.norm(data.mocap_pos[0, :2] - data.qpos[:2]))
+
+
+class Blindfold(AntSeeks):
+    """The null model: the same ant and the same ball, which cannot be seen."""
+
+    model = ant_and_ball(seen=False)
 
 
 def walk(speed: float, turn: float, seconds: float = 6.0) -> tuple[float, float]:

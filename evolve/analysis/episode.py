@@ -198,8 +198,8 @@ def _require_fit(policy: EyePolicy, worlds: Any, path: Path) -> None:
 
 
 def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any], float]:
-    """The single world's states, one after the other as a batch, the Episode's columns that playing fills, and the level
-    of its light."""
+    """The single world's states, one after the other as a batch, the Episode's columns that playing fills, and how much
+    light there is."""
     states, rows, done = [], [], False
     observation = worlds.reset()
     light = float(worlds.reset_infos[0].get("varied", {}).get("light", 1.0))

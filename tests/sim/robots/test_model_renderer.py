@@ -201,7 +201,9 @@ def test_what_is_not_matt_is_named():
         <geom name="floor" type="plane" size="1 1 1" material="mirror"/><geom size=".1" material="wet"/>
         <geom name="pane" size=".1" rgba="1 1 1 .5" pos="0 0 1"/><geom size=".1" material="lamp"/>
         <site name="eye" pos="0 -1 1"/></worldbody></mujoco>""")
-    words = "gloss of material 'wet'; light of material 'lamp' on surfaces; reflections in geom 'floor'; "
+    words = (
+        "gloss of material 'wet'; light of material 'lamp' on surfaces; reflections in geom 'floor'; "
         "what is behind .* geom 'pane'"
+    )
     with pytest.warns(sim.MirrorWarning, match=words):
         sim.ModelRenderer(model, EYE, [sim.Mount("eye")])
