@@ -246,6 +246,12 @@ def test_pictures_for_people_show_them():
         env = sim.make_vec_env(one, n_envs=1, render_mode="rgb_array")
         env.reset()
         pictures.append(env.get_images()[0].astype(int))
+    env = sim.make_vec_env(task, n_envs=1, render_mode="rgb_array")
+    env.reset()
+    for _ in range(Room.episode_steps - 1):
+        env.get_images()
+        env.step(np.zeros((1, 1)))
+    assert env.renderer.recordings <= 2, "pictures of one episode have no kernel recorded anew"
     green, red = ((p[..., 1] > 1.3 * p[..., 0]).sum() for p in pictures)
     assert green > red + 2000
 
