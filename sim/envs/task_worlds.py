@@ -173,7 +173,10 @@ class TaskWorlds:
         """What the step is worth to each that learns. The episode ends for all as soon as it ends for anybody."""
         data = self.datas[world]
         if failure is None and any(data.warning[kind].number for kind in _UNSTABLE):  # MuJoCo has begun it anew
-            failure = "physics is unstable: positions, speeds or accelerations are huge or not finite"
+            failure = (
+                "physics is unstable: positions, speeds or accelerations are huge or not finite; a shorter timestep, or "
+                "the integrator implicitfast, may help"
+            )
         outcomes: list[StepOfWorld] = []
         over = self.steps[world] >= self.episode_steps
         if failure is None:

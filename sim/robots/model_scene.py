@@ -5,9 +5,11 @@ Surfaces are matt here, and opaque: what of a material is gloss, mirror or glass
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 
 import mitsuba as mi
 import mujoco
@@ -26,6 +28,9 @@ from sim.scene.spectra import Spectra, of_geom, resolve
 from sim.scene.variant import Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
 from sim.tracing.lighting import DIRECT
+
+
+_HERE = Path(__file__).parents[1]
 
 
 class ModelScene:
@@ -76,7 +81,7 @@ class ModelScene:
             self.has_sky = self.scene.environment() is not None
         left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, self.geoms, light)]
         if left_out:
-            warnings.warn(f"eyes do not see: {'; '.join(left_out)}", MirrorWarning, stacklevel=4)
+            warnings.warn(f"eyes do not see: {'; '.join(left_out)}", MirrorWarning, stacklevel=_outside())
 
     def _matt(self, geom: int, white: bool) -> MitsubaObject:
         to_uv = shapes.uv_transform(self.model, geom)
@@ -166,6 +171,14 @@ def varied_geoms(model: mujoco.MjModel, seen: Sequence[int], names: Sequence[str
 def _moves(model: mujoco.MjModel, geom: int) -> bool:
     body = model.geom_bodyid[geom]
     return bool(model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0)
+
+
+def _outside() -> int:
+    """How many calls ago somebody else's code was running: that is where a warning points."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(_HERE):
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def _not_matt(model: mujoco.MjModel, geoms: Iterable[int], light: str) -> list[str]:
