@@ -174,8 +174,8 @@ class TaskWorlds:
         data = self.datas[world]
         if failure is None and any(data.warning[kind].number for kind in _UNSTABLE):  # MuJoCo has begun it anew
             failure = (
-                "physics is unstable: positions, speeds or accelerations are huge or not finite; a shorter timestep, or "
-                "the integrator implicitfast, may help"
+                "physics is unstable: positions, speeds or accelerations are huge or not finite; a shorter timestep or "
+                "the integrator implicitfast may help"
             )
         outcomes: list[StepOfWorld] = []
         over = self.steps[world] >= self.episode_steps

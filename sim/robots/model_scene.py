@@ -29,7 +29,6 @@ from sim.scene.variant import Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
 from sim.tracing.lighting import DIRECT
 
-
 _HERE = Path(__file__).parents[1]
 
 

@@ -91,6 +91,7 @@ class Movers:
         self._types = model.geom_type[self.geoms]
         # Of meshes from their origins [m]; a plane that is seen by itself has no end.
         self._mesh_reach = np.where(self._types == _TYPES.mjGEOM_PLANE, np.inf, model.geom_rbound[self.geoms])
+        self._known: tuple[bytes, np.ndarray, np.ndarray] | None = None  # extents of the last poses
         self._ends = np.cumsum([0, *(len(group) for group in by_kind.values())])
         self.inputs = {"mover_ends": whole_numbers(self._ends)}
 
@@ -123,6 +124,12 @@ class Movers:
         else:
             alike = poses.geom_size.strides[0] == 0  # one model for all worlds
             sizes = poses.geom_size[: 1 if alike else None, self.geoms]
+        asked = sizes.tobytes()
+        if self._known is None or self._known[0] != asked:
+            self._known = asked, *self._with_reach(sizes)
+        return self._known[1:]
+
+    def _with_reach(self, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         balls = self._types == _TYPES.mjGEOM_SPHERE
         sizes[:, balls] = sizes[:, balls, :1]
         reach = np.broadcast_to(self._mesh_reach, sizes.shape[:2]).copy()
