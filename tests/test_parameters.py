@@ -177,6 +177,7 @@ FIELDS = {
     "world.unseen": Case("world.unseen=true", life, NAVIGATING, "maze"),
     "world.course": Case("world.course=long", life, NAVIGATING, "navigation"),
     "world.evaluation_course": Case("world.evaluation_course=long", life, NAVIGATING, "navigation"),
+    "world.least_light": Case("world.least_light=0.01", life),
     "search.optimizer": Case("search.optimizer=mutation", history),
     "search.steady_state": Case("search.steady_state=true", history),
     "search.population": Case("search.population=4", history),

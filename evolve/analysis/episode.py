@@ -155,12 +155,13 @@ def record(
         memory=candidate.phenotype.memory_frames,
         mode="evaluation",
         rays_per_receptor=run.config.eye.rays_per_receptor,
+        vary=run.config.world.vary,
         **run.config.world.evaluation,
     )
     try:
         _require_fit(policy, worlds, run.policy_path(candidate.id))
-        states, columns = _play(policy, worlds)
-        views = _perfect_views(worlds, eyes, states, radiance_every)
+        states, columns, light = _play(policy, worlds)
+        views = _perfect_views(worlds, eyes, states, radiance_every, light)
     except TrainingDiverged as error:
         raise RunError(f"{run.policy_path(candidate.id)} is damaged: {error}") from error
     finally:
@@ -196,10 +197,12 @@ def _require_fit(policy: EyePolicy, worlds: Any, path: Path) -> None:
         raise RunError(f"{path} is another animal's: it sees {own}, this one {here} (memory, eye, channel, y, x)")
 
 
-def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any]]:
-    """The single world's states, one after the other as a batch, and the Episode's columns that playing fills."""
+def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any], float]:
+    """The single world's states, one after the other as a batch, the Episode's columns that playing fills, and how much
+    light there is."""
     states, rows, done = [], [], False
     observation = worlds.reset()
+    light = float(worlds.reset_infos[0].get("varied", {}).get("light", 1.0))
     while not done:
         states.append(worlds.state)
         seen = observation["eyes"][0, -1]
@@ -209,16 +212,17 @@ def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any]]:
         felt = infos[0]["terminal_observation"]["contact"] if done else observation["contact"][0]
         rows.append((action[0], reward[0], infos[0]["reward_terms"], felt[0] > 0, seen))
     action, reward, terms, contact, signals = zip(*rows, strict=True)
-    return concatenate(states), {
+    columns = {
         "action": np.array(action),
         "reward": np.array(reward),
         "reward_terms": {name: np.array([of_step[name] for of_step in terms]) for name in terms[0]},
         "contact": np.array(contact),
         "signals": np.array(signals),
     }
+    return concatenate(states), columns, light
 
 
-def _perfect_views(worlds: Any, eyes: sim.Eyes, states: WorldState, every: int) -> dict[str, Any]:
+def _perfect_views(worlds: Any, eyes: sim.Eyes, states: WorldState, every: int, light: float = 1.0) -> dict[str, Any]:
     """The same scenes in the same light through a perfect lens: by the same receptors, and as radiance on a finer
     grid."""
     world, seen = worlds.simulation.world, worlds.renderer.fidelity
@@ -229,9 +233,9 @@ def _perfect_views(worlds: Any, eyes: sim.Eyes, states: WorldState, every: int) 
     receptors, pictures = (sim.BatchedRenderer(world, e, 1, fidelity) for e in (perfect, fine))
     scenes = [states.take(np.array([t])) for t in range(states.n)]
     frames = np.arange(0, states.n, every)
-    radiance = [np.moveaxis(pictures.receptor_radiance(scenes[t]), 0, 2) for t in frames]
+    radiance = [light * np.moveaxis(pictures.receptor_radiance(scenes[t]), 0, 2) for t in frames]
     return {
-        "perfect_signals": np.concatenate([receptors.signals(scene) for scene in scenes]),
+        "perfect_signals": light * np.concatenate([receptors.signals(scene) for scene in scenes]),
         "wavelengths_nm": 1e9 * np.asarray(pictures.bands.wavelengths),
         "radiance_frames": frames,
         "radiance": np.concatenate(radiance),

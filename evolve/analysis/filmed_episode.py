@@ -17,6 +17,7 @@ from evolve.learning.policy import EyePolicy
 from evolve.learning.worlds import own_task_for
 from sim.envs.task_fidelity import fidelity_of
 from sim.envs.task_vec_env import TaskVecEnv
+from sim.envs.task_worlds import TaskWorlds
 from sim.robots.eye_kinds import kinds_of
 from sim.robots.poses import Poses
 from sim.robots.task import Task
@@ -88,7 +89,7 @@ def film(
     (kind,) = kinds_of(task)
     with contextlib.closing(TaskVecEnv(task, 1, seed, phenotype.memory_frames, "rgb_array")) as worlds:
         poses, columns, lit = _play(policy, worlds)
-        views = _perfect_views(worlds.worlds.model, task, poses, radiance_every, lit)
+        views = _perfect_views(worlds.worlds, task, poses, radiance_every, lit)
         seconds = task.substeps * float(worlds.worlds.model.opt.timestep)
     return FilmedEpisode(
         task=config.task,
@@ -104,11 +105,11 @@ def film(
     )
 
 
-def moments(task: Task, n: int, seed: int) -> tuple[mujoco.MjModel, Poses]:
-    """Where everything is at the beginnings of n episodes."""
+def moments(task: Task, n: int, seed: int) -> tuple[mujoco.MjModel, tuple[str, ...], Poses]:
+    """The model, which of its geoms differ, and where everything is at the beginnings of n episodes."""
     with contextlib.closing(TaskVecEnv(task, n, seed)) as worlds:
         worlds.reset()
-        return worlds.worlds.model, Poses.of(worlds.worlds.datas)
+        return worlds.worlds.model, worlds.worlds.bodies.varied, Poses.of(worlds.worlds.datas)
 
 
 def _play(policy: EyePolicy, worlds: TaskVecEnv) -> tuple[list[Poses], dict[str, Any], Lit]:
@@ -142,12 +143,13 @@ def _play(policy: EyePolicy, worlds: TaskVecEnv) -> tuple[list[Poses], dict[str,
     }
 
     def lit(wavelengths: np.ndarray) -> np.ndarray:
-        return np.ones((1, len(wavelengths))) if variation is None else variation.light(varied, wavelengths)
+        found = None if variation is None else variation.light(varied, wavelengths)
+        return np.ones((1, len(wavelengths))) if found is None else found
 
     return poses, columns, lit
 
 
-def _perfect_views(model: mujoco.MjModel, task: Task, poses: list[Poses], every: int, lit: Lit) -> dict[str, Any]:
+def _perfect_views(worlds: TaskWorlds, task: Task, poses: list[Poses], every: int, lit: Lit) -> dict[str, Any]:
     """The same scenes through a perfect lens: by the same receptors, and as radiance on a finer grid."""
     (kind,) = kinds_of(task)
     perfect = replace(kind.eye, pupil=None)
@@ -155,8 +157,9 @@ def _perfect_views(model: mujoco.MjModel, task: Task, poses: list[Poses], every:
     factor = max(1, -(-FINE_PIXELS // max(height, width)))
     fine = replace(perfect, resolution=(factor * height, factor * width))
     fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
+    how: dict[str, Any] = {"spectra": task.spectra, "varied": worlds.bodies.varied}
     receptors, pictures = (
-        sim.ModelRenderer(model, eye, kind.mounts, 1, fidelity, spectra=task.spectra) for eye in (perfect, fine)
+        sim.ModelRenderer(worlds.model, eye, kind.mounts, 1, fidelity, **how) for eye in (perfect, fine)
     )
     wavelengths = np.asarray(receptors.eye.spectral_bands.wavelengths)
     frames, light = np.arange(0, len(poses), every), lit(wavelengths)

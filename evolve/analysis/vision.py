@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,11 +78,12 @@ def seen_and_perfect(eyes: sim.Eyes, task: str, world: WorldConfig | None = None
 def _own_views(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
     """The same in a task of somebody's own."""
     task = own_task_for(animal, config)
-    model, poses = moments(task, SCENES, 0)
+    model, varied, poses = moments(task, SCENES, 0)
+    how: dict[str, Any] = {"spectra": task.spectra, "varied": varied}
     (kind,) = kinds_of(task)
     fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
     seen, sharp = (
-        sim.ModelRenderer(model, eye, kind.mounts, SCENES, fidelity, spectra=task.spectra).signals(poses)
+        sim.ModelRenderer(model, eye, kind.mounts, SCENES, fidelity, **how).signals(poses)
         for eye in (kind.eye, replace(kind.eye, pupil=None))
     )
     return np.asarray(seen), np.asarray(sharp)

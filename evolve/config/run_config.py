@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 # What only our own agents have: a speed and a turn, contact with walls, a course. Their body stands level.
-OF_OUR_AGENTS = ("learning.first_speed", "learning.contact_ramp", "learning.least_return")
+OF_OUR_AGENTS = ("world.least_light", "learning.first_speed", "learning.contact_ramp", "learning.least_return")
 LEAST_EXPOSURE = 2e-4  # [lx s]: of some 30 photons from white at a = 1; of few, noise is not what it is taken for
 
 

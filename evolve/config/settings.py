@@ -94,6 +94,11 @@ class WorldConfig:
     )
     course: str = setting("short", None, "navigation's course: short, or long, twice as long in half as many actions")
     evaluation_course: str = setting("short", None, "navigation's course in evaluation")
+    least_light: float = setting(
+        1.0,
+        Interval(1e-6, 1),
+        "darkest light that an episode may have, as a share of daylight; each draws its own between that and 1",
+    )
 
     @property
     def training(self) -> dict[str, Any]:
@@ -104,6 +109,11 @@ class WorldConfig:
     def evaluation(self) -> dict[str, Any]:
         """The same for those that fitness comes from."""
         return {"mazes": self.mazes, "world_seed": int(self.unseen), "course": self.evaluation_course}
+
+    @property
+    def vary(self) -> dict[str, tuple[float, float]] | None:
+        """What differs between episodes, as `sim.make_vec_env` has it; None: nothing."""
+        return {"light": (self.least_light, 1.0)} if self.least_light < 1 else None
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from sim.envs.vec_env import EyesVecEnv
 from sim.render.fidelity import Fidelity
 from sim.render.fidelity_choice import fidelity_for
 from sim.robots.task import Task, grown
+from sim.robots.variation import Variation
 
 __all__ = ["LifeWorlds", "embodied", "own_task_for", "worlds_of"]
 
@@ -44,12 +45,16 @@ def worlds_of(phenotype: Phenotype, config: RunConfig, learning: int, evaluation
     coarse = _at_most(fine, wanted.rays_per_receptor)
     same_place = config.world.training == config.world.evaluation
     school = scene if same_place else prepared_scene(config.task, eyes, **config.world.training)
+    vary, episodes = config.world.vary, config.evaluation.episodes
+    variation = None if vary is None else Variation(vary)
     checkpoints, finals = (
-        vec_env_in(scene, how, config.evaluation.episodes, evaluation, memory=memory, mode="evaluation")
+        vec_env_in(scene, how, episodes, evaluation, memory=memory, mode="evaluation", variation=variation)
         for how in (coarse, fine)
     )
     least = wanted.least_return or None
-    lessons = vec_env_in(school, coarse, wanted.n_envs, learning, memory=memory, least_return=least)
+    lessons = vec_env_in(
+        school, coarse, wanted.n_envs, learning, memory=memory, least_return=least, variation=variation
+    )
     return LifeWorlds(lessons, checkpoints, finals)
 
 

@@ -10,6 +10,8 @@ task_animals           all animals in them, those who learn and those who do not
 task_pictures          pictures of them
 parallel_env           EncounterEnv: PettingZoo
 task_fidelity          how finely they are seen
+auxiliary              depth, ids and flow beside what is seen
+world_poses            rhabdom's own worlds as any model is seen
 task_state             where these stand, as arrays
 one_environment        what both answer stable-baselines3 alike
 env                    make_env, EyesEnv: Gymnasium

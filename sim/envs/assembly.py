@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,7 @@ import drjit as dr
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum
+from sim.envs.auxiliary import checked
 from sim.envs.follow_camera import check_render_mode
 from sim.envs.simulation import Simulation, check_least_return
 from sim.envs.task_vec_env import TaskVecEnv
@@ -49,6 +50,7 @@ def make_vec_env(
     episode_steps: int | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
     vary: Mapping[str, tuple[float, float]] | None = None,
+    auxiliary: Sequence[str] = (),
     render_mode: str | None = None,
 ) -> EyesVecEnv | TaskVecEnv:
     """A batched environment of one task.
@@ -70,6 +72,7 @@ def make_vec_env(
     spectra: of materials and lights, by name, in the place of their colours: see `sim.build_world`
     vary: {"light": (low, high)}: each episode has its own level of light, drawn evenly over its logarithm; full
         daylight is 1, and the most
+    auxiliary: of "depth", "ids" and "flow": what observations hold of each receptor beside its signal, docs/tasks.md
     render_mode: "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye reports,
         side by side
 
@@ -95,7 +98,7 @@ def make_vec_env(
     eyes = eyes if asked is None else replace(eyes, bands=asked.bands)
     scene = prepared_scene(task, eyes, world_seed=world_seed, mazes=mazes, course=course, spectra=spectra)
     how: dict[str, Any] = {"memory": memory, "mode": mode, "least_return": least_return, "render_mode": render_mode}
-    how |= {"episode_steps": episode_steps, "variation": variation}
+    how |= {"episode_steps": episode_steps, "variation": variation, "auxiliary": checked(auxiliary, "auxiliary")}
     return vec_env_in(scene, asked or chosen_fidelity(scene), n_envs, seed, **how)
 
 
@@ -149,6 +152,7 @@ def vec_env_in(
     episode_steps: int | None = None,
     render_mode: str | None = None,
     variation: Variation | None = None,
+    auxiliary: tuple[str, ...] = (),
 ) -> EyesVecEnv:
     """A batched environment in a scene that has been prepared, rendered as finely as is said; arguments as
     `make_vec_env` has them.
@@ -160,7 +164,9 @@ def vec_env_in(
     threads = min(dr.thread_count(), n_envs)
     world = scene.world if episode_steps is None else replace(scene.world, episode_steps=episode_steps)
     simulation = Simulation(world, n_envs, seed, mode, threads, least_return)
-    return EyesVecEnv(simulation, BatchedRenderer.of(scene, n_envs, fidelity), memory, render_mode, variation)
+    return EyesVecEnv(
+        simulation, BatchedRenderer.of(scene, n_envs, fidelity), memory, render_mode, variation, auxiliary
+    )
 
 
 def _dimmed(vary: Mapping[str, tuple[float, float]] | None) -> Variation | None:

@@ -14,6 +14,8 @@ from sim.robots.encounter import Encounter, Frozen, name_of
 from sim.robots.poses import Poses
 from sim.robots.task import Task
 
+NOWHERE = np.empty(0, int)
+
 
 class TaskAnimals:
     """Worlds, and what the animals in them know.
@@ -51,7 +53,7 @@ class TaskAnimals:
         self.worlds.reset(self._everyone)
         for senses in self.seeing:
             senses.acted(np.zeros_like(senses.action))
-        return self.remember(self.look(self._everyone), self._everyone)
+        return self.remember(self.look(self._everyone, self._everyone), self._everyone)
 
     def act(self, actions: Sequence[np.ndarray]) -> list[StepOfWorld]:
         """One action further; actions (world, number) of each that learns. What `TaskWorlds.step` returns."""
@@ -66,10 +68,11 @@ class TaskAnimals:
                 senses.acted(commanded)
         return self.worlds.step(everyones)
 
-    def look(self, worlds: np.ndarray) -> list[Seen]:
-        """What all who look see in these worlds; all eyes are begun before any is waited for."""
+    def look(self, worlds: np.ndarray, fresh: np.ndarray = NOWHERE) -> list[Seen]:
+        """What all who look see in these worlds; all eyes are begun before any is waited for. fresh: worlds whose
+        episode has just begun"""
         poses = Poses.of(self.worlds.datas)
-        begun = [senses.begin(poses, worlds) for senses in self.seeing]
+        begun = [senses.begin(poses, worlds, fresh) for senses in self.seeing]
         return [{name: looking.wait() for name, looking in kinds.items()} for kinds in begun]
 
     def begin_again(self, ended: np.ndarray, seen: Sequence[Seen]) -> None:
@@ -77,7 +80,7 @@ class TaskAnimals:
         for senses in self.seeing:
             senses.action[ended] = 0.0
         self.worlds.reset(ended)
-        for frames, fresh in zip(seen, self.look(ended), strict=True):
+        for frames, fresh in zip(seen, self.look(ended, ended), strict=True):
             for name, of_kind in frames.items():
                 of_kind[ended] = fresh[name]
 

@@ -40,12 +40,12 @@ def fidelities_of(task: Task) -> dict[str, Fidelity]:
     if len(found) < len(kinds):
         with contextlib.closing(TaskWorlds(task, WORLDS, 0)) as worlds:
             datas, model, spectra = _moments(worlds), worlds.model, worlds.spectra
-            variation = worlds.variation
+            variation, varied = worlds.variation, worlds.bodies.varied
         for kind in kinds:
             if kind.name not in found:
                 tolerance = None if variation is None else _in_brightest(variation, kind.eye)
                 found[kind.name] = choose_model_fidelity(
-                    model, kind.eye, kind.mounts, datas, tolerance, spectra=spectra
+                    model, kind.eye, kind.mounts, datas, tolerance, spectra=spectra, varied=varied
                 )
     return found
 

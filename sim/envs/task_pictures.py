@@ -23,7 +23,7 @@ class TaskPictures:
 
     def __init__(self, animals: TaskAnimals, render_mode: str | None) -> None:
         self._animals, self._mode = animals, render_mode
-        self._camera: QuickCamera | None = None
+        self._cameras: dict[int, tuple[bytes, QuickCamera]] = {}
 
     def taken(self) -> list[np.ndarray]:
         """(y, x, 3) uint8: one of every world, or of the eyes of each that learns in every world; none without mode."""
@@ -32,9 +32,20 @@ class TaskPictures:
             return [picture for senses in learners for picture in _of_all_kinds(senses)]
         if self._mode == "rgb_array":
             worlds = self._animals.worlds
-            self._camera = self._camera or QuickCamera(worlds.model, self._animals.learners[0].renderer.spectra)
-            return [self._picture(self._camera, data) for data in worlds.datas]
+            return [self._picture(self._camera_of(world), data) for world, data in enumerate(worlds.datas)]
         return []
+
+    def _camera_of(self, world: int) -> QuickCamera:
+        """The one for all; where sizes or colours differ, each world's own, made anew with its episode and no earlier:
+        a camera's materials have all eyes' kernels recorded once more."""
+        bodies = self._animals.worlds.bodies
+        model = bodies.models[world]
+        looks = model.geom_size.tobytes() + model.geom_rgba.tobytes()
+        known, camera = self._cameras.get(world if bodies.varied else 0, (b"", None))
+        if camera is None or looks != known:
+            camera = QuickCamera(model, self._animals.learners[0].renderer.spectra)
+            self._cameras[world if bodies.varied else 0] = looks, camera
+        return camera
 
     def _picture(self, camera: QuickCamera, data: mujoco.MjData) -> np.ndarray:
         worlds = self._animals.worlds

@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from sim.envs.auxiliary import Auxiliary, checked
 from sim.envs.task_fidelity import fidelities_among
 from sim.envs.task_sight import EyesOfKind
 from sim.envs.task_worlds import TaskWorlds
-from sim.render.pending_frame import PendingFrame
-from sim.robots.eye_kinds import kinds_of
+from sim.render.pending_frame import PendingFrame, settled
+from sim.robots.eye_kinds import kinds_of, several
 from sim.robots.model_renderer import ModelRenderer
 from sim.robots.poses import Poses
 
-Seen = dict[str, np.ndarray]  # by kind of eyes: (world, eye, channel, height, width)
+Seen = dict[str, np.ndarray]  # by kind of eyes: (world, eye, channel, height, width); and what there is beside
 
 
 class Senses:
@@ -34,6 +35,13 @@ class Senses:
         self.sights = {
             kind.name: EyesOfKind(worlds, kind, fidelities[kind.name], keys[k], memory) for k, kind in enumerate(kinds)
         }
+        names = checked(task.auxiliary, f"{type(task).__name__}: auxiliary")
+        prefixes = [f"{name}_" if several(task) else "" for name in self.sights] if names else []
+        self._auxiliary = [
+            Auxiliary(sight.renderer, names, prefix)
+            for prefix, sight in zip(prefixes, self.sights.values(), strict=False)
+        ]
+        self._told: Seen = {}
         self.action_space = spaces.Box(-1.0, 1.0, (task.n_actions(worlds.model),), np.float32)
         self.observation_space = self._space()
         self.action = np.zeros((n, *self.action_space.shape), np.float32)
@@ -52,19 +60,24 @@ class Senses:
         """Remember what was done: nothing, where an action was no number."""
         self.action = np.clip(np.nan_to_num(commanded, posinf=0, neginf=0), -1, 1)
 
-    def begin(self, poses: Poses, worlds: np.ndarray) -> dict[str, PendingFrame]:
-        """Begin to see these worlds with eyes of every kind."""
-        return {name: sight.begin(poses, worlds) for name, sight in self.sights.items()}
+    def begin(self, poses: Poses, worlds: np.ndarray, fresh: np.ndarray) -> dict[str, PendingFrame]:
+        """Begin to see these worlds with eyes of every kind; fresh: those whose episode has just begun."""
+        begun = {name: sight.begin(poses, worlds) for name, sight in self.sights.items()}
+        for auxiliary in self._auxiliary:
+            begun |= {name: settled(array[worlds]) for name, array in auxiliary.look(poses, fresh).items()}
+        return begun
 
     def observation(self, seen: Seen, fresh: np.ndarray) -> dict[str, np.ndarray]:
         """With new frames of all worlds; fresh: those that have just begun."""
         remembered = {name: sight.memory.remember(seen[name], fresh) for name, sight in self.sights.items()}
-        return {**remembered, **self._beside(slice(None))}
+        self._told = {name: seen[name] for auxiliary in self._auxiliary for name in auxiliary.spaces}
+        return {**remembered, **self._told, **self._beside(slice(None))}
 
     def preview(self, seen: Seen, worlds: np.ndarray) -> dict[str, np.ndarray]:
         """Of these worlds, with these of the new frames of all; nothing is remembered."""
         frames = {name: sight.memory.preview(seen[name][worlds], worlds) for name, sight in self.sights.items()}
-        return {**frames, **self._beside(worlds)}
+        told = {name: seen[name][worlds] for auxiliary in self._auxiliary for name in auxiliary.spaces}
+        return {**frames, **told, **self._beside(worlds)}
 
     @property
     def begun(self) -> bool:
@@ -74,7 +87,8 @@ class Senses:
     @property
     def now(self) -> dict[str, np.ndarray]:
         """What it knows."""
-        return {**{name: sight.memory.held for name, sight in self.sights.items()}, **self._beside(slice(None))}
+        frames = {name: sight.memory.held for name, sight in self.sights.items()}
+        return {**frames, **self._copied(), **self._beside(slice(None))}
 
     def state(self) -> dict[str, np.ndarray]:
         """What its future observations follow from, beside its worlds."""
@@ -83,13 +97,20 @@ class Senses:
             for k, (name, sight) in enumerate(self.sights.items())
             for what, array in sight.state().items()
         }
-        return {**parts, "action": self.action.copy()}
+        return {**parts, **self._copied(), "action": self.action.copy()}
 
     def bring_back(self, state: dict[str, np.ndarray]) -> None:
         """Inverse of `state`."""
         for k, (name, sight) in enumerate(self.sights.items()):
             sight.bring_back(*(state[_part(k, name, what)] for what in ("remembered", "noise")))
         self.action = state["action"]
+        self._told = {name: state[name] for name in self._told}
+        for auxiliary in self._auxiliary:
+            auxiliary.go_on_from(Poses.of(self._worlds.datas))
+
+    def _copied(self) -> Seen:
+        """What it was told last beside what is seen."""
+        return {name: array.copy() for name, array in self._told.items()}
 
     def _beside(self, worlds: Any) -> dict[str, np.ndarray]:
         """What it knows beside what is seen."""
@@ -100,6 +121,8 @@ class Senses:
 
     def _space(self) -> spaces.Dict:
         found: dict[str, spaces.Space[Any]] = {name: sight.space for name, sight in self.sights.items()}
+        for auxiliary in self._auxiliary:
+            found |= auxiliary.spaces
         found["previous_action"] = spaces.Box(-1.0, 1.0, self.action_space.shape, np.float32)
         felt = self._worlds.felt[self._number].shape[1:]
         if felt[0]:

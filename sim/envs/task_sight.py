@@ -24,9 +24,8 @@ class EyesOfKind:
     """
 
     def __init__(self, worlds: TaskWorlds, kind: EyeKind, fidelity: Fidelity, keys: np.ndarray, memory: int) -> None:
-        self.renderer = ModelRenderer(
-            worlds.model, kind.eye, kind.mounts, len(worlds.datas), fidelity, spectra=worlds.spectra
-        )
+        seen = {"spectra": worlds.spectra, "varied": worlds.bodies.varied}
+        self.renderer = ModelRenderer(worlds.model, kind.eye, kind.mounts, len(worlds.datas), fidelity, **seen)
         self._worlds, self._wavelengths = worlds, np.asarray(self.renderer.eye.spectral_bands.wavelengths)
         self.memory, self._noise = Memory(memory), NoiseModel.of(self.renderer.eye)
         frame = (len(kind.mounts), self.renderer.eye.channels, *self.renderer.eye.resolution)

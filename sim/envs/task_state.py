@@ -30,17 +30,18 @@ def of_worlds(worlds: TaskWorlds) -> dict[str, np.ndarray]:
 def bring_back(worlds: TaskWorlds, state: Mapping[str, np.ndarray], chosen: np.ndarray) -> None:
     """Worlds `chosen` as they were."""
     for i in chosen:
-        data, row = worlds.datas[i], np.ascontiguousarray(state["physics"][i])
-        mujoco.mj_resetData(worlds.model, data)
-        mujoco.mj_setState(worlds.model, data, row, _ALL)
-        mujoco.mj_forward(worlds.model, data)
-        mujoco.mj_setState(worlds.model, data, row, _ALL)  # the solver's warm start, which mj_forward has moved
+        for name, values in worlds.varied.items():
+            values[i] = state[_varied(name)][i]
+        worlds.bodies.begin(i, {name: values[i] for name, values in worlds.varied.items()})
+        data, model, row = worlds.datas[i], worlds.bodies.models[i], np.ascontiguousarray(state["physics"][i])
+        mujoco.mj_resetData(model, data)
+        mujoco.mj_setState(model, data, row, _ALL)
+        mujoco.mj_forward(model, data)
+        mujoco.mj_setState(model, data, row, _ALL)  # the solver's warm start, which mj_forward has moved
         worlds.rngs[i].bit_generator.state = json.loads(str(state["chance"][i]))
         worlds.steps[i] = state["steps"][i]
         for k, felt in enumerate(worlds.felt):
             felt[i] = state[_felt(worlds, k)][i]
-        for name, values in worlds.varied.items():
-            values[i] = state[_varied(name)][i]
 
 
 def _felt(worlds: TaskWorlds, number: int) -> str:

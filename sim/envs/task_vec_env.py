@@ -173,7 +173,8 @@ class TaskVecEnv(OneEnvironment):
 
     def _varied(self, row: int) -> dict[str, Any]:
         """How the world of a row differs from others, if they differ."""
-        varied = {name: float(values[row % len(self._everyone)]) for name, values in self.worlds.varied.items()}
+        world = row % len(self._everyone)
+        varied = {name: _plain(values[world]) for name, values in self.worlds.varied.items()}
         return {"varied": varied} if varied else {}
 
     def _count(self, failure: str, row: int) -> None:
@@ -183,6 +184,11 @@ class TaskVecEnv(OneEnvironment):
         self.failures[failure] += 1
         if self.failures[failure] == 1:
             warnings.warn(f"{type(self.task).__name__}: {failure}; its episode ends here", stacklevel=4)
+
+
+def _plain(value: np.ndarray) -> float | tuple[float, ...]:
+    """A number, or three."""
+    return tuple(map(float, value)) if value.ndim else float(value)
 
 
 def _rows(observations: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:

@@ -17,6 +17,7 @@ from sim.robots.encounter import Encounter, cast, name_of, of_world
 from sim.robots.eye_kinds import kinds_of
 from sim.robots.task import Task, compiled, named_terms
 from sim.robots.variation import Variation
+from sim.robots.world_models import WorldModels
 
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 _OURS = (__file__, task_module.__file__)
@@ -40,8 +41,9 @@ class TaskWorlds:
     task: of the animal that learns, with its others; or an Encounter, where all learn
     episode_steps: actions, then an episode is truncated; None: as many as the task has
     learners: tasks of those who learn · frozen: the others · animals: tasks of all, those who learn first
-    model · datas: mjData of every world · steps: actions taken in its episode, (n,) int
-    variation: what differs between episodes; None: nothing · varied: how it is now, by name: (n,)
+    model · bodies: models of every world, where sizes or colours differ · datas: mjData of every world
+    steps: actions taken in its episode, (n,) int
+    variation: what differs between episodes; None: nothing · varied: how it is now, by name: (n,) or (n, 3)
     felt: what each animal feels now, by animal: (n, numbers) float32
     rngs: of each world's episodes · noise_keys: of receptors, by animal: (kind of eyes, n)
     entropy: what all random streams come from; seeded with it again, everything happens again
@@ -60,8 +62,9 @@ class TaskWorlds:
         self.episode_steps = self.animals[0].episode_steps if episode_steps is None else episode_steps
         vary = of_world(self.animals, "vary")
         self.variation = Variation(vary) if vary else None
-        self.varied = {name: np.ones(n) for name in vary or ()}
-        self.datas = [mujoco.MjData(self.model) for _ in range(n)]
+        self.varied = {} if self.variation is None else self.variation.blank(n)
+        self.bodies = WorldModels(self.animals[0].model, self.model, n, self.variation)
+        self.datas = [mujoco.MjData(model) for model in self.bodies.models]
         self.steps, self.felt = np.zeros(n, int), [np.zeros((n, 0), np.float32) for _ in self.animals]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self.seed(seed)
@@ -93,15 +96,17 @@ class TaskWorlds:
             RuntimeError: a task's own reset fails; by its name, line and message.
         """
         for i in worlds:
-            data = self.datas[i]
-            mujoco.mj_resetData(self.model, data)
-            if self.variation is not None:
-                for name, value in self.variation.draw(self.rngs[i]).items():
-                    self.varied[name][i] = value
+            data, model = self.datas[i], self.bodies.models[i]
+            drawn = {} if self.variation is None else self.variation.draw(self.rngs[i])
+            for name, value in drawn.items():
+                self.varied[name][i] = value
+            self.bodies.begin(i, drawn)
+            mujoco.mj_resetData(model, data)
+            self.bodies.place(data, drawn)
             try:
                 for animal in self.animals:
                     animal.reset(data, self.rngs[i])
-                mujoco.mj_forward(self.model, data)
+                mujoco.mj_forward(model, data)
                 self._feel(i)
             except Exception as error:
                 raise RuntimeError(_told(error)) from error
@@ -144,8 +149,8 @@ class TaskWorlds:
         return failures
 
     def _moved(self, data: mujoco.MjData) -> None:
-        mujoco.mj_step(self.model, data, self.animals[0].substeps)
-        mujoco.mj_forward(self.model, data)
+        mujoco.mj_step(data.model, data, self.animals[0].substeps)
+        mujoco.mj_forward(data.model, data)
 
     def _feel(self, world: int) -> None:
         """What the world's animals feel.
@@ -168,7 +173,10 @@ class TaskWorlds:
         """What the step is worth to each that learns. The episode ends for all as soon as it ends for anybody."""
         data = self.datas[world]
         if failure is None and any(data.warning[kind].number for kind in _UNSTABLE):  # MuJoCo has begun it anew
-            failure = "physics is unstable: positions, speeds or accelerations are huge or not finite"
+            failure = (
+                "physics is unstable: positions, speeds or accelerations are huge or not finite; a shorter timestep or "
+                "the integrator implicitfast may help"
+            )
         outcomes: list[StepOfWorld] = []
         over = self.steps[world] >= self.episode_steps
         if failure is None:

@@ -6,14 +6,17 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
+from sim.envs.auxiliary import Auxiliary
 from sim.envs.follow_camera import FollowCamera
 from sim.envs.info import first_infos, infos_of
 from sim.envs.observation import STANDING, Memory, action_space, observation_space
 from sim.envs.one_environment import OneEnvironment
 from sim.envs.retina_images import side_by_side
 from sim.envs.simulation import LEAST_RETURN, NOWHERE, Simulation, Step
+from sim.envs.world_poses import WorldPoses, model_renderer
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.noisy_signals import NoisySignals
 from sim.render.pending_frame import PendingFrame
@@ -40,6 +43,7 @@ class EyesVecEnv(OneEnvironment):
         memory: int,
         render_mode: str | None = None,
         variation: Variation | None = None,
+        auxiliary: tuple[str, ...] = (),
     ) -> None:
         self.simulation, self.renderer, self.eyes = simulation, renderer, renderer.eyes
         self.render_mode = render_mode
@@ -50,6 +54,12 @@ class EyesVecEnv(OneEnvironment):
         if variation is not None:
             self._signals.level = np.ones(simulation.n)
         space = observation_space(self.eyes, renderer.eye.channels, memory, renderer.brightest, self._signals.spread)
+        self._auxiliary: Auxiliary | None = None
+        if auxiliary:
+            world = simulation.world
+            self._poses = WorldPoses(world)
+            self._auxiliary = Auxiliary(model_renderer(world, self.eyes, renderer.eye, simulation.n), auxiliary)
+            space = spaces.Dict({**space.spaces, **self._auxiliary.spaces})
         super().__init__(simulation.n, space, action_space())
         self._commanded = self._actions = np.zeros((self.num_envs, 2), np.float32)
         self._returns, self._lengths = np.zeros(self.num_envs), np.zeros(self.num_envs, int)
@@ -71,7 +81,9 @@ class EyesVecEnv(OneEnvironment):
         self._returns[:], self._lengths[:] = 0.0, 0
         self.reset_infos = self._with_light(first_infos(self.state))
         untouched = np.zeros(self.num_envs, bool)
-        return self._observation(self._signals.begin(self.state).wait(), np.arange(self.num_envs), untouched)
+        everyone = np.arange(self.num_envs)
+        seen = self._signals.begin(self.state).wait()
+        return self._observation(seen, everyone, untouched) | self._told(self.state, everyone)
 
     def step_async(self, actions: np.ndarray) -> None:
         actions = np.asarray(actions, np.float32)
@@ -88,7 +100,7 @@ class EyesVecEnv(OneEnvironment):
         step, looking = self._advance()
         reward = step.reward
         infos = self._infos(step, reward, np.flatnonzero(step.done))
-        observation = self._observation(self._seen(looking, step), NOWHERE, step.contact)
+        observation = self._observation(self._seen(looking, step), NOWHERE, step.contact) | self._told(step.state)
         return observation, reward, step.terminated, step.truncated, infos
 
     def step_wait(self) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, list[dict[str, Any]]]:
@@ -98,11 +110,16 @@ class EyesVecEnv(OneEnvironment):
         infos = self._infos(step, reward, ended)
         # First looks of new episodes run beside the last looks of all, but not beside those at objects put elsewhere.
         beginning = self._begin_anew(ended) if len(ended) and not len(step.respawned) else None
-        seen = self._seen(looking, step)
+        seen, told = self._seen(looking, step), self._told(step.state)
         if len(ended):
             self._add_terminal_observations(infos, step, ended, seen[ended])
+            for name, array in told.items():
+                for world in ended:
+                    infos[world]["terminal_observation"][name] = array[world].copy()
             seen[ended] = (beginning or self._begin_anew(ended)).wait()
-        observation = self._observation(seen, ended, step.contact)
+            for name, array in self._told(self.state, ended).items():
+                told[name][ended] = array[ended]
+        observation = self._observation(seen, ended, step.contact) | told
         return observation, reward.astype(np.float32), done, infos
 
     def _begin_anew(self, ended: np.ndarray) -> PendingFrame:
@@ -169,6 +186,10 @@ class EyesVecEnv(OneEnvironment):
                 "contact": step.contact[world : world + 1].astype(np.float32),
                 "previous_action": self._actions[world].copy(),
             }
+
+    def _told(self, state: WorldState, fresh: np.ndarray = NOWHERE) -> dict[str, np.ndarray]:
+        """What observations hold beside; fresh: worlds that have just begun."""
+        return {} if self._auxiliary is None else self._auxiliary.look(self._poses.of(state), fresh)
 
     # --- light
 

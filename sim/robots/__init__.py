@@ -1,7 +1,9 @@
 """Eyes on any robot: models that are not one of our worlds.
 
 task                Task: what a robot has to do
-variation           what differs between episodes: light
+variation           what differs between episodes: light, sizes, colours, starts
+world_models        a model for each world, where these differ
+paint               colours that differ, for the kernel
 encounter           Encounter: several tasks in one world; Frozen: an animal that does not learn
 model_renderer      ModelRenderer: eyes mounted on any MuJoCo model, in many worlds at once
 model_fidelity      how many rays eyes on a model need
@@ -15,7 +17,7 @@ optic_flow          where what eyes look at moves on their retinas
 edge_rays           many rays where a receptor sees an edge, few elsewhere
 model_scene         what stands still, as a Mitsuba scene, and what moves
 model_lights        lights, that may move
-model_tracer        direct light along rays
+model_tracer        light along rays
 primitives          rays that meet ellipsoids, capsules, cylinders and boxes
 movers              the same, for all that move in a world
 """

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import did_you_mean, of_kind
-from sim.robots.eye_kinds import TAKEN
 from sim.robots.task import Task
 
+FRAMES_AXES = 5  # memory, eye, channel, height, width: of what eyes see in an observation, and of nothing else
 SHARED = ("substeps", "episode_steps")  # what belongs to the world: every animal must say the same of it
 
 
@@ -44,7 +44,8 @@ class Frozen:
     def memory(self) -> int:
         """Frames in the observations that its policy wants."""
         known = getattr(getattr(self.policy, "observation_space", None), "spaces", {})
-        return max((int(space.shape[0]) for name, space in known.items() if name not in TAKEN), default=1)
+        shapes = [space.shape for space in known.values()]
+        return max((shape[0] for shape in shapes if len(shape) == FRAMES_AXES), default=1)
 
     def actions(self, observation: Mapping[str, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
         """What it does in every world, of this shape (world, number).

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from sim.robots.task import Task
 
 EYES = "eyes"  # what an only kind is called
-TAKEN = ("previous_action", "feels")  # what else an observation holds
+AUXILIARY = ("depth", "ids", "flow")  # of each receptor, what an observation may hold, see `sim.Task`
+TAKEN = ("previous_action", "feels", *AUXILIARY)  # what else an observation holds
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,11 @@ def kinds_of(task: Task) -> tuple[EyeKind, ...]:
             raise ValueError(
                 f"{where}: eye: kind {name!r}: must be a name such as 'sharp', and not {' or '.join(TAKEN)}"
             )
+        for what in AUXILIARY:
+            if f"{name}_{what}" in eyes:
+                raise ValueError(
+                    f"{where}: eye: kind '{name}_{what}': must have another name, {name!r} has {what!r}, too"
+                )
         of_kind(f"{where}: eye[{name!r}]", eyes[name], optics.Eye, "optics.Eye(resolution=(15, 15))")
     return tuple(EyeKind(name, eyes[name], tuple(places[name]), fidelities[name]) for name in eyes)
 

@@ -41,9 +41,10 @@ class ModelLight:
 
 
 def model_lights(
-    model: mujoco.MjModel, spectra: Spectra, wavelengths: np.ndarray
+    model: mujoco.MjModel, spectra: Spectra, wavelengths: np.ndarray, light: str = lighting.DIRECT
 ) -> tuple[list[ModelLight], list[str]]:
-    """A model's lights at these wavelengths [m] in the variant in force, and what of them has no counterpart here."""
+    """A model's lights at these wavelengths [m] in the variant in force, and what of them has no counterpart here;
+    light: what of it is followed."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     emitters, left_out = lights.emitters(model, data, spectra)
@@ -51,7 +52,7 @@ def model_lights(
     for emitter in emitters:
         kind = emitter.description["type"]
         if kind not in (_DIRECTIONAL, _POINT, _SPOT):
-            left_out.append("light of the sky on surfaces")
+            left_out += ["light of the sky on surfaces"] if light == lighting.DIRECT else []
             continue
         level = _level({k: v for k, v in emitter.description.items() if k != "texture"}, wavelengths)
         cutoff, exponent = -1.0, 0.0

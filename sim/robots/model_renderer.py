@@ -39,17 +39,19 @@ class ModelRenderer:
     eye: its optics and retina; with the fidelity's bands
     mounts: where on the model the eyes are
     n_envs: number of worlds
-    fidelity: rays per receptor and bands: `Fidelity(16, bands=4)`; light is direct; samples="edges" for that many rays
-        only where a few of them differ
+    fidelity: rays per receptor and bands: `Fidelity(16, bands=4)`, in the direct light of lamps; light="bounce" adds
+        light that is reflected twice, and what the sky and what glows send; samples="edges" for that many rays only
+        where a few of them differ, in direct light
     groups, spectra: see `sim.mirror`
+    varied: names of geoms whose size or colour may differ from world to world: as `poses` say, by the worlds' mjModels
     brightest: signal of a white surface that faced all directional lights at once
 
     Warns (`sim.MirrorWarning`) once of what eyes do not see of the model.
 
     Raises:
         ValueError: a bad argument, a mount on what the model does not have, an eye that is inside of a sphere, a
-            capsule or another primitive in the model's reference pose, or a fidelity that wants areas or light that was
-            reflected twice, or more rays than there is memory for.
+            capsule or another primitive in the model's reference pose, or a fidelity that wants areas or light that is
+            reflected more often, or more rays than there is memory for.
         optics.AccuracyError: a pupil whose light spreads too far.
     """
 
@@ -63,6 +65,7 @@ class ModelRenderer:
         *,
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
+        varied: Sequence[str] = (),
     ) -> None:
         self.n_envs = whole("n_envs", n_envs, 1, MOST_ENVS)
         of_kind("eye", eye, optics.Eye, "optics.Eye(resolution=(15, 15))")
@@ -74,14 +77,14 @@ class ModelRenderer:
             raise ValueError("mounts = []: must be one sim.Mount at least")
         wavelengths = self.eye.spectral_bands.wavelengths
         self._check_memory()
-        self._scene = ModelScene(self.model, wavelengths, groups, spectra)
+        self._scene = ModelScene(self.model, wavelengths, groups, spectra, varied, light=fidelity.light)
         self._refuse_eyes_inside()
         sampling = eye_sampling(self.eye, fidelity.depth)
         at_edges = fidelity.samples == EDGES
         self.sensor = sampling.sensor(FIRST if at_edges else fidelity.rays_per_receptor)
         mixing = self.eye.throughput * self.eye.spectral_bands.weights
         with in_variant(self._scene.variant):
-            self._tracer = ModelTracer(self._scene, wavelengths)
+            self._tracer = ModelTracer(self._scene, wavelengths, fidelity.light)
             suns = [light.level for light in self._scene.lights.found if light.kind == "directional"]
             self._sunlight = mixing * np.sum([np.zeros(len(wavelengths)), *suns], axis=0) / np.pi
             self.brightest = self.brightest_in(np.ones(len(wavelengths)))
@@ -91,7 +94,11 @@ class ModelRenderer:
             self._wavefront = ModelWavefront(self._scene, self._tracer, self.sensor, self.n_envs, len(self.mounts))
             centres = directions_of(self.eye, receptor_centres(self.eye))
             along = {"light": self.sensor.directions, "depth": centres, "which": centres}
-            self._looks = {what: self._wavefront.look(directions) for what, directions in along.items()}
+            bounces = self.sensor.bounce_samples
+            self._looks = {
+                what: self._wavefront.look(directions, bounces if what == "light" else None)
+                for what, directions in along.items()
+            }
             self._edges: EdgeRays | None = None
             if at_edges:
                 assert isinstance(sampling, BoxSampling)
@@ -170,8 +177,9 @@ class ModelRenderer:
 
     @property
     def only_directional(self) -> bool:
-        """Whether nothing is lit by points, which are brighter the nearer they are, or by the sky."""
-        return all(light.kind == "directional" for light in self._scene.lights.found) and not self._scene.has_sky
+        """Whether there are no points, which light what is near more brightly, no sky, and nothing that glows."""
+        scene = self._scene
+        return all(light.kind == "directional" for light in scene.lights.found) and not (scene.has_sky or scene.glows)
 
     @property
     def spectra(self) -> Mapping[str, Spectrum]:
@@ -218,6 +226,7 @@ class ModelRenderer:
             raise ValueError(f"poses of {poses.n} worlds, this renderer was built for n_envs = {self.n_envs}")
         if poses.geom_xpos.shape[1] != self.model.ngeom or poses.xpos.shape[1] != self.model.nbody:
             raise ValueError("poses of another model")
+        self._scene.refuse_differences(poses)
         if not np.isfinite(poses.geom_xpos).all():
             world = int(np.flatnonzero(~np.isfinite(poses.geom_xpos).all(axis=(1, 2)))[0])
             raise ValueError(f"poses of world {world} are not finite")
@@ -254,10 +263,12 @@ def _placed(poses: Poses | Sequence[mujoco.MjData]) -> Poses:
 
 def _check(fidelity: Fidelity, eye: optics.Eye) -> None:
     of_kind("fidelity", fidelity, Fidelity, "Fidelity(16, bands=4)")
-    if fidelity.light != lighting.DIRECT or fidelity.samples == AREAS:
+    if fidelity.light == lighting.ALL or fidelity.samples == AREAS:
         raise ValueError(
             f"fidelity: light = {fidelity.light!r}, samples = {fidelity.samples!r}: models of one's own are seen by "
-            "rays in direct light"
+            "rays, which follow two reflections at most"
         )
+    if fidelity.samples == EDGES and fidelity.light == lighting.BOUNCE:
+        raise ValueError("fidelity: samples = 'edges': is for direct light; light that bounces differs from ray to ray")
     if fidelity.samples == EDGES and eye.pupil is not None:
         raise ValueError("fidelity: samples = 'edges': is for perfect lenses; behind a pupil receptors share all rays")

@@ -1,4 +1,9 @@
-"""Direct light along rays through a model: what stands still by Mitsuba, what moves in closed form."""
+"""Light along rays through a model: what stands still is met by Mitsuba, what moves in closed form.
+
+Direct light is that of lamps. Light that bounces is followed as `sim.tracing.lighting` says: a surface that is seen
+looks in one direction for what is reflected to it once more, for the sky and for what glows, and what it sees there
+looks once again for the latter two. So nothing is left out that is reflected twice at most.
+"""
 
 from __future__ import annotations
 
@@ -10,48 +15,107 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.robots.model_scene import ModelScene
+from sim.scene.device_arrays import whole_numbers
 from sim.scene.variant import MitsubaObject
 from sim.tracing import lighting
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Where the kernel finds one world's movers and lights: their rows, and which is its first."""
+    """Where the kernel finds one world's movers, lights and colours: their rows, and which is its first."""
 
     movers: Array
     first_mover: Array
     lights: Array
     first_light: Array
+    paint: Array
+    first_paint: Array
+
+
+@dataclass(frozen=True)
+class _Met:
+    """What rays end at. si: to ask the BSDF by · colors: that multiply its reflectance, per chunk of bands
+    which: mover, as many as there are: none · seen: whether there is anything · active: rays that there are
+    point, normal: in the world, towards where the ray comes from · t: distance [m] · direction: of the ray
+    """
+
+    si: Array
+    bsdf: Array
+    colors: list[Array]
+    which: Array
+    seen: Array
+    active: Array
+    point: Array
+    normal: Array
+    t: Array
+    direction: Array
 
 
 class ModelTracer:
-    """One component per band: surfaces are Lambertian, and each light is asked for once per ray.
+    """One component per band: surfaces are Lambertian, and each lamp is asked for once per ray and reflection.
 
+    light: what of it is followed, "direct" or "bounce"
     basis: (component, band): what each component is worth in each band · inputs: arrays for the kernel
     """
 
-    def __init__(self, scene: ModelScene, wavelengths: np.ndarray) -> None:
-        self._scene, self._bands = scene, lighting.spectra(wavelengths)
+    def __init__(self, scene: ModelScene, wavelengths: np.ndarray, light: str = lighting.DIRECT) -> None:
+        self._scene, self._bands, self.light = scene, lighting.spectra(wavelengths), light
         self.basis = np.eye(len(wavelengths))
-        self._sky = scene.has_sky
+        self._glows = len(scene.glows) > 0
         shapes = scene.scene.shapes()
         self._any_still = len(shapes) > 0
         # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.
         known = [*scene.bsdfs, *(shape.bsdf() for shape in shapes[:1])]
-        self.inputs = {"bsdfs": mi.BSDFPtr(known), **scene.movers.inputs}
-        if self._sky:
+        self.inputs = {"bsdfs": mi.BSDFPtr(known), **scene.movers.inputs, **scene.paint.inputs}
+        if scene.has_sky:
             self.inputs["sky"] = mi.EmitterPtr([scene.scene.environment()])
+        if self._glows:
+            number = {geom: k for k, geom in enumerate(scene.glows)}
+            of_movers = [number.get(int(g), len(number)) for g in scene.movers.geoms]
+            self.inputs["glowing"] = whole_numbers([*of_movers, len(number)])
+            self.inputs["glows"] = mi.BSDFPtr(list(scene.glows.values()))
 
     def radiance(
-        self, still: MitsubaObject, ray: Array, axis: Array, rows: Rows, inputs: dict[str, Array]
+        self, still: MitsubaObject, ray: Array, axis: Array, rows: Rows, inputs: dict[str, Array], samples: Array
     ) -> tuple[list[Array], Array]:
-        """What comes along each ray, per band, and from how far [m]; axis: of the eye that looks."""
+        """What comes along each ray, per band, and from how far [m]; axis: of the eye that looks; samples: each ray's
+        own, twice two numbers on the unit square, wanted for light that bounces (`lighting.onwards`)."""
+        met = self._met(still, ray, rows, inputs)
+        arrives = self._irradiance(still, met, axis, rows, inputs, shadow_of_headlight=False)
+        if self.light == lighting.BOUNCE:
+            onwards = self._returned(still, met, axis, rows, inputs, samples)
+            arrives = [e + dr.pi * more for e, more in zip(arrives, onwards, strict=True)]
+        spectra = self._sent(still, met, arrives, inputs)
+        return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], met.t
+
+    def _returned(
+        self, still: MitsubaObject, met: _Met, axis: Array, rows: Rows, inputs: dict[str, Array], samples: Array
+    ) -> list[Array]:
+        """What comes to surfaces that are seen, from one direction each, drawn from Lambert's cosine: light that is
+        reflected there, and what glows, the sky too, be it there or reflected there."""
+        onwards = lighting.onwards(met.point, met.normal, mi.Point2f(samples.x, samples.y))
+        there = self._met(still, onwards, rows, inputs, met.seen)
+        arrives = self._irradiance(still, there, axis, rows, inputs, shadow_of_headlight=True)
+        if self._scene.has_sky or self._glows:
+            further = lighting.onwards(there.point, there.normal, mi.Point2f(samples.z, samples.w))
+            last = self._met(still, further, rows, inputs, there.seen)
+            emitted = self._emitted(still, last, inputs)
+            arrives = [e + dr.pi * more for e, more in zip(arrives, emitted, strict=True)]
+        found = self._sent(still, there, arrives, inputs)
+        return [dr.select(met.seen, spectrum, 0) for spectrum in found]
+
+    def _met(
+        self, still: MitsubaObject, ray: Array, rows: Rows, inputs: dict[str, Array], active: Array | None = None
+    ) -> _Met:
+        """What rays meet first."""
         movers = self._scene.movers
+        active = mi.Bool(True) if active is None else active
         ray.wavelengths = self._bands[0]
-        si = still.ray_intersect(ray) if self._any_still else _nothing()
-        hit = movers.nearest(ray, si.t, rows.movers, rows.first_mover, inputs)
-        on_mover = hit.which < len(movers)
-        seen = si.is_valid() | on_mover
+        si = still.ray_intersect(ray, active) if self._any_still else _nothing()
+        far = dr.select(active, si.t, 0)
+        hit = movers.nearest(ray, far, rows.movers, rows.first_mover, inputs)
+        on_mover = active & (hit.which < len(movers))
+        seen = active & (si.is_valid() | on_mover)
         point = ray(dr.select(seen, hit.t, 0))
         normal = dr.select(on_mover, hit.normal, mi.Vector3f(si.sh_frame.n))
         normal = dr.select(dr.dot(normal, ray.d) > 0, -normal, normal)
@@ -61,11 +125,11 @@ class ModelTracer:
         si.wi = si.to_local(-ray.d)
         mine = dr.gather(mi.BSDFPtr, inputs["bsdfs"], dr.minimum(hit.which, len(inputs["bsdfs"]) - 1), on_mover)
         bsdf = dr.select(on_mover, mine, si.bsdf()) if self._any_still else mine
-        arrives = self._irradiance(still, point, normal, seen, axis, rows, inputs)
-        spectra = self._sent_on(si, bsdf, seen, arrives)
-        if self._sky:
-            spectra = [s + self._heaven(still, ray, ~seen, band) for s, band in zip(spectra, self._bands, strict=True)]
-        return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], hit.t
+        colors = [mi.Spectrum(1) for _ in self._bands]
+        which = dr.minimum(hit.which, len(movers))
+        if len(self._scene.paint):
+            colors = self._scene.paint.of(which, rows.paint, rows.first_paint, inputs, seen)
+        return _Met(si, bsdf, colors, which, seen, active, point, normal, hit.t, ray.d)
 
     def distance(self, still: MitsubaObject, ray: Array, rows: Rows, inputs: dict[str, Array]) -> Array:
         """How far what each ray meets is [m]."""
@@ -87,21 +151,21 @@ class ModelTracer:
     def _irradiance(
         self,
         still: MitsubaObject,
-        point: Array,
-        normal: Array,
-        seen: Array,
+        met: _Met,
         axis: Array,
         rows: Rows,
         inputs: dict[str, Array],
+        *,
+        shadow_of_headlight: bool,
     ) -> list[Array]:
-        """Of a surface, as spectra of so many bands each."""
-        start = lighting.clear_of(point, normal)
+        """Of a surface by lamps, as spectra of so many bands each."""
+        start = lighting.clear_of(met.point, met.normal)
         total = [mi.Spectrum(0) for _ in self._bands]
         for k, light in enumerate(self._scene.lights.found):
-            towards, far, share = self._scene.lights.towards(k, point, axis, rows.lights, rows.first_light)
-            cosine = dr.dot(normal, towards)
-            shines = seen & (cosine > 0) & (share > 0)
-            if light.light >= 0:  # an eye's own headlight throws no shadow that it could see
+            towards, far, share = self._scene.lights.towards(k, met.point, axis, rows.lights, rows.first_light)
+            cosine = dr.dot(met.normal, towards)
+            shines = met.seen & (cosine > 0) & (share > 0)
+            if light.light >= 0 or shadow_of_headlight:  # an eye's own headlight throws no shadow that it could see
                 shines &= ~self._shadowed(still, mi.Ray3f(start, towards), far, shines, rows, inputs)
             arrives = dr.select(shines, cosine * share, 0)
             chunks = np.pad(light.level, (0, -len(light.level) % lighting.LANES)).reshape(-1, lighting.LANES)
@@ -115,18 +179,37 @@ class ModelTracer:
         blocked = self._scene.movers.block(ray, dr.select(active, far, 0), rows.movers, rows.first_mover, inputs)
         return blocked | still.ray_test(ray, active & ~blocked) if self._any_still else blocked
 
-    def _sent_on(self, si: Array, bsdf: MitsubaObject, seen: Array, arrives: list[Array]) -> list[Array]:
-        found = []
-        for band, e in zip(self._bands, arrives, strict=True):
-            si.wavelengths = band
-            found.append(dr.select(seen, e * bsdf.eval_diffuse_reflectance(si, seen) * dr.inv_pi, 0))
+    def _sent(self, still: MitsubaObject, met: _Met, arrives: list[Array], inputs: dict[str, Array]) -> list[Array]:
+        """Radiance: what is reflected of the light that arrives, and what is emitted."""
+        emitted, found = self._emitted(still, met, inputs), []
+        for band, color, e, own in zip(self._bands, met.colors, arrives, emitted, strict=True):
+            met.si.wavelengths = band
+            reflected = color * e * met.bsdf.eval_diffuse_reflectance(met.si, met.seen) * dr.inv_pi
+            found.append(own + dr.select(met.seen, reflected, 0))
+        return found
+
+    def _emitted(self, still: MitsubaObject, met: _Met, inputs: dict[str, Array]) -> list[Array]:
+        """Radiance of the sky where nothing is met, and of what glows."""
+        found = [mi.Spectrum(0) for _ in self._bands]
+        if self._scene.has_sky:
+            nothing = met.active & ~met.seen
+            found = [
+                e + self._heaven(still, met.direction, nothing, b) for e, b in zip(found, self._bands, strict=True)
+            ]
+        if self._glows:
+            k = dr.gather(mi.UInt32, inputs["glowing"], met.which, met.seen)
+            glows = met.seen & (k < len(inputs["glows"]))
+            glow = dr.gather(mi.BSDFPtr, inputs["glows"], k, glows)
+            for i, band in enumerate(self._bands):
+                met.si.wavelengths = band
+                found[i] += dr.select(glows, glow.eval_diffuse_reflectance(met.si, glows), 0)
         return found
 
     @staticmethod
-    def _heaven(still: MitsubaObject, ray: Array, active: Array, band: Array) -> Array:
+    def _heaven(still: MitsubaObject, direction: Array, active: Array, band: Array) -> Array:
         """Radiance of the sky."""
         si = dr.zeros(mi.SurfaceInteraction3f)
-        si.wi, si.wavelengths = -ray.d, band
+        si.wi, si.wavelengths = -direction, band
         return dr.select(active, still.environment().eval(si, active), 0)
 
 

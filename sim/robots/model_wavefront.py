@@ -19,9 +19,11 @@ from sim.robots.poses import Poses
 from sim.scene.device_arrays import aligned, floats, three, whole_numbers
 from sim.scene.variant import MitsubaObject
 from sim.scene.variant import variant as in_variant
+from sim.tracing import lighting
 
 EYE_ROWS = 4  # of four floats: the pupil, right, up and ahead
-SIZES = 4  # numbers of rays, eyes, rows of movers and lights
+SECOND = 3  # seed
+SIZES = 5  # numbers of rays, eyes, rows of movers, lights and colours
 
 
 class ModelWavefront:
@@ -38,26 +40,36 @@ class ModelWavefront:
             "eyes": n_eyes * EYE_ROWS,
             "movers": scene.movers.n_rows,
             "lights": max(len(scene.lights), 1) * LIGHT_ROWS,
+            "paint": scene.paint.n_rows,
         }
         self._buffers = {name: aligned(n_envs * n * 4, np.float32).reshape(n_envs, n * 4) for name, n in rows.items()}
         self.light: Any = dr.freeze(lambda *args: self._light(*args))
         self.depth: Any = dr.freeze(lambda *args: self._depth(*args))
         self.which: Any = dr.freeze(lambda *args: self._which(*args))
 
-    def look(self, directions: np.ndarray) -> dict[str, Array]:
-        """What a kernel reads to look along these directions (ray, 3) with every eye."""
+    def look(self, directions: np.ndarray, bounce_samples: np.ndarray | None = None) -> dict[str, Array]:
+        """What a kernel reads to look along these directions (ray, 3) with every eye; bounce_samples: (ray, 2), for
+        light that bounces."""
         fours = np.zeros((len(directions), 4), np.float32)
         fours[:, :3] = directions
-        sizes = [len(directions), self._n_eyes, self._scene.movers.n_rows, max(len(self._scene.lights), 1)]
+        scene = self._scene
+        sizes = [len(directions), self._n_eyes, scene.movers.n_rows, max(len(scene.lights), 1), scene.paint.n_rows]
         lanes = dr.arange(mi.UInt32, self._n_envs * self._n_eyes * len(directions))
         dr.eval(lanes)
-        return {"directions": floats(fours), "sizes": whole_numbers(sizes), "lanes": lanes, **self._tracer.inputs}
+        inputs = {"directions": floats(fours), "sizes": whole_numbers(sizes), "lanes": lanes, **self._tracer.inputs}
+        if self._tracer.light == lighting.BOUNCE and bounce_samples is not None:
+            more = np.random.default_rng(SECOND).random(bounce_samples.shape)  # for a reflection further on
+            inputs["bounce_samples"] = floats(np.concatenate([bounce_samples, more], axis=1))
+        return inputs
 
     def launch(self, kernel: Any, look: dict[str, Array], poses: Poses, eyes: np.ndarray) -> Callable[[], np.ndarray]:
         """Start a kernel; what is returned waits for it. eyes: rows (world, eye, EYE_ROWS, 3)."""
         scene = self._scene
         self._buffers["eyes"].reshape(self._n_envs, -1, EYE_ROWS, 4)[..., :3] = eyes
         self._buffers["movers"][:] = scene.movers.rows(poses)
+        if len(scene.paint):
+            with in_variant(scene.variant):
+                self._buffers["paint"][:] = scene.paint.rows(poses)
         if len(scene.lights):
             self._buffers["lights"][:] = scene.lights.rows(poses).reshape(self._n_envs, -1)
         return self.again(kernel, look)
@@ -76,7 +88,10 @@ class ModelWavefront:
     ) -> tuple[list[Array], Array]:
         """Within a kernel: what comes along every lane's ray, and 1 / depth along the eye's axis of what it meets."""
         ray, axis, cosine, rows = _of_lane(buffers, look)
-        components, distance = self._tracer.radiance(still, ray, axis, rows, look)
+        ray_of_eye = look["lanes"] % dr.maximum(dr.gather(mi.UInt32, look["sizes"], 0), 1)
+        bounces = self._tracer.light == lighting.BOUNCE
+        samples = dr.gather(mi.Vector4f, look["bounce_samples"], ray_of_eye) if bounces else mi.Vector4f(0)
+        components, distance = self._tracer.radiance(still, ray, axis, rows, look, samples)
         return components, dr.rcp(distance * cosine)
 
     def _light(
@@ -108,13 +123,14 @@ def _of_lane(buffers: dict[str, Array], look: dict[str, Array]) -> tuple[Array, 
     """The lane's ray, its eye's axis, the cosine between them, and the rows of its world."""
     lane = look["lanes"]
     # Lanes that only fill up a packet read 0, and to divide by that ends the process.
-    rays, eyes, movers, lights = (dr.maximum(dr.gather(mi.UInt32, look["sizes"], i), 1) for i in range(SIZES))
+    rays, eyes, movers, lights, paint = (dr.maximum(dr.gather(mi.UInt32, look["sizes"], i), 1) for i in range(SIZES))
     view = lane // rays
     env = view // eyes
     pupil, right, up, ahead = (three(buffers["eyes"], view * EYE_ROWS + i) for i in range(EYE_ROWS))
     local = dr.gather(mi.Vector4f, look["directions"], lane - view * rays)
     ray = mi.Ray3f(mi.Point3f(pupil), right * local.x + up * local.y + ahead * local.z)
-    return ray, ahead, local.z, Rows(buffers["movers"], env * movers, buffers["lights"], env * lights * LIGHT_ROWS)
+    at = buffers["movers"], env * movers, buffers["lights"], env * lights * LIGHT_ROWS, buffers["paint"], env * paint
+    return ray, ahead, local.z, Rows(*at)
 
 
 def _read(found: Array | tuple[Array, ...]) -> np.ndarray:

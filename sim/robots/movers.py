@@ -18,7 +18,7 @@ from optics.numerics.autodiff import Array
 from sim.robots.poses import Poses
 from sim.robots.primitives import PRIMITIVES, Primitive
 from sim.scene import shapes, surfaces
-from sim.scene.device_arrays import floats, three, whole_numbers
+from sim.scene.device_arrays import three, whole_numbers
 from sim.scene.variant import MitsubaObject
 
 _TYPES = mujoco.mjtGeom
@@ -29,10 +29,18 @@ _KINDS = {
     _TYPES.mjGEOM_CYLINDER: "cylinder",
     _TYPES.mjGEOM_BOX: "box",
 }
-# Of four floats for each mover: a sphere around it; then an axis of its frame in the world and a coordinate of its
-# origin, three times.
+# Of four floats for each mover: a sphere around its origin; then an axis of its frame in the world and one of its
+# sizes, three times.
 ROWS = 4
 MESHES = 32  # scenes in one kernel, at most
+# How far each kind reaches from its origin [m], by half sizes (..., 3).
+_REACH: dict[mujoco.mjtGeom, Callable[[np.ndarray], np.ndarray]] = {
+    _TYPES.mjGEOM_SPHERE: lambda size: size[..., 0],
+    _TYPES.mjGEOM_ELLIPSOID: lambda size: size.max(axis=-1),
+    _TYPES.mjGEOM_CAPSULE: lambda size: size[..., 0] + size[..., 1],
+    _TYPES.mjGEOM_CYLINDER: lambda size: np.hypot(size[..., 0], size[..., 1]),
+    _TYPES.mjGEOM_BOX: lambda size: np.linalg.norm(size, axis=-1),
+}
 
 
 @dataclass(frozen=True)
@@ -79,13 +87,13 @@ class Movers:
         primitives = [g for group in by_kind.values() for g in group]
         self.geoms, self.n_primitives = np.array([*primitives, *meshes], int), len(primitives)
         self.meshes = list(meshes.values())
-        sizes = np.zeros((len(self.geoms) + 1, 4))  # one more: never empty
-        sizes[: len(self.geoms), :3] = model.geom_size[self.geoms]
-        round_ = [i for i, g in enumerate(primitives) if model.geom_type[g] == _TYPES.mjGEOM_SPHERE]
-        sizes[round_, :3] = sizes[round_, :1]
-        self._reach = model.geom_rbound[self.geoms]  # of each from its origin [m]
+        self._sizes = model.geom_size[self.geoms].copy()
+        self._types = model.geom_type[self.geoms]
+        # Of meshes from their origins [m]; a plane that is seen by itself has no end.
+        self._mesh_reach = np.where(self._types == _TYPES.mjGEOM_PLANE, np.inf, model.geom_rbound[self.geoms])
+        self._known: tuple[bytes, np.ndarray, np.ndarray] | None = None  # extents of the last poses
         self._ends = np.cumsum([0, *(len(group) for group in by_kind.values())])
-        self.inputs = {"mover_sizes": floats(sizes), "mover_ends": whole_numbers(self._ends)}
+        self.inputs = {"mover_ends": whole_numbers(self._ends)}
 
     def __len__(self) -> int:
         return len(self.geoms)
@@ -99,14 +107,36 @@ class Movers:
         """What the kernel reads of a world: a sphere around all movers, then each, (world, 4 n_rows) float32."""
         rows = np.zeros((poses.n, self.n_rows, 4), np.float32)
         if len(self):
-            places = poses.geom_xpos[:, self.geoms]
+            places, (sizes, reach) = poses.geom_xpos[:, self.geoms], self._extents(poses)
             rows[:, 0, :3] = centre = places.mean(axis=1)
-            rows[:, 0, 3] = (np.linalg.norm(places - centre[:, None], axis=-1) + self._reach).max(axis=1)
+            rows[:, 0, 3] = (np.linalg.norm(places - centre[:, None], axis=-1) + reach).max(axis=1)
             each = rows[:, 1:].reshape(poses.n, len(self), ROWS, 4)
-            each[:, :, 0, :3], each[:, :, 0, 3] = places, self._reach
+            each[:, :, 0, :3], each[:, :, 0, 3] = places, reach
             each[:, :, 1:, :3] = np.swapaxes(poses.geom_xmat[:, self.geoms], -1, -2)
-            each[:, :, 1:, 3] = places
+            each[:, :, 1:, 3] = sizes
         return rows.reshape(poses.n, -1)
+
+    def _extents(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+        """Half sizes (world or 1, mover, 3), of spheres three times the radius, and how far each reaches from its
+        origin, (world or 1, mover) [m]."""
+        if poses.geom_size is None:
+            sizes = self._sizes[None].copy()
+        else:
+            alike = poses.geom_size.strides[0] == 0  # one model for all worlds
+            sizes = poses.geom_size[: 1 if alike else None, self.geoms]
+        asked = sizes.tobytes()
+        if self._known is None or self._known[0] != asked:
+            self._known = asked, *self._with_reach(sizes)
+        return self._known[1:]
+
+    def _with_reach(self, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        balls = self._types == _TYPES.mjGEOM_SPHERE
+        sizes[:, balls] = sizes[:, balls, :1]
+        reach = np.broadcast_to(self._mesh_reach, sizes.shape[:2]).copy()
+        for kind, how_far in _REACH.items():
+            mine = self._types[: self.n_primitives] == kind
+            reach[:, : self.n_primitives][:, mine] = how_far(sizes[:, : self.n_primitives][:, mine])
+        return sizes, reach
 
     def nearest(self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Hit:
         """The one that a ray meets first, nearer than `farthest`; first: of the world's rows."""
@@ -130,7 +160,7 @@ class Movers:
         for i, primitive in self._kinds():
 
             def step(k: Array, t: Array, which: Array, hit: Callable[..., Array] = primitive.hit) -> tuple[Array, ...]:
-                found = _met(hit, ray, rows, first, k, inputs)
+                found = _met(hit, ray, rows, first, k)
                 nearer = found < t
                 return k + 1, dr.select(nearer, found, t), dr.select(nearer, k, which)
 
@@ -139,7 +169,7 @@ class Movers:
         normal = self._normals(ray(dr.select(which < len(self), t, 0)), which, rows, first, inputs)
         for m, scene in enumerate(self.meshes):
             k = self.n_primitives + m
-            frame = _frame(rows, first, mi.UInt32(k))
+            frame, _ = _frame(rows, first, mi.UInt32(k))
             si = scene.ray_intersect(_local_ray(ray, frame), mi.RayFlags.All, True)
             nearer = si.is_valid() & (si.t < t)
             t, which = dr.select(nearer, si.t, t), dr.select(nearer, k, which)
@@ -152,11 +182,11 @@ class Movers:
         for i, primitive in self._kinds():
 
             def step(k: Array, blocked: Array, hit: Callable[..., Array] = primitive.hit) -> tuple[Array, ...]:
-                return k + 1, blocked | (_met(hit, ray, rows, first, k, inputs) < farthest)
+                return k + 1, blocked | (_met(hit, ray, rows, first, k) < farthest)
 
             _, blocked = _loop(i, inputs, step, blocked)
         for m, scene in enumerate(self.meshes):
-            local = _local_ray(ray, _frame(rows, first, mi.UInt32(self.n_primitives + m)))
+            local = _local_ray(ray, _frame(rows, first, mi.UInt32(self.n_primitives + m))[0])
             local.maxt = farthest
             blocked |= scene.ray_test(local, ~blocked)
         return blocked
@@ -168,7 +198,7 @@ class Movers:
     def _normals(self, point: Array, which: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Array:
         """Of primitives, at points on them."""
         k = dr.minimum(which, max(self.n_primitives - 1, 0))
-        frame, size = _frame(rows, first, k), _size(inputs, k)
+        frame, size = _frame(rows, first, k)
         local = frame.taken(point - frame.origin)
         normal = mi.Vector3f(0, 0, 1)
         for i, primitive in self._kinds():
@@ -184,21 +214,22 @@ def kind_of(model: mujoco.MjModel, geom: int) -> str | None:
     return None if shapes.is_textured(model, geom) else _KINDS.get(surfaces.geom_type(model, geom))
 
 
-def _met(hit: Callable[..., Array], ray: Array, rows: Array, first: Array, k: Array, inputs: dict[str, Array]) -> Array:
+def _met(hit: Callable[..., Array], ray: Array, rows: Array, first: Array, k: Array) -> Array:
     """Where a ray meets mover k [m]. Most rays miss the sphere around it, and their neighbours do, too."""
 
     def within() -> Array:
-        frame = _frame(rows, first, k)
-        return hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), _size(inputs, k))
+        frame, size = _frame(rows, first, k)
+        return hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), size)
 
     found: Array = dr.if_stmt((), _may_meet(ray, rows, first + k * ROWS), within, lambda: mi.Float(dr.inf))
     return found
 
 
-def _frame(rows: Array, first: Array, k: Array) -> _Frame:
+def _frame(rows: Array, first: Array, k: Array) -> tuple[_Frame, Array]:
+    """Of a mover, and its half sizes."""
     fours = [list(dr.gather(mi.Vector4f, rows, first + k * ROWS + i)) for i in range(1, ROWS)]
     a, b, c = (mi.Vector3f(*four[:3]) for four in fours)
-    return _Frame((a, b, c), mi.Vector3f(*(four[3] for four in fours)))
+    return _Frame((a, b, c), three(rows, first + k * ROWS)), mi.Vector3f(*(four[3] for four in fours))
 
 
 def _may_meet(ray: Array, rows: Array, first: Array) -> Array:
@@ -208,10 +239,6 @@ def _may_meet(ray: Array, rows: Array, first: Array) -> Array:
     along = dr.dot(way, ray.d)
     away = dr.squared_norm(way)
     return (away < square) | ((along > 0) & (away - along * along < square))
-
-
-def _size(inputs: dict[str, Array], k: Array) -> Array:
-    return three(inputs["mover_sizes"], k)
 
 
 def _loop(kind: int, inputs: dict[str, Array], step: Callable[..., Any], *state: Array) -> tuple[Array, ...]:

@@ -1,12 +1,15 @@
-"""Where everything in many worlds of one model is."""
+"""Where everything in many worlds of one model is, and how large and of which colour."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import mujoco
 import numpy as np
+
+_OF_MODELS = ("geom_size", "geom_rgba")
 
 
 @dataclass(frozen=True)
@@ -14,6 +17,8 @@ class Poses:
     """Positions [m] (world, thing, 3) and rotations (world, thing, 3, 3) as mjData has them after mj_forward.
 
     geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat, xpos, xmat (of bodies) · light_xpos, light_xdir
+    geom_size (world, geom, 3), geom_rgba (world, geom, 4): as each world's own mjModel has them; None: as the
+        renderer's model
     """
 
     geom_xpos: np.ndarray
@@ -26,17 +31,24 @@ class Poses:
     xmat: np.ndarray
     light_xpos: np.ndarray
     light_xdir: np.ndarray
+    geom_size: np.ndarray | None = None
+    geom_rgba: np.ndarray | None = None
 
     @classmethod
     def of(cls, datas: Sequence[mujoco.MjData]) -> Poses:
         """Of as many worlds as there are data."""
-        stacked = {f.name: np.stack([getattr(data, f.name) for data in datas]) for f in fields(cls)}
-        return cls(**{name: _square(array) if name.endswith("mat") else array for name, array in stacked.items()})
+        names = [f.name for f in fields(cls) if f.name not in _OF_MODELS]
+        stacked = {name: np.stack([getattr(data, name) for data in datas]) for name in names}
+        found = {name: _square(array) if name.endswith("mat") else array for name, array in stacked.items()}
+        models = [data.model for data in datas]
+        return cls(**found, **{name: _of_models(models, name) for name in _OF_MODELS})
 
     @classmethod
     def joined(cls, *parts: Poses) -> Poses:
         """The worlds of all of them, one after the other."""
-        return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
+        found: dict[str, list[Any]] = {f.name: [getattr(part, f.name) for part in parts] for f in fields(cls)}
+        joined: dict[str, Any] = {n: None if each[0] is None else np.concatenate(each) for n, each in found.items()}
+        return cls(**joined)
 
     @property
     def n(self) -> int:
@@ -47,6 +59,13 @@ class Poses:
         """Origins (world, 3) and rotations (world, 3, 3) of a site, a camera or a body."""
         name = {"site": "site_x", "camera": "cam_x", "body": "x"}[kind]
         return getattr(self, f"{name}pos")[:, index], getattr(self, f"{name}mat")[:, index]
+
+
+def _of_models(models: Sequence[mujoco.MjModel], name: str) -> np.ndarray:
+    if all(model is models[0] for model in models):
+        field = getattr(models[0], name).copy()  # it may be written to later
+        return np.broadcast_to(field, (len(models), *field.shape))
+    return np.stack([getattr(model, name) for model in models])
 
 
 def _square(rows: np.ndarray) -> np.ndarray:

@@ -35,9 +35,17 @@ class Task:
         `sim.choose_model_fidelity`; of several kinds alike, or a dictionary, too
     substeps: of physics in one action · episode_steps: actions, then an episode is truncated
     spectra: of materials and lights, by name, in the place of their colours
-    vary: what is drawn anew for each episode, as (low, high) by name: "light", a factor of all lights, evenly over its
-        logarithm, and "color_temperature" [K] of what is white, evenly over its reciprocal. Sizes, surfaces and starts
-        are `reset`'s own, as far as mjData has them
+    vary: what is drawn anew for each episode and world, as (low, high) by name, before `reset`:
+        "light", a factor of all lights, evenly over its logarithm
+        "color_temperature" [K] of what is white, evenly over its reciprocal
+        "GEOM.size", a factor of a geom's size, evenly over its logarithm; its mass and inertia are MuJoCo's compiler's
+        "GEOM.color", between two colours (red, green, blue), each share by itself; a texture is multiplied by it
+        "JOINT.start", where a hinge [rad] or a slide [m] is at first; "BODY.start", between two points (x, y, z) [m],
+        of a mocap body or one with a free joint
+        All but "light" and "color_temperature" are in each world's own `data.model`, or in its data
+    auxiliary: of "depth", "ids" and "flow": what an observation holds of each receptor beside its signal: how far what
+        its centre looks at is, which geom, and how it has moved since the last observation; see docs/tasks.md. Eyes
+        that evolve have none
     camera: name of the camera that pictures for people are taken with; None: one that looks at the whole model
     actuators: names of those that an action drives; None: all
     name: what it is called among others; None: as its class
@@ -59,7 +67,8 @@ class Task:
     substeps: int = 5
     episode_steps: int = 256
     spectra: Mapping[str, Spectrum | str] | None = None
-    vary: Mapping[str, tuple[float, float]] | None = None
+    vary: Mapping[str, tuple[Any, Any]] | None = None
+    auxiliary: Sequence[str] = ()
     camera: str | None = None
     actuators: Sequence[str] | None = None
     name: str | None = None
@@ -135,7 +144,7 @@ def grown(task: Task, eyes: Eyes, elevation_deg: float = 0.0) -> Task:
         raise ValueError(f"{name}: eye and mounts have several kinds of eyes: must have one, where eyes evolve")
     if not task.mounts and type(task).place is Task.place:
         raise ValueError(f"{name}: mounts = {task.mounts!r}: must hold one sim.Mount at least, where the eyes are")
-    animal.eye = eyes.eye()
+    animal.eye, animal.auxiliary = eyes.eye(), ()
     animal.mounts = tuple(task.place(eyes.n_eyes, eyes.placement_range_deg, elevation_deg))
     if len(animal.mounts) != eyes.n_eyes or not all(isinstance(mount, Mount) for mount in animal.mounts):
         raise ValueError(f"{name}: place returned {animal.mounts!r:.200}: must be {eyes.n_eyes} of sim.Mount")

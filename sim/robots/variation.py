@@ -1,7 +1,7 @@
-"""What differs between the episodes of a task of one's own: how bright its lights are, and how warm.
+"""What differs between the episodes of a task of one's own: light, and how large, of which colour and where things are.
 
 All of a world's lights, the sky among them, are multiplied by one spectrum, and signals with them, exactly: light adds
-up. So all worlds are still one kernel.
+up. Sizes, colours and places are the worlds' own, see `sim.robots.world_models`. So all worlds are still one kernel.
 """
 
 from __future__ import annotations
@@ -17,56 +17,123 @@ from optics.numerics.arguments import did_you_mean
 from optics.spectra.spectrum import cie_1931, daylight
 
 DAYLIGHT = 6504.0  # [K] the correlated colour temperature of CIE D65
-LIMITS = {"light": (1e-6, 1e6), "color_temperature": (1000.0, 40_000.0)}  # of their ranges: a factor, and kelvins
+LIGHT, TEMPERATURE = "light", "color_temperature"
+SIZE, COLOR, START = OF_THINGS = ("size", "color", "start")  # of what has a name: "ball.size"
+# Of their ranges: factors, kelvins, shares of red, green and blue, and lengths or angles.
+LIMITS = {
+    LIGHT: (1e-6, 1e6),
+    TEMPERATURE: (1000.0, 40_000.0),
+    SIZE: (1e-3, 1e3),
+    COLOR: (0.0, 1.0),
+    START: (-1e6, 1e6),
+}
 _VISIBLE = np.arange(380, 781, 5) * 1e-9
+
+Range = tuple[Any, Any]
 
 
 @dataclass(frozen=True)
 class Variation:
-    """ranges: (low, high) by name, those of LIMITS; low = high is one value for all
+    """ranges: (low, high) by name: "light", "color_temperature", and "NAME.size", "NAME.color" or "NAME.start" of
+        things; colours, and places in space, are three numbers each, (low, high) two opposite corners · low = high is
+        one value for all
 
     Raises:
         ValueError: another name, or no range.
     """
 
-    ranges: Mapping[str, tuple[float, float]]
+    ranges: Mapping[str, Range]
 
     def __post_init__(self) -> None:
         for name, given in self.ranges.items():
-            if name not in LIMITS:
-                hint = did_you_mean(name, list(LIMITS)) or f": must be one of {', '.join(LIMITS)}"
-                raise ValueError(f"vary: {name!r}{hint}")
-            least, most = LIMITS[name]
-            if not _is_range(given) or not least <= given[0] <= given[1] <= most:
-                raise ValueError(f"vary: {name} = {given!r}: must be (low, high) within [{least:g}, {most:g}]")
+            what = kind_of(name)
+            least, most = LIMITS[what]
+            corners = _corners(given)
+            wanted = {COLOR: (3,), START: None}.get(what, ())
+            fits = corners is not None and corners.shape[1:] in ({(), (3,)} if wanted is None else {wanted})
+            if corners is None or not fits or not (least <= corners[0]).all() or not (corners[1] <= most).all():
+                raise ValueError(f"vary: {name} = {given!r}: must be {_FORM[what]} within [{least:g}, {most:g}]")
+            if (corners[0] > corners[1]).any():
+                raise ValueError(f"vary: {name} = {given!r}: must be (low, high), low first")
 
-    def draw(self, random: np.random.Generator) -> dict[str, float]:
+    def draw(self, random: np.random.Generator) -> dict[str, float | np.ndarray]:
         """For one episode: factors evenly over their logarithm, temperatures over their reciprocal, in which equal
-        steps look alike (mired)."""
-        found = {}
+        steps look alike (mired), colours and places evenly between their corners."""
+        found: dict[str, float | np.ndarray] = {}
         for name, (low, high) in self.ranges.items():
-            share = random.random()
-            if name == "light":
-                found[name] = low * (high / low) ** share
+            what = kind_of(name)
+            if what in (LIGHT, SIZE):
+                found[name] = low * (high / low) ** random.random()
+            elif what == TEMPERATURE:
+                found[name] = 1 / (1 / low + (1 / high - 1 / low) * random.random())
             else:
-                found[name] = 1 / (1 / low + (1 / high - 1 / low) * share)
+                corners = np.asarray((low, high), float)
+                drawn = corners[0] + (corners[1] - corners[0]) * random.random(corners.shape[1:])
+                found[name] = drawn if drawn.ndim else float(drawn)
         return found
 
-    def light(self, values: Mapping[str, np.ndarray], wavelengths: np.ndarray) -> np.ndarray:
-        """What lights are multiplied by, (world, band) float32; values: by name, of each world · wavelengths [m]"""
-        n = len(next(iter(values.values())))
+    def blank(self, n: int) -> dict[str, np.ndarray]:
+        """Room for what is drawn, by name: (n,) or (n, 3)."""
+        return {name: np.ones((n, *np.shape(low))) for name, (low, _) in self.ranges.items()}
+
+    def of_things(self, what: str) -> dict[str, str]:
+        """Names of ranges by the things that they are of; what: one of OF_THINGS."""
+        return {name.rpartition(".")[0]: name for name in self.ranges if kind_of(name) == what}
+
+    @property
+    def of_light(self) -> tuple[str, ...]:
+        """What of it is light's."""
+        return tuple(name for name in self.ranges if name in (LIGHT, TEMPERATURE))
+
+    def light(self, values: Mapping[str, np.ndarray], wavelengths: np.ndarray) -> np.ndarray | None:
+        """What lights are multiplied by, (world, band) float32; None: nothing. values: by name, of each world ·
+        wavelengths [m]"""
+        if not self.of_light:
+            return None
+        n = len(values[self.of_light[0]])
         factors = np.ones((n, len(wavelengths)))
-        if "light" in values:
-            factors *= values["light"][:, None]
-        if "color_temperature" in values:
-            factors *= np.array([filter_to(kelvins, wavelengths) for kelvins in values["color_temperature"]])
+        if LIGHT in values:
+            factors *= values[LIGHT][:, None]
+        if TEMPERATURE in values:
+            factors *= np.array([filter_to(kelvins, wavelengths) for kelvins in values[TEMPERATURE]])
         return factors.astype(np.float32)
 
     def extremes(self, wavelengths: np.ndarray) -> np.ndarray:
-        """`light` at the ends of all ranges, (case, band): no band is ever brighter or darker by a percent."""
-        names = list(self.ranges)
-        corners = np.stack(np.meshgrid(*self.ranges.values(), indexing="ij"), axis=-1).reshape(-1, len(names))
-        return self.light(dict(zip(names, corners.T, strict=True)), wavelengths)
+        """`light` at the ends of all its ranges, (case, band): no band is ever brighter or darker by a percent."""
+        names = self.of_light
+        ends = [self.ranges[name] for name in names]
+        corners = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, len(names)) if names else None
+        if corners is None:
+            return np.ones((1, len(wavelengths)), np.float32)
+        found = self.light(dict(zip(names, corners.T, strict=True)), wavelengths)
+        assert found is not None
+        return found
+
+
+_FORM = {
+    LIGHT: "(low, high)",
+    TEMPERATURE: "(low, high)",
+    SIZE: "(low, high), factors,",
+    COLOR: "((red, green, blue), (red, green, blue))",
+    START: "(low, high), numbers or points (x, y, z),",
+}
+
+
+def kind_of(name: str) -> str:
+    """What a range is of, one of LIMITS.
+
+    Raises:
+        ValueError: it is of none.
+    """
+    if name in (LIGHT, TEMPERATURE):
+        return name
+    thing, _, what = str(name).rpartition(".")
+    if thing and what in OF_THINGS:
+        return what
+    near = [LIGHT, TEMPERATURE, *(f"{thing}.{each}" for each in OF_THINGS if thing)]
+    known = [LIGHT, TEMPERATURE, *(f"NAME.{each}" for each in OF_THINGS)]
+    hint = did_you_mean(name, near) or f": must be one of {', '.join(known)}"
+    raise ValueError(f"vary: {name!r}{hint}")
 
 
 def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
@@ -86,8 +153,10 @@ def _ratio(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
     return found
 
 
-def _is_range(given: Any) -> bool:
+def _corners(given: Any) -> np.ndarray | None:
+    """(low, high) as an array (2,) or (2, 3); None: it is no such pair of finite numbers."""
     try:
-        return np.shape(given) == (2,) and bool(np.isfinite(np.asarray(given, float)).all())
+        corners = np.asarray(given, float)
     except (TypeError, ValueError):
-        return False
+        return None
+    return corners if corners.shape in ((2,), (2, 3)) and np.isfinite(corners).all() else None

@@ -81,6 +81,15 @@ def matt(
     return mi.load_dict({"type": "twosided", "inside": description})
 
 
+def matt_white(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> MitsubaObject:
+    """Lambertian, opaque and white on both sides, but for its texture."""
+    texture = surfaces.texture_id(model, geom)
+    color: Description = {"type": "uniform", "value": 1.0}
+    if texture >= 0 and surfaces.is_mirrored(model, geom, texture):
+        color = surfaces.bitmap(surfaces.linear(model, texture, np.ones(3)), to_uv)
+    return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": color}})
+
+
 def has_gloss(model: mujoco.MjModel, material: int) -> bool:
     """Whether a material asks for more than a Lambertian surface."""
     if model.mat_metallic[material] >= 0 or model.mat_roughness[material] >= 0:

@@ -201,3 +201,14 @@ def test_archives_that_would_fill_the_memory_are_refused(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "pipe.npz")
     with pytest.raises(ValueError, match=r"pipe.npz holds no episode"):
         Episode.load(tmp_path / "pipe.npz")
+
+
+def test_an_episode_of_a_run_in_little_light_is_dark_throughout(run):
+    """What a perfect lens would see of it, too: the noise and no other is what lies between."""
+    dusk = dataclasses.replace(run.config.world, least_light=1e-3)
+    dark = dataclasses.replace(run, config=dataclasses.replace(run.config, world=dusk))
+    plain, dim = (record(one, 0, seed=5, radiance_every=64) for one in (run, dark))
+    level = dim.perfect_signals[0].mean() / plain.perfect_signals[0].mean()
+    assert 1e-3 <= level < 0.9
+    assert dim.radiance[0].mean() / plain.radiance[0].mean() == pytest.approx(level, rel=1e-5)
+    assert np.sqrt(np.square(dim.signals - dim.perfect_signals).mean()) < 0.08

@@ -107,7 +107,7 @@ def test_rays_of_frozen_animals_are_chosen_once(folder):
     config, _ = lived(f"{folder / 'auto.py'}:Prey")
     [predator] = executed_task(config.own_task).others
     assert isinstance(predator.task.fidelity, sim.Fidelity)
-    assert "moments" in predator.task.fidelity.levels[1].why
+    assert "moments" in predator.task.fidelity.levels[-1].why
 
 
 def test_what_is_wrong_with_others_is_told_before_a_run(folder):

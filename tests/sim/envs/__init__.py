@@ -9,7 +9,9 @@ task_animals: test_encounter.py, test_parallel_env.py
 task_pictures: test_task_vec_env.py, test_parallel_env.py
 parallel_env: test_parallel_env.py
 task_fidelity: robots/test_model_fidelity.py, test_encounter.py
-task_state: test_task_state.py
+task_state: test_task_state.py, test_differing_worlds.py
+auxiliary: test_auxiliary.py
+world_poses: test_auxiliary.py
 one_environment: test_vec_env.py
 env: test_env.py
 vec_env: test_vec_env.py, test_env.py, test_light_levels.py

@@ -2,20 +2,22 @@
 
 model_renderer: test_model_renderer.py
 model_wavefront: test_model_renderer.py
-model_fidelity: test_model_fidelity.py
+model_fidelity: test_model_fidelity.py, test_model_light.py
 edge_rays: test_edge_rays.py
 eye_kinds: envs/test_eye_kinds.py
 mounts: test_mounts.py
 task: envs/test_task_vec_env.py, envs/test_encounter.py
 encounter: envs/test_encounter.py, envs/test_bad_encounters.py
 variation: test_variation.py
+world_models: envs/test_differing_worlds.py
+paint: envs/test_differing_worlds.py
 optic_flow: test_labels.py
 eye_marks: test_eye_marks.py
 inside: test_mounts.py
 poses: test_model_renderer.py
 model_scene: test_model_renderer.py
 model_lights: test_model_renderer.py
-model_tracer: test_model_renderer.py
+model_tracer: test_model_renderer.py, test_model_light.py
 primitives: test_movers.py
 movers: test_movers.py
 """

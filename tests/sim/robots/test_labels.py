@@ -147,6 +147,42 @@ def test_there_is_no_flow_of_nothing_or_behind(wall, model):
         renderer.flow(datas[:1], datas)
 
 
+TERRAIN = """
+<mujoco>
+  <visual><headlight active="0"/></visual>
+  <asset><hfield name="hills" nrow="9" ncol="13" size="2 1.5 .8 .2"/></asset>
+  <worldbody>
+    <light type="directional" dir="0 0 -1"/>
+    <geom name="still" type="hfield" hfield="hills" pos="3 0 -.5"/>
+    <body name="raft" pos="3 3 -.5"><joint type="hinge" axis="0 0 1"/><joint type="slide" axis="0 1 .3"/>
+      <geom name="raft" type="hfield" hfield="hills"/></body>
+    <body name="eye" pos="0 1 .8"/>
+  </worldbody>
+</mujoco>"""
+
+
+def test_height_fields_are_met_where_mujocos_rays_meet_them():
+    """One that stands still and one that moves, in three poses."""
+    model = mujoco.MjModel.from_xml_string(TERRAIN)
+    model.hfield_data[:] = np.random.default_rng(0).uniform(0, 1, model.hfield_data.shape)
+    datas = []
+    for turn in (0.0, 0.7, 2.0):
+        datas.append(mujoco.MjData(model))
+        datas[-1].qpos[:] = turn, turn / 3
+        mujoco.mj_forward(model, datas[-1])
+    eye = optics.Eye(resolution=(40, 60), fov_deg=100, bands=3)
+    renderer = sim.ModelRenderer(model, eye, [sim.Mount("eye", azimuth_deg=10, elevation_deg=-12)], 3, ONE_RAY)
+    ids, depth = renderer.ids(datas), renderer.depth(datas)
+    pupils, frames = renderer.eye_frames(sim.Poses.of(datas))
+    geom, centres, right = np.zeros(1, np.int32), directions_of(eye, receptor_centres(eye)), []
+    for w, r in np.ndindex(3, len(centres)):
+        far = mujoco.mj_ray(model, datas[w], pupils[w, 0], (frames[w, 0] @ centres[r]).astype(float), None, 1, -1, geom)
+        near = np.isinf(depth[w, 0].flat[r]) if far < 0 else abs(depth[w, 0].flat[r] - far * centres[r, 2]) < 1e-3
+        right.append(ids[w, 0].flat[r] == geom[0] and near)
+    assert np.mean(right) >= 0.995
+    assert {*np.unique(ids)} == {-1, 0, 1}
+
+
 def test_signals_are_tensors_without_a_copy(model):
     renderer = sim.ModelRenderer(model, EYE, MOUNTS, 1, ONE_RAY)
     signals = renderer.signals([posed(model, 0.0)])
@@ -155,3 +191,14 @@ def test_signals_are_tensors_without_a_copy(model):
         assert tensor.shape == signals.shape
     tensor += 1
     assert signals.min() >= 1
+    kept = signals.copy()
+    renderer.signals([posed(model, 1.0)])  # later frames do not write into earlier ones
+    np.testing.assert_array_equal(signals, kept)
+
+
+def test_what_environments_return_are_tensors_without_a_copy():
+    env = sim.make_vec_env("detection", sim.Eyes(n_eyes=1), n_envs=2, rays_per_receptor=1, auxiliary=("depth", "flow"))
+    for name, array in env.reset().items():
+        assert torch.from_dlpack(array).data_ptr() == array.ctypes.data, name
+    signals = env.renderer.signals(env.state)
+    assert torch.from_dlpack(signals).data_ptr() == signals.ctypes.data

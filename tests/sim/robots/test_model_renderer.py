@@ -168,7 +168,7 @@ def test_eyes_behind_a_pupil_see_it_too(model):
         ({"n_envs": 0}, "n_envs = 0: must be a whole number"),
         ({"mounts": []}, r"mounts = \[\]: must be one sim.Mount at least"),
         ({"eye": sim.Eyes()}, "eye = .*: must be a kind of Eye"),
-        ({"fidelity": sim.Fidelity(4, bands=3, light="bounce")}, "light = 'bounce', samples = 'rays'.*direct light"),
+        ({"fidelity": sim.Fidelity(4, bands=3, light="all", samples="areas")}, "light = .all., samples = .areas."),
         ({"fidelity": 16}, "fidelity = 16: must be a kind of Fidelity"),
         ({"groups": (5,)}, "no visible geom"),
         ({"n_envs": 10**8}, "worlds with 1 eyes of 40 x 56 receptors would take .* GiB of memory"),
@@ -202,7 +202,8 @@ def test_what_is_not_matt_is_named():
         <geom name="pane" size=".1" rgba="1 1 1 .5" pos="0 0 1"/><geom size=".1" material="lamp"/>
         <site name="eye" pos="0 -1 1"/></worldbody></mujoco>""")
     words = (
-        "gloss of material 'wet'; glow of material 'lamp'; reflections in geom 'floor'; what is behind .* geom 'pane'"
+        "gloss of material 'wet'; light of material 'lamp' on surfaces; reflections in geom 'floor'; "
+        "what is behind .* geom 'pane'"
     )
     with pytest.warns(sim.MirrorWarning, match=words):
         sim.ModelRenderer(model, EYE, [sim.Mount("eye")])

@@ -168,7 +168,12 @@ def test_brighter_worlds_are_looked_at_more_finely():
     [
         ({"lihgt": (1, 2)}, "vary: 'lihgt'.*light"),
         ({"size": (1, 2)}, "vary: 'size': must be one of light, color_temperature"),
-        ({"light": (2, 1)}, r"vary: light = \(2, 1\): must be \(low, high\) within"),
+        ({"light": (2, 1)}, r"vary: light = \(2, 1\): must be \(low, high\), low first"),
+        ({"ball.sise": (1, 2)}, "vary: 'ball.sise'; did you mean 'ball.size'?"),
+        ({"ball.size": ((1, 1, 1), (2, 2, 2))}, r"vary: ball.size = .*: must be \(low, high\), factors, within"),
+        ({"ball.color": (0, 1)}, r"vary: ball.color = \(0, 1\): must be \(\(red, green, blue\), .* within \[0, 1\]"),
+        ({"ball.color": ((0, 0, 0), (1, 1, 2))}, "vary: ball.color = .*: must be"),
+        ({"ball.start": ((0, 0), (1, 1))}, "vary: ball.start = .*: must be .* numbers or points"),
         ({"light": (0, 1)}, r"vary: light = \(0, 1\): must be"),
         ({"light": 3}, "vary: light = 3: must be"),
         ({"light": ("a", "b")}, "vary: light = .*: must be"),

@@ -1,0 +1,75 @@
+"""Colours that differ from world to world, as reflectances in the eye's bands, for the kernel.
+
+What is painted is built white, texture and all, and the kernel multiplies it by its world's colour: MuJoCo, too, has a
+colour multiply a texture. Spectra of colours are Mitsuba's (Jakob and Hanika 2019), as everywhere.
+"""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.robots.poses import Poses
+from sim.scene import surfaces
+from sim.scene.color import decode_srgb
+from sim.scene.device_arrays import whole_numbers
+from sim.tracing import lighting
+
+
+class Paint:
+    """Of some geoms, in the order of `geoms`; needs the variant in force.
+
+    movers: ids of all movers · inputs: arrays for the kernel
+    """
+
+    def __init__(self, model: mujoco.MjModel, geoms: list[int], movers: np.ndarray, wavelengths: np.ndarray) -> None:
+        self.geoms, self._spectra, self._bands = np.array(geoms, int), lighting.spectra(wavelengths), len(wavelengths)
+        self._own = np.array([surfaces.rgba(model, g)[:3] for g in geoms]).reshape(-1, 3)
+        place = {geom: k for k, geom in enumerate(geoms)}
+        self.inputs = {"painted": whole_numbers([*(place.get(int(g), len(geoms)) for g in movers), len(geoms)])}
+        self._known: dict[tuple[float, ...], np.ndarray] = {}
+
+    def __len__(self) -> int:
+        return len(self.geoms)
+
+    @property
+    def n_rows(self) -> int:
+        """Of four floats each, in one world; never none."""
+        return max(len(self) * len(self._spectra), 1)
+
+    def rows(self, poses: Poses) -> np.ndarray:
+        """Reflectances, (world, 4 n_rows) float32."""
+        rows = np.zeros((poses.n, self.n_rows * lighting.LANES), np.float32)
+        if not len(self):
+            return rows
+        each = rows.reshape(poses.n, len(self), -1)
+        colors = poses.geom_rgba[:, self.geoms, :3] if poses.geom_rgba is not None else self._own[None]
+        for world, k in np.ndindex(poses.n, len(self)):
+            each[world, k, : self._bands] = self._reflectance(tuple(map(float, colors[world % len(colors), k])))
+        return rows
+
+    def of(self, which: Array, rows: Array, first: Array, inputs: dict[str, Array], seen: Array) -> list[Array]:
+        """What a mover's reflectances are multiplied by, as spectra; first: of the world's rows."""
+        k = dr.gather(mi.UInt32, inputs["painted"], which, seen)
+        painted = seen & (k < len(self))
+        found = []
+        for chunk in range(len(self._spectra)):
+            row = first + dr.select(painted, k, 0) * len(self._spectra) + chunk
+            found.append(dr.select(painted, mi.Spectrum(*dr.gather(mi.Vector4f, rows, row)), 1))
+        return found
+
+    def _reflectance(self, rgb: tuple[float, ...]) -> np.ndarray:
+        if rgb not in self._known:
+            if len(self._known) > 10_000:
+                self._known.clear()
+            color = [float(c) for c in np.clip(decode_srgb(np.array(rgb)), 0, 1)]
+            texture, si = mi.load_dict({"type": "rgb", "value": color}), dr.zeros(mi.SurfaceInteraction3f)
+            found = []
+            for spectrum in self._spectra:
+                si.wavelengths = spectrum
+                found.append(np.array(texture.eval(si)).ravel())
+            self._known[rgb] = np.concatenate(found)[: self._bands]
+        return self._known[rgb]

@@ -1,0 +1,136 @@
+"""A model for each world, where sizes and colours differ between worlds, and where things are when an episode begins.
+
+A size goes through MuJoCo's compiler, so that mass, inertia and all that follows from them are the compiler's own: what
+has a density weighs by its volume, what was given a mass keeps it. A world's model and data stay the same objects.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from optics.numerics.arguments import did_you_mean
+from sim.robots.movers import kind_of as primitive_of
+from sim.robots.variation import COLOR, SIZE, START, Variation
+from sim.scene import source, surfaces
+
+Drawn = Mapping[str, float | np.ndarray]
+# Fields that no size changes: what is large among them would be copied for nothing.
+_FIXED = ("tex", "mesh", "hfield", "skin", "mat_", "name", "text", "numeric", "tuple", "key", "path")
+_JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+
+
+class WorldModels:
+    """Of `n` worlds of one model.
+
+    given: what the model was made of · model: what became of it
+    models: of each world; the same for all, where nothing of them differs
+    varied: names of the geoms whose size or colour differs
+
+    Raises:
+        ValueError: the model has no such thing, or one that cannot differ.
+    """
+
+    def __init__(self, given: Any, model: mujoco.MjModel, n: int, variation: Variation | None) -> None:
+        ranges = {what: {} if variation is None else variation.of_things(what) for what in (SIZE, COLOR, START)}
+        self.model = model
+        self._sizes = {_geom(model, thing, name): name for thing, name in ranges[SIZE].items()}
+        self._colors = {_geom(model, thing, name): name for thing, name in ranges[COLOR].items()}
+        self._starts = {name: _place(model, thing, name, variation) for thing, name in ranges[START].items()}
+        self.varied = tuple(model.geom(g).name for g in sorted({*self._sizes, *self._colors}))
+        self.models = [copy.copy(model) for _ in range(n)] if self.varied else [model] * n
+        if not self._sizes:
+            return
+        self._spec = _specification(given)
+        for geom, name in self._sizes.items():
+            if primitive_of(model, geom) is None:
+                raise ValueError(
+                    f"vary: {name}: must be a sphere, capsule, cylinder, ellipsoid or box without a texture"
+                )
+        by_name = {geom.name: geom for geom in self._spec.geoms}
+        self._geoms = {geom: by_name[model.geom(geom).name] for geom in self._sizes}
+        self._natural = {geom: (np.array(mjs.size), np.array(mjs.fromto)) for geom, mjs in self._geoms.items()}
+        self._fields = _fields_of(model)
+
+    def begin(self, world: int, drawn: Drawn) -> None:
+        """A world's sizes and colours from now on."""
+        mine = self.models[world]
+        if self._sizes:
+            self._resize(mine, drawn)
+        for geom, name in self._colors.items():
+            mine.geom_rgba[geom] = [*np.asarray(drawn[name]), surfaces.rgba(self.model, geom)[3]]
+
+    def place(self, data: mujoco.MjData, drawn: Drawn) -> None:
+        """Things are where an episode begins."""
+        for name, (where, address) in self._starts.items():
+            getattr(data, where)[address] = drawn[name]
+
+    def _resize(self, mine: mujoco.MjModel, drawn: Drawn) -> None:
+        for geom, mjs in self._geoms.items():
+            factor, (size, ends) = float(drawn[self._sizes[geom]]), self._natural[geom]
+            middle = np.tile((ends[:3] + ends[3:]) / 2, 2)
+            # A capsule that was given by its ends keeps its middle, and its half length is nobody's number.
+            mjs.size, mjs.fromto = factor * size, middle + factor * (ends - middle)
+        compiled = self._spec.compile()
+        for name in self._fields:
+            np.copyto(getattr(mine, name), getattr(compiled, name))
+        for name in ("meaninertia", "meanmass", "meansize", "extent"):
+            setattr(mine.stat, name, getattr(compiled.stat, name))
+        mine.stat.center[:] = compiled.stat.center
+
+
+def _geom(model: mujoco.MjModel, thing: str, name: str) -> int:
+    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, thing)
+    if found < 0:
+        known = [model.geom(g).name for g in range(model.ngeom) if model.geom(g).name]
+        hint = did_you_mean(thing, known) or (
+            f"; it has {', '.join(map(repr, known))}" if known else "; none has a name"
+        )
+        raise ValueError(f"vary: {name}: the model has no geom {thing!r}{hint}")
+    return int(found)
+
+
+def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | None) -> tuple[str, Any]:
+    """Which entries of which field of mjData say where a thing is."""
+    assert variation is not None
+    spatial = np.ndim(variation.ranges[name][0]) == 1
+    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, thing)
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, thing)
+    if joint >= 0 and mujoco.mjtJoint(int(model.jnt_type[joint])) in _JOINTS and not spatial:
+        return "qpos", int(model.jnt_qposadr[joint])
+    if body >= 0 and spatial and model.body_mocapid[body] >= 0:
+        return "mocap_pos", int(model.body_mocapid[body])
+    if body >= 0 and spatial and model.body_jntnum[body] == 1:
+        first = int(model.body_jntadr[body])
+        if model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE:
+            start = int(model.jnt_qposadr[first])
+            return "qpos", slice(start, start + 3)
+    form = "points (x, y, z)" if spatial else "numbers"
+    wanted = "a mocap body or one with a free joint" if spatial else "a hinge or slide joint"
+    joints = [model.joint(j).name for j in range(model.njnt)]
+    bodies = [model.body(b).name for b in range(1, model.nbody)]
+    hint = did_you_mean(thing, [known for known in (bodies if spatial else joints) if known])
+    raise ValueError(f"vary: {name} is between {form}: {thing!r} must be {wanted}{hint}")
+
+
+def _specification(given: Any) -> mujoco.MjSpec:
+    """What can be compiled anew."""
+    if isinstance(given, mujoco.MjSpec):
+        return given.copy()
+    if isinstance(given, str) and given.lstrip().startswith("<"):
+        return mujoco.MjSpec.from_string(given)
+    if isinstance(given, str | Path) and Path(given).suffix != ".mjb":
+        source.load(given)  # says what is wrong, where something is
+        return mujoco.MjSpec.from_file(str(given))
+    kind = f"a {type(given).__name__}" if isinstance(given, mujoco.MjModel) else "a compiled file"
+    raise ValueError(f"vary: sizes: model is {kind}: must be MJCF or an MjSpec, which can be compiled anew")
+
+
+def _fields_of(model: mujoco.MjModel) -> list[str]:
+    names = [name for name in dir(model) if not name.startswith(("_", *_FIXED))]
+    return [name for name in names if isinstance(getattr(model, name), np.ndarray) and getattr(model, name).size]
