@@ -80,7 +80,7 @@ class Eye:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "resolution", shape_2d("resolution", self.resolution))
-        in_range("fov_deg", self.fov_deg, 1e-3, 170)
+        in_range("fov_deg", self.fov_deg, 1e-3, 170, carried=True)
         positive("sensor_width", self.sensor_width)
         object.__setattr__(self, "eccentricity_deg", direction("eccentricity_deg", self.eccentricity_deg))
         in_range("noise_sigma", self.noise_sigma, 0, 1e6)
@@ -91,7 +91,8 @@ class Eye:
         if self.photon_budget is not None:
             of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
-        spectral = self._chosen_bands() if self.bands == "auto" else SpectralBands.uniform(self.bands, self.receptors)
+        by_itself = isinstance(self.bands, str) and self.bands == "auto"
+        spectral = self._chosen_bands() if by_itself else SpectralBands.uniform(self.bands, self.receptors)
         object.__setattr__(self, "spectral_bands", spectral)
         object.__setattr__(self, "bands", len(spectral.wavelengths))
 
@@ -155,7 +156,7 @@ class Eye:
         Raises:
             AccuracyError: see `optics.psf`.
         """
-        positive("z", z, infinite=True)
+        positive("z", z, infinite=True, carried=True)
         if self.pupil is None:
             return perfect_psf(self._retina(1), self.widest_pupil / 2)
         return retinal_psf(self.pupil, self._retina(4), z, tangents(self.eccentricity_deg))
@@ -176,7 +177,7 @@ class Eye:
         Raises:
             AccuracyError: see `optics.psf`.
         """
-        positive("z", z, infinite=True)
+        positive("z", z, infinite=True, carried=True)
         asked = self.eccentricity_deg if direction_deg is None else direction("direction_deg", direction_deg)
         return to_user(self._kernel(_whole(samples_per_receptor), z, tangents(asked)))
 

@@ -12,7 +12,7 @@ import numpy as np
 from optics.apertures.circular import disk_profile
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import point_2d, reals, shown, without_derivative
+from optics.numerics.arguments import point_2d, reals, shown
 from optics.numerics.autodiff import Array, to_user
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
@@ -196,7 +196,7 @@ def encircled_energy(
     """
     import drjit as dr
 
-    wanted = np.atleast_1d(reals("radii", without_derivative("radii", radii)))
+    wanted = np.atleast_1d(reals("radii", radii))
     if wanted.ndim > 1:
         raise ValueError(f"radii has shape {wanted.shape}: must be a number or a row of them [m]")
     middle = result.centre if centre is None else point_2d("centre", centre)

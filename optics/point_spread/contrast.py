@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import in_range, positive, reals, shown, without_derivative
+from optics.numerics.arguments import in_range, positive, reals, shown
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2
@@ -64,7 +64,7 @@ class MTF:
         if self.fx.size < 2:
             raise ValueError("a PSF of one sample has no frequencies but 0: must be at least 2 x 2")
         types = precision("float64")
-        f = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
+        f = np.atleast_1d(reals("frequencies", frequencies))
         angle = 2 * np.pi * (np.arange(ORIENTATIONS) + 0.5) / ORIENTATIONS
         side, waves = self.fx.size, self.tensor.shape[0]
         places = [np.outer(f, part) / (self.fx[1] - self.fx[0]) + side // 2 for part in (np.sin(angle), np.cos(angle))]
@@ -234,9 +234,9 @@ def image_quality(
     """
     import drjit as dr
 
-    positive("nyquist", without_derivative("nyquist", nyquist))
-    in_range("throughput", throughput, 0, 1)
-    in_range("noise_sigma", without_derivative("noise_sigma", noise_sigma), 0, 1e6)
+    positive("nyquist", nyquist)
+    in_range("throughput", throughput, 0, 1, carried=True)
+    in_range("noise_sigma", noise_sigma, 0, 1e6)
     waves = result.tensor.shape[0]
     if number(throughput) == 0:
         return (np.zeros(waves), np.zeros(waves)) if with_error else np.zeros(waves)

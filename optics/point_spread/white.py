@@ -12,7 +12,7 @@ import numpy as np
 
 from optics.elements.pupil import Pupil
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import shown, whole
+from optics.numerics.arguments import reals, shown, whole
 from optics.numerics.autodiff import Array
 from optics.numerics.interpolation import linear_weights
 from optics.numerics.precision import precision
@@ -110,7 +110,8 @@ def _weights(light: Any, kinds: Any, nodes: np.ndarray) -> np.ndarray:
     if not isinstance(source, Spectrum) and not callable(source):
         raise ValueError(f"light = {shown(light)}: must be an illuminant's name, a Spectrum, or a function of [m]")
     nm = np.arange(nodes[0], nodes[-1] + 0.5)
-    power = source.at(nm * 1e-9) if isinstance(source, Spectrum) else np.broadcast_to(source(nm * 1e-9), nm.shape)
+    given = source.at(nm * 1e-9) if isinstance(source, Spectrum) else reals("light", source(nm * 1e-9))
+    power = np.broadcast_to(given, nm.shape)
     if not (np.isfinite(power).all() and (power >= 0).all()):
         raise ValueError("light: must be finite and not negative over the receptors' range")
     caught = np.stack([kind.at(nm * 1e-9) * nm * power for kind in kinds.types])
