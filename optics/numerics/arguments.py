@@ -1,6 +1,5 @@
 """Checks of arguments: bad input ends in one line that names the argument, its value and the valid range."""
 
-import difflib
 import math
 from collections.abc import Iterable
 from typing import Any
@@ -151,6 +150,8 @@ def did_you_mean(word: Any, known: Iterable[str], cutoff: float = 0.5) -> str:
 
 def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | None:
     """The known word that is nearest, in capitals or not; None where none is near (difflib's ratio below `cutoff`)."""
+    import difflib  # for messages only
+
     plain = {option.lower(): option for option in known}
     near = difflib.get_close_matches(word.lower(), plain, n=1, cutoff=cutoff)
     return plain[near[0]] if near else None
