@@ -16,14 +16,7 @@ from optics.eye.photoreceptor import gaussian_noise, own_type, photon_noise, qua
 from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
 from optics.eye.retinal_image import blur, centred, receptor_average
 from optics.eye.summary import Description, describe
-from optics.numerics.arguments import (
-    in_range,
-    of_kind,
-    positive,
-    radiance_cube,
-    shape_2d,
-    whole,
-)
+from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.precision import precision
 from optics.point_spread.psf_result import PSFResult
@@ -91,8 +84,9 @@ class Eye:
         if self.photon_budget is not None:
             of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
-        by_itself = isinstance(self.bands, str) and self.bands == "auto"
-        spectral = self._chosen_bands() if by_itself else SpectralBands.uniform(self.bands, self.receptors)
+        spectral = (
+            self._chosen_bands() if str(self.bands) == "auto" else SpectralBands.uniform(self.bands, self.receptors)
+        )
         object.__setattr__(self, "spectral_bands", spectral)
         object.__setattr__(self, "bands", len(spectral.wavelengths))
 
