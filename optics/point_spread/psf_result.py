@@ -30,6 +30,7 @@ from optics.point_spread.request import Request
 __all__ = ["PSFResult", "spread"]
 
 MOST_AGAIN = 2049  # choice: samples along a side of a window that a measure asks for by itself
+MANY = 4  # choice: wavelengths of which each by itself would be planned longer than computed
 MOST_SECONDS = 20.0  # choice: that such a window may take
 SUM_ERROR = 3.0  # choice: how much more than the picture a sum may err, relatively: test_measure_errors.py
 OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are means over cells
@@ -230,14 +231,15 @@ def _through(request: Request, window: Grid) -> Request:
 
 
 def spread(requests: Sequence[Request]) -> PSFResult:
-    """PSFs of one pupil at several wavelengths, over one window; planned as the first is, where that will do.
+    """PSFs of one pupil at several wavelengths, over one window; MANY are planned as the first is, where that
+    will do.
 
     Raises:
         AccuracyError: no method meets the tolerance, or a window is so dark that rounding breaks it.
     """
     import drjit as dr
 
-    flat, plans, fields = zip(*pictures(requests, alike=True), strict=True)
+    flat, plans, fields = zip(*pictures(requests, alike=len(requests) >= MANY), strict=True)
     beam, window, types = requests[0].beam, requests[0].problem.window, precision(requests[0].problem.dtype)
     tensor = types.Tensor(flat[0] if len(flat) == 1 else dr.concat(flat), (len(flat), *window.shape))
     wavelengths = np.array([request.beam.wavelength for request in requests])
