@@ -30,7 +30,7 @@ from optics.point_spread.request import Request
 __all__ = ["PSFResult", "spread"]
 
 MOST_AGAIN = 2049  # choice: samples along a side of a window that a measure asks for by itself
-MANY = 4  # choice: wavelengths of which each by itself would be planned longer than computed
+MANY = 8  # choice: wavelengths of which each by itself would be planned longer than computed
 MOST_SECONDS = 20.0  # choice: that such a window may take
 SUM_ERROR = 3.0  # choice: how much more than the picture a sum may err, relatively: test_measure_errors.py
 OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are means over cells
