@@ -11,7 +11,7 @@ import numpy as np
 from optics.apertures.aperture import Aperture, Nodes, SoftAperture
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
-from optics.numerics.arguments import in_range, shown, without_derivative
+from optics.numerics.arguments import in_range, shown
 from optics.numerics.autodiff import Array
 from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision
@@ -64,7 +64,7 @@ class Annulus(Aperture):
     inner: float
 
     def __post_init__(self) -> None:
-        inner = in_range("inner", without_derivative("inner", self.inner), 0.0, 1.0)
+        inner = in_range("inner", self.inner, 0.0, 1.0)
         if not 0 < inner < 1:
             raise ValueError(f"inner = {shown(self.inner)}: must lie between 0 and 1, both excluded")
         object.__setattr__(self, "inner", inner)

@@ -18,7 +18,7 @@ from optics.apertures.shapes import Disk, Shape
 from optics.apertures.soft_edge import SoftEdge
 from optics.apertures.soft_outline import SoftOutline
 from optics.apertures.strips import strips
-from optics.numerics.arguments import finite, in_range, shown, whole, without_derivative
+from optics.numerics.arguments import finite, in_range, shown, whole
 
 __all__ = ["Combined", "difference", "hexagonal_segments", "intersection", "union"]
 
@@ -132,7 +132,7 @@ def hexagonal_segments(
         ValueError: rings outside 0 to 12, gap outside [0, 1), a number that no segment has, or nothing left.
     """
     whole("rings", rings, 0, MOST_RINGS)
-    in_range("gap", without_derivative("gap", gap), 0, 0.999)
+    in_range("gap", gap, 0, 0.999)
     turn = np.exp(1j * np.deg2rad(finite("rotation_deg", rotation_deg)))
     centres = [0j]
     for ring in range(1, rings + 1):

@@ -105,8 +105,8 @@ class Slit(Aperture):
     height: float
 
     def __post_init__(self) -> None:
-        positive("width", without_derivative("width", self.width), "pupil radii")
-        positive("height", without_derivative("height", self.height), "pupil radii")
+        positive("width", self.width, "pupil radii")
+        positive("height", self.height, "pupil radii")
         if np.hypot(self.width, self.height) > 2 * RIM:
             raise ValueError(
                 f"(width, height) = ({shown(self.width)}, {shown(self.height)}): must fit into the unit circle, "

@@ -12,7 +12,7 @@ from optics.apertures.aperture import Aperture, Nodes, SoftAperture
 from optics.apertures.circular import disk_table, ring_nodes
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
-from optics.numerics.arguments import positive, reals, shown, vacuum_wavelength, without_derivative
+from optics.numerics.arguments import positive, reals, shown, vacuum_wavelength
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import SOFT_EDGE_SAMPLE
 from optics.numerics.precision import Precision
@@ -35,7 +35,7 @@ class Rings(Aperture):
     radii: Any
 
     def __post_init__(self) -> None:
-        radii = np.array(reals("radii", without_derivative("radii", self.radii)))
+        radii = np.array(reals("radii", self.radii))
         if radii.ndim != 1 or radii.size % 2 or not 2 <= radii.size <= MOST:
             raise ValueError(f"radii has shape {radii.shape}: must be an even number of radii, 2 to {MOST}")
         if not (np.diff(radii, prepend=0.0)[1:] > 0).all() or not (radii[0] >= 0 and radii[-1] <= 1):
@@ -53,8 +53,8 @@ class Rings(Aperture):
         Raises:
             ValueError: a length that is not positive, fewer than two zones, or more than 500.
         """
-        radius = positive("aperture_radius", without_derivative("aperture_radius", aperture_radius))
-        focal = positive("focal_length", without_derivative("focal_length", focal_length))
+        radius = positive("aperture_radius", aperture_radius)
+        focal = positive("focal_length", focal_length)
         half = vacuum_wavelength(wavelength) / 2
         zones = (sqrt(focal**2 + radius**2) - focal) / half
         if not 2 <= zones <= MOST:

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from optics.apertures.outline import Outline
-from optics.numerics.arguments import finite, in_range, point_2d, positive, whole, without_derivative
+from optics.numerics.arguments import finite, in_range, point_2d, positive, whole
 
 __all__ = ["Disk", "Oblong", "Shape", "Spider"]
 
@@ -40,7 +40,7 @@ class Disk:
     centre: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        positive("radius", without_derivative("radius", self.radius), "pupil radii")
+        positive("radius", self.radius, "pupil radii")
         in_range("radius", self.radius, 0, FARTHEST)
         object.__setattr__(self, "centre", _centre(self.centre))
 
@@ -68,10 +68,10 @@ class Oblong:
     def __post_init__(self) -> None:
         for name in ("width", "height"):
             value = getattr(self, name)
-            positive(name, without_derivative(name, value), "pupil radii")
+            positive(name, value, "pupil radii")
             in_range(name, value, 0, 2 * FARTHEST)
         object.__setattr__(self, "centre", _centre(self.centre))
-        finite("rotation_deg", without_derivative("rotation_deg", self.rotation_deg))
+        finite("rotation_deg", self.rotation_deg)
 
     @property
     def outline(self) -> Outline:
@@ -100,9 +100,9 @@ class Spider:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vanes", whole("vanes", self.vanes, 1, MOST_VANES))
-        positive("width", without_derivative("width", self.width), "pupil radii")
+        positive("width", self.width, "pupil radii")
         in_range("width", self.width, 0, 1)
-        finite("rotation_deg", without_derivative("rotation_deg", self.rotation_deg))
+        finite("rotation_deg", self.rotation_deg)
 
     @property
     def rectangles(self) -> list[Oblong]:

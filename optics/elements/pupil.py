@@ -68,12 +68,12 @@ class Pupil:
     object_n: float | Dispersion | None = None
 
     def __post_init__(self) -> None:
-        positive("aperture_radius", self.aperture_radius)
+        positive("aperture_radius", self.aperture_radius, carried=True)
         index_of("medium_n", self.medium_n)
         if self.object_n is not None:
             index_of("object_n", self.object_n)
         if not isinstance(self.n, Dispersion):
-            in_range("n", self.n, 1.0, 10.0)
+            in_range("n", self.n, 1.0, 10.0, carried=True)
             object.__setattr__(self, "n", RefractiveIndex(self.n))
         of_kind("aperture", self.aperture, Aperture, "Circle()")
         if self.mask is not None:
@@ -90,7 +90,8 @@ class Pupil:
         if self.wavefront is not None:
             self._check_wavefront(of_kind("wavefront", self.wavefront, Aberration, "Zernike({(2, 0): 0.1})"))
         if self.thin_lens_focal_length is not None:
-            positive("abs(thin_lens_focal_length)", abs(finite("thin_lens_focal_length", self.thin_lens_focal_length)))
+            focal = finite("thin_lens_focal_length", self.thin_lens_focal_length, carried=True)
+            positive("abs(thin_lens_focal_length)", abs(focal))
 
     def _check_wavefront(self, wavefront: Aberration) -> None:
         self._check_reach("wavefront", wavefront.radius)

@@ -59,16 +59,16 @@ class RefractiveIndex(Dispersion):
     d: float = 0.0
 
     def __post_init__(self) -> None:
-        in_range("n", self.a, 1.0, 10.0)
-        finite("b", self.b)
+        in_range("n", self.a, 1.0, 10.0, carried=True)
+        finite("b", self.b, carried=True)
         for name in ("c", "d"):
-            finite(name, without_derivative(name, getattr(self, name)))
+            finite(name, getattr(self, name))
 
     @classmethod
     def from_abbe(cls, n_d: float, abbe_number: float) -> RefractiveIndex:
         """The Cauchy curve with index n_d at 587.562 nm and the given Abbe number (infinite: no dispersion)."""
-        in_range("n_d", n_d, 1.0, 10.0)
-        number = positive("abbe_number", without_derivative("abbe_number", abbe_number), "1", infinite=True)
+        in_range("n_d", n_d, 1.0, 10.0, carried=True)
+        number = positive("abbe_number", abbe_number, "1", infinite=True)
         b = (n_d - 1) / number / (LINE_F**-2 - LINE_C**-2)
         return cls(n_d - b / LINE_D**2, b)
 
@@ -123,7 +123,7 @@ class Cornu(Dispersion):
 
     def __post_init__(self) -> None:
         for name in ("a", "b_um", "c_um"):
-            finite(name, without_derivative(name, getattr(self, name)))
+            finite(name, getattr(self, name))
 
     def _n(self, wavelength: float) -> float:
         beyond = wavelength / UM - self.c_um
@@ -172,4 +172,4 @@ def index_of(name: str, value: Any) -> Dispersion:
                 f"{name} asks for a derivative, which it does not carry to the picture: give plain numbers"
             )
         return value
-    return RefractiveIndex(in_range(name, without_derivative(name, value), 1.0, 10.0))
+    return RefractiveIndex(in_range(name, value, 1.0, 10.0))

@@ -25,7 +25,7 @@ class PointSource:
     angle: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        positive("source_distance", self.distance, infinite=True)
+        positive("source_distance", self.distance, infinite=True, carried=True)
         tx, ty = point_2d("source_angle", self.angle, "angles (x, y) [rad]")
         angle = in_range("source_angle", tx, -1.5, 1.5), in_range("source_angle", ty, -1.5, 1.5)
         object.__setattr__(self, "angle", angle)

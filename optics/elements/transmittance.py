@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from optics.elements.relief import HeightMap, square_heights
-from optics.numerics.arguments import positive, shown, without_derivative
+from optics.numerics.arguments import positive, shown
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
@@ -54,7 +54,7 @@ class GaussianMask(Mask):
     waist: Scalar
 
     def __post_init__(self) -> None:
-        positive("waist", self.waist)
+        positive("waist", self.waist, carried=True)
 
     def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
         import drjit as dr
@@ -92,7 +92,7 @@ class MaskMap(Mask):
         if np.abs(values).max() > 1 + 1e-9:
             raise ValueError(f"samples reach {shown(float(np.abs(values).max()))}: must be amplitudes in [-1, 1]")
         if self.reach is not None:
-            object.__setattr__(self, "reach", positive("reach", without_derivative("reach", self.reach)))
+            object.__setattr__(self, "reach", positive("reach", self.reach))
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", values)
         object.__setattr__(self, "_map", HeightMap(self.samples))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from optics.elements.relief import HeightMap, square_heights
-from optics.numerics.arguments import finite, positive, reals, shown, without_derivative
+from optics.numerics.arguments import finite, positive, reals, shown
 from optics.numerics.autodiff import Array, is_differentiable, number, plain
 from optics.numerics.precision import Precision, opaque
 
@@ -57,7 +57,7 @@ class Aberration(ABC):
 
     def _check_radius(self) -> None:
         if self.radius is not None:
-            object.__setattr__(self, "radius", positive("radius", without_derivative("radius", self.radius)))
+            object.__setattr__(self, "radius", positive("radius", self.radius))
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +87,9 @@ class Zernike(Aberration):
         if isinstance(given, Mapping):
             for key in given:
                 _check_mode(key)
-            named = {(int(n), int(m)): finite(f"coefficients_um[{n}, {m}]", c) for (n, m), c in given.items()}
-            object.__setattr__(self, "coefficients_um", {(int(n), int(m)): c for (n, m), c in given.items()})
+            modes = {(int(n), int(m)): c for (n, m), c in given.items()}
+            named = {(n, m): finite(f"coefficients_um[{n}, {m}]", c, carried=True) for (n, m), c in modes.items()}
+            object.__setattr__(self, "coefficients_um", modes)
         else:
             named = _of_vector(given)
         object.__setattr__(self, "modes", named)
@@ -229,11 +230,7 @@ def _check_mode(key: Any) -> None:
 
 def _of_vector(given: Any) -> dict[tuple[int, int], float]:
     """By OSA's index."""
-    vector = (
-        plain(given)
-        if is_differentiable(given)
-        else reals("coefficients_um", without_derivative("coefficients_um", given))
-    )
+    vector = plain(given) if is_differentiable(given) else reals("coefficients_um", given)
     most = (HIGHEST + 1) * (HIGHEST + 2) // 2
     if vector.ndim != 1 or not 0 < vector.size <= most:
         raise ValueError(

@@ -16,14 +16,7 @@ from optics.eye.photoreceptor import gaussian_noise, own_type, photon_noise, qua
 from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
 from optics.eye.retinal_image import blur, centred, receptor_average
 from optics.eye.summary import Description, describe
-from optics.numerics.arguments import (
-    in_range,
-    of_kind,
-    positive,
-    radiance_cube,
-    shape_2d,
-    whole,
-)
+from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.precision import precision
 from optics.point_spread.psf_result import PSFResult
@@ -80,7 +73,7 @@ class Eye:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "resolution", shape_2d("resolution", self.resolution))
-        in_range("fov_deg", self.fov_deg, 1e-3, 170)
+        in_range("fov_deg", self.fov_deg, 1e-3, 170, carried=True)
         positive("sensor_width", self.sensor_width)
         object.__setattr__(self, "eccentricity_deg", direction("eccentricity_deg", self.eccentricity_deg))
         in_range("noise_sigma", self.noise_sigma, 0, 1e6)
@@ -91,7 +84,9 @@ class Eye:
         if self.photon_budget is not None:
             of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
-        spectral = self._chosen_bands() if self.bands == "auto" else SpectralBands.uniform(self.bands, self.receptors)
+        spectral = (
+            self._chosen_bands() if str(self.bands) == "auto" else SpectralBands.uniform(self.bands, self.receptors)
+        )
         object.__setattr__(self, "spectral_bands", spectral)
         object.__setattr__(self, "bands", len(spectral.wavelengths))
 
@@ -155,7 +150,7 @@ class Eye:
         Raises:
             AccuracyError: see `optics.psf`.
         """
-        positive("z", z, infinite=True)
+        positive("z", z, infinite=True, carried=True)
         if self.pupil is None:
             return perfect_psf(self._retina(1), self.widest_pupil / 2)
         return retinal_psf(self.pupil, self._retina(4), z, tangents(self.eccentricity_deg))
@@ -176,7 +171,7 @@ class Eye:
         Raises:
             AccuracyError: see `optics.psf`.
         """
-        positive("z", z, infinite=True)
+        positive("z", z, infinite=True, carried=True)
         asked = self.eccentricity_deg if direction_deg is None else direction("direction_deg", direction_deg)
         return to_user(self._kernel(_whole(samples_per_receptor), z, tangents(asked)))
 

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from optics.elements.pupil import MIDDLE, Pupil
-from optics.numerics.arguments import in_range, of_kind, point_2d, positive, without_derivative
+from optics.numerics.arguments import in_range, of_kind, point_2d, positive
 from optics.numerics.autodiff import Scalar, is_differentiable, number
 
 __all__ = ["behind_pupil", "check_pupil", "direction", "etendue", "focal_length", "tangents"]
@@ -33,7 +33,7 @@ def behind_pupil(pupil: Pupil | None, focal: Scalar) -> Scalar:
 def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) -> None:
     """ValueError unless it is a pupil no wider than what gathers a throughput of 1."""
     if full_aperture is not None:
-        positive("full_aperture", without_derivative("full_aperture", full_aperture))
+        positive("full_aperture", full_aperture)
     if pupil is None:
         return
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6), or None for the perfect lens")

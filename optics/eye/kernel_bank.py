@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from optics.eye.kernel_interpolation import Choice, NodeChoice, nodes
-from optics.numerics.arguments import positive, shown, whole
+from optics.numerics.arguments import positive, shown, whole, without_derivative
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, plain
 from optics.numerics.interpolation import linear_weights
 
@@ -81,7 +81,7 @@ class _Range:
     @classmethod
     def of(cls, z: Any) -> _Range:
         if is_differentiable(z):
-            positive("z", z, infinite=True)
+            positive("z", z, infinite=True, carried=True)
             return cls((1 / number(z), 1 / number(z)), z)
         distances = _distances(z)
         near, far = float(distances.min()), float(distances.max())
@@ -144,6 +144,7 @@ def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:
 
 
 def _distances(z: Any) -> np.ndarray:
+    without_derivative("z", z)
     try:
         distances = np.atleast_1d(np.asarray(z, dtype=np.float64))
     except (TypeError, ValueError):

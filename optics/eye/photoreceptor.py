@@ -17,7 +17,7 @@ MOST_PHOTONS = 1e18  # a count must fit a 64-bit integer
 def throughput(relative_aperture: Scalar, open_share: float = 1.0) -> Scalar:
     """Light gathered, a² times the share of the disk that is open: the pupil's area against that of the widest disk
     (diameter = sensor width). A Dr.Jit array where relative_aperture is one."""
-    a = in_range("relative_aperture", relative_aperture, 0.0, 1.0 + 1e-9)
+    a = in_range("relative_aperture", relative_aperture, 0.0, 1.0 + 1e-9, carried=True)
     if a > 1:  # by rounding
         relative_aperture = relative_aperture * (1 / a)
     return relative_aperture * relative_aperture * open_share

@@ -123,7 +123,8 @@ def _spot(beams: list[Beam], retina: Retina) -> _Spot:
     if _cells_within(half, retina.cell) > MOST_CELLS:
         raise AccuracyError(
             f"the light spreads over {2 * half:.3g} m, {2 * half / retina.cell:.0f} cells of {retina.cell:.3g} m: "
-            f"at most {MOST_CELLS}; widen the field of view or the cells, or flatten the relief"
+            f"at most {MOST_CELLS}; widen the field of view or the cells"
+            + (", or flatten the relief" if beams[0].pupil.height is not None else "")
         )
     half = retina.cell * (_cells_within(half, retina.cell) + 1) / 2
     return _Spot((centre_x, centre_y), half, pitch, needs)

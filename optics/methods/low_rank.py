@@ -27,7 +27,7 @@ __all__ = ["LowRankSampling", "low_rank"]
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
 RANK_RIPPLE = 0.4  # choice: error of the rest at the pupil's rim, of the tolerance; test_low_rank.py
 TRIED = 41  # choice: places along a line through the window
-MOST_ENTRIES = 16_000_000  # choice, by memory: of the matrix between pupil and window
+MOST_BYTES = 288_000_000  # choice, by memory: of the matrix between pupil and window; it takes twice that
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class LowRankSampling:
 
     @property
     def largest(self) -> int:
-        return self.rank * len(self.pupil.at)
+        return len(self.pupil.at)  # whatever the rank: the matrix has a limit of its own
 
 
 def low_rank(problem: Problem) -> list[LowRankSampling]:
@@ -88,7 +88,8 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
 
 
 def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) -> LowRankSampling | None:
-    rank = _rank(problem, pupil, half, scale, math.isqrt(MOST_ENTRIES) // len(pupil.at))
+    entries = MOST_BYTES // np.dtype(precision(problem.dtype).complex_dtype).itemsize
+    rank = _rank(problem, pupil, half, scale, math.isqrt(entries) // len(pupil.at))
     if rank is None:
         return None
     inner = rank * len(pupil.at)

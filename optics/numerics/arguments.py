@@ -1,6 +1,5 @@
 """Checks of arguments: bad input ends in one line that names the argument, its value and the valid range."""
 
-import difflib
 import math
 from collections.abc import Iterable
 from typing import Any
@@ -51,17 +50,18 @@ def shown(value: Any) -> str:
     return type(value).__name__ if shape is None else f"{type(value).__name__} of shape {tuple(shape)}"
 
 
-def finite(name: str, value: float) -> float:
-    """`value` as float; ValueError unless it is a finite number."""
-    number = _number(name, value)
+def finite(name: str, value: float, *, carried: bool = False) -> float:
+    """`value` as float; ValueError unless it is a finite number. carried: see `without_derivative`."""
+    number = _number(name, value, carried)
     if not math.isfinite(number):
         raise ValueError(f"{name} = {shown(value)}: must be finite")
     return number
 
 
-def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False) -> float:
-    """`value` as float; ValueError unless it is > 0, within what arithmetic can square, or infinite where it may."""
-    number = _number(name, value)
+def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False, carried: bool = False) -> float:
+    """`value` as float; ValueError unless it is > 0, within what arithmetic can square, or infinite where it may.
+    carried: see `without_derivative`."""
+    number = _number(name, value, carried)
     if infinite and number == math.inf:
         return number
     if not SMALLEST <= number <= LARGEST:
@@ -72,7 +72,12 @@ def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False
 
 
 def without_derivative(name: str, value: Any) -> Any:
-    """`value`; ValueError if it, or an entry of a list, asks for a derivative: it would be dropped."""
+    """`value`; ValueError if it, or an entry of a list, asks for a derivative: it would be dropped.
+
+    The other checks here ask this, too, unless they are told that what they check is carried.
+    """
+    if type(value) is float:
+        return value  # asked for thousands of times in planning
     if isinstance(value, (tuple, list)):
         for entry in value:
             without_derivative(name, entry)
@@ -89,7 +94,7 @@ def _asks(value: Any) -> bool:
 
 def vacuum_wavelength(value: Any) -> float:
     """`value` [m] as float; ValueError unless it is > 0 and no longer than LONGEST_WAVE, as nanometres would be."""
-    wavelength = _number("wavelength", without_derivative("wavelength", value))
+    wavelength = _number("wavelength", value)
     if not SMALLEST <= wavelength <= LONGEST_WAVE:
         raise ValueError(
             f"wavelength = {shown(value)}: must be greater than 0 and at most {LONGEST_WAVE:g}, in m{UNIT}"
@@ -99,15 +104,15 @@ def vacuum_wavelength(value: Any) -> float:
 
 def vacuum_wavelengths(values: Any) -> np.ndarray:
     """`values` [m] as a float64 array of any shape, each checked as by `vacuum_wavelength`."""
-    wavelengths = reals("wavelengths", without_derivative("wavelengths", values))
+    wavelengths = reals("wavelengths", values)
     for end in (wavelengths.min(), wavelengths.max()) if wavelengths.size else ():
         vacuum_wavelength(end)
     return wavelengths
 
 
-def in_range(name: str, value: float, low: float, high: float) -> float:
-    """`value` as float; ValueError unless low <= value <= high."""
-    number = _number(name, value)
+def in_range(name: str, value: float, low: float, high: float, *, carried: bool = False) -> float:
+    """`value` as float; ValueError unless low <= value <= high. carried: see `without_derivative`."""
+    number = _number(name, value, carried)
     if not low <= number <= high:
         raise ValueError(f"{name} = {shown(value)}: must lie in [{low:g}, {high:g}]")
     return number
@@ -115,6 +120,7 @@ def in_range(name: str, value: float, low: float, high: float) -> float:
 
 def shape_2d(name: str, value: Any) -> tuple[int, int]:
     """(height, width) as ints; ValueError unless both are whole and at least 1."""
+    without_derivative(name, value)
     try:
         height, width = (int(n) for n in value)
         whole = all(float(n) == int(n) for n in value)
@@ -129,7 +135,7 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
 def one_of(name: str, value: Any, options: Iterable[str]) -> str:
     """`value`; ValueError, with the nearest option, unless it is one of them."""
     known = tuple(options)
-    if value not in known:
+    if not isinstance(value, str) or value not in known:
         raise ValueError(
             f"{name} = {shown(value)}: must be one of {', '.join(map(repr, known))}{did_you_mean(value, known)}"
         )
@@ -144,6 +150,8 @@ def did_you_mean(word: Any, known: Iterable[str], cutoff: float = 0.5) -> str:
 
 def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | None:
     """The known word that is nearest, in capitals or not; None where none is near (difflib's ratio below `cutoff`)."""
+    import difflib  # for messages only
+
     plain = {option.lower(): option for option in known}
     near = difflib.get_close_matches(word.lower(), plain, n=1, cutoff=cutoff)
     return plain[near[0]] if near else None
@@ -163,7 +171,8 @@ def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[f
 
 
 def reals(name: str, values: Any) -> np.ndarray:
-    """`values` as a float64 array of any shape; ValueError unless they are real numbers."""
+    """`values` as a float64 array of any shape; ValueError unless they are real numbers without derivatives."""
+    without_derivative(name, values)
     try:
         given = np.asarray(values)
     except (TypeError, ValueError):
@@ -193,6 +202,7 @@ def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
 
 def whole(name: str, value: Any, low: int, high: int) -> int:
     """`value` as int; ValueError unless it is whole and in [low, high]."""
+    without_derivative(name, value)
     try:
         fits = int(value) == value and low <= value <= high
     except (TypeError, ValueError, OverflowError):
@@ -209,7 +219,9 @@ def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
     return value
 
 
-def _number(name: str, value: Any) -> float:
+def _number(name: str, value: Any, carried: bool = False) -> float:
+    if not carried:
+        without_derivative(name, value)
     try:
         if isinstance(value, (str, bytes)):
             raise TypeError

@@ -7,17 +7,15 @@ comes from a child process and is cached by path, size and modification time.
 
 from __future__ import annotations
 
-import ctypes.util
 import glob
 import json
 import os
 import re
-import subprocess
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from functools import lru_cache
-from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
@@ -77,8 +75,11 @@ def candidates() -> Iterator[str]:
         return
     found = {os.path.realpath(path) for pattern in LIBRARY_PATTERNS for path in glob.glob(pattern, recursive=True)}
     yield from sorted(found, key=_version_in_name, reverse=True)
-    if not found and (name := ctypes.util.find_library("LLVM")):
-        yield name
+    if not found:
+        from ctypes import util
+
+        if name := util.find_library("LLVM"):
+            yield name
 
 
 def _version_in_name(path: str) -> tuple[int, ...]:
@@ -92,6 +93,8 @@ def prove(path: str) -> Llvm:
     """Run Dr.Jit with this LLVM library in a child process (0.1-0.2 s)."""
     if os.sep in path and not os.path.exists(path):
         return Llvm(path, "missing", detail="no such file")
+    import subprocess  # once in a machine's life
+
     environment = {**os.environ, VARIABLE: path}
     try:
         child = subprocess.run(
@@ -124,7 +127,21 @@ def _cache_key(path: str) -> str:
     """A verdict holds for this very file and this Dr.Jit."""
     stat = os.stat(path) if os.path.exists(path) else None
     size, modified = (stat.st_size, stat.st_mtime_ns) if stat else (0, 0)
-    return f"{path}|{size}|{modified}|drjit {metadata.version('drjit')}|python {sys.version_info[:2]}"
+    return f"{path}|{size}|{modified}|drjit {_drjit_version()}|python {sys.version_info[:2]}"
+
+
+def _drjit_version() -> str:
+    """By the name of the folder that its installation keeps beside it: importlib.metadata takes as long to import as
+    a picture to compute, and is asked only where there is no such folder."""
+    found = find_spec("drjit")
+    if found is not None and found.origin is not None:
+        beside = os.listdir(os.path.dirname(os.path.dirname(found.origin)))
+        versions = [name[6:-10] for name in beside if name.startswith("drjit-") and name.endswith(".dist-info")]
+        if len(versions) == 1:
+            return versions[0]
+    from importlib import metadata
+
+    return metadata.version("drjit")
 
 
 def _prove_cached(path: str) -> Llvm:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optics.numerics.arguments import LARGEST, SMALLEST, point_2d, positive, shape_2d, without_derivative
+from optics.numerics.arguments import LARGEST, SMALLEST, point_2d, positive, shape_2d
 from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision, opaque
 
@@ -30,9 +30,7 @@ class Grid:
         if self._is_plain:
             return  # planning makes hundreds of grids, of numbers that need no care
         object.__setattr__(self, "shape", shape_2d("shape", self.shape))
-        object.__setattr__(
-            self, "dx", positive("dx", without_derivative("dx", self.dx))
-        )  # a NumPy scalar would take a Dr.Jit array for its own
+        object.__setattr__(self, "dx", positive("dx", self.dx))  # a NumPy scalar would take a Dr.Jit array for its own
         object.__setattr__(self, "centre", point_2d("centre", self.centre))
 
     @property
@@ -45,8 +43,9 @@ class Grid:
             and min(height, width) >= 1
             and type(self.dx) is float
             and SMALLEST <= self.dx <= LARGEST
-            and self.centre == (0.0, 0.0)
             and type(self.centre) is tuple
+            and all(type(at) is float and at == 0 for at in self.centre)
+            and len(self.centre) == 2
         )
 
     @classmethod

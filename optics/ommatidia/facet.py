@@ -41,13 +41,13 @@ class FacetLens:
     shape: str = "hexagon"
 
     def __post_init__(self) -> None:
-        positive("diameter", without_derivative("diameter", self.diameter))
+        positive("diameter", self.diameter)
         for name in ("radius_front", "radius_back"):
             value = without_derivative(name, getattr(self, name))
             if not (isinstance(value, float) and math.isinf(value)):
                 positive(f"abs({name})", abs(finite(name, value)))
         if self.thickness != 0:
-            positive("thickness", without_derivative("thickness", self.thickness))
+            positive("thickness", self.thickness)
         for name in ("n", "object_n", "medium_n"):
             index_of(name, getattr(self, name))
         one_of("shape", self.shape, SHAPES)

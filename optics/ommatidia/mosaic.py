@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from optics.numerics.arguments import in_range, of_kind, positive, vacuum_wavelength, whole, without_derivative
+from optics.numerics.arguments import in_range, of_kind, positive, vacuum_wavelength, whole
 from optics.ommatidia.ommatidium import Ommatidium
 
 __all__ = ["AppositionEye", "hexagonal_directions"]
@@ -52,7 +52,6 @@ class AppositionEye:
 
     def __post_init__(self) -> None:
         of_kind("ommatidium", self.ommatidium, Ommatidium, "Ommatidium(FacetLens(25e-6, 14e-6), Waveguide(2e-6))")
-        without_derivative("interommatidial_deg", self.interommatidial_deg)
         in_range("interommatidial_deg", self.interommatidial_deg, 1e-3, 30.0)
         hexagonal_directions(self.rings, self.interommatidial_deg)
 

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from optics.elements.pupil import Pupil
-from optics.numerics.arguments import in_range, of_kind, positive, reals, vacuum_wavelength, without_derivative
+from optics.numerics.arguments import in_range, of_kind, positive, reals, vacuum_wavelength
 from optics.ommatidia.coupling import ModesAtPupil, modes_at_pupil
 from optics.ommatidia.facet import FacetLens
 from optics.ommatidia.waveguide import Mode, Waveguide
@@ -41,7 +41,7 @@ class Ommatidium:
             of_kind("lens", self.lens, Pupil, "FacetLens(25e-6, 14e-6), or a Pupil")
         of_kind("rhabdom", self.rhabdom, Waveguide, "Waveguide(2e-6)")
         if self.distance is not None:
-            positive("distance", without_derivative("distance", self.distance))
+            positive("distance", self.distance)
 
     @property
     def pupil(self) -> Pupil:
@@ -130,5 +130,12 @@ def _coupled(eye: Ommatidium, wavelength: float, steepest: float) -> ModesAtPupi
 
 def snyder_acceptance(diameter: float, focal_length: float, rhabdom: float, wavelength: float) -> float:
     """Δρ [rad] after Snyder (J. Comp. Physiol. 116, 161, 1977), √((λ/D)² + (d/f)²): diffraction and rhabdom as if both
-    were Gaussian and no waveguide. focal_length: the object's, n₀/P [m]."""
+    were Gaussian and no waveguide. focal_length: the object's, n₀/P [m].
+
+    Raises:
+        ValueError: a length that is not positive.
+    """
+    for name, value in (("diameter", diameter), ("focal_length", focal_length), ("rhabdom", rhabdom)):
+        positive(name, value)
+    vacuum_wavelength(wavelength)
     return math.hypot(wavelength / diameter, rhabdom / focal_length)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from optics.elements.refractive_index import Dispersion, index_of
-from optics.numerics.arguments import positive, reals, vacuum_wavelength, without_derivative
+from optics.numerics.arguments import positive, reals, vacuum_wavelength
 
 __all__ = ["Mode", "Waveguide"]
 
@@ -86,12 +86,12 @@ class Waveguide:
     absorption: float = 6e3
 
     def __post_init__(self) -> None:
-        positive("diameter", without_derivative("diameter", self.diameter))
+        positive("diameter", self.diameter)
         index_of("n_core", self.n_core)
         index_of("n_clad", self.n_clad)
         if self.length is not None:
-            positive("length", without_derivative("length", self.length))
-        positive("absorption", without_derivative("absorption", self.absorption), "1/m")
+            positive("length", self.length)
+        positive("absorption", self.absorption, "1/m")
 
     def v_number(self, wavelength: float) -> float:
         """V = πd/λ √(n_core² - n_clad²) at a vacuum wavelength [m]: below 2.405 there is one mode.

@@ -10,6 +10,7 @@ vector_focus   vector_focus: beyond scalar theory
 population     one plan for many pupils
 batch          psf_batch: many eyes at once
 contrast       mtf, image_quality
+mixture        sums over wavelengths
 white          white_psf: a lamp's light as receptors weigh it
 concentration  strehl_ratio, encircled_energy
 """

@@ -12,7 +12,7 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import Plan
-from optics.numerics.arguments import in_range, of_kind, positive, shown, vacuum_wavelength
+from optics.numerics.arguments import in_range, of_kind, positive, shown, vacuum_wavelength, without_derivative
 from optics.numerics.autodiff import Array, Scalar, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, padded_for_packets, precision
@@ -71,6 +71,7 @@ def psf_batch(
     for name, values in (("pupils", pupils), ("wavelengths", wavelengths), ("source_distances", source_distances)):
         if not isinstance(values, Sized) or len(values) == 0:
             raise ValueError(f"{name} = {shown(values)}: must be a sequence of at least one")
+    without_derivative("wavelengths", wavelengths)
     window = Grid(shape, dx)
     in_range("tolerance", tolerance, 1e-12, 0.5)
     members = list(_members(pupils, wavelengths, sensor_distance, source_distances))
@@ -96,11 +97,11 @@ def _members(
 ) -> Iterator[Member]:
     """Eyes, depths, wavelengths, the last fastest."""
     if sensor_distance is not None:
-        positive("sensor_distance", sensor_distance)
+        positive("sensor_distance", sensor_distance, carried=True)
     lambdas = [vacuum_wavelength(wavelength) for wavelength in wavelengths]
     first = number(PointSource(source_distances[0]).distance)
     for depth in source_distances:
-        positive("source_distance", depth, infinite=True)
+        positive("source_distance", depth, infinite=True, carried=True)
     for pupil in pupils:
         of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
         at = pupil.image_distance(first) if sensor_distance is None else sensor_distance

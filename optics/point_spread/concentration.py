@@ -6,17 +6,18 @@ Where the PSF carries derivatives, so do these numbers: they are Dr.Jit arrays t
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from optics.apertures.circular import disk_profile
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import point_2d, reals, shown, without_derivative
+from optics.numerics.arguments import point_2d, reals, shown
 from optics.numerics.autodiff import Array, to_user
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
-from optics.point_spread.contrast import flat
+from optics.point_spread.mixture import Mixture, flat
 from optics.point_spread.psf_result import SUM_ERROR, PSFResult
 
 __all__ = ["encircled_energy", "strehl_ratio"]
@@ -34,8 +35,9 @@ RIPPLE = 1e-5  # choice: of the circle's spectrum
 FINE = 1 / 3  # choice: of 1/cutoff, the coarsest pitch for circles; the finer, the less they need around them
 
 
-def strehl_ratio(result: PSFResult, with_error: bool = False) -> np.ndarray | Array:
-    """Peak of the PSF over the peak that the same aperture makes without aberration, (wavelength,).
+def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
+    """Peak of the PSF over the peak that the same aperture makes without aberration, (wavelength,); of a `WhitePSF`
+    (type,).
 
     Unaberrated is the spherical wave that converges on the sensor's axis; with L = √(z² + r²) its field there is
 
@@ -53,6 +55,8 @@ def strehl_ratio(result: PSFResult, with_error: bool = False) -> np.ndarray | Ar
     """
     import drjit as dr
 
+    if not isinstance(result, PSFResult):
+        return result.strehl_ratio(with_error)
     types = precision("float64")
     peaks, errors = zip(*(_peak(result, index) for index in range(result.tensor.shape[0])), strict=True)
     peak = types.Float(peaks[0] if len(peaks) == 1 else dr.concat(list(peaks)))
@@ -176,12 +180,13 @@ def _vertex(result: PSFResult, index: int) -> tuple[Array, float]:
 
 
 def encircled_energy(
-    result: PSFResult,
+    result: PSFResult | Mixture,
     radii: np.ndarray | float,
     centre: tuple[float, float] | None = None,
     with_error: bool = False,
-) -> np.ndarray | Array:
-    """Fraction of the pupil's power within `radii` [m] of `centre` (x, y) [m] on the sensor, (wavelength, radius).
+) -> Any:
+    """Fraction of the pupil's power within `radii` [m] of `centre` (x, y) [m] on the sensor, (wavelength, radius); of a
+    `WhitePSF` (type, radius).
 
     A sum over samples, each with the share of it that lies within the circle. The circle is convolved with a kernel
     whose spectrum is 1 where the intensity has one, and 0 beyond what samples can tell apart: the sum is then that of
@@ -196,7 +201,9 @@ def encircled_energy(
     """
     import drjit as dr
 
-    wanted = np.atleast_1d(reals("radii", without_derivative("radii", radii)))
+    if not isinstance(result, PSFResult):
+        return result.encircled_energy(radii, centre, with_error)
+    wanted = np.atleast_1d(reals("radii", radii))
     if wanted.ndim > 1:
         raise ValueError(f"radii has shape {wanted.shape}: must be a number or a row of them [m]")
     middle = result.centre if centre is None else point_2d("centre", centre)

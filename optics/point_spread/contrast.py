@@ -6,7 +6,6 @@ Where the PSF carries derivatives, so do these numbers: they are Dr.Jit arrays t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -14,16 +13,17 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import in_range, positive, reals, shown, without_derivative
+from optics.numerics.arguments import in_range, positive, reals, shown
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2
 from optics.numerics.grid import Grid
-from optics.numerics.precision import opaque, padded_for_packets, precision
+from optics.numerics.precision import opaque, precision
+from optics.point_spread.mixture import Mixture, flat, mixed
 from optics.point_spread.psf_result import PSFResult
 from optics.point_spread.request import Request
 
-__all__ = ["MTF", "combined_mtf", "flat", "image_quality", "mtf"]
+__all__ = ["MTF", "combined_mtf", "image_quality", "mtf"]
 
 ORIENTATIONS = 64  # choice: over which a profile is a mean
 HELD_TOO_MUCH = 1e-2  # choice: above all that arrives, by which sums may err
@@ -64,7 +64,7 @@ class MTF:
         if self.fx.size < 2:
             raise ValueError("a PSF of one sample has no frequencies but 0: must be at least 2 x 2")
         types = precision("float64")
-        f = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
+        f = np.atleast_1d(reals("frequencies", frequencies))
         angle = 2 * np.pi * (np.arange(ORIENTATIONS) + 0.5) / ORIENTATIONS
         side, waves = self.fx.size, self.tensor.shape[0]
         places = [np.outer(f, part) / (self.fx[1] - self.fx[0]) + side // 2 for part in (np.sin(angle), np.cos(angle))]
@@ -81,8 +81,9 @@ class MTF:
         return to_user(types.Tensor(mean, (waves, f.size)))
 
 
-def mtf(result: PSFResult, arriving: Any = None, tolerance: float = 0.02) -> MTF:
-    """|F{PSF}| over all the light that arrives (Goodman, Introduction to Fourier Optics, §6.3.2).
+def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.02) -> MTF:
+    """|F{PSF}| over all the light that arrives (Goodman, Introduction to Fourier Optics, §6.3.2). Of a `WhitePSF` one
+    of each type of receptor.
 
     arriving: what of the pupil's power arrives on the unbounded plane, a number or (wavelength,), in (0, 1]. None: all
         but what the pupil's edge, and slopes of its relief beyond grazing, make evanescent.
@@ -96,6 +97,11 @@ def mtf(result: PSFResult, arriving: Any = None, tolerance: float = 0.02) -> MTF
             which would do.
     """
     positive("tolerance", tolerance, "contrast")
+    if not isinstance(result, PSFResult):
+        if arriving is not None:
+            raise ValueError("arriving: must be None for a mixture of wavelengths, each of which has its own")
+        mixture: MTF = result.mtf(tolerance)
+        return mixture
     light, unsure = _arriving(result, arriving)
     known = light.numpy()
     seen = _wide(result.with_pitch(0.5 / result.highest_cutoff, "the MTF"), known, tolerance)
@@ -111,19 +117,18 @@ def mtf(result: PSFResult, arriving: Any = None, tolerance: float = 0.02) -> MTF
     return _transformed(seen, light, error)
 
 
-def combined_mtf(
-    result: PSFResult, weights: np.ndarray, combined: Callable[[PSFResult, np.ndarray], Array], tolerance: float
-) -> MTF:
-    """As `mtf`, of sums of the PSF's wavelengths: weights (sum, wavelength), combined(result, weights) (sum, y, x)."""
+def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MTF:
+    """As `mtf`, of sums of the PSF's wavelengths: weights (sum, wavelength), of which some may be below 0."""
     positive("tolerance", tolerance, "contrast")
     light, unsure = _arriving(result, None)
     known = light.numpy()
     seen = _wide(result.with_pitch(0.5 / float(result.cutoff.max()), "the MTF"), known, tolerance)
-    error = weights @ (np.maximum(known - plain(seen.held), 0) + unsure + seen.sum_error) / (weights @ known)
+    missing = np.maximum(known - plain(seen.held), 0) + unsure + seen.sum_error
+    error = np.abs(weights) @ missing / (weights @ known)
     if float(error.max()) > tolerance and tolerance < 1:
         raise AccuracyError(f"tolerance = {tolerance:g}: contrasts err by up to {float(error.max()):.2g}: widen it")
-    shortest = np.array([result.wavelengths[row > 0].min() for row in weights])
-    sums = replace(seen, tensor=combined(seen, weights), wavelengths=shortest, requests=())
+    shortest = np.array([result.wavelengths[row != 0].min() for row in weights])
+    sums = replace(seen, tensor=mixed(seen.tensor, weights), wavelengths=shortest, requests=())
     return _transformed(sums, precision("float64").Float(weights @ known), error)
 
 
@@ -212,7 +217,7 @@ def _bent_beyond_grazing(request: Request) -> float:
 
 
 def image_quality(
-    result: PSFResult,
+    result: PSFResult | Mixture,
     nyquist: float,
     throughput: Scalar = 1.0,
     noise_sigma: float = 0.0,
@@ -234,10 +239,11 @@ def image_quality(
     """
     import drjit as dr
 
-    positive("nyquist", without_derivative("nyquist", nyquist))
-    in_range("throughput", throughput, 0, 1)
-    in_range("noise_sigma", without_derivative("noise_sigma", noise_sigma), 0, 1e6)
-    waves = result.tensor.shape[0]
+    positive("nyquist", nyquist)
+    in_range("throughput", throughput, 0, 1, carried=True)
+    in_range("noise_sigma", noise_sigma, 0, 1e6)
+    transfer = mtf(result, tolerance=tolerance)
+    waves = transfer.tensor.shape[0]
     if number(throughput) == 0:
         return (np.zeros(waves), np.zeros(waves)) if with_error else np.zeros(waves)
     types = precision("float64")
@@ -245,15 +251,7 @@ def image_quality(
     weight = np.full(f.size, 1 / (f.size - 1))
     weight[[0, -1]] /= 2
     light = opaque(types, throughput)
-    transfer = mtf(result, tolerance=tolerance)
     contrast = types.Float(flat(transfer.profile(f)))
     above = dr.maximum(contrast - noise_sigma / light, 0) * types.Float(np.tile(weight, waves))
     value = to_user(types.Tensor(light * dr.block_reduce(dr.ReduceOp.Add, above, f.size), (waves,)))
     return (value, number(throughput) * transfer.predicted_error) if with_error else value
-
-
-def flat(tensor: np.ndarray | Array) -> Array:
-    """Row by row, Dr.Jit or NumPy."""
-    import drjit as dr
-
-    return padded_for_packets(tensor) if isinstance(tensor, np.ndarray) else dr.ravel(tensor)

@@ -224,5 +224,5 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, metho
     return (
         f"tolerance = {problem.tolerance:g} needs {least.largest} samples across and about {least.seconds:.2g} s by "
         f"{least.method}; the limits are {MOST_SAMPLES} and {most_seconds:g} s: widen the tolerance, shrink the window "
-        f"({width:.3g} m) or flatten the relief"
+        f"({width:.3g} m) or the pupil (radius {problem.radius:.3g} m, Fresnel number {problem.fresnel_number:.3g})"
     )

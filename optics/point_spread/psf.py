@@ -37,7 +37,7 @@ def psf(
 ) -> PSFResult:
     """|U|² / (pupil area) of the field U that a unit-amplitude wave makes behind the pupil.
 
-    wavelengths: in vacuum [m], one or a row of them.
+    wavelengths: in vacuum [m], one or a row of them; eight and more are planned as the first is, where that will do.
     sensor_distance: [m] behind the pupil; None: where an ideal lens images the source, or 240 µm without such a lens.
     source_distance, source_angle: [m], (x, y) [rad]: see PointSource.
     dx, shape, centre: of the window: pitch [m], samples (y, x), position of sample n//2 (x, y) [m].

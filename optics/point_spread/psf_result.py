@@ -22,6 +22,7 @@ from optics.numerics.arguments import reals, shown
 from optics.numerics.autodiff import Array, Scalar, number, to_user
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
+from optics.point_spread.mixture import mixed
 from optics.point_spread.pictures import pictures
 from optics.point_spread.planner import APPROXIMATE
 from optics.point_spread.request import Request
@@ -29,6 +30,7 @@ from optics.point_spread.request import Request
 __all__ = ["PSFResult", "spread"]
 
 MOST_AGAIN = 2049  # choice: samples along a side of a window that a measure asks for by itself
+MANY = 8  # choice: wavelengths of which each by itself would be planned longer than computed
 MOST_SECONDS = 20.0  # choice: that such a window may take
 SUM_ERROR = 3.0  # choice: how much more than the picture a sum may err, relatively: test_measure_errors.py
 OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are means over cells
@@ -157,7 +159,7 @@ class PSFResult:
         return float(self.cutoff.max() * self.wavelengths.max() / shortest)
 
     def mean(self, shares: np.ndarray) -> PSFResult:
-        """The PSF of light of all wavelengths at once, (1, y, x), at their mean wavelength; without derivatives.
+        """The PSF of light of all wavelengths at once, (1, y, x), at their mean wavelength, with derivatives.
 
         shares: (wavelength,) of each in the light; they sum to 1.
 
@@ -167,7 +169,7 @@ class PSFResult:
         parts = reals("shares", shares)
         if parts.shape != self.wavelengths.shape or not math.isclose(float(parts.sum()), 1, rel_tol=1e-6):
             raise ValueError(f"shares = {shown(shares)}: must be {self.wavelengths.size} that sum to 1")
-        image = np.tensordot(parts, self.psf.astype(np.float64), axes=1)[None]
+        image = mixed(self.tensor, parts[None])
         wavelength, asked = np.array([parts @ self.wavelengths]), self.requests if self.can_be_seen_anew else ()
         return replace(
             self,
@@ -229,14 +231,15 @@ def _through(request: Request, window: Grid) -> Request:
 
 
 def spread(requests: Sequence[Request]) -> PSFResult:
-    """PSFs of one pupil at several wavelengths, over one window.
+    """PSFs of one pupil at several wavelengths, over one window; MANY are planned as the first is, where that
+    will do.
 
     Raises:
         AccuracyError: no method meets the tolerance, or a window is so dark that rounding breaks it.
     """
     import drjit as dr
 
-    flat, plans, fields = zip(*pictures(requests), strict=True)
+    flat, plans, fields = zip(*pictures(requests, alike=len(requests) >= MANY), strict=True)
     beam, window, types = requests[0].beam, requests[0].problem.window, precision(requests[0].problem.dtype)
     tensor = types.Tensor(flat[0] if len(flat) == 1 else dr.concat(flat), (len(flat), *window.shape))
     wavelengths = np.array([request.beam.wavelength for request in requests])

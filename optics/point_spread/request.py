@@ -49,12 +49,14 @@ class Request:
         Raises:
             AccuracyError: no method meets the tolerance within the limits on memory and time.
         """
-        relief = self.beam.pupil.height
-        jump = 0.0 if relief is None else relief.jump
+        pupil = self.beam.pupil
+        jump = 0.0 if pupil.height is None else pupil.height.jump
         try:
             plan, sampling = self._as_before() or choose(self.problem, self._methods, self.most_seconds)
         except AccuracyError as error:
-            raise AccuracyError(f"{error}; {_wrapped(jump)}" if jump else str(error)) from None
+            bent = " and ".join(name for name in ("height", "wavefront") if getattr(pupil, name) is not None)
+            advice = _wrapped(jump) if jump else f"a flatter {bent} needs less" if bent else ""
+            raise AccuracyError(f"{error}; {advice}" if advice else str(error)) from None
         if jump and plan.seconds > MOST_SECONDS_OF_JUMPS:
             raise AccuracyError(f"about {plan.seconds:.2g} s by {plan.method}: {_wrapped(jump)}")
         return plan, sampling

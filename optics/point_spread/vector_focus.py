@@ -13,7 +13,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.methods.richards_wolf import Light, focal_integrals
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import of_kind, one_of, positive, shown, vacuum_wavelength
+from optics.numerics.arguments import of_kind, one_of, positive, shown, vacuum_wavelength, without_derivative
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 
@@ -74,6 +74,7 @@ def vector_focus(
     if not pupil.rotationally_symmetric(lambda_) or len(pupil.aperture.rings) > 1:
         raise ValueError(f"pupil = {shown(pupil)}: must be the same all around, a circle or ring with such a relief")
     z = pupil.image_distance(math.inf) if sensor_distance is None else positive("sensor_distance", sensor_distance)
+    _check_plain(pupil, lambda_)
     index = pupil.index_behind(lambda_)
     zones = pupil.radius**2 * index / (lambda_ * z)
     if zones < FEWEST_ZONES:
@@ -85,6 +86,15 @@ def vector_focus(
     found = focal_integrals(radii * dx, 2 * math.pi * index / lambda_, z, ends, light)
     found = found[:, back.reshape(window.shape)] / math.sqrt(pupil.area)
     return _components(found, np.arctan2(y, x), polarization, window.dx)
+
+
+def _check_plain(pupil: Pupil, wavelength: float) -> None:
+    """ValueError if the pupil carries a derivative."""
+    types = precision("float64")
+    at, middle = types.Float64(0.5), types.Float64(0.0)
+    path = pupil.path(at * pupil.radius, middle, wavelength, PointSource(), types)
+    for part in (pupil.aperture_radius, path, pupil.amplitude(at, middle, types)):
+        without_derivative("pupil", part)
 
 
 def _flat(pupil: Pupil, wavelength: float, z: float) -> tuple[tuple[float, float], Light]:
@@ -126,6 +136,7 @@ def _components(found: np.ndarray, phi: np.ndarray, polarization: Any, dx: float
     along, axial, twice, scalar = found
     by_x = np.array([along + twice * np.cos(2 * phi), twice * np.sin(2 * phi), -2j * axial * np.cos(phi)])
     by_y = np.array([twice * np.sin(2 * phi), along - twice * np.cos(2 * phi), -2j * axial * np.sin(phi)])
+    without_derivative("polarization", polarization)
     if polarization is None:
         both = (np.abs(by_x) ** 2 + np.abs(by_y) ** 2) / 2
         return VectorFocus(both, np.abs(scalar) ** 2, dx)

@@ -1,10 +1,10 @@
-"""White light: PSF and MTF as each type of receptor weighs the wavelengths of a lamp."""
+"""White light: PSF and its measures as each type of receptor weighs the wavelengths of a lamp."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,11 +12,12 @@ import numpy as np
 
 from optics.elements.pupil import Pupil
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import shown, whole
-from optics.numerics.autodiff import Array
-from optics.numerics.interpolation import linear_weights
+from optics.numerics.arguments import in_range, reals, shown, whole
+from optics.numerics.autodiff import Array, plain, to_user
 from optics.numerics.precision import precision
-from optics.point_spread.contrast import MTF, combined_mtf, flat
+from optics.point_spread.concentration import encircled_energy, strehl_ratio
+from optics.point_spread.contrast import MTF, combined_mtf
+from optics.point_spread.mixture import mixed
 from optics.point_spread.psf import psf
 from optics.point_spread.psf_result import PSFResult
 from optics.spectra.receptors import receptors_of
@@ -24,26 +25,32 @@ from optics.spectra.spectrum import Spectrum, illuminant
 
 __all__ = ["WhitePSF", "white_psf"]
 
-MOST_WAVES = 401
+FIRST, MOST_WAVES = 9, 513  # choice: wavelengths that are tried, and that are ever taken
+# Choice: what fewer wavelengths change, half of them, and what is left of it. A fifteenth, where splines converge as
+# their fourth power; tests/optics/point_spread/test_white.py.
+LEFT = 0.25
+OF_PICTURES = 0.5  # choice: of the tolerance; the rest is the spectrum's
 
 
 @dataclass(frozen=True, eq=False)
 class WhitePSF:
     """PSF of each type of receptor, Σ_λ w(λ) PSF_λ with weights that sum to 1.
 
-    waves: the PSFs (wavelength, y, x) it is made of. weights: (type, wavelength).
-    spectral_error: (type,) predicted relative L2 error of so few wavelengths, half the difference from every second
-        one: linear between wavelengths, a third of it is left.
+    waves: the PSFs (wavelength, y, x) it is made of. weights: (type, wavelength); between wavelengths PSFs are cubic
+    splines, so that a weight may be a little below 0. coarse: the same of every second wavelength, and 0 between.
+    spectral_error: (type,) predicted relative L2 error of so few wavelengths, a quarter of the difference from every
+        second one: it falls with the fourth power of their number.
     """
 
     waves: PSFResult
     weights: np.ndarray
+    coarse: np.ndarray
     spectral_error: np.ndarray
 
     @cached_property
     def tensor(self) -> Array:
         """(type, y, x) in Dr.Jit, with derivatives."""
-        return _combined(self.waves, self.weights)
+        return mixed(self.waves.tensor, self.weights)
 
     @cached_property
     def psf(self) -> np.ndarray:
@@ -53,7 +60,7 @@ class WhitePSF:
     @property
     def predicted_error(self) -> np.ndarray:
         """(type,) relative L2 error over the window, of spectrum and pictures."""
-        found: np.ndarray = self.spectral_error + self.waves.plan.predicted_error
+        found: np.ndarray = self.spectral_error + self.waves.plan.predicted_error * np.abs(self.weights).sum(axis=1)
         return found
 
     def mtf(self, tolerance: float = 0.02) -> MTF:
@@ -62,55 +69,122 @@ class WhitePSF:
         Raises:
             AccuracyError: see `optics.mtf`.
         """
-        return combined_mtf(self.waves, self.weights, _combined, tolerance)
+        import drjit as dr
+
+        found = combined_mtf(self.waves, np.vstack([self.weights, self.coarse]), tolerance)
+        types, count, (height, width) = precision("float64"), len(self.weights), found.tensor.shape[1:]
+        fine, rough = found.mtf[:count], found.mtf[count:]
+        kept = dr.gather(types.Float, found.tensor.array, dr.arange(types.Index, count * height * width))
+        error = found.predicted_error[:count] + LEFT * np.abs(fine - rough).max(axis=(1, 2))
+        tensor = types.Tensor(kept, (count, height, width))
+        return replace(found, tensor=tensor, cutoff=found.cutoff[:count], predicted_error=error)
+
+    def strehl_ratio(self, with_error: bool = False) -> np.ndarray | Array:
+        """White peak over that of the same light without aberration, (type,). See `optics.strehl_ratio`.
+
+        Raises:
+            AccuracyError: see `optics.strehl_ratio`.
+        """
+        import drjit as dr
+
+        each = [strehl_ratio(self.waves.mean(row), with_error=True) for row in self.weights]
+        ratios, errors = ([row[part] for row in each] for part in (0, 1))
+        around = np.linalg.norm(self.psf, axis=(1, 2)) / self.psf.max(axis=(1, 2))
+        error = np.concatenate(errors) + self.spectral_error * around * np.concatenate([plain(r) for r in ratios])
+        if isinstance(ratios[0], np.ndarray):
+            value: np.ndarray | Array = np.concatenate(ratios)
+        else:
+            joined = ratios[0].array if len(ratios) == 1 else dr.concat([ratio.array for ratio in ratios])
+            value = type(ratios[0])(joined, (len(ratios),))
+        return (value, error) if with_error else value
+
+    def encircled_energy(
+        self,
+        radii: np.ndarray | float,
+        centre: tuple[float, float] | None = None,
+        with_error: bool = False,
+    ) -> np.ndarray | Array:
+        """Σ_λ w(λ) of what each wavelength holds, (type, radius). See `optics.encircled_energy`.
+
+        Raises:
+            ValueError: see `optics.encircled_energy`.
+            AccuracyError: see `optics.encircled_energy`.
+        """
+        each, errors = encircled_energy(self.waves, radii, centre, with_error=True)
+        known = plain(each)
+        change = np.abs((self.weights - self.coarse) @ known)
+        error = np.abs(self.weights) @ errors + LEFT * change
+        if isinstance(each, np.ndarray):
+            value: np.ndarray | Array = self.weights @ known
+        else:
+            value = to_user(mixed(each, self.weights))
+        return (value, error) if with_error else value
 
 
 def white_psf(
     pupil: Pupil,
     light: str | Spectrum | Callable[[np.ndarray], np.ndarray] = "D65",
     receptors: Any = "lms",
-    waves: int = 31,
+    waves: int | str = "auto",
     tolerance: float = 1e-2,
     **asked: Any,
 ) -> WhitePSF:
     """PSF in white light, as types of receptors see it: w(λ) ∝ light(λ) λ sensitivity(λ), since they count photons.
 
     light: name of an illuminant, a Spectrum, or spectral power as a function of wavelengths [m].
-    receptors: see `optics.receptors_of`; their types, in order. waves: an odd number of wavelengths over the
-        receptors' range; between them PSFs are linear. tolerance: of each picture as in `optics.psf`, and of the
-        spectrum, which fewer wavelengths carry less well. asked: all else that `optics.psf` takes.
+    receptors: see `optics.receptors_of`; their types, in order.
+    waves: "auto", as few wavelengths over the receptors' range as the tolerance allows; or an odd number of them.
+        Between them PSFs are cubic splines. All are planned as the first one is, where that will do.
+    tolerance: relative L2 error over the window, of the pictures and of the spectrum together. asked: all else that
+        `optics.psf` takes.
 
     Raises:
         ValueError: a bad argument, or light that no receptor of a type sees.
         AccuracyError: too few wavelengths, with how many would do; or see `optics.psf`.
     """
-    if whole("waves", waves, 5, MOST_WAVES) % 2 == 0:
+    by_itself = isinstance(waves, str) and waves == "auto"
+    count = FIRST if by_itself else whole("waves", waves, 5, MOST_WAVES)
+    if count % 2 == 0:
         raise ValueError(f"waves = {waves}: must be odd, so that every second wavelength reaches as far")
     if "wavelengths" in asked:
         raise ValueError("wavelengths: those of white light are the receptors' range, in `waves` steps")
+    within = in_range("tolerance", tolerance, 1e-12, 0.5) * OF_PICTURES
     kinds = receptors_of(receptors)
-    nodes = np.linspace(*kinds.limits_nm, waves)
-    weights, coarse = (_weights(light, kinds, each) for each in (nodes, nodes[::2]))
-    result = psf(pupil, nodes * 1e-9, tolerance=tolerance, **asked)
-    flat_psf = result.psf.reshape(waves, -1).astype(np.float64)
-    fine, rough = weights @ flat_psf, coarse @ flat_psf[::2]
-    error = np.linalg.norm(rough - fine, axis=1) / np.linalg.norm(fine, axis=1)
-    # Linear between wavelengths: half the step, a quarter of the error; a third of the difference is left.
-    if (worst := float(error.max()) / 3) > tolerance:
-        more = 2 * math.ceil(waves * math.sqrt(1.2 * worst / tolerance) / 2) + 1
-        raise AccuracyError(
-            f"tolerance = {tolerance:g}: {waves} wavelengths carry the spectrum to {worst:.2g}; ask for waves={more}"
-        )
-    return WhitePSF(result, weights, error / 2)
+    caught, ends = _caught(light, kinds), kinds.limits_nm
+    result = psf(pupil, np.linspace(*ends, count) * 1e-9, tolerance=within, **asked)
+    while True:
+        found = _weighed(result, caught, ends)
+        worst = float(found.spectral_error.max())
+        if worst <= tolerance - within:
+            return found
+        if not by_itself or 2 * count - 1 > MOST_WAVES:
+            more = 2 * math.ceil(count * (1.2 * worst / within) ** 0.25 / 2) + 1
+            raise AccuracyError(
+                f"tolerance = {tolerance:g}: {count} wavelengths carry the spectrum to {worst:.2g}; ask for "
+                f"waves={more}, or 'auto'"
+            )
+        count = 2 * count - 1
+        result = _with_middles(result, psf(pupil, np.linspace(*ends, count)[1::2] * 1e-9, tolerance=within, **asked))
 
 
-def _weights(light: Any, kinds: Any, nodes: np.ndarray) -> np.ndarray:
-    """(type, wavelength): integrals to 1 nm of what each type catches, times hats around the nodes [nm]."""
+def _weighed(result: PSFResult, caught: np.ndarray, ends: tuple[float, float]) -> WhitePSF:
+    nodes = np.linspace(*ends, len(result.wavelengths))
+    weights, coarse = caught @ _splines(nodes, ends), np.zeros((len(caught), len(nodes)))
+    coarse[:, ::2] = caught @ _splines(nodes[::2], ends)
+    flat = result.psf.reshape(len(nodes), -1).astype(np.float64)
+    fine = weights @ flat
+    error = LEFT * np.linalg.norm(coarse @ flat - fine, axis=1) / np.linalg.norm(fine, axis=1)
+    return WhitePSF(result, weights, coarse, error)
+
+
+def _caught(light: Any, kinds: Any) -> np.ndarray:
+    """(type, nm): what each type catches, to 1 nm, in shares of all that it does."""
     source = illuminant(light) if isinstance(light, str) else light
     if not isinstance(source, Spectrum) and not callable(source):
         raise ValueError(f"light = {shown(light)}: must be an illuminant's name, a Spectrum, or a function of [m]")
-    nm = np.arange(nodes[0], nodes[-1] + 0.5)
-    power = source.at(nm * 1e-9) if isinstance(source, Spectrum) else np.broadcast_to(source(nm * 1e-9), nm.shape)
+    nm = _nanometres(kinds.limits_nm)
+    given = source.at(nm * 1e-9) if isinstance(source, Spectrum) else reals("light", source(nm * 1e-9))
+    power = np.broadcast_to(given, nm.shape)
     if not (np.isfinite(power).all() and (power >= 0).all()):
         raise ValueError("light: must be finite and not negative over the receptors' range")
     caught = np.stack([kind.at(nm * 1e-9) * nm * power for kind in kinds.types])
@@ -118,17 +192,42 @@ def _weights(light: Any, kinds: Any, nodes: np.ndarray) -> np.ndarray:
     total = caught.sum(axis=1, keepdims=True)
     if not (total > 0).all():
         raise ValueError(f"light: receptors of type {int(np.argmin(total))} see nothing of it")
-    found: np.ndarray = caught @ linear_weights(nm, nodes).T / total
+    found: np.ndarray = caught / total
     return found
 
 
-def _combined(result: PSFResult, weights: np.ndarray) -> Array:
-    """Σ_λ weights[type, λ] PSF_λ, (type, y, x)."""
+def _nanometres(ends: tuple[float, float]) -> np.ndarray:
+    return np.arange(ends[0], ends[1] + 0.5)
+
+
+def _splines(nodes: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    """(nm, wavelength): the cubic spline that is 1 at one of the nodes [nm] and 0 at the others, for each of them."""
+    from scipy.interpolate import CubicSpline
+
+    found: np.ndarray = CubicSpline(nodes, np.eye(len(nodes)))(_nanometres(ends))
+    return found
+
+
+def _with_middles(result: PSFResult, between: PSFResult) -> PSFResult:
+    """Both, the second's wavelengths between the first's."""
     import drjit as dr
 
-    types = precision("float64")
+    def braided(first: Any, second: Any) -> list[Any]:
+        return [(first, second)[index % 2][index // 2] for index in range(len(first) + len(second))]
+
+    types = precision(result.requests[0].problem.dtype)
     count, height, width = result.tensor.shape
-    values, size = types.Float(flat(result.tensor)), height * width
-    planes = [dr.gather(types.Float, values, dr.arange(types.Index, size) + index * size) for index in range(count)]
-    sums = [sum(float(w) * plane for w, plane in zip(row, planes, strict=True)) for row in weights]
-    return types.Tensor(sums[0] if len(sums) == 1 else dr.concat(sums), (len(sums), height, width))
+    size, parts = height * width, [types.Float(dr.ravel(each.tensor)) for each in (result, between)]
+    both = dr.concat(parts)
+    plane = np.array(braided(range(count), range(count, 2 * count - 1)))
+    at = types.Index(np.repeat(plane * size, size).astype(np.uint32)) + types.Index(
+        np.tile(np.arange(size), 2 * count - 1).astype(np.uint32)
+    )
+    return replace(
+        result,
+        tensor=types.Tensor(dr.gather(types.Float, both, at), (2 * count - 1, height, width)),
+        wavelengths=np.array(braided(result.wavelengths, between.wavelengths)),
+        plans=tuple(braided(result.plans, between.plans)),
+        requests=tuple(braided(result.requests, between.requests)),
+        field_parts=None,
+    )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import one_of, shown
+from optics.numerics.arguments import one_of, shown, without_derivative
 from optics.spectra.pigment import Pigment
 from optics.spectra.spectrum import LIMITS_NM, Spectrum, cone_fundamentals, daylight
 
@@ -78,6 +78,7 @@ class Receptors:
 
 
 def _types(types: Any) -> tuple[Pigment | Spectrum, ...]:
+    without_derivative("receptors", types)
     if isinstance(types, (Pigment, Spectrum)) or np.ndim(types) == 0:
         types = (types,)
     if not len(types):

@@ -12,7 +12,7 @@ from importlib import resources
 
 import numpy as np
 
-from optics.numerics.arguments import one_of, vacuum_wavelengths
+from optics.numerics.arguments import one_of, vacuum_wavelengths, without_derivative
 
 __all__ = [
     "ILLUMINANTS",
@@ -66,6 +66,7 @@ class Spectrum:
 
 
 def _row(name: str, numbers: Sequence[float]) -> tuple[float, ...]:
+    without_derivative(name, numbers)
     try:
         row = np.asarray(numbers, dtype=np.float64)
     except (TypeError, ValueError):

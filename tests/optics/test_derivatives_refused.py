@@ -8,6 +8,8 @@ from drjit.auto.ad import Float64, TensorXf64
 import optics
 
 PUPIL = optics.Pupil(10e-6, thin_lens_focal_length=100e-6)
+WIDE = optics.Pupil(1e-3, thin_lens_focal_length=1e-3)
+EYE = optics.Eye(PUPIL, resolution=(5, 5))
 FIELD = np.ones((4, 4), dtype=complex)
 
 
@@ -15,6 +17,16 @@ def asking(value):
     found = Float64(value)
     dr.enable_grad(found)
     return found
+
+
+def asking_map(shape):
+    found = TensorXf64(np.ones(shape))
+    dr.enable_grad(found)
+    return found
+
+
+def a_picture():
+    return optics.psf(PUPIL, shape=(9, 9))
 
 
 def seen_by_a_rhabdom(pupil):
@@ -68,6 +80,37 @@ DROPPED = {
     "radii": lambda: optics.encircled_energy(optics.psf(PUPIL, shape=(9, 9)), asking(1e-6)),
     "nyquist": lambda: optics.image_quality(optics.psf(PUPIL, shape=(9, 9)), asking(1e5)),
     "noise_sigma": lambda: optics.image_quality(optics.psf(PUPIL, shape=(9, 9)), 1e5, 1.0, asking(0.1)),
+    "centre of a window on the axis": lambda: optics.psf(PUPIL, centre=(asking(0.0), 0.0)),
+    "tolerance": lambda: optics.psf(PUPIL, tolerance=asking(1e-3)),
+    "shape": lambda: optics.psf(PUPIL, shape=(asking(9.0), 9)),
+    "wavelengths of a batch": lambda: optics.psf_batch([PUPIL], asking([500e-9])),
+    "waves": lambda: optics.white_psf(PUPIL, waves=asking(31.0)),
+    "light": lambda: optics.white_psf(PUPIL, lambda wavelengths: asking(np.ones(len(wavelengths)))),
+    "pupil of a vector focus": lambda: optics.vector_focus(optics.Pupil(asking(1e-3), thin_lens_focal_length=1e-3)),
+    "pupil of a vector focus, its lens": lambda: optics.vector_focus(
+        optics.Pupil(1e-3, thin_lens_focal_length=asking(1e-3))
+    ),
+    "sensor_distance of a vector focus": lambda: optics.vector_focus(WIDE, sensor_distance=asking(1e-3)),
+    "polarization": lambda: optics.vector_focus(WIDE, polarization=(asking(1.0), 0.0)),
+    "sensor_width": lambda: optics.Eye(PUPIL, sensor_width=asking(2e-4)),
+    "noise_sigma of an eye": lambda: optics.Eye(PUPIL, noise_sigma=asking(0.1)),
+    "bands": lambda: optics.Eye(PUPIL, bands=asking(4.0)),
+    "receptors": lambda: optics.Eye(PUPIL, receptors=asking([500.0, 600.0])),
+    "direction_deg": lambda: EYE.kernel(2, direction_deg=(asking(1.0), 0.0)),
+    "radiance": lambda: EYE.see(asking_map((4, 10, 10)), 2),
+    "tolerance of a sight": lambda: EYE.sight(2, tolerance=asking(0.01)),
+    "z": lambda: EYE.sight(2, z=[asking(1.0), 2.0]),
+    "illuminance": lambda: optics.PhotonBudget(asking(1e4)),
+    "lambda_max_nm": lambda: optics.Pigment(asking(500.0)),
+    "values": lambda: optics.Spectrum((400.0, 700.0), asking([1.0, 1.0])),
+    "rotation_deg of a polygon": lambda: optics.Polygon.regular(6, asking(30.0)),
+    "arriving": lambda: optics.mtf(a_picture(), arriving=asking(0.9)),
+    "tolerance of an MTF": lambda: optics.mtf(a_picture(), tolerance=asking(0.9)),
+    "frequencies": lambda: optics.mtf(a_picture(), tolerance=0.9).profile(asking([1e5])),
+    "shares": lambda: a_picture().mean(asking([1.0])),
+    "distance of a plane": lambda: optics.FreeSpace(asking(1e-3)),
+    "angle_x": lambda: optics.Ommatidium(PUPIL, optics.Waveguide(2e-6)).sensitivity(asking(0.0), 0.0),
+    "focal_length of Snyder": lambda: optics.snyder_acceptance(2.5e-5, asking(5e-5), 2e-6, 5e-7),
     "distance": lambda: optics.propagate(FIELD, dx=1e-6, wavelength=5e-7, distance=asking(1e-3)),
 }
 

@@ -24,6 +24,14 @@ def test_steep_heights_need_no_memory_to_be_refused():
         optics.psf(optics.Pupil(5e-3, height=PHASE[:12, :12] * 5e-2))
 
 
+def test_a_refusal_names_what_there_is():
+    """A hole 25 m wide has no relief to flatten: its radius is told. A relief of millimetres is named."""
+    with pytest.raises(optics.AccuracyError, match=r"the pupil \(radius 25 m, Fresnel number [\d.e+]+\)$"):
+        optics.psf(optics.Pupil(25))
+    with pytest.raises(optics.AccuracyError, match=r"Fresnel number [\d.]+\); a flatter height needs less$"):
+        optics.psf(optics.Pupil(25e-6, np.random.default_rng(0).random((8, 8)) * 0.9e-3))
+
+
 def test_a_wrapped_height_map_points_at_pixels():
     x = (np.arange(128) + 0.5) / 64 - 1
     for radius in (60e-6, 200e-6):  # too slow, and refused anyhow

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from importlib import metadata
 
 import pytest
 
@@ -77,6 +78,10 @@ def test_verdict_is_cached_and_proved_anew_for_another_file(tmp_path, monkeypatc
     library.write_bytes(b"another")
     backend.find([str(library)])
     assert len(calls) == 2
+
+
+def test_the_version_of_drjit_is_that_of_its_metadata():
+    assert backend._drjit_version() == metadata.version("drjit")
 
 
 def test_corrupt_cache_is_ignored(tmp_path, monkeypatch):

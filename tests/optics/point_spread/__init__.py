@@ -3,6 +3,7 @@
 batch: test_batch.py
 concentration: test_measures.py, test_measure_errors.py
 contrast: test_measures.py, test_measure_errors.py
+mixture: test_mixture.py
 pictures: test_pictures.py
 planner: test_planner.py
 population: test_population.py

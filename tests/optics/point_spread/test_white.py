@@ -11,6 +11,7 @@ from validation import reference
 
 R, F = 60e-6, 6e-3
 LENS = Pupil(R, thin_lens_focal_length=F)
+COMA = Pupil(R, thin_lens_focal_length=F, wavefront=Zernike({(2, 0): 1.0, (3, 1): 0.2}))
 GREEN = Spectrum((420.0, 540.0, 680.0), (0.0, 1.0, 0.0))
 SMALL = {"dx": 8e-6, "shape": (15, 15), "tolerance": 1e-3}
 
@@ -72,6 +73,88 @@ def test_predicted_error_holds():
         assert reference.relative_l2(got, true) < error < 0.02
 
 
+def test_as_few_wavelengths_as_the_tolerance_allows():
+    """Against the mean over every other nanometre of PSFs asked for one by one, with weights typed out here."""
+    nm = np.arange(420.0, 681, 2)
+    weight = caught(optics.illuminant("D65"), GREEN, nm)
+    each = np.stack([optics.psf(COMA, [at * 1e-9], **{**SMALL, "tolerance": 1e-5}).psf[0] for at in nm])
+    exact = np.tensordot(weight / weight.sum(), each, axes=1)
+    counts = []
+    for tolerance in (1e-1, 1e-2, 1e-3):
+        white = optics.white_psf(COMA, "D65", GREEN, **{**SMALL, "tolerance": tolerance})
+        counts.append(len(white.waves.wavelengths))
+        assert white.predicted_error[0] <= tolerance
+        assert reference.relative_l2(white.psf[0], exact) <= white.predicted_error[0]
+        assert [request.beam.wavelength for request in white.waves.requests] == list(white.waves.wavelengths)
+        assert np.all(np.diff(white.waves.wavelengths) > 0)
+    assert counts == sorted(counts)
+    assert counts[0] < counts[2]
+
+
+def test_the_spectrums_error_falls_with_the_fourth_power(monkeypatch):
+    """Of splines; linear between wavelengths it would fall with the second."""
+    monkeypatch.setattr("optics.point_spread.white.LEFT", 1e-9)  # take whatever number is asked for
+    ask = {"dx": 8e-6, "shape": (9, 9), "tolerance": 1e-4}
+    *found, exact = (optics.white_psf(COMA, "A", GREEN, waves=waves, **ask).psf[0] for waves in (9, 17, 33, 65))
+    errors = [reference.relative_l2(each, exact) for each in found]
+    assert reference.order_of_convergence([1 / 8, 1 / 16, 1 / 32], errors) > 3.7
+
+
+def test_all_wavelengths_are_planned_as_the_first():
+    white = optics.white_psf(LENS, "D65", GREEN, waves=9, **{**SMALL, "tolerance": 1e-2})
+    assert white.waves.plans[0].why.endswith("cheapest of those that meet the tolerance")
+    assert all("as at the wavelength before" in plan.why for plan in white.waves.plans[1:])
+
+
+def test_measures_take_white_light():
+    """Each against its definition: sums over wavelengths of what monochromatic light has."""
+    white = optics.white_psf(LENS, "A", "lms", dx=4e-6, shape=(41, 41), centre=(0.0, 0.0))
+    (strehl, error), peaks = optics.strehl_ratio(white, with_error=True), white.psf[:, 20, 20]
+    ideal = white.weights @ (np.pi * R**2 / (white.waves.wavelengths * F) ** 2)
+    assert np.all(np.abs(strehl - peaks / ideal) < error + 1e-3)
+    assert strehl == pytest.approx(1, abs=2e-3)
+    radii = np.array([2e-5, 5e-5])
+    energy, error = optics.encircled_energy(white, radii, with_error=True)
+    for cone in range(3):
+        for index, radius in enumerate(radii):
+            airy = [reference.airy_encircled_energy(radius, at, R, F) for at in white.waves.wavelengths]
+            assert energy[cone, index] == pytest.approx(white.weights[cone] @ airy, abs=error[cone, index] + 2e-3)
+    contrast = optics.mtf(white)
+    assert contrast.mtf.shape == white.mtf().mtf.shape == (3, *contrast.mtf.shape[1:])
+    assert optics.image_quality(white, 1e4).shape == (3,)
+    with pytest.raises(ValueError, match="arriving: must be None for a mixture"):
+        optics.mtf(white, arriving=0.9)
+
+
+def test_a_strehl_ratio_of_colours_side_by_side():
+    """Of a lens of dispersive glass: the peak of the mean, not the mean of peaks that lie apart."""
+    x = np.linspace(-1, 1, 4) * 3 * R
+    glass = optics.RefractiveIndex.from_abbe(1.5, 20)
+    prism = Pupil(R, optics.BSplineRelief(np.outer(np.ones(4), 0.3 * x)), n=glass, thin_lens_focal_length=F)
+    white = optics.white_psf(prism, "D65", GREEN, dx=8e-6, shape=(61, 61), centre=(0.15 * F, 0.0))
+    ratio, error = optics.strehl_ratio(white, with_error=True)
+    ideal = white.weights @ (np.pi * R**2 / (white.waves.wavelengths * F) ** 2)
+    assert ratio == pytest.approx(white.psf.max(axis=(1, 2)) / ideal, rel=0.03)
+    assert ratio[0] < 0.9 * (white.weights @ optics.strehl_ratio(white.waves))[0]
+    assert 0 < error[0] < 0.05
+
+
+def test_measures_carry_derivatives():
+    def measured(focus):
+        white = optics.white_psf(
+            Pupil(R, thin_lens_focal_length=focus), "D65", GREEN, 9, 1e-2, sensor_distance=F, dx=9e-6
+        )
+        return optics.strehl_ratio(white), optics.encircled_energy(white, 5e-5)
+
+    step = 1e-6
+    before, after = measured(5.5e-3 - step), measured(5.5e-3 + step)
+    for index in range(2):
+        asked = Float64(5.5e-3)
+        dr.enable_grad(asked)
+        dr.backward(dr.sum(measured(asked)[index].array))
+        assert dr.grad(asked)[0] == pytest.approx(np.sum(after[index] - before[index]) / (2 * step), rel=5e-3)
+
+
 def test_derivatives_flow():
     def bright(focus):
         white = optics.white_psf(
@@ -95,7 +178,7 @@ def test_derivatives_flow():
         ({"light": lambda at: -at}, "light: must be finite and not negative"),
         ({"light": Spectrum((700.0, 701), (0.0, 1.0)), "receptors": (350,)}, "light: receptors of type 0 see nothing"),
         ({"waves": 30}, "waves = 30: must be odd"),
-        ({"waves": 3}, r"waves = 3: must be a whole number in \[5, 401\]"),
+        ({"waves": 3}, r"waves = 3: must be a whole number in \[5, 513\]"),
         ({"wavelengths": [5e-7]}, "wavelengths: those of white light"),
     ],
 )

@@ -1,0 +1,46 @@
+"""Sums over wavelengths, and what has measures of its own because it is one."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from optics.numerics.precision import padded_for_packets, precision
+
+__all__ = ["Mixture", "flat", "mixed"]
+
+
+class Mixture(Protocol):
+    """Light of several wavelengths at once, such as a WhitePSF; see the functions of these names."""
+
+    def mtf(self, tolerance: float = 0.02) -> Any: ...
+
+    def strehl_ratio(self, with_error: bool = False) -> Any: ...
+
+    def encircled_energy(
+        self,
+        radii: np.ndarray | float,
+        centre: tuple[float, float] | None = None,
+        with_error: bool = False,
+    ) -> Any: ...
+
+
+def mixed(tensor: np.ndarray | Array, weights: np.ndarray) -> Array:
+    """Σ_λ weights[row, λ] tensor[λ, …], (row, …) in Dr.Jit, with derivatives."""
+    import drjit as dr
+
+    types = precision("float64")
+    count, rest = tensor.shape[0], tuple(tensor.shape[1:])
+    values, size = types.Float(flat(tensor)), int(np.prod(rest))
+    planes = [dr.gather(types.Float, values, dr.arange(types.Index, size) + index * size) for index in range(count)]
+    sums = [sum(float(w) * plane for w, plane in zip(row, planes, strict=True)) for row in weights]
+    return types.Tensor(sums[0] if len(sums) == 1 else dr.concat(sums), (len(sums), *rest))
+
+
+def flat(tensor: np.ndarray | Array) -> Array:
+    """Row by row, Dr.Jit or NumPy."""
+    import drjit as dr
+
+    return padded_for_packets(tensor) if isinstance(tensor, np.ndarray) else dr.ravel(tensor)
