@@ -119,9 +119,9 @@ def _lights(rows: Iterable[Trained]) -> list[float]:
 
 
 def _lives(rows: Sequence[Trained], sigma: float) -> str:
-    """How many lives every animal has lived in this light: as many as all of them have."""
+    """How many lives each animal has lived in this light, of those that have lived in it."""
     counts = [len(_cell(rows, task, sigma, shape)) for task in TASKS for shape in SHAPES]
-    least, most = min(counts), max(counts)
+    least, most = min(filter(None, counts)), max(counts)
     return f"{least}{f' to {most}' if most > least else ''} at σ = {sigma:g}"
 
 
