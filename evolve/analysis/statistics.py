@@ -224,7 +224,7 @@ def eye_image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
     if eye.pupil is None:
         return max(1 - noise_of(eye), 0.0)
     white = polychromatic(eye, eye.psf())
-    return float(optics.image_quality(white, 1 / (2 * eye.receptor_pitch), eye.throughput, noise_of(eye))[0])
+    return float(optics.image_quality(white, 1 / (2 * eye.receptor_pitch), eye.white_signal, noise_of(eye))[0])
 
 
 def bootstrap_interval(

@@ -53,7 +53,7 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
         )
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)
-    gain = 1 / float(eyes.eye().throughput)
+    gain = 1 / float(eyes.eye().white_signal)
     return Vision(quality, contrast, psnr(seen, perfect, gain), ssim(gain * seen, perfect))
 
 

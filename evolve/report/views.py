@@ -48,7 +48,7 @@ def _busiest(episode: AnyEpisode) -> int:
 def _row(episode: AnyEpisode, eye: int, name: str, frame: int, lens: optics.Eye) -> Html:
     time = episode.radiance_frames[frame]
     scene = np.einsum("cb,byx->cyx", lens.spectral_bands.weights, episode.radiance[frame, eye])
-    gain = 1 / lens.throughput
+    gain = 1 / lens.white_signal
     pictures = (
         ("scene", display(scene)),
         ("perfect lens", display(episode.perfect_signals[time, eye])),
