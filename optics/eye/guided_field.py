@@ -31,6 +31,7 @@ FINER = 10.0  # choice: E is sampled for a tenth of the tolerance; it goes throu
 DEGREE, MARGIN = 5, 8  # of the spline, and samples beyond the window that it needs
 MOST_SAMPLES = 4096  # choice: of E, along an axis
 DEPTHS = 3.0  # choice: of the first mode's evanescent field, beyond the core, that belong to the window
+MORE_DIGITS = 1.5  # choice: of amplitudes, than of the tolerance
 WIDER = 1.5  # choice: steps in which windows are tried
 CELL_DIGITS = 4.0  # choice: of integrals over cells
 
@@ -140,8 +141,9 @@ def _seen(beam: Beam, spot: Spot, guide: Guide, cells: _Cells) -> tuple[np.ndarr
     modes = guide.waveguide.modes(beam.wavelength)
     taken = np.array([guide.waveguide.absorbed(mode) for mode in modes])
     steepest = float(np.hypot(np.abs(sine_x).max(), np.abs(sine_y).max()))
-    caught = modes_at_pupil(beam, modes, steepest, spot.centre)
-    seen = caught.power_on(sines, taken)
+    digits = MORE_DIGITS - math.log10(cells.tolerance)
+    caught = modes_at_pupil(beam, modes, steepest, spot.centre, digits)
+    seen = caught.power_on(sines, taken, digits)
     places = [(sine_y - sines.y[0]) / sines.dx, (sine_x - sines.x[0]) / sines.dx]
     found = map_coordinates(seen, places, order=DEGREE, mode="nearest")
     nodes = len(weight)

@@ -43,9 +43,9 @@ class ScatteredSum:
         self.first = low_y + self.held[0] // 2, low_x + self.held[1] // 2
 
     def of(self, u: np.ndarray) -> np.ndarray:
-        """S (y, x), complex, of amplitudes (point,)."""
-        held = (self.cells.T @ u).reshape(self.held)
-        found = fourier_sum(held, self.period, self.shape, 1)
+        """S (sum, y, x), complex, of amplitudes (sum, point)."""
+        held = (self.cells.T @ np.ascontiguousarray(u.T)).T.reshape(len(u), *self.held)
+        found = np.stack([fourier_sum(np.ascontiguousarray(one), self.period, self.shape, 1) for one in held])
         for axis, (first, n) in enumerate(zip(self.first, self.shape, strict=True)):
             k = np.arange(n) - n // 2
             turns = k * first / self.period

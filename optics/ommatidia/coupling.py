@@ -28,6 +28,7 @@ from optics.ommatidia.waveguide import Mode
 
 __all__ = ["ModesAtPupil", "modes_at_pupil"]
 
+TOGETHER = 8  # choice, by memory: modes
 PAIRS = 4_000_000  # choice, by memory: of nodes at once
 
 
@@ -57,15 +58,17 @@ class ModesAtPupil:
             found[:, part] = np.abs(self.weights @ waves) ** 2 / self.area
         return found
 
-    def power_on(self, sines: Grid, taken: np.ndarray) -> np.ndarray:
+    def power_on(self, sines: Grid, taken: np.ndarray, digits: float = DIGITS) -> np.ndarray:
         """Share of the light on the pupil that all modes take, (y, x), from directions on a grid of sines; taken: what
         each mode's light counts."""
         per_sample = self.wavenumber / (2 * math.pi) * sines.dx
-        sums = ScatteredSum(self.x * per_sample, self.y * per_sample, sines.shape, DIGITS)
+        sums = ScatteredSum(self.x * per_sample, self.y * per_sample, sines.shape, digits)
         middle = np.exp(1j * self.wavenumber * (self.x * sines.centre[0] + self.y * sines.centre[1]))
         found = np.zeros(sines.shape)
-        for weight, share in zip(self.weights, taken, strict=True):
-            found += share * np.abs(sums.of(weight * middle)) ** 2
+        for start in range(0, len(taken), TOGETHER):
+            some = slice(start, start + TOGETHER)
+            for amplitude, share in zip(sums.of(self.weights[some] * middle), taken[some], strict=True):
+                found += share * (amplitude.real**2 + amplitude.imag**2)
         return found / self.area
 
     def total(self, taken: np.ndarray) -> float:
@@ -75,11 +78,15 @@ class ModesAtPupil:
 
 
 def modes_at_pupil(
-    beam: Beam, modes: tuple[Mode, ...], steepest: float, place: tuple[float, float] = (0.0, 0.0)
+    beam: Beam,
+    modes: tuple[Mode, ...],
+    steepest: float,
+    place: tuple[float, float] = (0.0, 0.0),
+    digits: float = DIGITS,
 ) -> ModesAtPupil:
     """Modes of a waveguide whose end lies in a beam's plane, for directions up to a sine from that of its source.
 
-    place: of the end (x, y) [m] off the axis.
+    place: of the end (x, y) [m] off the axis. digits: of the sums over the pupil.
 
     Raises:
         ValueError: a relief of pixels, or anything with a derivative.
@@ -93,7 +100,7 @@ def modes_at_pupil(
     residue = pupil.slopes(wavelength, beam.source).turning(z, window, beam.index)[1] / wavelength
     cycles = pupil.radius * (residue + pupil.index_before(wavelength) * steepest / wavelength)
     detail = 0.0 if pupil.mask is None else pupil.mask.bandwidth(1e-6, pupil.radius) * pupil.radius
-    nodes = cached_nodes(pupil.aperture, cycles + detail, DIGITS)
+    nodes = cached_nodes(pupil.aperture, cycles + detail, digits)
     x, y = nodes.x * pupil.radius, nodes.y * pupil.radius
     at = types.Float64(x), types.Float64(y)
     waves, passed = beam.waves(*at, types), pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types)

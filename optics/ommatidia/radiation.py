@@ -5,12 +5,14 @@ Seen from the waveguide that is cos lφ or sin lφ times a function of the angle
     Ψ(ξ) = z e^{ikD} cos lφ G(sin θ, D),   G = ∫ ψ(x) (1/d - ik)/(2πd²) e^{ik(d - D)} dx,   d = |ξ - x|.
 
 z is that of the waveguide's end, of the pupil's plane; off the pupil's axis the end is oblique to it, and Ψ errs by up to
-5e-3 of its largest value. G is integrated at Chebyshev points in sin θ and 1/D; between them it is a polynomial.
+5e-3 of its largest value. G is integrated at Chebyshev points in sin θ and 1/D; between them it is a polynomial. On the pupil's axis D is z/cos θ, and G
+a function of sin θ alone.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -26,9 +28,11 @@ FAR = 14.0  # choice: a mode's field ends where e^{-Wr/b} does, at e^-14 of the 
 FARTHEST = 12.0  # choice: or so many core radii away, for modes near their cut-off
 PAIRS = 4_000_000  # choice, by memory: of points and nodes at once
 SPARE_POINTS = 10, 5  # choice: Chebyshev points in sin θ and 1/D beyond the radians of half their range
+LINE = 5e-3  # choice: radians between close points, for DIGITS
 CLEAR = 1e-9  # rounding, at the ranges' ends
 
 Ends = tuple[float, float]
+OfMode = Callable[[int], np.ndarray]
 
 
 def reach(modes: tuple[Mode, ...]) -> float:
@@ -48,18 +52,44 @@ def radiated(
     end: where the waveguide ends (x, y, z) [m], the pupil's centre at 0; its axis runs through both. k: [1/m].
     """
     sine, phi, distance = _seen_from(x, y, end)
-    sines = 0.0, float(sine.max()) * (1 + CLEAR)
-    nearness = (1 - CLEAR) / float(distance.max()), (1 + CLEAR) / float(distance.min())
-    table = _table(modes, sines, nearness, k)
-    by_sine = chebyshev_basis(_scaled(sine, sines), table.shape[1])
-    by_nearness = chebyshev_basis(_scaled(1 / distance, nearness), table.shape[2])
+    function = (_along_axis if end[:2] == (0.0, 0.0) else _aside)(modes, sine, distance, k)
     excess = (x * x + y * y - 2 * (x * end[0] + y * end[1])) / (distance + math.hypot(*end))
     sphere = end[2] / distance**2 * np.exp(1j * k * excess)
     found = np.empty((len(modes), len(x)), dtype=complex)
-    for mode, of_mode, out in zip(modes, table, found, strict=True):
+    for at, mode in enumerate(modes):
         around = np.sin(mode.l * phi) if mode.sine else np.cos(mode.l * phi)
-        out[:] = ((by_sine @ of_mode) * by_nearness).sum(axis=1) * (around * sphere)
+        np.multiply(function(at), around * sphere, out=found[at])
     return found
+
+
+def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
+    """G D² where D = z/cos θ, of each mode by its number: in straight lines between close points."""
+    z = float((distance * np.sqrt(1 - sine**2)).mean())
+    sines = 0.0, float(sine.max()) * (1 + CLEAR)
+    radians = k * reach(modes) * sines[1] / 2
+    at = _between(sines, radians, SPARE_POINTS[0])
+    table = _integrated(modes, at, z / np.sqrt(1 - at**2), k)
+    close = np.linspace(*sines, 2 * math.ceil(max(radians, 1) / LINE))
+    fine = table @ chebyshev_basis(_scaled(close, sines), len(at)).T
+
+    def function(mode: int) -> np.ndarray:
+        return np.asarray(np.interp(sine, close, fine[mode]))
+
+    return function
+
+
+def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
+    """The same of any sines and distances."""
+    sines = 0.0, float(sine.max()) * (1 + CLEAR)
+    nearness = (1 - CLEAR) / float(distance.max()), (1 + CLEAR) / float(distance.min())
+    far = reach(modes)
+    at = _between(sines, k * far * sines[1] / 2, SPARE_POINTS[0])
+    near = _between(nearness, k * far**2 * (nearness[1] - nearness[0]) / 4, SPARE_POINTS[1])
+    places = (axis.ravel() for axis in np.meshgrid(at, 1 / near, indexing="ij"))
+    table = _integrated(modes, *places, k).reshape(len(modes), len(at), len(near))
+    by_sine = chebyshev_basis(_scaled(sine, sines), len(at))
+    by_nearness = chebyshev_basis(_scaled(1 / distance, nearness), len(near))
+    return lambda mode: np.asarray(((by_sine @ table[mode]) * by_nearness).sum(axis=1))
 
 
 def _seen_from(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float]) -> tuple[np.ndarray, ...]:
@@ -85,24 +115,20 @@ def _between(ends: Ends, radians: float, spare: int) -> np.ndarray:
     return (ends[0] + ends[1] + (ends[1] - ends[0]) * chebyshev_points(math.ceil(1.2 * radians) + spare)) / 2
 
 
-def _table(modes: tuple[Mode, ...], sines: Ends, nearness: Ends, k: float) -> np.ndarray:
-    """G D² at Chebyshev points, (mode, sin θ, 1/D)."""
-    far = reach(modes)
-    sine = _between(sines, k * far * (sines[1] - sines[0]) / 2, SPARE_POINTS[0])
-    near = _between(nearness, k * far**2 * (nearness[1] - nearness[0]) / 4, SPARE_POINTS[1])
-    u, v, weight = _mode_nodes(modes, k * sines[1])
+def _integrated(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> np.ndarray:
+    """G D² at places (sin θ, D), (mode, place)."""
+    u, v, weight = _mode_nodes(modes, k * float(sine.max()))
     # A sine mode's function is its twin's, which alone shows at φ = 0.
     amplitude = np.stack([weight * replace(mode, sine=False).field(u, v) for mode in modes], axis=1)
-    s, distance = (axis.ravel() for axis in np.meshgrid(sine, 1 / near, indexing="ij"))
-    found = np.empty((len(s), len(modes)), dtype=complex)
+    found = np.empty((len(sine), len(modes)), dtype=complex)
     step = max(1, PAIRS // u.size)
-    for start in range(0, len(s), step):
-        at, of = s[start : start + step, None], distance[start : start + step, None]
+    for start in range(0, len(sine), step):
+        at, of = sine[start : start + step, None], distance[start : start + step, None]
         excess = u * u + v * v - 2 * of * at * u
         d = np.sqrt(of * of + excess)
         kernel = (of / d) ** 2 / (2 * np.pi) * (1 / d - 1j * k) * np.exp(1j * k * excess / (d + of))
         found[start : start + step] = kernel @ amplitude
-    return found.T.reshape(len(modes), len(sine), len(near))
+    return found.T
 
 
 def _mode_nodes(modes: tuple[Mode, ...], k: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
