@@ -175,7 +175,9 @@ def _checked_genome(section: Tree) -> Tree:
     for group in sorted(section, key=lambda name: -len(group_members(name))):
         key, members, use = f"genome.{group}", group_members(group), section[group]
         if not members:
-            raise ConfigError(f"unknown gene {group!r}; {suggestion(group, (*GENES, SIDE, RHABDOM, *CLUSTERS, *FAMILIES))}", key)
+            raise ConfigError(
+                f"unknown gene {group!r}; {suggestion(group, (*GENES, SIDE, RHABDOM, *CLUSTERS, *FAMILIES))}", key
+            )
         if not isinstance(use, dict):
             raise ConfigError(f"{key} = {use!r}: set {key}.open, .low, .high, .start or .opens_at", key)
         for name in use:

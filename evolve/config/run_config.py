@@ -148,10 +148,14 @@ class RunConfig:
         eye, default = self.eye, EyeConfig()
         for name in RHABDOMS if not eye.rhabdoms else ():
             if getattr(eye, name) != getattr(default, name):
-                raise ConfigError(f"eye.{name}: is for rhabdoms: set eye.rhabdoms = true", f"eye.{name}", "eye.rhabdoms")
+                raise ConfigError(
+                    f"eye.{name}: is for rhabdoms: set eye.rhabdoms = true", f"eye.{name}", "eye.rhabdoms"
+                )
         if eye.rhabdoms and not eye.optics:
             raise ConfigError(
-                "eye.rhabdoms = true: take waves of a pupil, and eye.optics = false has none", "eye.rhabdoms", "eye.optics"
+                "eye.rhabdoms = true: take waves of a pupil, and eye.optics = false has none",
+                "eye.rhabdoms",
+                "eye.optics",
             )
         if eye.rhabdom_length == 0 and eye.rhabdom_absorption != default.rhabdom_absorption:
             raise ConfigError(
@@ -161,8 +165,8 @@ class RunConfig:
         step = math.sqrt(max(eye.rhabdom_index**2 - eye.rhabdom_surround**2, 0.0))
         if not LEAST_STEP <= step <= MOST_STEP:
             raise ConfigError(
-                f"eye.rhabdom_index = {eye.rhabdom_index:g}, eye.rhabdom_surround = {eye.rhabdom_surround:g}: the root of "
-                f"the difference of their squares is {step:.3g}; must lie in [{LEAST_STEP:g}, {MOST_STEP:g}], to guide light",
+                f"eye.rhabdom_index = {eye.rhabdom_index:g}, eye.rhabdom_surround = {eye.rhabdom_surround:g}: the root "
+                f"of the difference of their squares is {step:.3g}; must lie in [{LEAST_STEP:g}, {MOST_STEP:g}]",
                 *("eye.rhabdom_index", "eye.rhabdom_surround"),
             )
 

@@ -49,8 +49,9 @@ def sides(values: Values) -> tuple[int, int]:
 def fitted(values: Values, uses: Uses, sizes: Sizes) -> Values:
     """`values` of an animal in which nothing overlaps; genes stay within their searched ranges.
 
-    Receptors too narrow are fewer, and rhabdoms wider than receptors narrower. Eyes too close are spread; where the searched range of their placement ends, there
-    are fewer of them, or, where eyes of fewer receptors are narrower, fewer of both in like proportion.
+    Receptors too narrow are fewer, and rhabdoms wider than receptors narrower. Eyes too close are spread; where the
+    searched range of their placement ends, there are fewer of them, or, where eyes of fewer receptors are narrower,
+    fewer of both in like proportion.
     """
     fits, width = dict(values), _width_gene(uses)
     fits[width] = min(values[width], float(_most_receptors(sizes)))

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from optics.elements.pupil import Pupil
-from optics.eye.band_choice import choose_bands
 from optics.eye.geometry import behind_pupil, check_pupil, direction, etendue, focal_length, tangents
-from optics.eye.guided_field import Guide, check_guide, guided_kernel
+from optics.eye.guided_field import check_guide
 from optics.eye.kernel_bank import KernelBank, prepare
-from optics.eye.photoreceptor import gaussian_noise, own_type, photon_noise, quantum_catch, throughput
-from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
+from optics.eye.photoreceptor import noise_on, own_type, quantum_catch, throughput
+from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf
+from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kernel, white_share
 from optics.eye.retinal_image import at_receptors, blur, centred, receptor_average, with_centre
 from optics.eye.summary import Description, describe
 from optics.numerics.arguments import (
@@ -25,7 +25,6 @@ from optics.numerics.arguments import (
     radiance_cube,
     shape_2d,
     whole,
-    without_derivative,
 )
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.precision import precision
@@ -34,11 +33,9 @@ from optics.point_spread.psf_result import PSFResult
 from optics.spectra.bands import SpectralBands
 from optics.spectra.photon_budget import PhotonBudget
 from optics.spectra.receptors import receptors_of
-from optics.spectra.spectrum import daylight
 
 __all__ = ["Eye"]
 
-CELLS_FOR_BANDS = 2  # per receptor, along an axis
 LIGHT_FROM = ("cells", "centres")  # of the scene
 
 
@@ -59,8 +56,8 @@ class Eye:
     photon_budget: the light there is; its shot noise comes before the Gaussian noise (None: no shot noise).
     receptors: types of receptor: "rgb" (three channels, red, green, blue), "lms" (human cones), "honeybee", "goldfish",
         wavelengths of pigments' peaks [nm], or `Receptors`, which can be a mosaic. The field then holds `Receptors`.
-    waveguide: what receptors are: rhabdoms, each in the middle of its square and pointing at the pupil's centre, which take
-        light in modes (None: they absorb all light on the square).
+    waveguide: what receptors are: rhabdoms, each in the middle of its square and pointing at the pupil's centre, which
+        take light in modes (None: they absorb all light on the square).
     tolerance: relative L2 error asked of the PSF; signal error, relative to white's, of whatever else is chosen.
     dtype: "float32" or "float64", of PSF, kernel and signals.
 
@@ -143,8 +140,7 @@ class Eye:
         it, mean of the channels."""
         if self.waveguide is None:
             return self.throughput
-        seen = plain(self.kernel(1)).sum(axis=(1, 2)) * daylight(self.spectral_bands.wavelengths)
-        return number(self.throughput) * float((self.spectral_bands.weights @ seen).mean())
+        return number(self.throughput) * white_share(plain(self.kernel(1)), self.spectral_bands)
 
     @property
     def channels(self) -> int:
@@ -199,34 +195,17 @@ class Eye:
         """
         positive("z", z, infinite=True)
         asked = self.eccentricity_deg if direction_deg is None else direction("direction_deg", direction_deg)
-        guided = self.waveguide is not None
-        return to_user(self._kernel(self._retina(_whole(samples_per_receptor)), z, tangents(asked), guided))
+        retina, guided = self._retina(_whole(samples_per_receptor)), self.waveguide is not None
+        return to_user(receptor_kernel(self, retina, z, tangents(asked), guided))
 
-    def _kernel(self, retina: Retina, z: Scalar, direction: tuple[float, float], from_cell: bool = False) -> Array:
-        """direction: (right, down), tangents."""
-        if self.pupil is None:
-            return precision(self.dtype).Tensor(np.ones((len(retina.wavelengths), 1, 1)))
-        if self.waveguide is None:
-            return visual_kernel(self.pupil, retina, z, direction, from_cell)
-        for name in ("fov_deg", "z"):
-            without_derivative(name, {"fov_deg": self.fov_deg, "z": z}[name])
-        guide = Guide(self.waveguide, number(self.sensor_distance), round(self.receptor_pitch / retina.cell), from_cell)
-        return guided_kernel(self.pupil, retina, z, direction, guide)
-
-    def _retina(self, samples_per_receptor: int, wavelengths: np.ndarray | None = None) -> Retina:
+    def _retina(self, samples_per_receptor: int) -> Retina:
         cell = self.receptor_pitch / samples_per_receptor
-        at = self.spectral_bands.wavelengths if wavelengths is None else wavelengths
-        return Retina(self.retina_distance, at, cell, self.tolerance, self.dtype)
+        return Retina(self.retina_distance, self.spectral_bands.wavelengths, cell, self.tolerance, self.dtype)
 
     def _chosen_bands(self) -> SpectralBands:
-        if self.pupil is None:
-            return choose_bands(self.tolerance, self.receptors)
-        guided, towards = self.waveguide is not None, tangents(self.eccentricity_deg)
-
-        def kernels(wavelengths: np.ndarray) -> np.ndarray:
-            return plain(self._kernel(self._retina(CELLS_FOR_BANDS, wavelengths), math.inf, towards, guided))
-
-        return choose_bands(self.tolerance, self.receptors, kernels, 1 if guided else CELLS_FOR_BANDS)
+        cell = self.receptor_pitch / CELLS_FOR_BANDS
+        retina = Retina(self.retina_distance, np.empty(0), cell, self.tolerance, self.dtype)
+        return bands_for(self, retina, tangents(self.eccentricity_deg))
 
     def sight(
         self,
@@ -262,7 +241,7 @@ class Eye:
 
         def kernel_at(distance: Scalar, right: float, down: float) -> Array:
             place = aside + right * half_field[0], below + down * half_field[1]
-            return with_centre(self._kernel(self._retina(s), distance, place, from_cell))
+            return with_centre(receptor_kernel(self, self._retina(s), distance, place, from_cell))
 
         counts, averaged = (depth_layers, field_zones), self.waveguide is None
         return prepare(kernel_at, self.resolution, s, z, counts, within, averaged=averaged)
@@ -301,16 +280,13 @@ class Eye:
         signal = quantum_catch(irradiance, self.spectral_bands.weights, self.throughput, types)
         if self.mosaic is not None:
             signal = own_type(signal, self.mosaic, types)
-        return to_user(signal) if rng is None else to_user(signal + types.Tensor(self._noise(signal, rng)))
-
-    def _noise(self, signal: Array, rng: np.random.Generator) -> np.ndarray:
-        """What noise adds to the signal."""
-        clean = plain(signal)
-        photons = self.photons
-        if photons is not None and self.mosaic is not None:
-            photons = photons[self.mosaic][None]
-        caught = clean if photons is None else photon_noise(np.maximum(clean, 0), photons, rng)
-        return gaussian_noise(caught, self.noise_sigma, rng) - clean
+        return (
+            to_user(signal)
+            if rng is None
+            else to_user(
+                signal + types.Tensor(noise_on(plain(signal), self.photons, self.mosaic, self.noise_sigma, rng))
+            )
+        )
 
     def in_bands(self, radiance: Any) -> np.ndarray:
         """(band,): a spectral radiance in this eye's bands, for `see`: each type of receptor then catches of it what it

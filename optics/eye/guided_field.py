@@ -1,8 +1,8 @@
 """Which directions a receptor sees that is a waveguide: what its modes take of the light on the pupil.
 
-With E(v) the share of a point's light that is caught and absorbed, v [m] on the retina, a receptor of a retina with pitch p
-sees E(v)/p² of a scene's radiance: a square that absorbs all light would have the mean over its own area. The waveguide
-stands where the ray through the pupil's centre lands, and points at that centre.
+With E(v) the share of a point's light that is caught and absorbed, v [m] on the retina, a receptor of a retina with
+pitch p sees E(v)/p² of a scene's radiance: a square that absorbs all light would have the mean over its own area. The
+waveguide stands where the ray through the pupil's centre lands, and points at that centre.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from optics.eye.cell_integrals import samples_per_cycle
 from optics.eye.receptive_field import Retina, Spot, beams_to, spot_of
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import of_kind
-from optics.numerics.autodiff import Array, Scalar, number
+from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count

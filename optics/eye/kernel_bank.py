@@ -107,8 +107,8 @@ def prepare(
     averaged: bool = True,
 ) -> KernelBank:
     """Choose how many kernels, and make them. kernel_at(z, right, down): positions in the field from -1 to 1 at the
-    retina's edges; counts of depth layers and of zones across the longer side, or "auto". averaged: whether a receptor's
-    signal is the mean over its cells."""
+    retina's edges; counts of depth layers and of zones across the longer side, or "auto". averaged: whether a
+    receptor's signal is the mean over its cells."""
     s, depths = samples_per_receptor, _Range.of(z)
     layers, zones = (
         None if count == "auto" else whole(name, count, 1, MOST_NODES)

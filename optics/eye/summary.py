@@ -221,8 +221,8 @@ def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
 
 
 def _acceptance(eye: DescribedEye, white: PSFResult, z: Scalar) -> float:
-    """Full width [m] at half height, along x through its peak, of what a receptor sees in white daylight: PSF ⊗ receptor
-    aperture, or what a waveguide takes."""
+    """Full width [m] at half height, along x through its peak, of what a receptor sees in white daylight: PSF ⊗
+    receptor aperture, or what a waveguide takes."""
     if eye.pupil is None:
         return eye.receptor_pitch
     if eye.waveguide is not None:

@@ -2,8 +2,8 @@
 
     S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)},   k counted from n//2.
 
-The spread is e^{β(√(1 - z²) - 1)} (Barnett, Magland & af Klinteberg, SIAM J. Sci. Comput. 41, C479, 2019), on a period of
-twice as many cells as the sum has samples; its own transform is divided out.
+The spread is e^{β(√(1 - z²) - 1)} (Barnett, Magland & af Klinteberg, SIAM J. Sci. Comput. 41, C479, 2019), on a period
+of twice as many cells as the sum has samples; its own transform is divided out.
 """
 
 from __future__ import annotations

@@ -4,9 +4,9 @@ Seen from the waveguide that is cos lφ or sin lφ times a function of the angle
 
     Ψ(ξ) = z e^{ikD} cos lφ G(sin θ, D),   G = ∫ ψ(x) (1/d - ik)/(2πd²) e^{ik(d - D)} dx,   d = |ξ - x|.
 
-z is that of the waveguide's end, of the pupil's plane; off the pupil's axis the end is oblique to it, and Ψ errs by up to
-5e-3 of its largest value. G is integrated at Chebyshev points in sin θ and 1/D; between them it is a polynomial. On the pupil's axis D is z/cos θ, and G
-a function of sin θ alone.
+z is the distance of the waveguide's end from the pupil's plane. Off the pupil's axis the end is oblique to that plane,
+and Ψ errs by up to 5e-3 of its largest value. G is integrated at Chebyshev points in sin θ and 1/D; between them it is
+a polynomial. On the pupil's axis D is z/cos θ, and G a function of sin θ alone.
 """
 
 from __future__ import annotations
@@ -85,8 +85,8 @@ def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: f
     far = reach(modes)
     at = _between(sines, k * far * sines[1] / 2, SPARE_POINTS[0])
     near = _between(nearness, k * far**2 * (nearness[1] - nearness[0]) / 4, SPARE_POINTS[1])
-    places = (axis.ravel() for axis in np.meshgrid(at, 1 / near, indexing="ij"))
-    table = _integrated(modes, *places, k).reshape(len(modes), len(at), len(near))
+    by_row, by_column = (axis.ravel() for axis in np.meshgrid(at, 1 / near, indexing="ij"))
+    table = _integrated(modes, by_row, by_column, k).reshape(len(modes), len(at), len(near))
     by_sine = chebyshev_basis(_scaled(sine, sines), len(at))
     by_nearness = chebyshev_basis(_scaled(1 / distance, nearness), len(near))
     return lambda mode: np.asarray(((by_sine @ table[mode]) * by_nearness).sum(axis=1))
@@ -132,8 +132,8 @@ def _integrated(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 
 
 def _mode_nodes(modes: tuple[Mode, ...], k: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """x, y [m] and weights over the modes' fields, for light of transverse wavenumbers up to k [1/m] along x: what is the
-    same on both sides of that axis is summed on one."""
+    """x, y [m] and weights over the modes' fields, for light of transverse wavenumbers up to k [1/m] along x: what is
+    the same on both sides of that axis is summed on one."""
     b, parts = modes[0].radius, []
     fastest, farthest, most = max(mode.u for mode in modes), max(map(_radii, modes)), max(mode.l for mode in modes)
     steep = max(mode.w for mode in modes) * (farthest - 1)  # of the fields' decay: a polynomial of about this degree

@@ -41,8 +41,8 @@ class Eyes:
         then holds optics.Receptors
     photon_budget: optics.PhotonBudget: how much light there is and how long receptors gather it; its shot noise comes
         beside `noise_sigma`. None: light is no object
-    waveguide: optics.Waveguide: receptors are rhabdoms, which take light in modes (behind a pupil only). None: each takes
-        all light on its square
+    waveguide: optics.Waveguide: receptors are rhabdoms, which take light in modes (behind a pupil only). None: each
+        takes all light on its square
 
     Raises:
         ValueError: values outside these ranges and for unknown receptors, with the nearest name.

@@ -39,8 +39,8 @@ class Draw:
 
 @dataclass(frozen=True)
 class ReceptiveFields:
-    """field: power per cell of one receptor's field: the turned PSF convolved with its square, or what a waveguide takes;
-        (plane, y, x), a plane for every depth layer's every band
+    """field: power per cell of one receptor's field: the turned PSF convolved with its square, or what a waveguide
+        takes; (plane, y, x), a plane for every depth layer's every band
     density: probability per cell of the mean over all receptors and planes, each with the same weight, (Y, X)
     resolution: receptors (height, width) · cells: along a receptor's side
     """
