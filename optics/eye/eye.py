@@ -18,14 +18,7 @@ from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf
 from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kernel, white_share
 from optics.eye.retinal_image import at_receptors, blur, centred, receptor_average, with_centre
 from optics.eye.summary import Description, describe
-from optics.numerics.arguments import (
-    in_range,
-    of_kind,
-    positive,
-    radiance_cube,
-    shape_2d,
-    whole,
-)
+from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.precision import precision
 from optics.ommatidia.waveguide import Waveguide
