@@ -60,7 +60,7 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
 def seen_and_perfect(eyes: sim.Eyes, task: str, world: WorldConfig | None = None) -> tuple[Floats, Floats]:
     """Signals without noise of the eyes, and of the same behind a perfect lens, (scene, eye, channel, height, width);
     the scenes are the same for all eyes."""
-    perfect = replace(eyes, optics=None)
+    perfect = replace(eyes, optics=None, waveguide=None)
     where = (world or WorldConfig()).evaluation
     worlds = sim.make_vec_env(task, perfect, SCENES, 0, mode="evaluation", **where)
     try:
@@ -82,7 +82,7 @@ def _own_views(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
     fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
     seen, sharp = (
         sim.ModelRenderer(model, eye, kind.mounts, SCENES, fidelity, spectra=task.spectra).signals(poses)
-        for eye in (kind.eye, replace(kind.eye, pupil=None))
+        for eye in (kind.eye, replace(kind.eye, pupil=None, waveguide=None))
     )
     return np.asarray(seen), np.asarray(sharp)
 
