@@ -70,5 +70,6 @@ def through(eye: optics.Eye, radiance: np.ndarray) -> np.ndarray:
     is taken to go on as it ends, as far as the eye's kernel reaches (at most a picture's width)."""
     samples = radiance.shape[-1] // eye.resolution[1]
     reach = min(max(eye.kernel(samples).shape[1:]) // 2, radiance.shape[-1])
-    sight = eye.sight(samples, light_from="centres")
+    # Cells may be wider than what a rhabdom sees, and their centres say little of it then.
+    sight = eye.sight(samples, light_from="centres" if eye.waveguide is None else "cells")
     return eye.see(np.pad(radiance, ((0, 0), (reach, reach), (reach, reach)), mode="edge"), samples, sight=sight)
