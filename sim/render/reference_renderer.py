@@ -28,8 +28,8 @@ class ReferenceRenderer:
     world, eyes: as in `sim.BatchedRenderer`
     integrator: of Mitsuba: "path", "direct", or its description, {"type": "path", "max_depth": 3}
     spp: samples per cell of a picture
-    samples_per_receptor: cells along a receptor's side; None: 4 behind a pupil, more where rhabdoms are narrow, 1 for the
-        perfect lens (pixels)
+    samples_per_receptor: cells along a receptor's side; None: 4 behind a pupil, more where rhabdoms are narrow, 1 for
+        the perfect lens (pixels)
     depths: nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all light is
         blurred as if from infinity
     depth_layers: kernels between them, or "auto"

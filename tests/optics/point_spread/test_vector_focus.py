@@ -122,7 +122,8 @@ def test_stokes_parameters_say_the_same_as_jones_vectors():
     by_stokes = optics.vector_focus(pupil, WAVE, polarization=by_jones.polarization, **window)
     np.testing.assert_allclose(by_jones.polarization, (1, 0.28, 0, 0.96))
     np.testing.assert_allclose(by_stokes.intensity, by_jones.intensity, atol=1e-9 * by_jones.psf.max())
-    assert by_stokes.field is not None
+    overlap = np.vdot(by_stokes.field, by_jones.field) / np.vdot(by_jones.field, by_jones.field).real
+    assert abs(overlap) == pytest.approx(1)  # turned the other way round, circular light is at right angles to it
     # Half polarised light is half unpolarised.
     plain = optics.vector_focus(pupil, WAVE, **window)
     half = optics.vector_focus(pupil, WAVE, polarization=(2, *by_jones.polarization[1:]), **window)
