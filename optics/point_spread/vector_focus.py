@@ -45,6 +45,10 @@ class VectorFocus:
     centre: tuple[float, float]
     polarization: tuple[float, float, float, float]
 
+    def __repr__(self) -> str:
+        height, width = self.scalar.shape
+        return f"<VectorFocus {height} x {width} samples {self.dx:.3g} m apart, scalar error {self.scalar_error:.1e}>"
+
     @cached_property
     def psf(self) -> np.ndarray:
         """Of all components, (y, x) [1/m²]."""
