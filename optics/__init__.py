@@ -36,6 +36,7 @@ _CONTENTS = {
     "Grid": "numerics.grid",
     "HeightMap": "elements.relief",
     "MaskMap": "elements.transmittance",
+    "Microvilli": "point_spread.microvilli",
     "Mode": "ommatidia.waveguide",
     "Oblong": "apertures.shapes",
     "Ommatidium": "ommatidia.ommatidium",

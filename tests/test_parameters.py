@@ -19,7 +19,7 @@ import evolve.cli.commands.run
 import sim
 from evolve.config.assemble import assemble
 from evolve.config.run_config import SECTIONS, GeneConfig, RunConfig
-from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, SIDE, gene_table
+from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RHABDOM, SIDE, gene_table
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.fitness import evaluate
@@ -153,6 +153,9 @@ TOUCHING = (
     *("learning.first_speed=1", "learning.total_steps=1024", "learning.n_steps=32", "learning.batch_size=128"),
     *PERFECT,
 )
+# Eyes whose receptors are as wide as a rhabdom or two.
+FOCUSED = ("eye.receptor_pitch=4e-6",)
+GUIDED = ("eye.rhabdoms=true", *FOCUSED)
 NAVIGATING = ("genome.resolution_height.start=1", "eye.rays_per_receptor=1", *PERFECT)
 FIELDS = {
     "task": Case("task=tracking", life),
@@ -171,6 +174,11 @@ FIELDS = {
     "eye.relief_symmetric": Case("eye.relief_symmetric=true", history, ("genome.doe.open=true",)),
     "eye.square": Case("eye.square=true", history, ("eye.square=false", *PERFECT)),
     "eye.receptor_pitch": Case("eye.receptor_pitch=40e-6", point_image, ()),
+    "eye.rhabdoms": Case("eye.rhabdoms=true", point_image, FOCUSED),
+    "eye.rhabdom_index": Case("eye.rhabdom_index=1.38", point_image, GUIDED),
+    "eye.rhabdom_surround": Case("eye.rhabdom_surround=1.33", point_image, GUIDED),
+    "eye.rhabdom_length": Case("eye.rhabdom_length=100e-6", sight, GUIDED),
+    "eye.rhabdom_absorption": Case("eye.rhabdom_absorption=1e4", point_image, ("eye.rhabdom_length=1e-4", *GUIDED)),
     "eye.head_radius": Case("eye.head_radius=100e-6", sight),
     "eye.receptor_width": Case("eye.receptor_width=100e-6", sight),
     "world.mazes": Case("world.mazes=2", life, NAVIGATING, "maze"),
@@ -222,6 +230,7 @@ GENE_OUTPUTS = {
     "refractive_index": point_image,
     "dispersion": point_image,
     "aperture_shape": point_image,
+    "rhabdom_diameter_um": sight,
     "memory_frames": life,
     "neurons": life,
     "layers": life,
@@ -261,7 +270,7 @@ def _names(cls, prefix=""):
 
 def test_tables_name_every_setting_and_every_gene():
     assert set(FIELDS) == set(_names(RunConfig))
-    assert set(GENE_OUTPUTS) == set(GENES) | set(gene_table(square=True))
+    assert set(GENE_OUTPUTS) == set(GENES) | set(gene_table(square=True, rhabdoms=True))
     assert all(is_dataclass(section) for section in SECTIONS.values())
 
 
@@ -280,7 +289,8 @@ def test_every_gene_moves_its_output(name):
     output = GENE_OUTPUTS[name]
     spectral = ALL_GENES[name].cluster == "spectral"
     task = "foraging" if spectral else OWN if output is own_sight else "detection"  # foraging alone is not grey
-    given = FOUR_TYPES if spectral else SQUARE if name == SIDE else () if output is point_image else PERFECT
+    special = {SIDE: SQUARE, RHABDOM: GUIDED}
+    given = FOUR_TYPES if spectral else special.get(name, () if output is point_image else PERFECT)
     before = _settled(output, task, given)
     config = small(task, (*given, f"genome.{name}.open=true"))
     genotype = Genotype(config.genome)

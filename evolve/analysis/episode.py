@@ -226,7 +226,7 @@ def _perfect_views(worlds: Any, eyes: sim.Eyes, states: WorldState, every: int, 
     """The same scenes in the same light through a perfect lens: by the same receptors, and as radiance on a finer
     grid."""
     world, seen = worlds.simulation.world, worlds.renderer.fidelity
-    perfect = replace(eyes, optics=None)
+    perfect = replace(eyes, optics=None, waveguide=None)
     factor = max(1, -(-FINE_PIXELS // max(eyes.resolution)))
     fine = replace(perfect, resolution=(factor * eyes.resolution[0], factor * eyes.resolution[1]))
     fidelity = sim.Fidelity(FINE[seen.samples], eyes.bands, light=seen.light, samples=seen.samples)

@@ -152,7 +152,7 @@ def _play(policy: EyePolicy, worlds: TaskVecEnv) -> tuple[list[Poses], dict[str,
 def _perfect_views(worlds: TaskWorlds, task: Task, poses: list[Poses], every: int, lit: Lit) -> dict[str, Any]:
     """The same scenes through a perfect lens: by the same receptors, and as radiance on a finer grid."""
     (kind,) = kinds_of(task)
-    perfect = replace(kind.eye, pupil=None)
+    perfect = replace(kind.eye, pupil=None, waveguide=None)
     height, width = perfect.resolution
     factor = max(1, -(-FINE_PIXELS // max(height, width)))
     fine = replace(perfect, resolution=(factor * height, factor * width))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.genome.genes import LAMBDA_MAX, TILT
+from evolve.genome.genes import LAMBDA_MAX, RHABDOM, TILT
 from evolve.genome.phenotype import Phenotype
 
 if TYPE_CHECKING:
@@ -160,6 +160,8 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
     if phenotype.refractive_index is not None:
         values["refractive_index"] = phenotype.refractive_index
         values |= {"dispersion": phenotype.dispersion, "aperture_shape": float(phenotype.aperture_shape)}
+    if phenotype.rhabdom_diameter_um is not None:
+        values[RHABDOM] = phenotype.rhabdom_diameter_um
     brain = ("memory_frames", "neurons", "layers")
     values |= {name: float(getattr(phenotype, name)) for name in brain}
     if phenotype.lambda_max_nm is not None:
@@ -224,7 +226,7 @@ def eye_image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
     if eye.pupil is None:
         return max(1 - noise_of(eye), 0.0)
     white = polychromatic(eye, eye.psf())
-    return float(optics.image_quality(white, 1 / (2 * eye.receptor_pitch), eye.throughput, noise_of(eye))[0])
+    return float(optics.image_quality(white, 1 / (2 * eye.receptor_pitch), eye.white_signal, noise_of(eye))[0])
 
 
 def bootstrap_interval(

@@ -54,14 +54,14 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
         )
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)
-    gain = 1 / float(eyes.eye().throughput)
+    gain = 1 / float(eyes.eye().white_signal)
     return Vision(quality, contrast, psnr(seen, perfect, gain), ssim(gain * seen, perfect))
 
 
 def seen_and_perfect(eyes: sim.Eyes, task: str, world: WorldConfig | None = None) -> tuple[Floats, Floats]:
     """Signals without noise of the eyes, and of the same behind a perfect lens, (scene, eye, channel, height, width);
     the scenes are the same for all eyes."""
-    perfect = replace(eyes, optics=None)
+    perfect = replace(eyes, optics=None, waveguide=None)
     where = (world or WorldConfig()).evaluation
     worlds = sim.make_vec_env(task, perfect, SCENES, 0, mode="evaluation", **where)
     try:
@@ -84,7 +84,7 @@ def _own_views(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
     fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
     seen, sharp = (
         sim.ModelRenderer(model, eye, kind.mounts, SCENES, fidelity, **how).signals(poses)
-        for eye in (kind.eye, replace(kind.eye, pupil=None))
+        for eye in (kind.eye, replace(kind.eye, pupil=None, waveguide=None))
     )
     return np.asarray(seen), np.asarray(sharp)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from evolve.analysis.statistics import gene_values
 from evolve.config.provenance import Source
+from evolve.config.run_config import RHABDOMS
 from evolve.genome.genes import ALL_GENES, INHERITED, SIDE
 from evolve.store.directory import Run
 
@@ -32,6 +33,8 @@ def starts_from(text: str) -> Source:
     tree: dict[str, Any] = {"genome": genome, "eye": {}}
     if candidate.phenotype.relief is not None:
         tree["eye"] |= {name: getattr(run.config.eye, name) for name in LENGTHS}
+    if candidate.phenotype.rhabdom_diameter_um is not None:
+        tree["eye"] |= {name: getattr(run.config.eye, name) for name in ("rhabdoms", *RHABDOMS)}
     if candidate.phenotype.lambda_max_nm is not None:
         tree["eye"]["receptors"] = INHERITED
     if candidate.phenotype.relief is not None and len(candidate.phenotype.relief) != 16:

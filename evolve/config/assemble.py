@@ -17,7 +17,18 @@ from evolve.config.relief_starts import no_such_gene, with_relief
 from evolve.config.run_config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
 from evolve.config.sources import parsed_toml, preset_sources, read_assignment, read_toml, task_defaults
 from evolve.config.square_eyes import no_such_side, with_square_eyes
-from evolve.genome.genes import ALL_GENES, CLUSTERS, FAMILIES, GENES, SIDE, SIDES, TILT, GeneConfig, group_members
+from evolve.genome.genes import (
+    ALL_GENES,
+    CLUSTERS,
+    FAMILIES,
+    GENES,
+    RHABDOM,
+    SIDE,
+    SIDES,
+    TILT,
+    GeneConfig,
+    group_members,
+)
 
 __all__ = ["assemble", "from_text", "from_toml", "to_toml"]
 
@@ -164,7 +175,9 @@ def _checked_genome(section: Tree) -> Tree:
     for group in sorted(section, key=lambda name: -len(group_members(name))):
         key, members, use = f"genome.{group}", group_members(group), section[group]
         if not members:
-            raise ConfigError(f"unknown gene {group!r}; {suggestion(group, (*GENES, SIDE, *CLUSTERS, *FAMILIES))}", key)
+            raise ConfigError(
+                f"unknown gene {group!r}; {suggestion(group, (*GENES, SIDE, RHABDOM, *CLUSTERS, *FAMILIES))}", key
+            )
         if not isinstance(use, dict):
             raise ConfigError(f"{key} = {use!r}: set {key}.open, .low, .high, .start or .opens_at", key)
         for name in use:
@@ -196,6 +209,11 @@ def _require_genes(source: Source, eye: EyeConfig, own: bool) -> None:
     for name in with_relief(source.tree, eye).get("genome", {}):
         if name in (SIDE, *SIDES) and name not in eye.genes:
             raise ConfigError(no_such_side(name, eye, not source.name), f"genome.{name}", "eye.square")
+        if name == RHABDOM and name not in eye.genes:
+            raise ConfigError(
+                f"genome.{name}: only eyes with rhabdoms have this gene; set eye.rhabdoms = true",
+                *(f"genome.{name}", "eye.rhabdoms"),
+            )
         if name == TILT and not own:
             raise ConfigError(
                 f"genome.{TILT}: is for tasks of one's own; in others eyes look along the floor",

@@ -39,6 +39,9 @@ __all__ = [
 
 # What only our own agents have: a speed and a turn, contact with walls, a course. Their body stands level.
 OF_OUR_AGENTS = ("world.least_light", "learning.first_speed", "learning.contact_ramp", "learning.least_return")
+RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
+# Numerical apertures: 0.25 is a fly's. With less a rhabdom guides next to nothing, with more it has hundreds of modes.
+LEAST_STEP, MOST_STEP = 0.2, 0.5
 LEAST_EXPOSURE = 2e-4  # [lx s]: of some 30 photons from white at a = 1; of few, noise is not what it is taken for
 
 
@@ -72,6 +75,7 @@ class RunConfig:
                 f"eye.receptors = {self.eye.receptors!r}: must be one of {', '.join(known)}", "eye.receptors"
             )
         self._check_light()
+        self._check_rhabdoms()
         self._check_world()
         for name, gene in self.genes.items():
             _check_gene_use(gene, self.genome[name])
@@ -137,6 +141,33 @@ class RunConfig:
                 f"eye.integration_time = {self.eye.integration_time:g}: counts photons, and there are none: set "
                 f"eye.illuminance, or leave it at {default:g}",
                 *("eye.integration_time", "eye.illuminance"),
+            )
+
+    def _check_rhabdoms(self) -> None:
+        """They guide, and behind a pupil; what describes them says nothing where there are none."""
+        eye, default = self.eye, EyeConfig()
+        for name in RHABDOMS if not eye.rhabdoms else ():
+            if getattr(eye, name) != getattr(default, name):
+                raise ConfigError(
+                    f"eye.{name}: is for rhabdoms: set eye.rhabdoms = true", f"eye.{name}", "eye.rhabdoms"
+                )
+        if eye.rhabdoms and not eye.optics:
+            raise ConfigError(
+                "eye.rhabdoms = true: take waves of a pupil, and eye.optics = false has none",
+                "eye.rhabdoms",
+                "eye.optics",
+            )
+        if eye.rhabdom_length == 0 and eye.rhabdom_absorption != default.rhabdom_absorption:
+            raise ConfigError(
+                f"eye.rhabdom_absorption = {eye.rhabdom_absorption:g}: absorbs along a length: set eye.rhabdom_length",
+                *("eye.rhabdom_absorption", "eye.rhabdom_length"),
+            )
+        step = math.sqrt(max(eye.rhabdom_index**2 - eye.rhabdom_surround**2, 0.0))
+        if not LEAST_STEP <= step <= MOST_STEP:
+            raise ConfigError(
+                f"eye.rhabdom_index = {eye.rhabdom_index:g}, eye.rhabdom_surround = {eye.rhabdom_surround:g}: the root "
+                f"of the difference of their squares is {step:.3g}; must lie in [{LEAST_STEP:g}, {MOST_STEP:g}]",
+                *("eye.rhabdom_index", "eye.rhabdom_surround"),
             )
 
     def _check_clusters(self) -> None:

@@ -69,6 +69,21 @@ class EyeConfig:
         Interval(0, 1e-4),
         "width of a receptor [m], so that eyes of more receptors are wider; 0: all retinas are sensor_width wide",
     )
+    rhabdoms: bool = setting(
+        False,
+        None,
+        "receptors are rhabdoms, which take light in modes; if false, squares that absorb all light on them",
+    )
+    rhabdom_index: float = setting(1.363, Interval(1, 2), "refractive index of rhabdoms")
+    rhabdom_surround: float = setting(1.340, Interval(1, 2), "refractive index of what is around them")
+    rhabdom_length: float = setting(
+        0.0,
+        Interval(0, 1e-2),
+        "length of rhabdoms [m], along which light is absorbed; 0: all that is caught is absorbed",
+    )
+    rhabdom_absorption: float = setting(
+        6e3, Interval(0, 1e6, open_low=True), "absorption along rhabdoms [1/m]; used only if rhabdom_length is above 0"
+    )
     head_radius: float = setting(
         1e-3, Interval(0, 10, open_low=True), "radius of the head [m]; eyes on it do not overlap"
     )
@@ -79,7 +94,7 @@ class EyeConfig:
     @property
     def genes(self) -> Mapping[str, Gene]:
         """Every gene that animals with such eyes have, by name."""
-        return gene_table(self.relief_points, self.relief_symmetric, self.square)
+        return gene_table(self.relief_points, self.relief_symmetric, self.square, self.rhabdoms)
 
 
 @dataclass(frozen=True)

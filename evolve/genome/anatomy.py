@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Protocol
 
-from evolve.genome.genes import SIDE, SIDES, GeneConfig
+from evolve.genome.genes import ALL_GENES, RHABDOM, SIDE, SIDES, GeneConfig
 
 __all__ = ["contradiction", "fitted", "retina_width", "sides"]
 
@@ -49,8 +49,9 @@ def sides(values: Values) -> tuple[int, int]:
 def fitted(values: Values, uses: Uses, sizes: Sizes) -> Values:
     """`values` of an animal in which nothing overlaps; genes stay within their searched ranges.
 
-    Receptors too narrow are fewer. Eyes too close are spread; where the searched range of their placement ends, there
-    are fewer of them, or, where eyes of fewer receptors are narrower, fewer of both in like proportion.
+    Receptors too narrow are fewer, and rhabdoms wider than receptors narrower. Eyes too close are spread; where the
+    searched range of their placement ends, there are fewer of them, or, where eyes of fewer receptors are narrower,
+    fewer of both in like proportion.
     """
     fits, width = dict(values), _width_gene(uses)
     fits[width] = min(values[width], float(_most_receptors(sizes)))
@@ -61,6 +62,9 @@ def fitted(values: Values, uses: Uses, sizes: Sizes) -> Values:
         fits["placement_range_deg"] = min(needed, widest)
         fewest = receptors if sizes.receptor_pitch == 0 else _lowest(width, uses)
         fits["n_eyes"], fits[width] = _thinned((eyes, receptors), (_lowest("n_eyes", uses), fewest), widest, sizes)
+    if RHABDOM in values:
+        pitch = 1e6 * retina_width(fits[width], sizes) / fits[width]
+        fits[RHABDOM] = min(values[RHABDOM], max(pitch, ALL_GENES[RHABDOM].range.low))
     return fits
 
 

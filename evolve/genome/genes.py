@@ -22,6 +22,7 @@ __all__ = [
     "INHERITED",
     "LAMBDA_MAX",
     "RELIEF_POINTS",
+    "RHABDOM",
     "SIDE",
     "SIDES",
     "TILT",
@@ -38,6 +39,7 @@ FAMILIES = ("doe", "lambda_max")  # genes of one kind: what their names begin wi
 RELIEF_POINTS = Interval(4, 9)  # of a relief along one side; names of its genes have a digit for each side
 SIDE = "resolution"  # of a square eye, which has it in place of the two
 SIDES = ("resolution_height", "resolution_width")
+RHABDOM = "rhabdom_diameter_um"  # of eyes whose receptors are rhabdoms
 TILT = "elevation_deg"  # of eyes on bodies of somebody's own; rhabdom's own agents look along the floor
 REAL: Literal["real"] = "real"
 INTEGER: Literal["integer"] = "integer"
@@ -99,11 +101,13 @@ class Gene:
 
 
 @lru_cache
-def gene_table(relief_points: int = 4, relief_symmetric: bool = False, square: bool = False) -> Mapping[str, Gene]:
+def gene_table(
+    relief_points: int = 4, relief_symmetric: bool = False, square: bool = False, rhabdoms: bool = False
+) -> Mapping[str, Gene]:
     """Every gene by name, in the order in which they stand in a genome; the relief has relief_points² of them, or those
-    of an eighth of it, and square eyes have one for both their sides."""
+    of an eighth of it, square eyes have one for both their sides, and rhabdoms one for how wide they are."""
     relief = set(representatives(relief_points, relief_symmetric))
-    absent = SIDES if square else (SIDE,)
+    absent = (*(SIDES if square else (SIDE,)), *(() if rhabdoms else (RHABDOM,)))
     return {
         name: gene
         for name, gene in _all_genes(relief_points).items()
@@ -145,6 +149,8 @@ def _optics(relief_points: int) -> list[Gene]:
         # Glasses reach from 1/90 to 1/20; 0 is a material that does not disperse.
         _held(gene("dispersion", REAL, (0, 0.1), (0, 0.05, 0), "1 / Abbe number", "fall of the index with wavelength")),
         _held(gene("aperture_shape", INTEGER, (0, last), (0, last, 0), "", f"pupil: {shapes}")),
+        # Thinner ones guide next to nothing of red light, and wider ones have a hundred modes.
+        _held(gene(RHABDOM, REAL, (0.8, 10), (1, 6, 2), "µm", "diameter of rhabdoms, at most a receptor's width")),
     ]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evolve.genome.anatomy import Sizes, fitted, retina_width, sides
-from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, TILT, GeneConfig
+from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, RHABDOM, TILT, GeneConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype_on_record import checked_fields
 from evolve.genome.relief_genes import representatives
@@ -51,6 +51,14 @@ class EyeSettings(Sizes, Protocol):
     def relief_points(self) -> int: ...
     @property
     def relief_symmetric(self) -> bool: ...
+    @property
+    def rhabdom_index(self) -> float: ...
+    @property
+    def rhabdom_surround(self) -> float: ...
+    @property
+    def rhabdom_length(self) -> float: ...
+    @property
+    def rhabdom_absorption(self) -> float: ...
 
 
 class Settings(Protocol):
@@ -71,6 +79,7 @@ class Phenotype:
     more the heights at cell centres that a cubic spline goes through.
     `aperture_shape` is a place in APERTURE_SHAPES, `dispersion` the inverse of the relief's Abbe number.
     `elevation_deg` is how far its eyes look up; None in rhabdom's own tasks, where they look along the floor.
+    `rhabdom_diameter_um` is that of its receptors; None: they are squares that absorb all light on them.
     `encoder` is the width of the layers that each eye's signals go through first.
     `lambda_max_nm` are the peaks of its receptor types' pigments; None: the receptors that all eyes of the run have.
     """
@@ -90,6 +99,22 @@ class Phenotype:
     lambda_max_nm: tuple[float, ...] | None = None
     encoder: int = FORMER_ENCODER
     elevation_deg: float | None = None
+    rhabdom_diameter_um: float | None = None
+
+    def waveguide(self, eye: EyeSettings) -> optics.Waveguide | None:
+        """Each receptor, no wider than its place; None for squares."""
+        import optics
+
+        if self.rhabdom_diameter_um is None:
+            return None
+        pitch = retina_width(self.resolution[1], eye) / self.resolution[1]
+        return optics.Waveguide(
+            diameter=min(1e-6 * self.rhabdom_diameter_um, pitch),
+            n_core=eye.rhabdom_index,
+            n_clad=eye.rhabdom_surround,
+            length=eye.rhabdom_length or None,
+            absorption=eye.rhabdom_absorption,
+        )
 
     def pupil(self, eye: EyeSettings) -> optics.Pupil | None:
         """Pupil of each of the eyes; None for the perfect lens."""
@@ -123,6 +148,7 @@ class Phenotype:
             photon_budget=optics.PhotonBudget(eye.illuminance, eye.integration_time) if eye.illuminance else None,
             bands=eye.bands,
             receptors=eye.receptors if self.lambda_max_nm is None else self.lambda_max_nm,
+            waveguide=self.waveguide(eye),
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -162,6 +188,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
         lambda_max_nm=peaks if config.eye.receptors == INHERITED else None,
         encoder=ceil(values["neurons"] / NEURONS_PER_FEATURE),
         elevation_deg=values.get(TILT),
+        rhabdom_diameter_um=values.get(RHABDOM),
     )
 
 

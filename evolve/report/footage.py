@@ -42,7 +42,7 @@ class Footage:
     @classmethod
     def of(cls, episode: FilmedEpisode) -> Footage:
         height, width = episode.pictures.shape[1:3]
-        gain = 1 / float(episode.eyes.eye().throughput)
+        gain = 1 / float(episode.eyes.eye().white_signal)
         return cls(episode.eyes, episode.seconds, gain, (round(WIDTH * height / width), WIDTH))
 
     def figure(self) -> Html:

@@ -58,7 +58,7 @@ class GroundPlan:
             object_radius=tuple(float(model.geom(name).size[0]) for name in world.objects),
             body_radius=BODY_RADIUS,
             seconds=SUBSTEPS * float(model.opt.timestep),
-            gain=1 / episode.eyes.eye().throughput,
+            gain=1 / episode.eyes.eye().white_signal,
         )
 
 

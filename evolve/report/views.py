@@ -48,7 +48,7 @@ def _busiest(episode: AnyEpisode) -> int:
 def _row(episode: AnyEpisode, eye: int, name: str, frame: int, lens: optics.Eye) -> Html:
     time = episode.radiance_frames[frame]
     scene = np.einsum("cb,byx->cyx", lens.spectral_bands.weights, episode.radiance[frame, eye])
-    gain = 1 / lens.throughput
+    gain = 1 / lens.white_signal
     pictures = (
         ("scene", display(scene)),
         ("perfect lens", display(episode.perfect_signals[time, eye])),
@@ -70,5 +70,6 @@ def through(eye: optics.Eye, radiance: np.ndarray) -> np.ndarray:
     is taken to go on as it ends, as far as the eye's kernel reaches (at most a picture's width)."""
     samples = radiance.shape[-1] // eye.resolution[1]
     reach = min(max(eye.kernel(samples).shape[1:]) // 2, radiance.shape[-1])
-    sight = eye.sight(samples, light_from="centres")
+    # Cells may be wider than what a rhabdom sees, and their centres say little of it then.
+    sight = eye.sight(samples, light_from="centres" if eye.waveguide is None else "cells")
     return eye.see(np.pad(radiance, ((0, 0), (reach, reach), (reach, reach)), mode="edge"), samples, sight=sight)

@@ -4,6 +4,8 @@ eye                   Eye
 geometry              lengths and directions, and how wide the pupil may be
 cell_integrals        integrals over cells of what is known at samples
 receptive_field       which directions a receptor sees: the kernel
+guided_field          the same of receptors that are waveguides
+receptor_kernel       either of them
 kernel_interpolation  how few kernels stand for a range of distances and directions
 kernel_bank           the kernels of an eye for a scene
 band_choice           how few spectral bands will do

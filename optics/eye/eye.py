@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from optics.elements.pupil import Pupil
-from optics.eye.band_choice import choose_bands
 from optics.eye.geometry import behind_pupil, check_pupil, direction, etendue, focal_length, tangents
+from optics.eye.guided_field import check_guide
 from optics.eye.kernel_bank import KernelBank, prepare
-from optics.eye.photoreceptor import gaussian_noise, own_type, photon_noise, quantum_catch, throughput
-from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf, visual_kernel
-from optics.eye.retinal_image import blur, centred, receptor_average
+from optics.eye.photoreceptor import noise_on, own_type, quantum_catch, throughput
+from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf
+from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kernel, white_share
+from optics.eye.retinal_image import at_receptors, blur, centred, receptor_average, with_centre
 from optics.eye.summary import Description, describe
 from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.precision import precision
+from optics.ommatidia.waveguide import Waveguide
 from optics.point_spread.psf_result import PSFResult
 from optics.spectra.bands import SpectralBands
 from optics.spectra.photon_budget import PhotonBudget
@@ -26,7 +29,6 @@ from optics.spectra.receptors import receptors_of
 
 __all__ = ["Eye"]
 
-CELLS_FOR_BANDS = 2  # per receptor, along an axis
 LIGHT_FROM = ("cells", "centres")  # of the scene
 
 
@@ -47,6 +49,8 @@ class Eye:
     photon_budget: the light there is; its shot noise comes before the Gaussian noise (None: no shot noise).
     receptors: types of receptor: "rgb" (three channels, red, green, blue), "lms" (human cones), "honeybee", "goldfish",
         wavelengths of pigments' peaks [nm], or `Receptors`, which can be a mosaic. The field then holds `Receptors`.
+    waveguide: what receptors are: rhabdoms, each in the middle of its square and pointing at the pupil's centre, which
+        take light in modes (None: they absorb all light on the square).
     tolerance: relative L2 error asked of the PSF; signal error, relative to white's, of whatever else is chosen.
     dtype: "float32" or "float64", of PSF, kernel and signals.
 
@@ -69,6 +73,7 @@ class Eye:
     receptors: Any = "rgb"
     full_aperture: float | None = None
     eccentricity_deg: tuple[float, float] = (0.0, 0.0)
+    waveguide: Waveguide | None = None
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -81,6 +86,7 @@ class Eye:
         if self.dtype not in ("float32", "float64"):
             raise ValueError(f"dtype = {self.dtype!r}: must be 'float32' or 'float64'")
         check_pupil(self.pupil, self.sensor_width, self.full_aperture)
+        check_guide(self.waveguide, self.pupil, self.receptor_pitch)
         if self.photon_budget is not None:
             of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
@@ -122,6 +128,14 @@ class Eye:
         if self.pupil is None:
             return throughput(self.relative_aperture, 1.0)
         return throughput(self.relative_aperture, self.pupil.aperture.area / math.pi) * self.pupil.transmission
+
+    @cached_property
+    def white_signal(self) -> Scalar:
+        """Of a receptor that sees white in daylight wherever it looks: the throughput, times what waveguides take of
+        it, mean of the channels."""
+        if self.waveguide is None:
+            return self.throughput
+        return number(self.throughput) * white_share(plain(self.kernel(1)), self.spectral_bands)
 
     @property
     def channels(self) -> int:
@@ -168,35 +182,25 @@ class Eye:
         a² Σ_b weights[c, b] (kernel_b ⊗ radiance_b), averaged over receptors; `see` takes it from all over the cells
         (see `sight`).
 
+        Waveguides are not averaged over: of them it is what a receptor takes from all over each cell around its
+        direction, ky and kx even where samples_per_receptor is, and the sum is the share of what its square would take.
+
         Raises:
             AccuracyError: see `optics.psf`.
         """
         positive("z", z, infinite=True, carried=True)
         asked = self.eccentricity_deg if direction_deg is None else direction("direction_deg", direction_deg)
-        return to_user(self._kernel(_whole(samples_per_receptor), z, tangents(asked)))
-
-    def _kernel(
-        self, samples_per_receptor: int, z: Scalar, direction: tuple[float, float], from_cell: bool = False
-    ) -> Array:
-        """direction: (right, down), tangents."""
-        if self.pupil is None:
-            return precision(self.dtype).Tensor(np.ones((len(self.spectral_bands.wavelengths), 1, 1)))
-        return visual_kernel(self.pupil, self._retina(samples_per_receptor), z, direction, from_cell)
+        retina, guided = self._retina(_whole(samples_per_receptor)), self.waveguide is not None
+        return to_user(receptor_kernel(self, retina, z, tangents(asked), guided))
 
     def _retina(self, samples_per_receptor: int) -> Retina:
         cell = self.receptor_pitch / samples_per_receptor
         return Retina(self.retina_distance, self.spectral_bands.wavelengths, cell, self.tolerance, self.dtype)
 
     def _chosen_bands(self) -> SpectralBands:
-        pupil, cell = self.pupil, self.receptor_pitch / CELLS_FOR_BANDS
-        if pupil is None:
-            return choose_bands(self.tolerance, self.receptors)
-
-        def kernels(wavelengths: np.ndarray) -> np.ndarray:
-            retina = Retina(self.retina_distance, wavelengths, cell, self.tolerance, self.dtype)
-            return plain(visual_kernel(pupil, retina, math.inf, tangents(self.eccentricity_deg)))
-
-        return choose_bands(self.tolerance, self.receptors, kernels, CELLS_FOR_BANDS)
+        cell = self.receptor_pitch / CELLS_FOR_BANDS
+        retina = Retina(self.retina_distance, np.empty(0), cell, self.tolerance, self.dtype)
+        return bands_for(self, retina, tangents(self.eccentricity_deg))
 
     def sight(
         self,
@@ -232,9 +236,10 @@ class Eye:
 
         def kernel_at(distance: Scalar, right: float, down: float) -> Array:
             place = aside + right * half_field[0], below + down * half_field[1]
-            return self._kernel(s, distance, place, from_cell)
+            return with_centre(receptor_kernel(self, self._retina(s), distance, place, from_cell))
 
-        return prepare(kernel_at, self.resolution, s, z, (depth_layers, field_zones), within)
+        counts, averaged = (depth_layers, field_zones), self.waveguide is None
+        return prepare(kernel_at, self.resolution, s, z, counts, within, averaged=averaged)
 
     def see(
         self,
@@ -266,20 +271,17 @@ class Eye:
         types = precision(self.dtype)
         scenes = [scene * share for share in bank.shares(scene.shape[1:], z)]
         image = blur(scenes, list(bank.kernels.values()), shape, types)
-        irradiance = receptor_average(image, s, types)
+        irradiance = (receptor_average if self.waveguide is None else at_receptors)(image, s, types)
         signal = quantum_catch(irradiance, self.spectral_bands.weights, self.throughput, types)
         if self.mosaic is not None:
             signal = own_type(signal, self.mosaic, types)
-        return to_user(signal) if rng is None else to_user(signal + types.Tensor(self._noise(signal, rng)))
-
-    def _noise(self, signal: Array, rng: np.random.Generator) -> np.ndarray:
-        """What noise adds to the signal."""
-        clean = plain(signal)
-        photons = self.photons
-        if photons is not None and self.mosaic is not None:
-            photons = photons[self.mosaic][None]
-        caught = clean if photons is None else photon_noise(np.maximum(clean, 0), photons, rng)
-        return gaussian_noise(caught, self.noise_sigma, rng) - clean
+        return (
+            to_user(signal)
+            if rng is None
+            else to_user(
+                signal + types.Tensor(noise_on(plain(signal), self.photons, self.mosaic, self.noise_sigma, rng))
+            )
+        )
 
     def in_bands(self, radiance: Any) -> np.ndarray:
         """(band,): a spectral radiance in this eye's bands, for `see`: each type of receptor then catches of it what it

@@ -103,18 +103,22 @@ def prepare(
     z: Any,
     counts: tuple[int | str, int | str],
     tolerance: float,
+    *,
+    averaged: bool = True,
 ) -> KernelBank:
     """Choose how many kernels, and make them. kernel_at(z, right, down): positions in the field from -1 to 1 at the
-    retina's edges; counts of depth layers and of zones across the longer side, or "auto"."""
+    retina's edges; counts of depth layers and of zones across the longer side, or "auto". averaged: whether a
+    receptor's signal is the mean over its cells."""
     s, depths = samples_per_receptor, _Range.of(z)
     layers, zones = (
         None if count == "auto" else whole(name, count, 1, MOST_NODES)
         for name, count in zip(("depth_layers", "field_zones"), counts, strict=True)
     )
-    along = NodeChoice("depth", lambda at: kernel_at(depths.distance(at[0]), 0.0, 0.0), [(n,) for n in DEPTH_COUNTS], s)
-    across = NodeChoice(
-        "field", lambda at: kernel_at(depths.distance(0), at[1], at[0]), [_grid(n, resolution) for n in FIELD_COUNTS], s
-    )
+    mean = s if averaged else 1
+    by_depth = [(n,) for n in DEPTH_COUNTS]
+    along = NodeChoice("depth", lambda at: kernel_at(depths.distance(at[0]), 0.0, 0.0), by_depth, mean)
+    by_place = [_grid(n, resolution) for n in FIELD_COUNTS]
+    across = NodeChoice("field", lambda at: kernel_at(depths.distance(0), at[1], at[0]), by_place, mean)
     if depths.only is not None:
         depth = Choice("depth", (1,), 0.0, "all at one distance")
     else:

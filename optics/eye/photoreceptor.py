@@ -9,7 +9,7 @@ from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["gaussian_noise", "own_type", "photon_noise", "quantum_catch", "throughput"]
+__all__ = ["gaussian_noise", "noise_on", "own_type", "photon_noise", "quantum_catch", "throughput"]
 
 MOST_PHOTONS = 1e18  # a count must fit a 64-bit integer
 
@@ -60,3 +60,13 @@ def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random
     expected = np.asarray(signal, dtype=np.float64) * budget
     in_range("signal x photons", float(expected.max(initial=0.0)), 0, MOST_PHOTONS)
     return rng.poisson(expected) / budget
+
+
+def noise_on(
+    clean: np.ndarray, photons: np.ndarray | None, mosaic: np.ndarray | None, sigma: float, rng: np.random.Generator
+) -> np.ndarray:
+    """What both kinds of noise add to signals (channel, y, x); photons: per type, or None; mosaic: see `own_type`."""
+    if photons is not None and mosaic is not None:
+        photons = photons[mosaic][None]
+    caught = clean if photons is None else photon_noise(np.maximum(clean, 0), photons, rng)
+    return gaussian_noise(caught, sigma, rng) - clean

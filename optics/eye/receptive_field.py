@@ -43,15 +43,16 @@ class Retina:
 @dataclass(frozen=True)
 class _WindowNeeds:
     """What one wavelength needs: half the window [m] around the geometric image, the pitch [m] that resolves the PSF,
-    and the band [1/m] beyond which there is less light than the tolerance."""
+    and the band [1/m] beyond which there is less light than the tolerance; half the window of its rays alone."""
 
     half_window: float
     pitch: float
     band: float
+    half_of_rays: float
 
 
 @dataclass(frozen=True)
-class _Spot:
+class Spot:
     """Where the light of a source lands: its geometric image (x, y) [m] on the sensor, half the side [m] of the square
     around it that holds the light, the pitch that resolves it, and what each wavelength needs."""
 
@@ -59,6 +60,11 @@ class _Spot:
     half: float
     pitch: float
     needs: tuple[_WindowNeeds, ...]
+
+    @property
+    def half_of_rays(self) -> float:
+        """The same of its rays alone."""
+        return min(self.half, max(need.half_of_rays for need in self.needs))
 
     def window(self, pitch: float) -> Grid:
         """Samples around the geometric image that hold the square."""
@@ -81,8 +87,8 @@ def visual_kernel(
 
     if is_differentiable(retina.distance) and direction != (0.0, 0.0):
         raise ValueError("fov_deg is a Dr.Jit array: must be a number off the axis, where it turns the light as well")
-    beams = _beams(pupil, retina, z, (-direction[0], -direction[1]))
-    spot = _spot(beams, retina)
+    beams = beams_to(pupil, retina, z, (-direction[0], -direction[1]))
+    spot = spot_of(beams, retina)
     # Each wavelength on samples of its own: longer ones need fewer.
     requests = [
         _request(beam, spot, need, spot.window(need.pitch), retina)
@@ -106,16 +112,16 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float,
     Raises:
         AccuracyError: no method meets the tolerance within the limits on memory and time.
     """
-    beams = _beams(pupil, retina, z, (-direction[0], -direction[1]))
-    return _spread(beams, _spot(beams, retina), retina)
+    beams = beams_to(pupil, retina, z, (-direction[0], -direction[1]))
+    return _spread(beams, spot_of(beams, retina), retina)
 
 
-def _beams(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, float]) -> list[Beam]:
+def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, float]) -> list[Beam]:
     source = PointSource(z, (math.atan(tangents[0]), math.atan(tangents[1])))
     return [Beam(pupil, source, float(wavelength), retina.distance) for wavelength in retina.wavelengths]
 
 
-def _spot(beams: list[Beam], retina: Retina) -> _Spot:
+def spot_of(beams: list[Beam], retina: Retina) -> Spot:
     distance = number(retina.distance)
     centre_x, centre_y = _image(beams[len(beams) // 2], distance)
     needs = tuple(_needs(beam, retina, (centre_x, centre_y)) for beam in beams)
@@ -127,7 +133,7 @@ def _spot(beams: list[Beam], retina: Retina) -> _Spot:
             + (", or flatten the relief" if beams[0].pupil.height is not None else "")
         )
     half = retina.cell * (_cells_within(half, retina.cell) + 1) / 2
-    return _Spot((centre_x, centre_y), half, pitch, needs)
+    return Spot((centre_x, centre_y), half, pitch, needs)
 
 
 def _image(beam: Beam, distance: float) -> tuple[float, float]:
@@ -140,12 +146,12 @@ def _image(beam: Beam, distance: float) -> tuple[float, float]:
     return distance * bent * x / axial, distance * bent * y / axial
 
 
-def _spread(beams: list[Beam], spot: _Spot, retina: Retina) -> PSFResult:
+def _spread(beams: list[Beam], spot: Spot, retina: Retina) -> PSFResult:
     window = spot.window(spot.pitch)
     return spread([_request(beam, spot, need, window, retina) for beam, need in zip(beams, spot.needs, strict=True)])
 
 
-def _request(beam: Beam, spot: _Spot, need: _WindowNeeds, window: Grid, retina: Retina) -> Request:
+def _request(beam: Beam, spot: Spot, need: _WindowNeeds, window: Grid, retina: Retina) -> Request:
     reach = spot.half + math.hypot(*spot.centre)
     problem = Problem.of(beam, window, retina.tolerance, retina.dtype)
     return Request(beam, replace(problem, widest_band=need.band, reach=reach), most_seconds=MOST_SECONDS)
@@ -182,7 +188,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
     # |U|² holds the differences of the field's frequencies. At a point of the sensor, lit from all over the pupil,
     # these span 2R/(λz); and no two within the band differ by more than twice the band.
     detail = min(2 * radius / (wavelength * z), 2 * band)
-    return _WindowNeeds(half, 1 / (samples_per_cycle(retina.tolerance) * detail), band)
+    return _WindowNeeds(half, 1 / (samples_per_cycle(retina.tolerance) * detail), band, shadow)
 
 
 def _shadow(beam: Beam, retina: Retina, centre: tuple[float, float]) -> float:

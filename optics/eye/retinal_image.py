@@ -13,7 +13,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision, padded_for_packets
 
-__all__ = ["blur", "centred", "receptor_average"]
+__all__ = ["at_receptors", "blur", "centred", "receptor_average", "with_centre"]
 
 
 def blur(
@@ -101,11 +101,21 @@ def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 def receptor_average(image: Array, samples_per_receptor: int, types: Precision) -> Array:
     """Mean over each receptor's square aperture, Dr.Jit tensors: (band, h s, w s) -> (band, h, w)."""
+    return _of_receptors(image, np.full(samples_per_receptor, 1 / samples_per_receptor), types)
 
-    down, across = (_means(n // samples_per_receptor, samples_per_receptor, types) for n in image.shape[1:])
+
+def at_receptors(image: Array, samples_per_receptor: int, types: Precision) -> Array:
+    """What is in each receptor's middle, or, where that lies between cells, in the next: see `with_centre`."""
+    return _of_receptors(image, np.arange(samples_per_receptor) == samples_per_receptor // 2, types)
+
+
+def with_centre(kernel: Array) -> Array:
+    """A kernel (band, k, k) with k odd; of one with k even the middle moves by half a cell, into a cell."""
+    side = kernel.shape[-1]
+    return kernel if side % 2 else type(kernel)(np.pad(kernel.numpy(), ((0, 0), (1, 0), (1, 0))))
+
+
+def _of_receptors(image: Array, shares: np.ndarray, types: Precision) -> Array:
+    """Sums over each receptor's own cells, by their shares along an axis."""
+    down, across = (types.Tensor(np.kron(np.eye(n // len(shares)), shares)) for n in image.shape[1:])
     return matmul(down, matmul(image, across, transposed=True))
-
-
-def _means(receptors: int, samples: int, types: Precision) -> Array:
-    """(receptor, cell): 1/s over each receptor's own cells."""
-    return types.Tensor(np.kron(np.eye(receptors), np.full((1, samples), 1 / samples)))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from optics.elements.pupil import Pupil
 from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import Scalar, number, plain
+from optics.ommatidia.waveguide import Waveguide
 from optics.point_spread.concentration import strehl_ratio
 from optics.point_spread.contrast import image_quality, mtf
 from optics.point_spread.psf_result import PSFResult
@@ -21,6 +22,7 @@ from optics.spectra.spectrum import daylight
 __all__ = ["DescribedEye", "Description", "describe", "noise_of"]
 
 FREQUENCIES = 513  # choice: between 0 and the cut-off, at which the MTF is held against the noise
+CELLS_ACROSS, MOST_CELLS = 8, 64  # choice: of a kernel, across a waveguide; along a receptor's side
 FINER = 16  # choice: steps per sample of the PSF, where a receptor's angular sensitivity is measured
 
 
@@ -52,9 +54,17 @@ class DescribedEye(Protocol):
     def throughput(self) -> Scalar: ...
 
     @property
+    def waveguide(self) -> Waveguide | None: ...
+
+    @property
+    def white_signal(self) -> Scalar: ...
+
+    @property
     def photons(self) -> np.ndarray | None: ...
 
     def psf(self, z: Scalar) -> PSFResult: ...
+
+    def kernel(self, samples_per_receptor: int, z: Scalar) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -70,6 +80,7 @@ class Description:
     photons: absorbed by it per integration time, mean of the channels (None: no photon budget).
     acceptance_angle_deg: full width at half height of a receptor's angular sensitivity, horizontally;
         interommatidial_angle_deg: Δφ between neighbours. plan: of the least accurate band's PSF.
+    white_signal: of a receptor that looks at white: the throughput, less what waveguides leave.
     unknown: what the light cannot tell well enough, a line each with the reason; its number is NaN.
     """
 
@@ -88,6 +99,7 @@ class Description:
     interommatidial_angle_deg: float
     plan: Plan
     unknown: tuple[str, ...] = ()
+    white_signal: float = math.nan
 
     @property
     def _limits(self) -> dict[str, float]:
@@ -107,7 +119,7 @@ class Description:
         rows = {
             "aperture": f"a = {self.relative_aperture:.3g}, f/{self.f_number:.3g}, throughput {self.throughput:.3g}",
             "image": f"Strehl ratio {self.strehl_ratio:.3g}, quality {self.image_quality:.3g}",
-            "noise": f"{self.noise:.2g} of {self.throughput:.3g} for white{shot}",
+            "noise": f"{self.noise:.2g} of {self.white_signal:.3g} for white{shot}",
             **{f"limit: {name}": f"{_cycles(limit)}{self._mark(name)}" for name, limit in self._limits.items()},
             "acuity": f"{_cycles(self.acuity_cpd)}, {self.binding} binds",
             "acceptance": f"{self.acceptance_angle_deg:.3g}°, {self._overlap:.3g} of the angle between receptors",
@@ -130,7 +142,7 @@ def noise_of(eye: DescribedEye) -> float:
     """Standard deviation of a receptor's signal where it sees white in daylight: its own noise, and that of photons."""
     if eye.photons is None:
         return float(eye.noise_sigma)
-    light = number(eye.throughput)
+    light = number(eye.white_signal)
     return math.hypot(eye.noise_sigma, light / math.sqrt(float(eye.photons.mean()) * light))
 
 
@@ -141,7 +153,7 @@ def describe(eye: DescribedEye, z: Scalar) -> Description:
     Raises:
         AccuracyError: the PSF cannot be computed: see `optics.psf`.
     """
-    distance, light, result = number(eye.sensor_distance), number(eye.throughput), eye.psf(z)
+    distance, light, result = number(eye.sensor_distance), number(eye.white_signal), eye.psf(z)
     white, wavelength = _white(eye, result)
     unknown: list[str] = []
     photons, noise = None if eye.photons is None else float(eye.photons.mean()) * light, noise_of(eye)
@@ -160,7 +172,8 @@ def describe(eye: DescribedEye, z: Scalar) -> Description:
     per_degree = math.radians(distance)
     return Description(
         relative_aperture=number(eye.relative_aperture),
-        throughput=light,
+        throughput=number(eye.throughput),
+        white_signal=light,
         f_number=number(eye.retina_distance) / (2 * result.pupil.radius),
         wavelength=wavelength,
         diffraction_cpd=diffraction * per_degree,
@@ -170,7 +183,7 @@ def describe(eye: DescribedEye, z: Scalar) -> Description:
         image_quality=quality,
         noise=noise,
         photons=photons,
-        acceptance_angle_deg=_acceptance(eye, white) / per_degree,
+        acceptance_angle_deg=_acceptance(eye, white, z) / per_degree,
         interommatidial_angle_deg=eye.receptor_pitch / per_degree,
         plan=result.plan,
         unknown=tuple(unknown),
@@ -207,10 +220,13 @@ def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
     return float(frequency[at - 1] + share * (frequency[at] - frequency[at - 1]))
 
 
-def _acceptance(eye: DescribedEye, white: PSFResult) -> float:
-    """Full width [m] at half height, along x through its peak, of PSF ⊗ receptor aperture in white daylight."""
+def _acceptance(eye: DescribedEye, white: PSFResult, z: Scalar) -> float:
+    """Full width [m] at half height, along x through its peak, of what a receptor sees in white daylight: PSF ⊗
+    receptor aperture, or what a waveguide takes."""
     if eye.pupil is None:
         return eye.receptor_pitch
+    if eye.waveguide is not None:
+        return _guided_acceptance(eye, eye.waveguide.diameter, z)
     half = eye.receptor_pitch / 2
     rows = _within(white.y, white.psf[0], white.y, half)
     peak = int(np.argmax(_within(white.x, rows.T, white.x, half).max(axis=0)))
@@ -220,6 +236,19 @@ def _acceptance(eye: DescribedEye, white: PSFResult) -> float:
     first, last = np.flatnonzero(above >= 0)[[0, -1]]
     left, right = above[first] / (above[first] - above[first - 1]), above[last] / (above[last] - above[last + 1])
     return float(last + right - first + left) * white.dx / FINER
+
+
+def _guided_acceptance(eye: DescribedEye, diameter: float, z: Scalar) -> float:
+    """The same of a waveguide of a diameter [m], from its kernel, by a spline through cells."""
+    from scipy.interpolate import CubicSpline
+
+    cells = min(max(4, math.ceil(CELLS_ACROSS * eye.receptor_pitch / diameter)), MOST_CELLS)
+    seen = eye.spectral_bands.white_light(plain(eye.kernel(cells, z))).mean(axis=0)
+    row = seen[int(np.argmax(seen.max(axis=1)))]
+    curve = CubicSpline(np.arange(len(row)), row)
+    at = np.linspace(0, len(row) - 1, FINER * len(row))
+    above = np.flatnonzero(curve(at) >= curve(at).max() / 2)
+    return float(at[above[-1]] - at[above[0]]) * eye.receptor_pitch / cells
 
 
 def _within(x: np.ndarray, image: np.ndarray, at: np.ndarray, half: float) -> np.ndarray:

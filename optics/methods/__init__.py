@@ -16,6 +16,7 @@ far_field            by one transform onto directions for each of a few nodes of
 fresnel              approximate: Fresnel and Fraunhofer, and how wrong they are
 geometric            approximate: density of rays; the pinhole
 richards_wolf        the vector focus of symmetric pupils, and how wrong scalar theory is
+vector_sum           the vector focus of any pupil
 rays                 where geometrical optics sends the light
 pupil_sampling       where matrix products sample the pupil
 sine_samples         the same, evenly spaced as seen from the window

@@ -15,4 +15,5 @@ matrices        matrix products of Dr.Jit tensors
 precision       float32 and float64 in Dr.Jit
 quadrature      Gauss-Legendre, and how many nodes a wave needs
 radial_profile  pictures that are symmetric about the axis, by one radius
+scattered_sum   Fourier sums over points anywhere
 """

@@ -20,6 +20,7 @@ __all__ = [
     "LAGRANGE_8",
     "TAPS",
     "Interpolant",
+    "chebyshev_basis",
     "chebyshev_points",
     "cubic_bsplines",
     "lagrange_basis",
@@ -131,3 +132,15 @@ def lagrange_basis(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
         for other in np.delete(nodes, i):
             basis[i] *= (x - other) / (node - other)
     return basis
+
+
+def chebyshev_basis(x: np.ndarray, n: int) -> np.ndarray:
+    """(*x.shape, node): the polynomial through values at `chebyshev_points(n)`, at x in [-1, 1], by the barycentric
+    formula (Berrut & Trefethen, SIAM Review 46, 501, 2004, eq. 4.2)."""
+    nodes, angle = chebyshev_points(n), np.pi * (np.arange(n) + 0.5) / n
+    apart = np.asarray(x)[..., None] - nodes
+    hit = apart == 0
+    share = (-1.0) ** np.arange(n) * np.sin(angle) / np.where(hit, 1, apart)
+    share = np.where(hit.any(-1, keepdims=True), hit, share)
+    found: np.ndarray = share / share.sum(-1, keepdims=True)
+    return found

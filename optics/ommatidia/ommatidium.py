@@ -8,7 +8,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
+from optics.elements.source import PointSource
 from optics.numerics.arguments import in_range, of_kind, positive, reals, vacuum_wavelength
 from optics.ommatidia.coupling import ModesAtPupil, modes_at_pupil
 from optics.ommatidia.facet import FacetLens
@@ -125,7 +127,7 @@ def _coupled(eye: Ommatidium, wavelength: float, steepest: float) -> ModesAtPupi
     modes = eye.modes(wavelength)
     if not modes:
         raise ValueError(f"rhabdom: guides nothing at {wavelength:g} m; must be wider, or of a higher index")
-    return modes_at_pupil(eye.pupil, modes, wavelength, eye._distance(), steepest)
+    return modes_at_pupil(Beam(eye.pupil, PointSource(), wavelength, eye._distance()), modes, steepest)
 
 
 def snyder_acceptance(diameter: float, focal_length: float, rhabdom: float, wavelength: float) -> float:

@@ -69,6 +69,12 @@ class PSFResult:
         re, im = (np.asarray(part.numpy()) for part in self.field_parts)
         return re + 1j * im
 
+    def __repr__(self) -> str:
+        """Short: requests hold grids of slopes."""
+        count, height, width = self.tensor.shape
+        planes = f"{count} wavelength{'s' * (count > 1)}, {height} x {width} samples {self.dx:.3g} m apart"
+        return f"<PSFResult {planes}, predicted error {self.plan.predicted_error:.1e}>"
+
     @cached_property
     def psf(self) -> np.ndarray:
         return self.tensor if isinstance(self.tensor, np.ndarray) else np.asarray(self.tensor.numpy())

@@ -47,6 +47,10 @@ class WhitePSF:
     coarse: np.ndarray
     spectral_error: np.ndarray
 
+    def __repr__(self) -> str:
+        errors = ", ".join(f"{error:.1e}" for error in self.predicted_error)
+        return f"<WhitePSF of {len(self.weights)} types from {self.waves!r}, predicted errors {errors}>"
+
     @cached_property
     def tensor(self) -> Array:
         """(type, y, x) in Dr.Jit, with derivatives."""

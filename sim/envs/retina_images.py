@@ -22,7 +22,7 @@ def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:
     their peaks: the longest as red, the shortest as blue, those between as what lies between; a single one as grey. In
     a mosaic every receptor has its type's colour.
     """
-    linear = np.einsum("ecyx,cyxk->eyxk", signals / eye.throughput, _palette(eye))
+    linear = np.einsum("ecyx,cyxk->eyxk", signals / eye.white_signal, _palette(eye))
     pixels = np.rint(255 * encode_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
     n, height, width = pixels.shape[:3]
     scale = max(1, min(SIZE[0] // height, (SIZE[1] - GAP * (n - 1)) // (n * width)))

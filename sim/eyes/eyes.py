@@ -17,7 +17,7 @@ from optics.spectra.photon_budget import PhotonBudget
 from optics.spectra.receptors import receptors_of
 
 if TYPE_CHECKING:
-    from optics import Eye, Pupil
+    from optics import Eye, Pupil, Waveguide
 
 BODY_RADIUS = 0.2  # [m]
 MOST = 10**6  # of anything that is counted; memory ends long before
@@ -41,6 +41,8 @@ class Eyes:
         then holds optics.Receptors
     photon_budget: optics.PhotonBudget: how much light there is and how long receptors gather it; its shot noise comes
         beside `noise_sigma`. None: light is no object
+    waveguide: optics.Waveguide: receptors are rhabdoms, which take light in modes (behind a pupil only). None: each
+        takes all light on its square
 
     Raises:
         ValueError: values outside these ranges and for unknown receptors, with the nearest name.
@@ -56,6 +58,7 @@ class Eyes:
     bands: int = 4
     receptors: Any = "rgb"
     photon_budget: PhotonBudget | None = None
+    waveguide: Waveguide | None = None
 
     def __post_init__(self) -> None:
         def check(name: str, valid: Callable[[Any], bool], range_: str) -> None:
@@ -88,6 +91,8 @@ class Eyes:
         check("optics", _is_pupil, "an optics.Pupil or None, the perfect lens")
         if not isinstance(self.photon_budget, PhotonBudget | None):
             raise ValueError(f"Eyes: photon_budget = {self.photon_budget!r}: must be an optics.PhotonBudget or None")
+        if self.waveguide is not None:
+            self._check_waveguide()
 
     def eye(self) -> Eye:
         """One eye's optics and retina."""
@@ -102,7 +107,16 @@ class Eyes:
             noise_sigma=self.noise_sigma,
             receptors=self.receptors,
             photon_budget=self.photon_budget,
+            waveguide=self.waveguide,
         )
+
+    def _check_waveguide(self) -> None:
+        from optics.eye.guided_field import check_guide
+
+        try:
+            check_guide(self.waveguide, self.optics, self.sensor_width / self.resolution[1])
+        except ValueError as error:
+            raise ValueError(f"Eyes: {error}") from None
 
     def azimuths(self) -> np.ndarray:
         """Azimuth of each optical axis [rad], (n_eyes,), from left (+) to right (-), evenly over the placement

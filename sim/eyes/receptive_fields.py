@@ -5,6 +5,7 @@ Fields are tabulated on square cells of the visual field's tangent plane, in the
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 # Chosen: cells across the eye, at least, on which receptive fields are tabulated (validation/C1_receptive_fields.py
 # says what of the error is this).
 MIN_CELLS = 32
+CELLS_ACROSS, MOST_CELLS = 4, 64  # chosen: across a waveguide, at least; along a receptor's side, at most
 
 
 class NoRaysError(ValueError):
@@ -37,9 +39,8 @@ class Draw:
 
 @dataclass(frozen=True)
 class ReceptiveFields:
-    """field: power per cell of one receptor's field: the turned PSF convolved with its square; (plane, y, x), a plane
-    for
-        every depth layer's every band
+    """field: power per cell of one receptor's field: the turned PSF convolved with its square, or what a waveguide
+        takes; (plane, y, x), a plane for every depth layer's every band
     density: probability per cell of the mean over all receptors and planes, each with the same weight, (Y, X)
     resolution: receptors (height, width) · cells: along a receptor's side
     """
@@ -57,8 +58,8 @@ class ReceptiveFields:
             optics.AccuracyError: see `optics.Eye.kernel`.
         """
         # (K ⊗ L)(r) = Σ_v K(r - v) L(v): as weights around the receptor, the convolution's kernel is turned about.
-        kernels = [eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances]
-        field = _averaged(_as_wide(kernels), cells)
+        kernels = _as_wide([eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances])
+        field = _averaged(kernels, cells) if eye.waveguide is None else kernels.astype(np.float64)
         everyone = np.arange(np.prod(eye.resolution))
         return cls(field, _mixture(field, eye.resolution, cells, everyone), eye.resolution, cells)
 
@@ -68,7 +69,7 @@ class ReceptiveFields:
 
     @property
     def power(self) -> np.ndarray:
-        """Fraction of the pupil's power inside a field, (plane,)."""
+        """Fraction of the pupil's power inside a field, and of that what waveguides take, (plane,)."""
         power: np.ndarray = self.field.sum(axis=(1, 2))
         return power
 
@@ -116,13 +117,21 @@ def cells_per_receptor(resolution: tuple[int, int]) -> int:
     return max(4, -(-MIN_CELLS // max(resolution)))
 
 
+def cells_for(eye: optics.Eye) -> int:
+    """The same, and enough across a waveguide that is narrower."""
+    fewest = cells_per_receptor(eye.resolution)
+    if eye.waveguide is None:
+        return fewest
+    return min(max(fewest, math.ceil(CELLS_ACROSS * eye.receptor_pitch / eye.waveguide.diameter)), MOST_CELLS)
+
+
 def receptive_fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
     """The fields of an eye on cells as fine as its PSF can be had on.
 
     Raises:
         optics.AccuracyError: a pupil whose light spreads too far for the coarsest.
     """
-    cells = cells_per_receptor(eye.resolution)
+    cells = cells_for(eye)
     while True:
         try:
             return ReceptiveFields.of(eye, cells, depth)

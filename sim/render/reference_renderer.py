@@ -14,6 +14,7 @@ import numpy as np
 
 import optics
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, camera_rotations, eye_positions
+from sim.eyes.receptive_fields import cells_for
 from sim.render.band_error import with_band_averaged_lights
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import mirror
@@ -27,7 +28,8 @@ class ReferenceRenderer:
     world, eyes: as in `sim.BatchedRenderer`
     integrator: of Mitsuba: "path", "direct", or its description, {"type": "path", "max_depth": 3}
     spp: samples per cell of a picture
-    samples_per_receptor: cells along a receptor's side; None: 4 behind a pupil, 1 for the perfect lens (pixels)
+    samples_per_receptor: cells along a receptor's side; None: 4 behind a pupil, more where rhabdoms are narrow, 1 for
+        the perfect lens (pixels)
     depths: nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all light is
         blurred as if from infinity
     depth_layers: kernels between them, or "auto"
@@ -56,7 +58,8 @@ class ReferenceRenderer:
     ) -> None:
         self.world, self.eyes, self.eye = world, eyes, eyes.eye()
         self.bands: optics.SpectralBands = self.eye.spectral_bands
-        self.samples_per_receptor = samples_per_receptor or (1 if self.eye.pupil is None else 4)
+        fewest = cells_for(self.eye) if self.eye.waveguide is not None else 4
+        self.samples_per_receptor = samples_per_receptor or (1 if self.eye.pupil is None else fewest)
         self._integrator, self._spp, self._sampler, self.seed = integrator, spp, sampler, seed
         self._has_depth = depths is not None
         z: Any = np.array(depths) if depths else math.inf

@@ -1,6 +1,6 @@
 """Which test covers which module of evolve/genome.
 
-genes: test_genotype.py
+genes: test_genotype.py, test_rhabdoms.py
 genotype: test_genotype.py
 phenotype: test_genotype.py, test_anatomy.py
 anatomy: test_anatomy.py

@@ -8,6 +8,8 @@ kernel_bank: test_kernel_bank.py
 kernel_interpolation: test_kernel_interpolation.py, test_kernel_bank.py
 photoreceptor: test_photoreceptor.py
 receptive_field: test_eye.py, test_eye_robustness.py
+guided_field: test_guided_field.py
+receptor_kernel: test_guided_field.py, test_eye.py
 retinal_image: test_retinal_image.py
 summary: test_summary.py
 """

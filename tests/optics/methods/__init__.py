@@ -17,4 +17,5 @@ sampling: point_spread/test_planner.py
 sine_samples: test_sine_samples.py
 spectral_taper: test_textbook.py
 textbook: test_textbook.py
+vector_sum: point_spread/test_vector_focus.py
 """

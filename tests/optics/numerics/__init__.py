@@ -15,4 +15,5 @@ matrices: test_fourier.py
 precision: test_precision.py
 quadrature: test_quadrature.py
 radial_profile: test_radial_profile.py
+scattered_sum: test_scattered_sum.py
 """

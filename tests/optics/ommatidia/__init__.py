@@ -1,6 +1,7 @@
 """Which test fails when a module of optics/ommatidia is broken.
 
 coupling: test_ommatidium.py
+radiation: test_radiation.py, test_ommatidium.py
 facet: test_facet.py
 mosaic: test_mosaic.py
 ommatidium: test_ommatidium.py

@@ -2,6 +2,7 @@
 
 batch: test_batch.py
 concentration: test_measures.py, test_measure_errors.py
+microvilli: test_microvilli.py
 contrast: test_measures.py, test_measure_errors.py
 mixture: test_mixture.py
 pictures: test_pictures.py
@@ -11,6 +12,6 @@ psf: test_psf.py, test_field.py, test_derivatives.py, test_robustness.py
 request: test_psf.py
 psf_result: test_psf.py, test_measure_errors.py
 spot_check: test_spot_check.py
-vector_focus: methods/test_richards_wolf.py
+vector_focus: test_vector_focus.py, methods/test_richards_wolf.py
 white: test_white.py
 """

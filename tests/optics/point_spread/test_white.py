@@ -190,3 +190,13 @@ def test_bad_input(arguments, message):
 def test_too_few_wavelengths_are_refused():
     with pytest.raises(AccuracyError, match=r"5 wavelengths carry the spectrum to .*; ask for waves="):
         optics.white_psf(LENS, waves=5, **SMALL)
+
+
+def test_results_are_printed_in_a_line():
+    """Not with all that they hold, which is megabytes."""
+    white = optics.white_psf(optics.Pupil(1e-3, thin_lens_focal_length=17e-3), dx=2e-6, shape=(9, 11))
+    focus = optics.vector_focus(optics.Pupil(1e-3, thin_lens_focal_length=17e-3), dx=2e-6, shape=(9, 11))
+    assert repr(white.waves).startswith("<PSFResult 31 wavelengths, 9 x 11 samples 2e-06 m apart, predicted error ")
+    assert repr(white).startswith("<WhitePSF of 3 types from <PSFResult 31 wavelengths")
+    assert repr(focus).startswith("<VectorFocus 9 x 11 samples 2e-06 m apart, scalar error ")
+    assert max(map(len, map(repr, (white, focus)))) < 240

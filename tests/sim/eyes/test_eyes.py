@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sim
-from optics import PhotonBudget, Pupil, Receptors
+from optics import PhotonBudget, Pupil, Receptors, Waveguide
 from sim.eyes.eyes import BODY_RADIUS, camera_rotations, eye_positions, eye_rotations
 
 
@@ -87,6 +87,7 @@ CHANGES = {
     "bands": (5, (2, 3, 4, 5)),
     "receptors": ("lms", (2, 3, 4, 5)),
     "photon_budget": (PhotonBudget(illuminance=10.0), (2, 3, 4, 5)),
+    "waveguide": (Waveguide(10e-6, 1.35), (2, 3, 4, 5)),
 }
 
 
@@ -95,7 +96,7 @@ def test_every_field_moves_what_is_seen(field):
     """A field that is not in the table fails: whoever adds one says what it does. (The sensor's width changes what a
     lens of given focal length makes of the scene.)"""
     value, shape = CHANGES[field]
-    behind_a_lens = field == "sensor_width"
+    behind_a_lens = field in ("sensor_width", "waveguide")
     before = _settled(behind_a_lens)
     after = _seen(sim.Eyes(**{**_given(behind_a_lens), field: value}))
     assert after.shape == shape

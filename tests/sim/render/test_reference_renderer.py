@@ -201,6 +201,33 @@ def test_parity_is_lost_when_something_is_wrong(through_a_prism, monkeypatch, sa
     assert departs(through_a_prism)
 
 
+@pytest.fixture(scope="module")
+def at_rhabdoms():
+    """The same prism, before rhabdoms a seventh of a receptor's place wide; the kernel is off centre."""
+    world, state = random_world("detection", 1)
+    eyes = dataclasses.replace(prism(EYES), waveguide=optics.Waveguide(4e-6))
+    return world, state, eyes, seeds(sim.ReferenceRenderer(world, eyes, "direct", 32), "signals", state)
+
+
+def test_rhabdoms_see_in_worlds_what_they_do_in_pictures(at_rhabdoms):
+    assert at_rhabdoms[2].eye().white_signal < 0.3 * at_rhabdoms[2].eye().throughput
+    assert not departs(at_rhabdoms)
+
+
+@pytest.mark.parametrize("sabotage", ["averaged", "turned"])
+def test_rhabdoms_parity_is_lost_when_something_is_wrong(at_rhabdoms, monkeypatch, sabotage):
+    """Averaged over squares as other receptors are, or turned the wrong way round."""
+    of = receptive_fields._as_wide
+    wrong = {
+        "averaged": lambda kernels: receptive_fields._averaged(
+            of(kernels), receptive_fields.cells_for(at_rhabdoms[2].eye())
+        ),
+        "turned": lambda kernels: of(kernels)[:, ::-1, ::-1],
+    }
+    monkeypatch.setattr(receptive_fields, "_as_wide", wrong[sabotage])
+    assert departs(at_rhabdoms)
+
+
 def test_shapes_and_light_levels():
     """(env, eye, ray, band) as the batched renderer has it; light that is reflected twice makes scenes brighter."""
     world, state = random_world("maze", 0)

@@ -1,0 +1,162 @@
+"""Which directions a receptor sees that is a waveguide: what its modes take of the light on the pupil.
+
+With E(v) the share of a point's light that is caught and absorbed, v [m] on the retina, a receptor of a retina with
+pitch p sees E(v)/p² of a scene's radiance: a square that absorbs all light would have the mean over its own area. The
+waveguide stands where the ray through the pupil's centre lands, and points at that centre.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from optics.elements.beam import Beam
+from optics.elements.pupil import Pupil
+from optics.eye.cell_integrals import samples_per_cycle
+from optics.eye.receptive_field import Retina, Spot, beams_to, spot_of
+from optics.numerics.accuracy import AccuracyError
+from optics.numerics.arguments import of_kind
+from optics.numerics.autodiff import Array, Scalar
+from optics.numerics.grid import Grid
+from optics.numerics.precision import precision
+from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
+from optics.ommatidia.coupling import modes_at_pupil
+from optics.ommatidia.waveguide import Waveguide
+
+__all__ = ["Guide", "check_guide", "guided_kernel"]
+
+FINER = 10.0  # choice: E is sampled for a tenth of the tolerance; it goes through a spline twice
+DEGREE, MARGIN = 5, 8  # of the spline, and samples beyond the window that it needs
+MOST_SAMPLES = 4096  # choice: of E, along an axis
+DEPTHS = 3.0  # choice: of the first mode's evanescent field, beyond the core, that belong to the window
+MORE_DIGITS = 1.5  # choice: of amplitudes, than of the tolerance
+WIDER = 1.5  # choice: steps in which windows are tried
+CELL_DIGITS = 4.0  # choice: of integrals over cells
+
+
+@dataclass(frozen=True)
+class Guide:
+    """A waveguide on a retina: focal: f [m], by which receptors see angles, x/f; cells: along a receptor's side;
+    from_cell: light comes from all over a cell of the scene, instead of from its centre."""
+
+    waveguide: Waveguide
+    focal: float
+    cells: int
+    from_cell: bool = True
+
+
+def check_guide(waveguide: Waveguide | None, pupil: Pupil | None, pitch: float) -> None:
+    """ValueError unless it is one that fits between its neighbours, behind a pupil."""
+    if waveguide is None:
+        return
+    of_kind("waveguide", waveguide, Waveguide, "Waveguide(2e-6), or None for receptors that are squares")
+    if pupil is None:
+        raise ValueError("waveguide is given and pupil = None: must be a Pupil, whose waves the waveguide takes")
+    if waveguide.diameter > pitch * (1 + 1e-9):
+        raise ValueError(
+            f"waveguide.diameter = {waveguide.diameter:g}: must be at most sensor_width / resolution[1] = {pitch:g} m, "
+            "for neighbours to have room"
+        )
+
+
+def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], guide: Guide) -> Array:
+    """What a receptor takes from every cell around its direction: Dr.Jit (band, k, k), k even where `guide.cells` is.
+
+    Turned as a kernel, see `receptive_field.visual_kernel`, which has the other arguments.
+
+    Raises:
+        ValueError: the waveguide guides nothing at one of the wavelengths, or something carries a derivative.
+        AccuracyError: too many samples of E.
+    """
+    beams = beams_to(pupil, retina, z, (-direction[0], -direction[1]))
+    spot = spot_of(beams, retina)
+    bands = [_within(beam, spot, need.pitch, retina, guide) for beam, need in zip(beams, spot.needs, strict=True)]
+    side = max(band.shape[0] for band in bands)
+    wide = [np.pad(band, (side - band.shape[0]) // 2) for band in bands]
+    scale = (guide.focal / (retina.cell * guide.cells)) ** 2
+    return precision(retina.dtype).Tensor(np.maximum(np.stack(wide) * scale, 0))
+
+
+def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
+    """E over cells of a window that holds all of it but the tolerance, and is no wider than `spot` asks."""
+    most = spot.half + _radius(guide.waveguide, beam)
+    diffracted = guide.focal * beam.wavelength / (beam.pupil.radius * beam.pupil.index_before(beam.wavelength))
+    half = spot.half_of_rays + most - spot.half + diffracted
+    while True:
+        half = min(half, most)
+        count = 2 * math.ceil(half / retina.cell - guide.cells % 2 / 2) + guide.cells % 2
+        cells = _Cells(count, retina.cell / guide.focal, pitch / guide.focal, retina.tolerance)
+        found, share = _seen(beam, spot, guide, cells)
+        if share >= 1 - retina.tolerance or half == most:
+            return found
+        half *= WIDER
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """How many in a row; their side, and the distance of samples that resolve E, as tangents."""
+
+    count: int
+    side: float
+    pitch: float
+    tolerance: float
+
+    def places(self, from_cell: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Tangents from the middle along an axis, (cell, node), and weights that sum to a cell's side."""
+        middle = (np.arange(self.count) - (self.count - 1) / 2) * self.side
+        if not from_cell:
+            return middle[:, None], np.array([self.side])
+        cycles = self.side / (self.pitch * samples_per_cycle(self.tolerance))
+        node, weight = gauss_legendre(gauss_legendre_count(cycles, CELL_DIGITS))
+        return middle[:, None] + (node - 0.5) * self.side, weight * self.side
+
+    @property
+    def step(self) -> float:
+        """Of samples, as sines."""
+        return self.pitch * samples_per_cycle(self.tolerance) / samples_per_cycle(self.tolerance / FINER)
+
+
+def _radius(waveguide: Waveguide, beam: Beam) -> float:
+    """[m] within which the field of the best guided mode lies."""
+    modes = waveguide.modes(beam.wavelength)
+    if not modes:
+        raise ValueError(f"waveguide: guides nothing at {beam.wavelength:g} m; must be wider, or of a higher index")
+    return modes[0].radius * (1 + min(DEPTHS / modes[0].w, DEPTHS))
+
+
+def _seen(beam: Beam, spot: Spot, guide: Guide, cells: _Cells) -> tuple[np.ndarray, float]:
+    """E over a band's cells, as integrals over tangents; and which share of all that is seen lies among them."""
+    from scipy.ndimage import map_coordinates
+
+    middle = [math.tan(angle) for angle in beam.source.angle]
+    at, weight = cells.places(guide.from_cell)
+    along_x, along_y = (tangent + at.ravel() for tangent in middle)
+    own = 1 / math.hypot(1, *middle)
+    cosine = 1 / np.sqrt(1 + along_x**2 + along_y[:, None] ** 2)
+    # Beside the source's own sine, which is in the modes' phase.
+    sine_x, sine_y = along_x * cosine - middle[0] * own, along_y[:, None] * cosine - middle[1] * own
+    sines = _grid_around(sine_x, sine_y, cells.step)
+    modes = guide.waveguide.modes(beam.wavelength)
+    taken = np.array([guide.waveguide.absorbed(mode) for mode in modes])
+    steepest = float(np.hypot(np.abs(sine_x).max(), np.abs(sine_y).max()))
+    digits = MORE_DIGITS - math.log10(cells.tolerance)
+    caught = modes_at_pupil(beam, modes, steepest, spot.centre, digits)
+    seen = caught.power_on(sines, taken, digits)
+    places = [(sine_y - sines.y[0]) / sines.dx, (sine_x - sines.x[0]) / sines.dx]
+    found = map_coordinates(seen, places, order=DEGREE, mode="nearest")
+    nodes = len(weight)
+    by_cell = found.reshape(cells.count, nodes, cells.count, nodes)
+    inner = seen[MARGIN:-MARGIN, MARGIN:-MARGIN].sum() * sines.dx**2
+    return np.einsum("yaxb,a,b->yx", by_cell, weight, weight), float(inner / caught.total(taken))
+
+
+def _grid_around(x: np.ndarray, y: np.ndarray, step: float) -> Grid:
+    """Sines that hold all of these, and what a spline needs beyond them."""
+    centre = tuple(float(axis.min() + axis.max()) / 2 for axis in (x, y))
+    sides = [math.ceil(float(np.ptp(axis)) / (2 * step)) for axis in (y, x)]
+    shape = tuple(2 * (side + MARGIN) + 1 for side in sides)
+    if max(shape) > MOST_SAMPLES:
+        raise AccuracyError(f"the light needs {max(shape)} samples of a receptor's field along an axis: at most 4096")
+    return Grid((shape[0], shape[1]), step, (centre[0], centre[1]))
