@@ -98,9 +98,8 @@ def film(
         views = _perfect_views(worlds.worlds, task, poses, radiance_every, lit)
         (sight,) = worlds.animals.learners[0].sights.values()
         everywhere = Poses.joined(*poses)
-        scene = FilmedScene.of(
-            worlds.worlds.model, solids, everywhere, kind.mounts[0], sight.renderer.eye_frames(everywhere)
-        )
+        eyes = sight.renderer.eye_frames(everywhere)
+        scene = FilmedScene.of(worlds.worlds.model, solids, everywhere, kind.mounts[0], eyes)
         seconds = task.substeps * float(worlds.worlds.model.opt.timestep)
     return FilmedEpisode(
         task=config.task,

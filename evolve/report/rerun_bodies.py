@@ -32,8 +32,7 @@ def draw_bodies(to: RerunStream, scene: FilmedScene, eyes: sim.Eyes) -> None:
 
 def _place(to: RerunStream, entity: tuple[str, ...], positions: np.ndarray, rotations: np.ndarray) -> None:
     """Where something is before each action, (t, 3) [m] and (t, 3, 3)."""
-    by_columns = np.swapaxes(rotations, 1, 2).reshape(-1, 9)
-    to.columns(entity, len(positions), to.rr.Transform3D.columns(translation=positions, mat3x3=by_columns))
+    to.columns(entity, len(positions), to.rr.Transform3D.columns(translation=positions, mat3x3=rotations))
 
 
 def _shape(rr: Any, solid: Solid) -> Any:

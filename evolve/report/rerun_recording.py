@@ -3,8 +3,8 @@
 Timelines: `action` counts actions, `time` is the world's [s]. Entities: `world` holds walls, objects and the agent, or
 the bodies of a model of somebody's own, with `path`, the animal's, and its eyes, each a camera that shows what it
 signals; `signals` the same as numbers (channel, y, x); `perfect_lens` and `scene` what the same receptors would signal
-behind a perfect lens, and what a fine grid of them would; `action`, `reward` and `contact` are numbers over time, and
-`outcome` says how an episode in a task of somebody's own ended.
+behind a perfect lens, and what a fine grid of them would; `action`, `reward` with its terms below it, and `contact` are
+numbers over time, and `outcome` says how an episode in a task of somebody's own ended.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def _look(to: RerunStream, episode: AnyEpisode, stage: Stage, eyes: tuple[str, .
 def _count(to: RerunStream, episode: AnyEpisode, commands: dict[str, np.ndarray]) -> None:
     """Numbers over time: commands, and rewards by term."""
     numbers = {("reward", name): term for name, term in episode.reward_terms.items()}
-    numbers |= {("reward", "total"): episode.reward}
+    numbers |= {("reward",): episode.reward}  # no term has its name
     numbers |= {("action", name): commanded for name, commanded in commands.items()}
     for entity, values in numbers.items():
         to.columns(entity, len(episode), to.rr.Scalars.columns(scalars=values.astype(np.float64)))
