@@ -80,8 +80,8 @@ def _look(to: RerunStream, episode: AnyEpisode, stage: Stage, eyes: tuple[str, .
 
 def _count(to: RerunStream, episode: AnyEpisode, commands: dict[str, np.ndarray]) -> None:
     """Numbers over time: commands, and rewards by term."""
-    numbers = {("reward", name): term for name, term in episode.reward_terms.items()}
-    numbers |= {("reward",): episode.reward}  # no term has its name
+    numbers: dict[tuple[str, ...], np.ndarray] = {("reward",): episode.reward}  # no term has its name
+    numbers |= {("reward", name): term for name, term in episode.reward_terms.items()}
     numbers |= {("action", name): commanded for name, commanded in commands.items()}
     for entity, values in numbers.items():
         to.columns(entity, len(episode), to.rr.Scalars.columns(scalars=values.astype(np.float64)))
