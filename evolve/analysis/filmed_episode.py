@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 import sim
+from evolve.analysis.filmed_scene import FilmedScene
 from evolve.config.run_config import EyeConfig, RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.policy import EyePolicy
@@ -20,6 +21,7 @@ from sim.envs.task_vec_env import TaskVecEnv
 from sim.envs.task_worlds import TaskWorlds
 from sim.robots.eye_kinds import kinds_of
 from sim.robots.poses import Poses
+from sim.robots.solids import solids_of
 from sim.robots.task import Task
 
 __all__ = ["FilmedEpisode", "film", "moments"]
@@ -45,6 +47,7 @@ class FilmedEpisode:
     radiance_frames: times t at which radiance was kept, (frame,)
     radiance: of the scene before each eye, on a finer grid, (frame, eye, band, y, x)
     picture_times: times t of which there are pictures, (picture,) · pictures (picture, y, x, 3) uint8 sRGB
+    scene: where everything was
     azimuths_deg, elevations_deg: where each eye looks in the frame of what it is on, (eye,)
     seconds: that one action lasts · solved: whether what is to be done was done at the end
     failure: what the task failed with, if it did
@@ -65,6 +68,7 @@ class FilmedEpisode:
     radiance: np.ndarray
     picture_times: np.ndarray
     pictures: np.ndarray
+    scene: FilmedScene
     azimuths_deg: np.ndarray
     elevations_deg: np.ndarray
     seconds: float
@@ -88,8 +92,14 @@ def film(
     task = own_task_for(phenotype, config)
     (kind,) = kinds_of(task)
     with contextlib.closing(TaskVecEnv(task, 1, seed, phenotype.memory_frames, "rgb_array")) as worlds:
-        poses, columns, lit = _play(policy, worlds)
+        first = worlds.reset()
+        solids = solids_of(worlds.worlds.datas[0].model)  # now: the next episode's may differ, and begins by itself
+        poses, columns, lit = _play(policy, worlds, first)
         views = _perfect_views(worlds.worlds, task, poses, radiance_every, lit)
+        (sight,) = worlds.animals.learners[0].sights.values()
+        everywhere = Poses.joined(*poses)
+        eyes = sight.renderer.eye_frames(everywhere)
+        scene = FilmedScene.of(worlds.worlds.model, solids, everywhere, kind.mounts[0], eyes)
         seconds = task.substeps * float(worlds.worlds.model.opt.timestep)
     return FilmedEpisode(
         task=config.task,
@@ -97,6 +107,7 @@ def film(
         seed=seed,
         phenotype=phenotype,
         eye=config.eye,
+        scene=scene,
         azimuths_deg=np.array([mount.azimuth_deg for mount in kind.mounts]),
         elevations_deg=np.array([mount.elevation_deg for mount in kind.mounts]),
         seconds=seconds,
@@ -112,12 +123,15 @@ def moments(task: Task, n: int, seed: int) -> tuple[mujoco.MjModel, tuple[str, .
         return worlds.worlds.model, worlds.worlds.bodies.varied, Poses.of(worlds.worlds.datas)
 
 
-def _play(policy: EyePolicy, worlds: TaskVecEnv) -> tuple[list[Poses], dict[str, Any], Lit]:
-    """Where everything was before each action, the columns that playing fills, and the episode's light."""
+def _play(
+    policy: EyePolicy, worlds: TaskVecEnv, observation: dict[str, np.ndarray]
+) -> tuple[list[Poses], dict[str, Any], Lit]:
+    """Where everything was before each action, the columns that playing fills, and the episode's light; the episode
+    has just begun with this observation."""
     poses: list[Poses] = []
     rows: list[tuple[Any, ...]] = []
     pictures: list[np.ndarray] = []
-    observation, info, done = worlds.reset(), dict[str, Any](), False
+    info, done = dict[str, Any](), False
     variation, varied = worlds.worlds.variation, {name: v.copy() for name, v in worlds.worlds.varied.items()}
     every = max(1, -(-worlds.worlds.episode_steps // MOST_PICTURES))
     while not done:

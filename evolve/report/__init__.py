@@ -22,4 +22,7 @@ moving_picture   an episode as a GIF or film
 replay           an episode once more
 exr_export       what an agent saw, as EXR files
 rerun_recording  an episode for rerun
+rerun_plan       where one of rhabdom's own tasks plays, for rerun
+rerun_bodies     the model of somebody's own task, for rerun
+rerun_stream     what these are written with
 """

@@ -8,12 +8,11 @@ from typing import Any
 
 from evolve.analysis.episode import Episode, record
 from evolve.analysis.filmed_episode import FilmedEpisode
-from evolve.config.own_task import is_own
-from evolve.config.run_config import ConfigError
 from evolve.report.footage import AnyEpisode
 from evolve.report.moving_picture import require_ffmpeg, write_gif, write_mp4
 from evolve.report.player import write_player
-from evolve.report.rerun_recording import require_rerun, write_recording
+from evolve.report.rerun_recording import write_recording
+from evolve.report.rerun_stream import require_rerun
 from evolve.store.directory import Run
 
 __all__ = ["BESIDE", "episode_facts", "episode_table", "write_page", "write_replay"]
@@ -32,12 +31,10 @@ def write_replay(
 
     Raises:
         RunError: there is no such candidate, or no policy of it.
-        ConfigError: rerun or ffmpeg are needed, but not installed, or rerun for a task of one's own.
+        ConfigError: rerun or ffmpeg are needed, but not installed.
     """
     if "rrd" in also:
         require_rerun()
-        if is_own(run.config.task):
-            raise ConfigError("--rrd is for rhabdom's own tasks; --gif and --mp4 are for all")
     if "mp4" in also:
         require_ffmpeg()
     episode = record(run, candidate_id, seed)

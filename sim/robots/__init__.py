@@ -19,5 +19,6 @@ model_scene         what stands still, as a Mitsuba scene, and what moves
 model_lights        lights, that may move
 model_tracer        light along rays
 primitives          rays that meet ellipsoids, capsules, cylinders and boxes
+solids              geoms as plain shapes, for what others draw
 movers              the same, for all that move in a world
 """

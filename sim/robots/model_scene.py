@@ -60,7 +60,7 @@ class ModelScene:
         self.model, self.variant = model, default_variant()
         self._as_built = {"size": model.geom_size.copy(), "colour": model.geom_rgba.copy()}
         self.spectra: Spectra = resolve(model, spectra)
-        seen = [g for g in range(model.ngeom) if model.geom_group[g] in groups and surfaces.rgba(model, g)[3] > 0]
+        seen = surfaces.visible(model, groups)
         self.geoms = [g for g in seen if shapes.has_shape(model, g)]
         if not self.geoms:
             raise ValueError("the model has no visible geom of a kind that can be mirrored")

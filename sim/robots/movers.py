@@ -22,7 +22,7 @@ from sim.scene.device_arrays import three, whole_numbers
 from sim.scene.variant import MitsubaObject
 
 _TYPES = mujoco.mjtGeom
-_KINDS = {
+KINDS = {
     _TYPES.mjGEOM_SPHERE: "ellipsoid",
     _TYPES.mjGEOM_ELLIPSOID: "ellipsoid",
     _TYPES.mjGEOM_CAPSULE: "capsule",
@@ -211,7 +211,7 @@ class Movers:
 
 def kind_of(model: mujoco.MjModel, geom: int) -> str | None:
     """Name of the primitive that a geom is; None: a mesh, or something whose texture wants triangles."""
-    return None if shapes.is_textured(model, geom) else _KINDS.get(surfaces.geom_type(model, geom))
+    return None if shapes.is_textured(model, geom) else KINDS.get(surfaces.geom_type(model, geom))
 
 
 def _met(hit: Callable[..., Array], ray: Array, rows: Array, first: Array, k: Array) -> Array:

@@ -238,11 +238,7 @@ def _visible(model: mujoco.MjModel, bodies: Sequence[str] | None, groups: Sequen
         if unknown:
             raise ValueError(f"mirror: no body {unknown[0]!r}; the model has {', '.join(map(repr, names))}")
         wanted = [names.index(name) for name in bodies]
-    return [
-        g
-        for g in range(model.ngeom)
-        if model.geom_bodyid[g] in wanted and model.geom_group[g] in groups and surfaces.rgba(model, g)[3] > 0
-    ]
+    return [g for g in surfaces.visible(model, groups) if model.geom_bodyid[g] in wanted]
 
 
 def _reference_pose(model: mujoco.MjModel) -> mujoco.MjData:

@@ -131,7 +131,7 @@ def parts(model: mujoco.MjModel, geom: int) -> list[Part]:
 
 
 def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
-    kind, size = surfaces.geom_type(model, geom), _half_sizes(model, geom)
+    kind, size = surfaces.geom_type(model, geom), half_sizes(model, geom)
     if kind in (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF):
         triangles = tessellation.mesh(model, model.geom_dataid[geom])
     elif kind == _TYPES.mjGEOM_HFIELD:
@@ -164,7 +164,7 @@ def _wrapped(model: mujoco.MjModel, geom: int, triangles: Triangles, size: np.nd
     return cube.laid(triangles, towards, int(model.tex_width[texture]), surfaces.faces_of(model, texture))
 
 
-def _half_sizes(model: mujoco.MjModel, geom: int) -> np.ndarray:
+def half_sizes(model: mujoco.MjModel, geom: int) -> np.ndarray:
     """What MuJoCo's renderer takes for half sizes along x, y, z."""
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if kind == _TYPES.mjGEOM_SPHERE:
@@ -184,8 +184,8 @@ def _exact_cylinder(kind: mujoco.mjtGeom, radius: float, half_length: float) -> 
     return [side, top, bottom]
 
 
-def _scaled(half_sizes: Sequence[float] | np.ndarray) -> np.ndarray:
-    return np.diag([*half_sizes, 1.0])
+def _scaled(scales: Sequence[float] | np.ndarray) -> np.ndarray:
+    return np.diag([*scales, 1.0])
 
 
 def _placed(sx: float, sy: float, sz: float, z: float = 0.0) -> np.ndarray:

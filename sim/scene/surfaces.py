@@ -3,6 +3,8 @@ that Jakob and Hanika (2019) give an RGB reflectance."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mitsuba as mi
 import mujoco
 import numpy as np
@@ -28,6 +30,11 @@ def rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
     if material >= 0 and np.array_equal(own, _UNSET_RGBA):
         return model.mat_rgba[material].astype(float)
     return own.astype(float)
+
+
+def visible(model: mujoco.MjModel, groups: Sequence[int]) -> list[int]:
+    """Ids of the geoms that are to be seen: those of these groups, but for what is wholly transparent."""
+    return [g for g in range(model.ngeom) if model.geom_group[g] in groups and rgba(model, g)[3] > 0]
 
 
 def texture_id(model: mujoco.MjModel, geom: int) -> int:

@@ -6,4 +6,5 @@ mishaps: test_mishaps.py
 genealogy: test_genealogy.py
 episode: test_episode.py
 filmed_episode: test_filmed_episode.py
+filmed_scene: report/test_rerun_bodies.py
 """

@@ -8,40 +8,19 @@ import pytest
 from evolve.cli.main import main
 from evolve.report import replay
 from evolve.report.ground_plan import GroundPlan
-from evolve.report.rerun_recording import write_recording
+from tests.evolve.report.read_back import frames, read_back, vectors
 
 
 @pytest.fixture(scope="module")
-def columns(run, episode, tmp_path_factory):
-    """Of each entity and component its values in order of the actions; of what is static, its value."""
-    pytest.importorskip("rerun", reason="the extra rerun is not installed")
-    from rerun.chunk import RrdReader
-
-    path = write_recording(episode, tmp_path_factory.mktemp("rrd") / "episode.rrd")
-    assert [file.name for file in path.parent.iterdir()] == ["episode.rrd"], "nothing half written is left"
-    rows = {}
-    for chunk in RrdReader(path).stream():
-        batch = chunk.to_record_batch()
-        actions = [0] * chunk.num_rows if chunk.is_static else batch.column("action").to_pylist()
-        for name in batch.schema.names:
-            if ":" in name or name == "time":
-                found = rows.setdefault((chunk.entity_path, name), [])
-                found += zip(actions, batch.column(name).to_pylist(), strict=True)
-    for (_, component), values in rows.items():
-        if component == "Transform3D:translation" and len(values) > 1:
-            assert sorted(action for action, _ in values) == list(range(len(episode))), "each has a time of its own"
-    return {key: [value for _, value in sorted(values, key=lambda row: row[0])] for key, values in rows.items()}
-
-
-def vectors(columns, entity, component):
-    return np.array([value[0] for value in columns[entity, component]])
+def columns(episode, tmp_path_factory):
+    return read_back(episode, tmp_path_factory.mktemp("rrd"))
 
 
 def test_actions_rewards_and_contact_are_numbers_over_time(columns, episode):
     for name, values in {
         "action/speed": episode.action[:, 0],
         "action/turn": episode.action[:, 1],
-        "reward/total": episode.reward,
+        "reward": episode.reward,
         "contact": episode.contact,
         **{f"reward/{name}": term for name, term in episode.reward_terms.items()},
     }.items():
@@ -51,6 +30,8 @@ def test_actions_rewards_and_contact_are_numbers_over_time(columns, episode):
 def test_agent_and_objects_move_as_they_did(columns, episode):
     place = vectors(columns, "/world/agent", "Transform3D:translation")
     np.testing.assert_allclose(place[:, :2], episode.position, atol=1e-5)
+    (path,) = vectors(columns, "/world/path", "LineStrips3D:strips")
+    np.testing.assert_array_equal(path, place)
     x, y, z, w = vectors(columns, "/world/agent", "Transform3D:quaternion").T
     assert not x.any()
     assert not y.any()
@@ -79,7 +60,7 @@ def test_pictures_are_there_of_every_eye_at_every_time(columns, episode):
 def test_eyes_are_cameras_that_look_where_the_eyes_look(columns, episode):
     """A point straight ahead of an eye is on its camera's axis: R (0, 0, 1) = (cos azimuth, sin azimuth, 0)."""
     for name, azimuth in zip(("left", "right"), np.radians([30, -30]), strict=True):
-        frame = np.reshape(columns[f"/world/agent/eyes/{name}", "Transform3D:mat3x3"][0][0], (3, 3)).T  # by columns
+        (frame,) = frames(columns, f"/world/agent/eyes/{name}")
         np.testing.assert_allclose(frame @ [0, 0, 1], [np.cos(azimuth), np.sin(azimuth), 0], atol=1e-6)
         np.testing.assert_allclose(frame @ [0, -1, 0], [0, 0, 1], atol=1e-6, err_msg="up")
         assert np.linalg.det(frame) == pytest.approx(1, abs=1e-6)

@@ -19,5 +19,6 @@ model_scene: test_model_renderer.py
 model_lights: test_model_renderer.py
 model_tracer: test_model_renderer.py, test_model_light.py
 primitives: test_movers.py
+solids: evolve/report/test_rerun_bodies.py
 movers: test_movers.py
 """

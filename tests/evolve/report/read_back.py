@@ -1,0 +1,36 @@
+"""Recordings for rerun, read by its own reader."""
+
+import numpy as np
+import pytest
+
+from evolve.report.rerun_recording import write_recording
+
+
+def read_back(episode, folder):
+    """Of each entity and component its values in order of the actions; of what is static, its value."""
+    pytest.importorskip("rerun", reason="the extra rerun is not installed")
+    from rerun.chunk import RrdReader
+
+    path = write_recording(episode, folder / "episode.rrd")
+    assert [file.name for file in folder.iterdir()] == ["episode.rrd"], "nothing half written is left"
+    rows = {}
+    for chunk in RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        actions = [0] * chunk.num_rows if chunk.is_static else batch.column("action").to_pylist()
+        for name in batch.schema.names:
+            if ":" in name or name == "time":
+                found = rows.setdefault((chunk.entity_path, name), [])
+                found += zip(actions, batch.column(name).to_pylist(), strict=True)
+    for (_, component), values in rows.items():
+        if component == "Transform3D:translation" and len(values) > 1:
+            assert sorted(action for action, _ in values) == list(range(len(episode))), "each has a time of its own"
+    return {key: [value for _, value in sorted(values, key=lambda row: row[0])] for key, values in rows.items()}
+
+
+def vectors(columns, entity, component):
+    return np.array([value[0] for value in columns[entity, component]])
+
+
+def frames(columns, entity):
+    """Rotations, from components that are by columns."""
+    return vectors(columns, entity, "Transform3D:mat3x3").reshape(-1, 3, 3).swapaxes(1, 2)
