@@ -214,7 +214,7 @@ class Movers:
         return blocked
 
     def _is_there(self, k: int, frame: _Frame) -> Array | bool:
-        """Whether a world has mover k."""
+        """Whether a world has mover k: what Embree and OptiX make of rays from nowhere is not defined."""
         return ~dr.isnan(frame.origin.x) if self._drawn[k] else True
 
     def _kinds(self) -> list[tuple[int, Primitive]]:
