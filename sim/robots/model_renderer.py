@@ -15,9 +15,9 @@ from sim.eyes.sampling import BoxSampling, directions_of, eye_sampling
 from sim.render.fidelity import AREAS, EDGES, Fidelity
 from sim.render.memory_budget import Demand, check_memory
 from sim.render.pending_frame import FrameSlot, PendingFrame
+from sim.robots.appearances import Varied
 from sim.robots.edge_rays import FIRST, EdgeRays, allowed_error
 from sim.robots.inside import depth_inside
-from sim.robots.looks import Varied
 from sim.robots.model_scene import ModelScene
 from sim.robots.model_tracer import ModelTracer
 from sim.robots.model_wavefront import ModelWavefront

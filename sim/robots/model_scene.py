@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum
-from sim.robots.looks import Look, Varied, looks_of, varied_geoms
+from sim.robots.appearances import Appearance, Varied, appearances_of, varied_geoms
 from sim.robots.model_lights import Lights, model_lights
 from sim.robots.movers import Movers, kind_of
 from sim.robots.paint import Paint
@@ -73,7 +73,7 @@ class ModelScene:
             differ = varied_geoms(model, self.geoms, varied, self.spectra)
             self._drawn = {geom: materials for geom, materials in differ.items() if materials}
             painted = [geom for geom in differ if geom not in self._drawn]
-            looks = looks_of(model, self.geoms, self._drawn)
+            looks = appearances_of(model, self.geoms, self._drawn)
             self.glows = {look: glow for look in looks if (glow := self._glow(look)) is not None}
             matt = {look: self._matt(look, look.geom in painted) for look in looks}
             moving = [each for each in looks if _moves(model, each.geom) or each.geom in differ or each in self.glows]
@@ -90,13 +90,13 @@ class ModelScene:
         if left_out:
             warnings.warn(f"eyes do not see: {'; '.join(left_out)}", MirrorWarning, stacklevel=_outside())
 
-    def _matt(self, look: Look, white: bool) -> MitsubaObject:
+    def _matt(self, look: Appearance, white: bool) -> MitsubaObject:
         to_uv = shapes.uv_transform(look.model, look.geom)
         if white:
             return bsdfs.matt_white(look.model, look.geom, to_uv)
         return bsdfs.matt(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
 
-    def _glow(self, look: Look) -> MitsubaObject | None:
+    def _glow(self, look: Appearance) -> MitsubaObject | None:
         """A BSDF whose reflectance is the radiance of what glows: the kernel asks for it as for the others."""
         to_uv = shapes.uv_transform(look.model, look.geom)
         radiance = lights.glow(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
@@ -104,7 +104,7 @@ class ModelScene:
             return None
         return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": radiance}})
 
-    def _mesh(self, look: Look, bsdf: MitsubaObject) -> MitsubaObject:
+    def _mesh(self, look: Appearance, bsdf: MitsubaObject) -> MitsubaObject:
         """A geom in its own frame."""
         parts = enumerate(shapes.parts(look.model, look.geom))
         built = {f"part_{k}": shapes.build(part, np.eye(4), f"part_{k}", bsdf, None) for k, part in parts}
@@ -187,7 +187,7 @@ def _outside() -> int:
     return level
 
 
-def _not_matt(model: mujoco.MjModel, looks: Sequence[Look], light: str) -> list[str]:
+def _not_matt(model: mujoco.MjModel, looks: Sequence[Appearance], light: str) -> list[str]:
     """What surfaces do that is left out, in words."""
     materials = sorted({look.material for look in looks if look.material >= 0})
     glossy = [m for m in materials if bsdfs.has_gloss(model, m)]

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.robots.looks import Look
+from sim.robots.appearances import Appearance
 from sim.robots.poses import Poses
 from sim.robots.primitives import PRIMITIVES, Primitive
 from sim.scene import shapes, surfaces
@@ -82,7 +82,9 @@ class Movers:
         ValueError: more than MESHES meshes.
     """
 
-    def __init__(self, model: mujoco.MjModel, looks: Sequence[Look], meshes: dict[Look, MitsubaObject]) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, looks: Sequence[Appearance], meshes: dict[Appearance, MitsubaObject]
+    ) -> None:
         if len(meshes) > MESHES:
             raise ValueError(f"the model has {len(meshes)} moving meshes: must be {MESHES} at most; hide some by group")
         closed = [look for look in looks if look not in meshes]

@@ -16,7 +16,7 @@ import numpy as np
 
 from optics.numerics.arguments import did_you_mean
 from sim.robots import variation as of_worlds
-from sim.robots.looks import in_material, material_of
+from sim.robots.appearances import in_material, material_of
 from sim.robots.movers import kind_of as primitive_of
 from sim.robots.variation import COLOR, MATERIAL, OF_THINGS, SIZE, START, Variation
 from sim.scene import source, surfaces

@@ -21,7 +21,7 @@ Varied = Sequence[str] | Mapping[str, Sequence[str]]
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class Appearance:
     """geom: its id · model: in which it looks so · drawn: whether it is one of several materials'"""
 
     geom: int
@@ -39,7 +39,9 @@ class Look:
         return float(surfaces.rgba(self.model, self.geom)[3])
 
 
-def looks_of(model: mujoco.MjModel, geoms: Sequence[int], materials: Mapping[int, Sequence[int]]) -> list[Look]:
+def appearances_of(
+    model: mujoco.MjModel, geoms: Sequence[int], materials: Mapping[int, Sequence[int]]
+) -> list[Appearance]:
     """All that are seen of these geoms; materials: ids of those that are drawn, by geom."""
     found = []
     for geom in geoms:
@@ -47,15 +49,15 @@ def looks_of(model: mujoco.MjModel, geoms: Sequence[int], materials: Mapping[int
             drawn = (in_material(model, geom, material) for material in materials[geom])
             found += [look for look in drawn if look.alpha > 0]
         else:
-            found.append(Look(geom, model))
+            found.append(Appearance(geom, model))
     return found
 
 
-def in_material(model: mujoco.MjModel, geom: int, material: int) -> Look:
+def in_material(model: mujoco.MjModel, geom: int, material: int) -> Appearance:
     """As a geom looks in one of the model's materials."""
     changed = copy.copy(model)
     changed.geom_matid[geom] = material
-    return Look(geom, changed, drawn=True)
+    return Appearance(geom, changed, drawn=True)
 
 
 def material_of(model: mujoco.MjModel, material: str, where: str) -> int:
