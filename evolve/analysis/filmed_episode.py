@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -116,7 +116,7 @@ def film(
     )
 
 
-def moments(task: Task, n: int, seed: int) -> tuple[mujoco.MjModel, tuple[str, ...], Poses]:
+def moments(task: Task, n: int, seed: int) -> tuple[mujoco.MjModel, Mapping[str, Sequence[str]], Poses]:
     """The model, which of its geoms differ, and where everything is at the beginnings of n episodes."""
     with contextlib.closing(TaskVecEnv(task, n, seed)) as worlds:
         worlds.reset()

@@ -174,10 +174,10 @@ def _dimmed(vary: Mapping[str, tuple[float, float]] | None) -> Variation | None:
     if not vary:
         return None
     variation = Variation(vary)
-    for name, (_, high) in variation.ranges.items():
+    for name, given in variation.ranges.items():
         if name != "light":
             raise ValueError(f"vary: {name!r}: is for a sim.Task; rhabdom's own tasks vary 'light' alone")
-        if high > 1:
+        if given[1] > 1:
             raise ValueError(f"vary: light = {vary[name]!r}: must be at most 1, full daylight")
     return variation
 

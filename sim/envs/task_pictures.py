@@ -36,11 +36,11 @@ class TaskPictures:
         return []
 
     def _camera_of(self, world: int) -> QuickCamera:
-        """The one for all; where sizes or colours differ, each world's own, made anew with its episode and no earlier:
+        """The one for all; where bodies differ, each world's own, made anew with its episode and no earlier:
         a camera's materials have all eyes' kernels recorded once more."""
         bodies = self._animals.worlds.bodies
         model = bodies.models[world]
-        looks = model.geom_size.tobytes() + model.geom_rgba.tobytes()
+        looks = model.geom_size.tobytes() + model.geom_rgba.tobytes() + model.geom_matid.tobytes()
         known, camera = self._cameras.get(world if bodies.varied else 0, (b"", None))
         if camera is None or looks != known:
             camera = QuickCamera(model, self._animals.learners[0].renderer.spectra)

@@ -186,8 +186,10 @@ class TaskVecEnv(OneEnvironment):
             warnings.warn(f"{type(self.task).__name__}: {failure}; its episode ends here", stacklevel=4)
 
 
-def _plain(value: np.ndarray) -> float | tuple[float, ...]:
-    """A number, or three."""
+def _plain(value: np.ndarray) -> str | float | tuple[float, ...]:
+    """A name, a number, or three."""
+    if value.dtype.kind == "U":
+        return str(value)
     return tuple(map(float, value)) if value.ndim else float(value)
 
 

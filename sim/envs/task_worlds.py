@@ -41,9 +41,10 @@ class TaskWorlds:
     task: of the animal that learns, with its others; or an Encounter, where all learn
     episode_steps: actions, then an episode is truncated; None: as many as the task has
     learners: tasks of those who learn · frozen: the others · animals: tasks of all, those who learn first
-    model · bodies: models of every world, where sizes or colours differ · datas: mjData of every world
+    model · bodies: models of every world, where sizes, colours or materials differ · datas: mjData of every world
     steps: actions taken in its episode, (n,) int
-    variation: what differs between episodes; None: nothing · varied: how it is now, by name: (n,) or (n, 3)
+    variation: what differs between episodes; None: nothing
+    varied: how it is now, by name: (n,) or (n, 3), numbers or names
     felt: what each animal feels now, by animal: (n, numbers) float32
     rngs: of each world's episodes · noise_keys: of receptors, by animal: (kind of eyes, n)
     entropy: what all random streams come from; seeded with it again, everything happens again

@@ -1,9 +1,10 @@
 """Eyes on any robot: models that are not one of our worlds.
 
 task                Task: what a robot has to do
-variation           what differs between episodes: light, sizes, colours, starts
+variation           what differs between episodes: light, sizes, colours, materials, starts
 world_models        a model for each world, where these differ
 paint               colours that differ, for the kernel
+appearances         materials that differ: how a geom may look, of which a world has one
 encounter           Encounter: several tasks in one world; Frozen: an animal that does not learn
 model_renderer      ModelRenderer: eyes mounted on any MuJoCo model, in many worlds at once
 model_fidelity      how many rays eyes on a model need

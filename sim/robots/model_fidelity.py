@@ -20,6 +20,7 @@ import optics
 from optics.spectra.spectrum import Spectrum
 from sim.render.fidelity import EDGES, RAYS, Fidelity, Level
 from sim.render.fidelity_choice import FidelityWarning
+from sim.robots.appearances import Varied
 from sim.robots.edge_rays import allowed_error, edges_pay
 from sim.robots.model_renderer import ModelRenderer
 from sim.robots.mounts import Mount
@@ -55,7 +56,7 @@ def choose_model_fidelity(
     *,
     groups: Sequence[int] = VISIBLE_GROUPS,
     spectra: Mapping[str, Spectrum | str] | None = None,
-    varied: Sequence[str] = (),
+    varied: Varied = (),
     light: str = lighting.DIRECT,
 ) -> Fidelity:
     """The fewest rays for `ModelRenderer` whose error, tried at these poses, is within the tolerance; a FidelityWarning

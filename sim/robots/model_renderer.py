@@ -15,6 +15,7 @@ from sim.eyes.sampling import BoxSampling, directions_of, eye_sampling
 from sim.render.fidelity import AREAS, EDGES, Fidelity
 from sim.render.memory_budget import Demand, check_memory
 from sim.render.pending_frame import FrameSlot, PendingFrame
+from sim.robots.appearances import Varied
 from sim.robots.edge_rays import FIRST, EdgeRays, allowed_error
 from sim.robots.inside import depth_inside
 from sim.robots.model_scene import ModelScene
@@ -43,7 +44,8 @@ class ModelRenderer:
         light that is reflected twice, and what the sky and what glows send; samples="edges" for that many rays only
         where a few of them differ, in direct light
     groups, spectra: see `sim.mirror`
-    varied: names of geoms whose size or colour may differ from world to world: as `poses` say, by the worlds' mjModels
+    varied: names of geoms whose size or colour may differ from world to world: as `poses` say, by the worlds' mjModels;
+        {"floor": ("sand", "grass")}: and names of the materials that one may have, in the place of other colours
     brightest: signal of a white surface that faced all directional lights at once
 
     Warns (`sim.MirrorWarning`) once of what eyes do not see of the model.
@@ -65,7 +67,7 @@ class ModelRenderer:
         *,
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
-        varied: Sequence[str] = (),
+        varied: Varied = (),
     ) -> None:
         self.n_envs = whole("n_envs", n_envs, 1, MOST_ENVS)
         of_kind("eye", eye, optics.Eye, "optics.Eye(resolution=(15, 15))")

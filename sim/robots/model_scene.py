@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -15,8 +15,8 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import did_you_mean
 from optics.spectra.spectrum import Spectrum
+from sim.robots.appearances import Appearance, Varied, appearances_of, varied_geoms
 from sim.robots.model_lights import Lights, model_lights
 from sim.robots.movers import Movers, kind_of
 from sim.robots.paint import Paint
@@ -38,8 +38,9 @@ class ModelScene:
     model · variant: of Mitsuba · geoms: ids of all that are seen
     scene: mi.Scene of what stands still, and the sky · movers: what moves · lights: all of them
     spectra: measured ones of materials and lights, by name · has_sky: whether there is something to see at infinity
-    glows: BSDFs whose reflectance is the radiance of geoms that glow, by id; these are met like movers
-    paint: of what differs from world to world, `varied` by name: it is met like a mover, though it may stand still
+    glows: BSDFs whose reflectance is the radiance of what glows, by look; these are met like movers
+    paint: of sizes and colours that differ from world to world, `varied` by name: what differs is met like a mover,
+        though it may stand still
     bsdfs: of every mover, in their order; kept here, since a BSDFPtr does not keep its objects alive
 
     Warns (`sim.MirrorWarning`) once of what has no counterpart.
@@ -54,51 +55,58 @@ class ModelScene:
         wavelengths: np.ndarray,
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
-        varied: Sequence[str] = (),
+        varied: Varied = (),
         light: str = DIRECT,
     ) -> None:
         self.model, self.variant = model, default_variant()
-        self._as_built = {"size": model.geom_size.copy(), "colour": model.geom_rgba.copy()}
+        self._as_built = {
+            "size": model.geom_size.copy(),
+            "colour": model.geom_rgba.copy(),
+            "material": model.geom_matid[:, None].copy(),
+        }
         self.spectra: Spectra = resolve(model, spectra)
         seen = surfaces.visible(model, groups)
         self.geoms = [g for g in seen if shapes.has_shape(model, g)]
         if not self.geoms:
             raise ValueError("the model has no visible geom of a kind that can be mirrored")
         with in_variant(self.variant):
-            self.glows = {g: glow for g in self.geoms if (glow := self._glow(g)) is not None}
-            painted = varied_geoms(model, self.geoms, varied, self.spectra)
-            matt = {g: self._matt(g, g in painted) for g in self.geoms}
-            moving = [g for g in self.geoms if _moves(model, g) or g in painted or g in self.glows]
-            meshes = {g: self._mesh(g, matt[g]) for g in moving if kind_of(model, g) is None}
+            differ = varied_geoms(model, self.geoms, varied, self.spectra)
+            self._drawn = {geom: materials for geom, materials in differ.items() if materials}
+            painted = [geom for geom in differ if geom not in self._drawn]
+            looks = appearances_of(model, self.geoms, self._drawn)
+            self.glows = {look: glow for look in looks if (glow := self._glow(look)) is not None}
+            matt = {look: self._matt(look, look.geom in painted) for look in looks}
+            moving = [each for each in looks if _moves(model, each.geom) or each.geom in differ or each in self.glows]
+            meshes = {look: self._mesh(look, matt[look]) for look in moving if kind_of(look.model, look.geom) is None}
             self.movers = Movers(model, moving, meshes)
             self.paint = Paint(model, painted, self.movers.geoms, wavelengths)
-            self.bsdfs = [matt[int(g)] for g in self.movers.geoms]
+            self.bsdfs = [matt[look] for look in self.movers.looks]
             found, left_out = model_lights(model, self.spectra, wavelengths, light)
             self.lights = Lights(found)
-            self._matt_still = {g: matt[g] for g in self.geoms if g not in moving}
+            self._matt_still = {look.geom: matt[look] for look in looks if look not in moving}
             self.scene = self._still()
             self.has_sky = self.scene.environment() is not None
-        left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, self.geoms, light)]
+        left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, looks, light)]
         if left_out:
             warnings.warn(f"eyes do not see: {'; '.join(left_out)}", MirrorWarning, stacklevel=_outside())
 
-    def _matt(self, geom: int, white: bool) -> MitsubaObject:
-        to_uv = shapes.uv_transform(self.model, geom)
+    def _matt(self, look: Appearance, white: bool) -> MitsubaObject:
+        to_uv = shapes.uv_transform(look.model, look.geom)
         if white:
-            return bsdfs.matt_white(self.model, geom, to_uv)
-        return bsdfs.matt(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
+            return bsdfs.matt_white(look.model, look.geom, to_uv)
+        return bsdfs.matt(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
 
-    def _glow(self, geom: int) -> MitsubaObject | None:
-        """A BSDF whose reflectance is the radiance of a geom that glows: the kernel asks for it as for the others."""
-        to_uv = shapes.uv_transform(self.model, geom)
-        radiance = lights.glow(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
+    def _glow(self, look: Appearance) -> MitsubaObject | None:
+        """A BSDF whose reflectance is the radiance of what glows: the kernel asks for it as for the others."""
+        to_uv = shapes.uv_transform(look.model, look.geom)
+        radiance = lights.glow(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
         if radiance is None:
             return None
         return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": radiance}})
 
-    def _mesh(self, geom: int, bsdf: MitsubaObject) -> MitsubaObject:
+    def _mesh(self, look: Appearance, bsdf: MitsubaObject) -> MitsubaObject:
         """A geom in its own frame."""
-        parts = enumerate(shapes.parts(self.model, geom))
+        parts = enumerate(shapes.parts(look.model, look.geom))
         built = {f"part_{k}": shapes.build(part, np.eye(4), f"part_{k}", bsdf, None) for k, part in parts}
         return mi.load_dict({"type": "scene", **built}, optimize=False)
 
@@ -111,13 +119,18 @@ class ModelScene:
         return scene, np.array([int(shape.id().split("_")[1]) for shape in scene.shapes()], int)
 
     def refuse_differences(self, poses: Poses) -> None:
-        """Sizes and colours that differ from the model's where they cannot.
+        """Sizes, colours and materials that differ from the model's where they cannot.
 
         Raises:
             ValueError: they do.
         """
-        free = self.movers.geoms[: self.movers.n_primitives]
-        for what, here, may in (("size", poses.geom_size, free), ("colour", poses.geom_rgba, self.paint.geoms)):
+        self._refuse_other_materials(poses)
+        material = None if poses.geom_matid is None else poses.geom_matid[..., None]
+        for what, here, may in (
+            ("size", poses.geom_size, self.movers.resizable),
+            ("colour", poses.geom_rgba, self.paint.geoms),
+            ("material", material, list(self._drawn)),
+        ):
             if here is None:
                 continue
             own = self._as_built[what]
@@ -129,10 +142,20 @@ class ModelScene:
             wrong = [g for g in np.flatnonzero(differs) if g in self.geoms]
             if wrong:
                 name = self.model.geom(int(wrong[0])).name or str(wrong[0])
-                more = ", and be a primitive without a texture" if what == "size" else ""
+                more = {"size": ", and be a primitive without a texture", "material": ", with its materials"}.get(
+                    what, ""
+                )
                 raise ValueError(
                     f"geom {name!r} has another {what} than in the renderer's model: must be in `varied`{more}"
                 )
+
+    def _refuse_other_materials(self, poses: Poses) -> None:
+        own = self._as_built["material"][None, :, 0]
+        for geom, materials in self._drawn.items():
+            here = (own if poses.geom_matid is None else poses.geom_matid)[:, geom]
+            if not np.isin(here, materials).all():
+                listed = inventory.listed_materials(self.model, list(materials))
+                raise ValueError(f"geom {self.model.geom(geom).name!r} has a material beside {listed}, see `varied`")
 
     def _still_parts(self) -> list[PlacedPart]:
         data = mujoco.MjData(self.model)
@@ -151,22 +174,6 @@ class ModelScene:
         return mi.load_dict(description, optimize=False)
 
 
-def varied_geoms(model: mujoco.MjModel, seen: Sequence[int], names: Sequence[str], spectra: Spectra) -> list[int]:
-    """Those whose size or colour differs from world to world.
-
-    Raises:
-        ValueError: there is none of that name to be seen, or its reflectance is measured.
-    """
-    known = {model.geom(g).name: g for g in seen if model.geom(g).name}
-    for name in names:
-        if name not in known:
-            hint = did_you_mean(name, known) or f"; it has {', '.join(map(repr, known))}"
-            raise ValueError(f"varied: the model has no visible geom {name!r}{hint}")
-        if of_geom(model, known[name], spectra) is not None:
-            raise ValueError(f"varied: geom {name!r} has a measured spectrum: must have a colour, or not vary")
-    return sorted({known[name] for name in names})
-
-
 def _moves(model: mujoco.MjModel, geom: int) -> bool:
     body = model.geom_bodyid[geom]
     return bool(model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0)
@@ -180,14 +187,13 @@ def _outside() -> int:
     return level
 
 
-def _not_matt(model: mujoco.MjModel, geoms: Iterable[int], light: str) -> list[str]:
+def _not_matt(model: mujoco.MjModel, looks: Sequence[Appearance], light: str) -> list[str]:
     """What surfaces do that is left out, in words."""
-    materials = sorted({int(model.geom_matid[g]) for g in geoms if model.geom_matid[g] >= 0})
-    geoms = list(geoms)
+    materials = sorted({look.material for look in looks if look.material >= 0})
     glossy = [m for m in materials if bsdfs.has_gloss(model, m)]
     glowing = [m for m in materials if model.mat_emission[m] > 0 and light == DIRECT]
-    mirrors = [g for g in geoms if bsdfs.mirror_share(model, g) > 0]
-    glass = [g for g in geoms if surfaces.rgba(model, g)[3] < 1]
+    mirrors = list(dict.fromkeys(look.geom for look in looks if bsdfs.mirror_share(look.model, look.geom) > 0))
+    glass = list(dict.fromkeys(look.geom for look in looks if look.alpha < 1))
     words = [f"gloss of {inventory.listed_materials(model, glossy)}"] if glossy else []
     words += [f"light of {inventory.listed_materials(model, glowing)} on surfaces"] if glowing else []
     words += [f"reflections in {inventory.listed_geoms(model, mirrors)}"] if mirrors else []

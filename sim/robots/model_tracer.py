@@ -70,8 +70,8 @@ class ModelTracer:
         if scene.has_sky:
             self.inputs["sky"] = mi.EmitterPtr([scene.scene.environment()])
         if self._glows:
-            number = {geom: k for k, geom in enumerate(scene.glows)}
-            of_movers = [number.get(int(g), len(number)) for g in scene.movers.geoms]
+            number = {look: k for k, look in enumerate(scene.glows)}
+            of_movers = [number.get(look, len(number)) for look in scene.movers.looks]
             self.inputs["glowing"] = whole_numbers([*of_movers, len(number)])
             self.inputs["glows"] = mi.BSDFPtr(list(scene.glows.values()))
 

@@ -5,7 +5,7 @@ Each mesh is a scene of its own, in the geom's frame, and rays are taken there: 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from sim.robots.appearances import Appearance
 from sim.robots.poses import Poses
 from sim.robots.primitives import PRIMITIVES, Primitive
 from sim.scene import shapes, surfaces
@@ -70,9 +71,10 @@ class _Frame:
 
 
 class Movers:
-    """The geoms of a model that move, primitives first, by kind.
+    """The geoms of a model that move, primitives first, by kind; where materials are drawn, each of a geom's looks.
 
-    geoms: their ids, (mover,) · n_primitives: of them
+    looks: of each · geoms: their ids, (mover,) · n_primitives: of them
+    resizable: ids of geoms whose sizes may differ between worlds: those that are primitives only
     meshes: Mitsuba scenes of the others
     inputs: arrays for the kernel, by name
 
@@ -80,12 +82,19 @@ class Movers:
         ValueError: more than MESHES meshes.
     """
 
-    def __init__(self, model: mujoco.MjModel, geoms: list[int], meshes: dict[int, MitsubaObject]) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, looks: Sequence[Appearance], meshes: dict[Appearance, MitsubaObject]
+    ) -> None:
         if len(meshes) > MESHES:
             raise ValueError(f"the model has {len(meshes)} moving meshes: must be {MESHES} at most; hide some by group")
-        by_kind = {name: [g for g in geoms if g not in meshes and kind_of(model, g) == name] for name in PRIMITIVES}
-        primitives = [g for group in by_kind.values() for g in group]
-        self.geoms, self.n_primitives = np.array([*primitives, *meshes], int), len(primitives)
+        closed = [look for look in looks if look not in meshes]
+        by_kind = {name: [each for each in closed if kind_of(each.model, each.geom) == name] for name in PRIMITIVES}
+        primitives = [look for group in by_kind.values() for look in group]
+        self.looks, self.n_primitives = [*primitives, *meshes], len(primitives)
+        self.geoms = np.array([look.geom for look in self.looks], int)
+        self.resizable = np.setdiff1d(self.geoms[: self.n_primitives], self.geoms[self.n_primitives :])
+        self._materials = np.array([look.material for look in self.looks], int)
+        self._drawn, self._as_built = np.array([look.drawn for look in self.looks], bool), model.geom_matid[None].copy()
         self.meshes = list(meshes.values())
         self._sizes = model.geom_size[self.geoms].copy()
         self._types = model.geom_type[self.geoms]
@@ -108,13 +117,26 @@ class Movers:
         rows = np.zeros((poses.n, self.n_rows, 4), np.float32)
         if len(self):
             places, (sizes, reach) = poses.geom_xpos[:, self.geoms], self._extents(poses)
+            absent = self._absent(poses)
+            if absent is not None:
+                reach = np.where(absent, 0, reach)
             rows[:, 0, :3] = centre = places.mean(axis=1)
             rows[:, 0, 3] = (np.linalg.norm(places - centre[:, None], axis=-1) + reach).max(axis=1)
             each = rows[:, 1:].reshape(poses.n, len(self), ROWS, 4)
             each[:, :, 0, :3], each[:, :, 0, 3] = places, reach
             each[:, :, 1:, :3] = np.swapaxes(poses.geom_xmat[:, self.geoms], -1, -2)
             each[:, :, 1:, 3] = sizes
+            if absent is not None:
+                each[:, :, 0, :3] += np.where(absent, np.nan, 0)[..., None]  # nowhere: no comparison holds
         return rows.reshape(poses.n, -1)
+
+    def _absent(self, poses: Poses) -> np.ndarray | None:
+        """Which looks a world has not, (world or 1, mover); None: it has all."""
+        if not self._drawn.any():
+            return None
+        here = self._as_built if poses.geom_matid is None else poses.geom_matid
+        absent: np.ndarray = self._drawn & (here[:, self.geoms] != self._materials)
+        return absent
 
     def _extents(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
         """Half sizes (world or 1, mover, 3), of spheres three times the radius, and how far each reaches from its
@@ -170,7 +192,7 @@ class Movers:
         for m, scene in enumerate(self.meshes):
             k = self.n_primitives + m
             frame, _ = _frame(rows, first, mi.UInt32(k))
-            si = scene.ray_intersect(_local_ray(ray, frame), mi.RayFlags.All, True)
+            si = scene.ray_intersect(_local_ray(ray, frame), mi.RayFlags.All, True, self._is_there(k, frame))
             nearer = si.is_valid() & (si.t < t)
             t, which = dr.select(nearer, si.t, t), dr.select(nearer, k, which)
             normal = dr.select(nearer, frame.given(mi.Vector3f(si.n)), normal)
@@ -186,10 +208,16 @@ class Movers:
 
             _, blocked = _loop(i, inputs, step, blocked)
         for m, scene in enumerate(self.meshes):
-            local = _local_ray(ray, _frame(rows, first, mi.UInt32(self.n_primitives + m))[0])
+            k = self.n_primitives + m
+            frame, _ = _frame(rows, first, mi.UInt32(k))
+            local = _local_ray(ray, frame)
             local.maxt = farthest
-            blocked |= scene.ray_test(local, ~blocked)
+            blocked |= scene.ray_test(local, ~blocked & self._is_there(k, frame))
         return blocked
+
+    def _is_there(self, k: int, frame: _Frame) -> Array | bool:
+        """Whether a world has mover k: what Embree and OptiX make of rays from nowhere is not defined."""
+        return ~dr.isnan(frame.origin.x) if self._drawn[k] else True
 
     def _kinds(self) -> list[tuple[int, Primitive]]:
         """Those that there are, by number."""

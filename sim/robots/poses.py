@@ -1,4 +1,4 @@
-"""Where everything in many worlds of one model is, and how large and of which colour."""
+"""Where everything in many worlds of one model is, and how large, of which colour and of which material."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-_OF_MODELS = ("geom_size", "geom_rgba")
+_OF_MODELS = ("geom_size", "geom_rgba", "geom_matid")
 
 
 @dataclass(frozen=True)
@@ -17,8 +17,8 @@ class Poses:
     """Positions [m] (world, thing, 3) and rotations (world, thing, 3, 3) as mjData has them after mj_forward.
 
     geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat, xpos, xmat (of bodies) · light_xpos, light_xdir
-    geom_size (world, geom, 3), geom_rgba (world, geom, 4): as each world's own mjModel has them; None: as the
-        renderer's model
+    geom_size (world, geom, 3), geom_rgba (world, geom, 4), geom_matid (world, geom): as each world's own mjModel has
+        them; None: as the renderer's model
     """
 
     geom_xpos: np.ndarray
@@ -33,6 +33,7 @@ class Poses:
     light_xdir: np.ndarray
     geom_size: np.ndarray | None = None
     geom_rgba: np.ndarray | None = None
+    geom_matid: np.ndarray | None = None
 
     @classmethod
     def of(cls, datas: Sequence[mujoco.MjData]) -> Poses:

@@ -40,6 +40,7 @@ class Task:
         "color_temperature" [K] of what is white, evenly over its reciprocal
         "GEOM.size", a factor of a geom's size, evenly over its logarithm; its mass and inertia are MuJoCo's compiler's
         "GEOM.color", between two colours (red, green, blue), each share by itself; a texture is multiplied by it
+        "GEOM.material", of two or more of the model's, by name: its texture, colour and glow; the geom has no rgba
         "JOINT.start", where a hinge [rad] or a slide [m] is at first; "BODY.start", between two points (x, y, z) [m],
         of a mocap body or one with a free joint
         All but "light" and "color_temperature" are in each world's own `data.model`, or in its data
@@ -67,7 +68,7 @@ class Task:
     substeps: int = 5
     episode_steps: int = 256
     spectra: Mapping[str, Spectrum | str] | None = None
-    vary: Mapping[str, tuple[Any, Any]] | None = None
+    vary: Mapping[str, tuple[Any, ...]] | None = None
     auxiliary: Sequence[str] = ()
     camera: str | None = None
     actuators: Sequence[str] | None = None

@@ -1,7 +1,8 @@
-"""What differs between the episodes of a task of one's own: light, and how large, of which colour and where things are.
+"""What differs between the episodes of a task of one's own: light, and how large, of what and where things are.
 
 All of a world's lights, the sky among them, are multiplied by one spectrum, and signals with them, exactly: light adds
-up. Sizes, colours and places are the worlds' own, see `sim.robots.world_models`. So all worlds are still one kernel.
+up. Sizes, colours, materials and places are the worlds' own, see `sim.robots.world_models`. So all worlds are still one
+kernel.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from optics.spectra.spectrum import cie_1931, daylight
 
 DAYLIGHT = 6504.0  # [K] the correlated colour temperature of CIE D65
 LIGHT, TEMPERATURE = "light", "color_temperature"
-SIZE, COLOR, START = OF_THINGS = ("size", "color", "start")  # of what has a name: "ball.size"
+SIZE, COLOR, MATERIAL, START = OF_THINGS = ("size", "color", "material", "start")  # of what has a name: "ball.size"
 # Of their ranges: factors, kelvins, shares of red, green and blue, and lengths or angles.
 LIMITS = {
     LIGHT: (1e-6, 1e6),
@@ -29,14 +30,15 @@ LIMITS = {
 }
 _VISIBLE = np.arange(380, 781, 5) * 1e-9
 
-Range = tuple[Any, Any]
+Range = tuple[Any, ...]
+Drawn = float | np.ndarray | str
 
 
 @dataclass(frozen=True)
 class Variation:
     """ranges: (low, high) by name: "light", "color_temperature", and "NAME.size", "NAME.color" or "NAME.start" of
         things; colours, and places in space, are three numbers each, (low, high) two opposite corners · low = high is
-        one value for all
+        one value for all · "NAME.material": names of which one is drawn
 
     Raises:
         ValueError: another name, or no range.
@@ -47,6 +49,9 @@ class Variation:
     def __post_init__(self) -> None:
         for name, given in self.ranges.items():
             what = kind_of(name)
+            if what == MATERIAL:
+                _check_names(name, given)
+                continue
             least, most = LIMITS[what]
             corners = _corners(given)
             wanted = {COLOR: (3,), START: None}.get(what, ())
@@ -56,12 +61,16 @@ class Variation:
             if (corners[0] > corners[1]).any():
                 raise ValueError(f"vary: {name} = {given!r}: must be (low, high), low first")
 
-    def draw(self, random: np.random.Generator) -> dict[str, float | np.ndarray]:
+    def draw(self, random: np.random.Generator) -> dict[str, Drawn]:
         """For one episode: factors evenly over their logarithm, temperatures over their reciprocal, in which equal
-        steps look alike (mired), colours and places evenly between their corners."""
-        found: dict[str, float | np.ndarray] = {}
-        for name, (low, high) in self.ranges.items():
+        steps look alike (mired), colours and places evenly between their corners, materials alike."""
+        found: dict[str, Drawn] = {}
+        for name, given in self.ranges.items():
             what = kind_of(name)
+            if what == MATERIAL:
+                found[name] = str(given[random.integers(len(given))])
+                continue
+            low, high = given
             if what in (LIGHT, SIZE):
                 found[name] = low * (high / low) ** random.random()
             elif what == TEMPERATURE:
@@ -73,8 +82,11 @@ class Variation:
         return found
 
     def blank(self, n: int) -> dict[str, np.ndarray]:
-        """Room for what is drawn, by name: (n,) or (n, 3)."""
-        return {name: np.ones((n, *np.shape(low))) for name, (low, _) in self.ranges.items()}
+        """Room for what is drawn, by name: (n,) or (n, 3), numbers or names."""
+        return {
+            name: np.array(given)[np.zeros(n, int)] if kind_of(name) == MATERIAL else np.ones((n, *np.shape(given[0])))
+            for name, given in self.ranges.items()
+        }
 
     def of_things(self, what: str) -> dict[str, str]:
         """Names of ranges by the things that they are of; what: one of OF_THINGS."""
@@ -120,7 +132,7 @@ _FORM = {
 
 
 def kind_of(name: str) -> str:
-    """What a range is of, one of LIMITS.
+    """What a range is of: LIGHT, TEMPERATURE, or one of OF_THINGS.
 
     Raises:
         ValueError: it is of none.
@@ -134,6 +146,12 @@ def kind_of(name: str) -> str:
     known = [LIGHT, TEMPERATURE, *(f"NAME.{each}" for each in OF_THINGS)]
     hint = did_you_mean(name, near) or f": must be one of {', '.join(known)}"
     raise ValueError(f"vary: {name!r}{hint}")
+
+
+def _check_names(name: str, given: Any) -> None:
+    names = given if isinstance(given, tuple | list) and all(isinstance(each, str) for each in given) else ()
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"vary: {name} = {given!r}: must be (name, name, ...), materials, each of them once")
 
 
 def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A model for each world, where sizes and colours differ between worlds, and where things are when an episode begins.
+"""A model for each world, where sizes, colours and materials differ, and where things are when an episode begins.
 
 A size goes through MuJoCo's compiler, so that mass, inertia and all that follows from them are the compiler's own: what
 has a density weighs by its volume, what was given a mass keeps it. A world's model and data stay the same objects.
@@ -15,11 +15,13 @@ import mujoco
 import numpy as np
 
 from optics.numerics.arguments import did_you_mean
+from sim.robots import variation as of_worlds
+from sim.robots.appearances import in_material, material_of
 from sim.robots.movers import kind_of as primitive_of
-from sim.robots.variation import COLOR, SIZE, START, Variation
+from sim.robots.variation import COLOR, MATERIAL, OF_THINGS, SIZE, START, Variation
 from sim.scene import source, surfaces
 
-Drawn = Mapping[str, float | np.ndarray]
+Drawn = Mapping[str, of_worlds.Drawn]
 # Fields that no size changes: what is large among them would be copied for nothing.
 _FIXED = ("tex", "mesh", "hfield", "skin", "mat_", "name", "text", "numeric", "tuple", "key", "path")
 _JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
@@ -30,25 +32,32 @@ class WorldModels:
 
     given: what the model was made of · model: what became of it
     models: of each world; the same for all, where nothing of them differs
-    varied: names of the geoms whose size or colour differs
+    varied: names of the geoms whose size, colour or material differs, and of the materials that are drawn
 
     Raises:
         ValueError: the model has no such thing, or one that cannot differ.
     """
 
     def __init__(self, given: Any, model: mujoco.MjModel, n: int, variation: Variation | None) -> None:
-        ranges = {what: {} if variation is None else variation.of_things(what) for what in (SIZE, COLOR, START)}
+        ranges = {what: {} if variation is None else variation.of_things(what) for what in OF_THINGS}
         self.model = model
         self._sizes = {_geom(model, thing, name): name for thing, name in ranges[SIZE].items()}
         self._colors = {_geom(model, thing, name): name for thing, name in ranges[COLOR].items()}
         self._starts = {name: _place(model, thing, name, variation) for thing, name in ranges[START].items()}
-        self.varied = tuple(model.geom(g).name for g in sorted({*self._sizes, *self._colors}))
+        materials = {_geom(model, thing, name): name for thing, name in ranges[MATERIAL].items()}
+        self._materials = {geom: (name, self._candidates(geom, name, variation)) for geom, name in materials.items()}
+        self.varied = {
+            model.geom(g).name: tuple(self._materials[g][1]) if g in self._materials else ()
+            for g in sorted({*self._sizes, *self._colors, *self._materials})
+        }
         self.models = [copy.copy(model) for _ in range(n)] if self.varied else [model] * n
         if not self._sizes:
             return
         self._spec = _specification(given)
         for geom, name in self._sizes.items():
-            if primitive_of(model, geom) is None:
+            drawn = self._materials.get(geom, ("", {}))[1].values()
+            looks = [in_material(model, geom, material).model for material in drawn] or [model]
+            if any(primitive_of(look, geom) is None for look in looks):
                 raise ValueError(
                     f"vary: {name}: must be a sphere, capsule, cylinder, ellipsoid or box without a texture"
                 )
@@ -58,17 +67,35 @@ class WorldModels:
         self._fields = _fields_of(model)
 
     def begin(self, world: int, drawn: Drawn) -> None:
-        """A world's sizes and colours from now on."""
+        """A world's sizes, colours and materials from now on.
+
+        Raises:
+            ValueError: a material that is not one of its own.
+        """
         mine = self.models[world]
         if self._sizes:
             self._resize(mine, drawn)
         for geom, name in self._colors.items():
             mine.geom_rgba[geom] = [*np.asarray(drawn[name]), surfaces.rgba(self.model, geom)[3]]
 
+        for geom, (name, candidates) in self._materials.items():
+            if (material := str(drawn[name])) not in candidates:
+                raise ValueError(f"{name} = {material!r}: must be one of {', '.join(candidates)}")
+            mine.geom_matid[geom] = candidates[material]
+
     def place(self, data: mujoco.MjData, drawn: Drawn) -> None:
         """Things are where an episode begins."""
         for name, (where, address) in self._starts.items():
             getattr(data, where)[address] = drawn[name]
+
+    def _candidates(self, geom: int, name: str, variation: Variation | None) -> dict[str, int]:
+        """Ids of materials, by name."""
+        assert variation is not None
+        if geom in self._colors:
+            raise ValueError(f"vary: {name} and {self._colors[geom]}: must be one of them; materials have colours")
+        if not np.array_equal(self.model.geom_rgba[geom], surfaces.UNSET_RGBA):
+            raise ValueError(f"vary: {name}: the geom's own rgba takes the place of its materials': must have none")
+        return {each: material_of(self.model, each, f"vary: {name}") for each in variation.ranges[name]}
 
     def _resize(self, mine: mujoco.MjModel, drawn: Drawn) -> None:
         for geom, mjs in self._geoms.items():

@@ -14,7 +14,7 @@ from sim.scene.color import decode_srgb
 from sim.scene.variant import Description
 
 # MuJoCo's own sign that a geom's rgba was not set, and its material's counts.
-_UNSET_RGBA = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
+UNSET_RGBA = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
 _ROLES = mujoco.mjtTextureRole
 
 
@@ -27,7 +27,7 @@ def rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
     """Display-referred colour (4,) of a geom, by MuJoCo's rule: its own unless unset, then its material's."""
     own = model.geom_rgba[geom]
     material = model.geom_matid[geom]
-    if material >= 0 and np.array_equal(own, _UNSET_RGBA):
+    if material >= 0 and np.array_equal(own, UNSET_RGBA):
         return model.mat_rgba[material].astype(float)
     return own.astype(float)
 

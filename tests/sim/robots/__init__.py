@@ -11,6 +11,7 @@ encounter: envs/test_encounter.py, envs/test_bad_encounters.py
 variation: test_variation.py
 world_models: envs/test_differing_worlds.py
 paint: envs/test_differing_worlds.py
+appearances: envs/test_differing_materials.py
 optic_flow: test_labels.py
 eye_marks: test_eye_marks.py
 inside: test_mounts.py
