@@ -13,6 +13,7 @@ from optics.numerics.arguments import close_match
 __all__ = ["AUTO", "ConfigError", "check_gene_value", "check_value", "suggestion"]
 
 SHOWN = 200  # letters of a value that a message quotes
+MOST_LISTED = 36  # of known words: all genes and tasks, and not all settings
 AUTO = "auto"  # in place of a number: chosen when it is needed
 
 
@@ -57,12 +58,16 @@ def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """ "did you mean X?" where a known word, or the last part of one, is near; else the list of them."""
+    """ "did you mean X?" where a known word, or the last part of one, is near; else the list of them, the first
+    MOST_LISTED of it."""
     known = list(known)
     by_last = {name.rpartition(".")[2]: name for name in known}
     last = close_match(word.rpartition(".")[2], by_last, cutoff=0.75)
     close = close_match(word, known) or (by_last[last] if last else None)
-    return f"did you mean {close!r}?" if close else f"known: {', '.join(known)}"
+    if close:
+        return f"did you mean {close!r}?"
+    more = f", and {len(known) - MOST_LISTED} more: see evolve config schema" if len(known) > MOST_LISTED else ""
+    return f"known: {', '.join(known[:MOST_LISTED])}{more}"
 
 
 def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> Any:
