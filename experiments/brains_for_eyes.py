@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from evolve.analysis.statistics import acuity_cpd
+from experiments import designed
 from experiments.brains_and_acuity import label
-from experiments.designed import Design, Trained, train_all
-from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
+from experiments.designed import Design, Trained
+from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.powers import PowerLaw, power_law
-from experiments.store import Origin, read_rows
+from experiments.store import Origin
 
 __all__ = ["DEFINITIONS", "best_brains", "designs", "frontier", "missed", "over_both", "page", "shortfall"]
 
@@ -195,20 +196,7 @@ def _key() -> list[Any]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Train what is missing if asked; make the page from the store."""
-    options = parser(__doc__ or "")
-    options.add_argument("--compute", action="store_true", help="train the animals that the stored numbers lack")
-    options.add_argument("--workers", type=int, default=0, help="processes; 0: one per core")
-    options.add_argument("--answer", help="the page's answer; kept from now on")
-    chosen = options.parse_args(arguments)
-    data = chosen.docs / "data" / f"{NAME}.csv"
-    said = data.with_suffix(".txt")
-    if chosen.compute:
-        train_all(designs(), SETTINGS, data, chosen.workers)
-    if chosen.answer:
-        said.write_text(chosen.answer + "\n", encoding="utf-8")
-    answer = said.read_text(encoding="utf-8").strip() if said.exists() else "(not written yet)"
-    page(read_rows(Trained, data), Origin.read(data.with_suffix(".json")), answer).publish(chosen.docs)
-    return 0
+    return designed.main(designed.Experiment(NAME, __doc__ or "", designs, SETTINGS, page), arguments)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
@@ -16,9 +17,10 @@ from evolve.search.job import Job
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.worker import evaluate_candidate, prepare_device
 from evolve.store.evaluation import Evaluation
+from experiments.page import Page, parser
 from experiments.store import Origin, read_rows, write_rows
 
-__all__ = ["Design", "Trained", "crossed", "train_all"]
+__all__ = ["Design", "Experiment", "Trained", "crossed", "main", "train_all"]
 
 
 @dataclass(frozen=True)
@@ -120,3 +122,38 @@ def crossed(
         replace(animal, task=task, height=animal.width if task != "navigation" else 1, noise_sigma=sigma, seed=seed)
         for seed, sigma, task, animal in itertools.product(seeds, noises, tasks, animals)
     ]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """name: of page and data · text: for help · designs: all trainings · settings: of all of them
+    page: of stored rows, their origin and the answer that a person has given"""
+
+    name: str
+    text: str
+    designs: Callable[[], list[Design]]
+    settings: Sequence[str]
+    page: Callable[[Sequence[Trained], Origin, str], Page]
+
+
+def main(experiment: Experiment, arguments: Sequence[str] | None = None) -> int:
+    """Train what is missing if asked; make the page from the store."""
+    options = parser(experiment.text)
+    options.add_argument("--compute", action="store_true", help="train the animals that the stored numbers lack")
+    options.add_argument("--workers", type=int, default=0, help="processes; 0: one per core")
+    options.add_argument("--answer", help="the page's answer; kept from now on")
+    chosen = options.parse_args(arguments)
+    data = chosen.docs / "data" / f"{experiment.name}.csv"
+    data.parent.mkdir(parents=True, exist_ok=True)
+    said = data.with_suffix(".txt")
+    if chosen.compute:
+        train_all(experiment.designs(), experiment.settings, data, chosen.workers)
+    rows = read_rows(Trained, data)
+    if not rows:
+        print(f"{experiment.name}: error: {data} holds no animals; train some with --compute", file=sys.stderr)
+        return 2
+    if chosen.answer:
+        said.write_text(chosen.answer + "\n", encoding="utf-8")
+    answer = said.read_text(encoding="utf-8").strip() if said.exists() else "(not written yet)"
+    experiment.page(rows, Origin.read(data.with_suffix(".json")), answer).publish(chosen.docs)
+    return 0

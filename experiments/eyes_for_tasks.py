@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sim
-from experiments.designed import Design, Trained, crossed, train_all
+from experiments import designed
+from experiments.designed import Design, Trained, crossed
 from experiments.means import Interval
-from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
+from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.portraits import draw_head
-from experiments.store import Origin, read_rows
+from experiments.store import Origin
 
 __all__ = ["Crossing", "crossing", "designs", "page"]
 
@@ -204,21 +205,7 @@ def _draw_heads(place: Any) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Train what is missing if asked; make the page from the store."""
-    options = parser(__doc__ or "")
-    options.add_argument("--compute", action="store_true", help="train the animals that the stored numbers lack")
-    options.add_argument("--workers", type=int, default=0, help="processes; 0: one per core")
-    options.add_argument("--answer", help="the page's answer; kept from now on")
-    chosen = options.parse_args(arguments)
-    data = chosen.docs / "data" / f"{NAME}.csv"
-    data.parent.mkdir(parents=True, exist_ok=True)
-    said = data.with_suffix(".txt")
-    if chosen.compute:
-        train_all(designs(), SETTINGS, data, chosen.workers)
-    if chosen.answer:
-        said.write_text(chosen.answer + "\n", encoding="utf-8")
-    answer = said.read_text(encoding="utf-8").strip() if said.exists() else "(not written yet)"
-    page(read_rows(Trained, data), Origin.read(data.with_suffix(".json")), answer).publish(chosen.docs)
-    return 0
+    return designed.main(designed.Experiment(NAME, __doc__ or "", designs, SETTINGS, page), arguments)
 
 
 if __name__ == "__main__":

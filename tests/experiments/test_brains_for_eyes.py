@@ -13,6 +13,7 @@ from experiments.brains_for_eyes import (
     best_brains,
     designs,
     frontier,
+    main,
     missed,
     over_both,
     page,
@@ -91,3 +92,9 @@ def test_the_page_shows_every_cell_and_what_is_missing(tmp_path):
         assert name in made.markdown
     made.publish(tmp_path)
     assert (tmp_path / "figures/brains_for_eyes.png").stat().st_size > 10_000
+
+
+def test_without_animals_there_is_no_page(tmp_path, capsys):
+    assert main(["--docs", str(tmp_path)]) == 2
+    assert "holds no animals; train some with --compute" in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.md"))
