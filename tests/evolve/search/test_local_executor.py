@@ -1,6 +1,7 @@
 """Worker processes: every job comes out once, whatever happens to the worker."""
 
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -204,3 +205,32 @@ def test_interrupts_are_held_from_every_child_the_first_included():
     found = subprocess.run([sys.executable, "-c", CHILDREN], capture_output=True, text=True, check=True, cwd=ROOT)
     blocked = [int(line, 16) >> (signal.SIGINT - 1) & 1 for line in found.stdout.split()]
     assert blocked == [1, 1]
+
+
+FAULTS = """
+import resource
+import numpy as np
+from evolve.search.worker import _keep_freed_memory
+
+def faults():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(20):
+        arrays = [np.ones(n) for n in (300_000, 900_000) * 6]
+        del arrays
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+faults()
+mapped = faults()
+_keep_freed_memory()
+faults()
+print(mapped, faults())
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other libraries are left alone")
+def test_freed_memory_is_kept_for_the_next_arrays():
+    """In a process of its own, which stays as it has been set: pages are mapped once, and not each time."""
+    done = subprocess.run([sys.executable, "-c", FAULTS], capture_output=True, text=True, check=True)
+    mapped, kept = map(int, done.stdout.split())
+    assert mapped > 10_000, "the test shows nothing"
+    assert kept < mapped / 100
