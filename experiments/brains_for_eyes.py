@@ -48,28 +48,30 @@ def designs() -> list[Design]:
     ]
 
 
-def _means(rows: Iterable[Trained], value: Callable[[Trained], float]) -> Errors:
-    """Over the lives of each animal."""
+def _lives(rows: Iterable[Trained], value: Callable[[Trained], float]) -> dict[tuple[int, int], list[float]]:
+    """Of all lives of each animal."""
     found: dict[tuple[int, int], list[float]] = {}
     for row in rows:
         if not row.failed:
             found.setdefault((row.width, row.neurons), []).append(value(row))
-    return {animal: float(np.mean(values)) for animal, values in found.items()}
+    return found
 
 
 def missed(rows: Sequence[Trained]) -> Errors:
     """Share of episodes in which the goal did not come first, (k + 1/2) / (n + 1), so that no error has no logarithm
     (Jeffreys' mean)."""
-    return _means(rows, lambda row: ((1 - row.success_rate) * row.episodes + 0.5) / (row.episodes + 1))
+    shares = _lives(rows, lambda row: ((1 - row.success_rate) * row.episodes + 0.5) / (row.episodes + 1))
+    return {animal: float(np.mean(values)) for animal, values in shares.items()}
 
 
 def shortfall(rows: Sequence[Trained]) -> Errors:
-    """Share of what separates the worst from the best life that an animal's lives are short of on average, with half a
-    life more for each, as in `missed`."""
+    """Share of what separates the worst from the best life that an animal's lives are short of, with half a life more
+    and (n + 1) in the place of n, as in `missed`."""
     fitness = [row.fitness for row in rows if not row.failed]
-    low, high = min(fitness, default=0.0), max(fitness, default=0.0)
-    lives, scale = len(SEEDS), max(high - low, 1e-9)
-    return {a: (lives * (high - f) / scale + 0.5) / (lives + 1) for a, f in _means(rows, lambda r: r.fitness).items()}
+    high = max(fitness, default=0.0)
+    scale = max(high - min(fitness, default=0.0), 1e-9)
+    short = _lives(rows, lambda row: (high - row.fitness) / scale)
+    return {animal: float((sum(values) + 0.5) / (len(values) + 1)) for animal, values in short.items()}
 
 
 DEFINITIONS: dict[str, Definition] = {"episodes missed": missed, "fitness missed": shortfall}

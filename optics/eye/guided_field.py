@@ -158,5 +158,8 @@ def _grid_around(x: np.ndarray, y: np.ndarray, step: float) -> Grid:
     sides = [math.ceil(float(np.ptp(axis)) / (2 * step)) for axis in (y, x)]
     shape = tuple(2 * (side + MARGIN) + 1 for side in sides)
     if max(shape) > MOST_SAMPLES:
-        raise AccuracyError(f"the light needs {max(shape)} samples of a receptor's field along an axis: at most 4096")
+        raise AccuracyError(
+            f"the light needs {max(shape)} samples of a receptor's field along an axis; the limit is {MOST_SAMPLES}: "
+            "narrow the view, or widen the pupil"
+        )
     return Grid((shape[0], shape[1]), step, (centre[0], centre[1]))

@@ -53,7 +53,7 @@ def test_misses_are_counted_and_never_none():
 def test_a_shortfall_is_between_the_worst_and_the_best_life():
     animals = designs()[:3]
     found = shortfall([lived(a, 0.5, fitness) for a, fitness in zip(animals, (10.0, 30.0, 50.0), strict=True)])
-    assert list(found.values()) == pytest.approx([3.5 / 4, 2.0 / 4, 0.5 / 4])
+    assert list(found.values()) == pytest.approx([1.5 / 2, 1.0 / 2, 0.5 / 2])
 
 
 def test_a_failed_life_says_nothing():

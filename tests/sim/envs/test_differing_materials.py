@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-import optics
 import sim
 from sim.envs.task_fidelity import fidelities_of
+from tests.sim.envs.rail import EYE, OnRail
 
 MATERIALS = "plain", "dark", "stripes", "cubic", "glowing"
 ROOM = """
@@ -39,22 +39,14 @@ ROOM = """
 </mujoco>"""
 GREY = 'rgba=".3 .3 .3 1"'
 SIZES = {"sphere": ".3", "cylinder": ".2 .3", "box": ".2 .3 .1"}
-EYE = optics.Eye(resolution=(15, 21), fov_deg=80, bands=5, noise_sigma=0.0)
 
 
 def room(thing="", floor=GREY, kind="sphere"):
     return ROOM.format(thing=thing, floor=floor, kind=kind, size=SIZES[kind])
 
 
-class Room(sim.Task):
+class Room(OnRail):
     model = room()
-    eye = EYE
-    mounts = (sim.Mount("cart", offset=(0.2, 0, 0.1)),)
-    fidelity = sim.Fidelity(4, bands=5)
-    episode_steps, substeps = 3, 2
-
-    def rewards(self, data):
-        return {"none": 0.0}
 
 
 def with_ranges(vary, model=None, light="direct"):

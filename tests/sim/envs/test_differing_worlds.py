@@ -6,13 +6,13 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from scipy.stats import kstest
 
-import optics
 import sim
 from sim.envs.task_fidelity import fidelities_of
 from sim.eyes.sampling import directions_of
 from sim.robots.optic_flow import receptor_centres
 from sim.robots.variation import Variation
 from sim.robots.world_models import WorldModels
+from tests.sim.envs.rail import EYE, OnRail
 
 SHAPES = {
     "sphere": 'size=".3"',
@@ -44,22 +44,14 @@ ROOM = """
   <actuator><velocity joint="rail" kv="10" ctrlrange="-2 2"/></actuator>
 </mujoco>"""
 FLOOR, RED = 'rgba=".3 .3 .3 1"', ".9 .2 .1"
-EYE = optics.Eye(resolution=(15, 21), fov_deg=80, bands=5, noise_sigma=0.0)
 
 
 def room(kind="sphere", shape=SHAPES["sphere"], rgb=RED, floor=FLOOR):
     return ROOM.format(kind=kind, shape=shape, rgb=rgb, floor=floor)
 
 
-class Room(sim.Task):
+class Room(OnRail):
     model = room()
-    eye = EYE
-    mounts = (sim.Mount("cart", offset=(0.2, 0, 0.1)),)
-    fidelity = sim.Fidelity(4, bands=5)
-    episode_steps, substeps = 3, 2
-
-    def rewards(self, data):
-        return {"none": 0.0}
 
 
 def with_ranges(vary, model=None):
