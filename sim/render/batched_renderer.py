@@ -21,13 +21,14 @@ from optics.numerics.autodiff import Array
 from sim.eyes.eyes import Eyes, eye_positions, eye_rotations
 from sim.eyes.sensor import Sensor
 from sim.render import memory_budget
+from sim.render.area_wavefront import AreaWavefront
 from sim.render.fidelity import AREAS, EDGES, Fidelity
 from sim.render.fidelity_choice import chosen_fidelity
 from sim.render.frozen_kernels import garbage_kept
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.render.prepared_scene import PreparedScene
-from sim.render.wavefront import PoseBuffer, Wavefront
-from sim.scene.device_arrays import floats
+from sim.render.wavefront import PoseBuffer, RayWavefront, Wavefront
+from sim.scene.device_arrays import floats, in_fours
 from sim.scene.variant import variant
 from sim.tracing import lighting
 from sim.tracing.areas.area_tracer import AreaTracer
@@ -127,22 +128,29 @@ class BatchedRenderer:
         self.n_envs = n_envs = int(n_envs)
         self._poses, self._slot = PoseBuffer(n_envs, len(self._static.spheres)), FrameSlot()
         with variant(self._static.variant):
+            wavefront = self._wavefront()
+            cosines = self.sensor.directions[:, 2]
             self._inputs = {
-                "directions": floats(_in_agent_frame(self.eyes, self.sensor.directions)),
-                "origins": floats(_in_fours(eye_positions(self.eyes.azimuths()), 0.0)),
+                "directions": floats(in_fours(self._in_agent_frame(self.sensor.directions), cosines)),
+                "origins": floats(in_fours(eye_positions(self.eyes.azimuths()), 0.0)),
                 "bounce_samples": floats(self.sensor.bounce_samples),
                 **self.tracer.inputs,
+                **wavefront.inputs,
             }
-            wavefront = Wavefront(n_envs, self.eyes.n_eyes, self.sensor, self.tracer, self._poses)
-            # Read lane by lane, so that a replay has the width that was recorded. With tables alone as inputs, Dr.Jit
-            # 1.5 took it from one that changes with what else the process has loaded: 126 lanes replayed out of 128,
-            # the last receptors silently dark (tests/test_parameters.py runs each life twice and has met it).
-            self._inputs["lanes"] = dr.arange(mi.UInt32, wavefront.lanes)
-            dr.eval(self._inputs["lanes"])
-            self._inputs |= wavefront.sizes
             reduced = self.sensor.rays_per_receptor
             self._rays: Any = dr.freeze(lambda scene, poses, inputs: wavefront(scene, poses, inputs, 1))
             self._sums: Any = dr.freeze(lambda scene, poses, inputs: wavefront(scene, poses, inputs, reduced))
+
+    def _wavefront(self) -> Wavefront:
+        if isinstance(self.tracer, AreaTracer):
+            sizes = self.n_envs, self.eyes.n_eyes
+            return AreaWavefront(sizes, self.sensor, self.tracer, self._poses, self._in_agent_frame)
+        return RayWavefront(self.n_envs, self.eyes.n_eyes, self.sensor, self.tracer, self._poses)
+
+    def _in_agent_frame(self, directions: np.ndarray) -> np.ndarray:
+        """Every eye's directions (ray, 3) in the agent's frame, (eye, ray, 3)."""
+        found: np.ndarray = np.einsum("eij,rj->eri", eye_rotations(self.eyes.azimuths()), directions)
+        return found
 
     def radiance(self, state: WorldState) -> np.ndarray:
         """Spectral radiance along every ray, (env, eye, ray, band) float32."""
@@ -202,15 +210,3 @@ def _read(light: Array) -> np.ndarray:
     """Waits for the kernel."""
     with garbage_kept():
         return np.array(light.numpy())
-
-
-def _in_agent_frame(eyes: Eyes, directions: np.ndarray) -> np.ndarray:
-    """Every eye's directions in the agent's frame, and their cosines with its axis, flat (eye, ray, 4)."""
-    return _in_fours(np.einsum("eij,rj->eri", eye_rotations(eyes.azimuths()), directions), directions[:, 2])
-
-
-def _in_fours(vectors: np.ndarray, fourth: np.ndarray | float) -> np.ndarray:
-    """Vectors (..., 3) flat, each followed by a fourth number: four aligned floats are gathered at once."""
-    rows = np.empty((*vectors.shape[:-1], 4), np.float32)
-    rows[..., :3], rows[..., 3] = vectors, fourth
-    return rows.ravel()

@@ -24,6 +24,8 @@ from sim.render.random_views import RandomViews, near_views, on_objects, random_
 from sim.scene.device_arrays import floats
 from sim.scene.variant import variant
 from sim.tracing import lighting
+from sim.tracing.areas.area_tracer import AreaTracer
+from sim.tracing.areas.illumination import Moment
 from sim.tracing.areas.patch import Area
 
 # Choices: how much a trial may cost, and how much finer than what it tries its truth is.
@@ -228,10 +230,18 @@ class FidelityTrials:
             width, height = (dr.opaque(mi.Float, side) for side in trial.extent)
             ray = mi.Ray3f(origin, mi.Vector3f([floats(d) for d in np.moveaxis(directions, -1, 0)]))
             area = Area.of(ray, agent, (width, height))
-            centres = [_points(views.objects[:, k], n) for k in range(views.objects.shape[1])]
-            components = tracer.radiance(area, agent, centres, tracer.inputs, depth)
+            world, bodies = dr.arange(mi.UInt32, n * len(views)) // n, [*np.moveaxis(views.objects, 1, 0), views.agents]
+            now = Moment([_points(b, n) for b in bodies], tracer.inputs, world, self._lit(tracer, bodies))
+            components = tracer.radiance(area, tracer.met_by(area, tracer.inputs), now, depth)
             dr.eval(components)
             return [np.array(c) for c in components]
+
+    def _lit(self, tracer: AreaTracer, bodies: list[np.ndarray]) -> list[Array]:
+        """The tracer's table of lit bodies, for their centres (view, 3)."""
+        if not tracer.places:
+            return []
+        place = dr.arange(mi.UInt32, tracer.places * len(bodies[0])) % tracer.places
+        return tracer.lit(place, [_points(b, tracer.places) for b in bodies], tracer.inputs)
 
     def _trace(self, views: RandomViews, trial: Trial, light: str) -> tuple[list[Array], Array]:
         """Components of light along a trial's rays of each view's eye, and from how far along its axis [m]: Dr.Jit,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -9,11 +12,9 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from sim.eyes.eyes import EYE_HEIGHT
 from sim.eyes.sensor import Sensor
-from sim.scene.device_arrays import aligned, floats, whole_numbers
+from sim.scene.device_arrays import aligned, counted, three, whole_numbers
 from sim.scene.variant import MitsubaObject
 from sim.tracing import lighting
-from sim.tracing.areas.area_tracer import AreaTracer
-from sim.tracing.areas.patch import Area
 from sim.tracing.static_scene import StaticScene
 from sim.tracing.tracer import Tracer
 from sim.worlds.state import WorldState
@@ -39,22 +40,19 @@ class PoseBuffer:
         return rows.reshape(-1)
 
 
-class Wavefront:
+class Wavefront(ABC):
     """The kernel's body. Everything here is traced once; only arrays passed as arguments may change."""
 
-    def __init__(
-        self, n_envs: int, n_eyes: int, sensor: Sensor, tracer: Tracer | AreaTracer, poses: PoseBuffer
-    ) -> None:
-        self.n_rays, self.n_eyes = len(sensor.directions), n_eyes
+    def __init__(self, n_envs: int, n_eyes: int, sensor: Sensor, poses: PoseBuffer) -> None:
+        self.n_rays, self.n_envs, self.n_eyes = len(sensor.directions), n_envs, n_eyes
         self.lanes = n_envs * n_eyes * self.n_rays
         self.stride, self.n_spheres = poses.stride, poses.n_spheres
-        self.tracer, self.depth, self.extent = tracer, sensor.depth, sensor.extent
+        self.depth = sensor.depth
 
     @property
-    def sizes(self) -> dict[str, Array]:
+    def inputs(self) -> dict[str, Array]:
         """Inputs, not constants: eyes of any resolution and field of view, in any number of worlds, share a kernel."""
-        sizes = {"sizes": whole_numbers([self.n_rays, self.n_eyes, self.lanes])}
-        return sizes | ({"extent": floats(np.array(self.extent))} if self.extent else {})
+        return {"sizes": whole_numbers([self.n_rays, self.n_eyes, self.lanes]), "lanes": counted(self.lanes)}
 
     def __call__(self, scene: MitsubaObject, poses: Array, inputs: dict[str, Array], reduced: int) -> Array:
         lane = inputs["lanes"]
@@ -64,10 +62,7 @@ class Wavefront:
         world = view // n_eyes
         sample = lane - view * n_rays
         eye = view - world * n_eyes
-        if isinstance(self.tracer, AreaTracer):
-            components = self.tracer.radiance(*self._area(poses, inputs, world, eye, sample), inputs, self.depth)
-        else:
-            components = self._along_rays(self.tracer, scene, poses, inputs, (world, eye, sample))
+        components = self._components(scene, poses, inputs, (world, eye, sample))
         if len(components) == 1:
             out = components[0]
         else:
@@ -77,47 +72,50 @@ class Wavefront:
         # One reduction of one array: a reduction per component would trace the rays once per component.
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
 
-    def _along_rays(
-        self,
-        tracer: Tracer,
-        scene: MitsubaObject,
-        poses: Array,
-        inputs: dict[str, Array],
-        place: tuple[Array, Array, Array],
+    @abstractmethod
+    def _components(
+        self, scene: MitsubaObject, poses: Array, inputs: dict[str, Array], place: tuple[Array, Array, Array]
     ) -> list[Array]:
-        """Components of the light that comes along the ray at this place (world, eye, sample), per depth layer."""
-        ray, cosine, agent, centres = self._ray(poses, inputs, *place)
-        bounces = tracer.light == lighting.BOUNCE
-        bounce_sample = dr.gather(mi.Point2f, inputs["bounce_samples"], place[2]) if bounces else None
-        components, distance = tracer.radiance(scene, ray, agent, centres, inputs, bounce_sample)
-        if self.depth.count == 1:
-            return components
-        shares = self.depth.shares(dr.rcp(distance * cosine))
-        return [component * share for share in shares for component in components]
-
-    def _area(
-        self, poses: Array, inputs: dict[str, Array], world: Array, eye: Array, sample: Array
-    ) -> tuple[Area, Array, list[Array]]:
-        """The lane's area, and the centres as for a ray."""
-        ray, _, agent, centres = self._ray(poses, inputs, world, eye, sample)
-        width, height = (dr.gather(mi.Float, inputs["extent"], i) for i in range(2))
-        return Area.of(ray, agent, (width, height)), agent, centres
+        """Of the light at this place (world, eye, sample), per depth layer."""
 
     def _ray(
         self, poses: Array, inputs: dict[str, Array], world: Array, eye: Array, ray: Array
     ) -> tuple[Array, Array, Array, list[Array]]:
         """The lane's ray, its cosine with the eye's axis, and the centres of the agent and of its world's spheres."""
+        agent, centres, turned = self._pose(poses, world)
+        origin = agent + turned(dr.gather(mi.Vector4f, inputs["origins"], eye))
+        row = eye * dr.gather(mi.UInt32, inputs["sizes"], 0) + ray
+        direction = dr.gather(mi.Vector4f, inputs["directions"], row)
+        return mi.Ray3f(origin, turned(direction)), direction.w, agent, centres
 
-        def row(name: str, index: Array) -> Array:
-            return dr.gather(mi.Vector4f, inputs[name] if name else poses, index)
-
-        x, y, cos, sin = row("", world * (self.stride // 4))
+    def _pose(self, poses: Array, world: Array) -> tuple[Array, list[Array], Callable[[Array], Array]]:
+        """Of a world: the centres of its agent and of its spheres, and what turns vectors as the agent is turned."""
+        first = world * (self.stride // 4)
+        x, y, cos, sin = dr.gather(mi.Vector4f, poses, first)
+        centres = [mi.Point3f(three(poses, first + (1 + k))) for k in range(self.n_spheres)]
 
         def turned(v: Array) -> Array:
             return mi.Vector3f(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
 
-        agent = mi.Point3f(x, y, EYE_HEIGHT)
-        origin = agent + turned(row("origins", eye))
-        direction = row("directions", eye * dr.gather(mi.UInt32, inputs["sizes"], 0) + ray)
-        centres = [mi.Point3f(*list(row("", world * (self.stride // 4) + (1 + k)))[:3]) for k in range(self.n_spheres)]
-        return mi.Ray3f(origin, turned(direction)), direction.w, agent, centres
+        return mi.Point3f(x, y, EYE_HEIGHT), centres, turned
+
+
+class RayWavefront(Wavefront):
+    """Follows rays."""
+
+    def __init__(self, n_envs: int, n_eyes: int, sensor: Sensor, tracer: Tracer, poses: PoseBuffer) -> None:
+        super().__init__(n_envs, n_eyes, sensor, poses)
+        self._tracer = tracer
+
+    def _components(
+        self, scene: MitsubaObject, poses: Array, inputs: dict[str, Array], place: tuple[Array, Array, Array]
+    ) -> list[Array]:
+        """Of the light that comes along the ray there."""
+        ray, cosine, agent, centres = self._ray(poses, inputs, *place)
+        bounces = self._tracer.light == lighting.BOUNCE
+        bounce_sample = dr.gather(mi.Point2f, inputs["bounce_samples"], place[2]) if bounces else None
+        components, distance = self._tracer.radiance(scene, ray, agent, centres, inputs, bounce_sample)
+        if self.depth.count == 1:
+            return components
+        shares = self.depth.shares(dr.rcp(distance * cosine))
+        return [component * share for share in shares for component in components]

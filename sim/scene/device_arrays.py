@@ -52,6 +52,23 @@ def as_whole_numbers(values: Any) -> np.ndarray:
     return found
 
 
+def counted(n: int) -> Array:
+    """0 ... n - 1, in memory of its own: a frozen kernel that reads it lane by lane replays at this width. Reading
+    tables alone, Dr.Jit 1.5 took its width from one that changes with what else the process has loaded: 126 lanes
+    replayed out of 128, the last receptors silently dark (tests/test_parameters.py runs each life twice and has met
+    it)."""
+    found = dr.arange(mi.UInt32, n)
+    dr.eval(found)
+    return found
+
+
+def in_fours(vectors: np.ndarray, fourth: np.ndarray | float) -> np.ndarray:
+    """Vectors (..., 3) flat, each followed by a fourth number: four aligned floats are gathered at once."""
+    rows = np.empty((*vectors.shape[:-1], 4), np.float32)
+    rows[..., :3], rows[..., 3] = vectors, fourth
+    return rows.ravel()
+
+
 def three(fours: Array, row: Array) -> Array:
     """The first three of a row of four floats; aligned, they are gathered at once."""
     x, y, z, _ = dr.gather(mi.Vector4f, fours, row)

@@ -4,7 +4,9 @@ area_tracer    AreaTracer: what an area sees
 branches       what is left out where no area needs it
 illumination   the light that falls on a patch
 patch          Area, and the Patch of a surface that is seen in it
+lit_bodies     and on bodies that move
 half_planes    shares that straight lines cut off
+borders        between columns of areas
 columns        walls, floor and sky behind an area
 sphere_areas   spheres in front of them
 light_table    light that walls and floor send on to each other

@@ -83,21 +83,21 @@ class AreaTracer:
     def radiance(
         self,
         area: Area,
-        agent: Array,
-        centres: list[Array],
-        inputs: dict[str, Array],
+        met: tuple[Array, Array],
+        now: Moment,
         depth: DepthLayers = ONE_PSF,
     ) -> list[Array]:
-        """Mean of what comes out of each area, one array per component, for each depth layer; agent, centres: of the
-        spheres that move."""
-        bodies, nothing = [*centres, agent], [0.0] * (depth.count * len(self.basis))
-        now = self._illumination.moment(bodies, inputs) if self._reflected else Moment(bodies, inputs)
-        pieces = self._columns.pieces(area, inputs)
+        """Mean of what comes out of each area, one array per component, for each depth layer.
+
+        met: faces at the area's left and right border, see `met` and `met_by`
+        """
+        nothing = [0.0] * (depth.count * len(self.basis))
+        pieces = self._columns.pieces(area, met, now.inputs)
         seen = [only_where(piece.beside > 0, partial(self._wall, area, piece, now, depth), nothing) for piece in pieces]
         floor = partial(self._floor, area, pieces, now, depth)
         seen.append(only_where(pieces[0].below + pieces[1].below > 0, floor, nothing))
         spheres = []
-        for k, centre in enumerate(centres):
+        for k, centre in enumerate(self._seen_bodies(now)):
             in_view = sphere_areas.may_see(area, centre, self._radii[k])
             sphere = partial(self._sphere, area, k, pieces, now, depth)
             spheres.append(only_where(in_view, sphere, [0.0] * 3 + nothing))
@@ -107,6 +107,24 @@ class AreaTracer:
             left = dr.clip(1 - sum(hidden, mi.Float(0)) / dr.maximum(part, LEAST_DIP), 0, 1)
             total = [dr.fma(left, own, sum_) for own, sum_ in zip(light, total, strict=True)]
         return [sum(own, rest) for rest, *own in zip(total, *(sphere[3:] for sphere in spheres), strict=True)]
+
+    def met(self, origin: Array, level: Array, inputs: dict[str, Array]) -> Array:
+        """Number of the wall's face that is met in a level direction (Vector2f)."""
+        return self._columns.met(origin, level, inputs)
+
+    def met_by(self, area: Area, inputs: dict[str, Array]) -> tuple[Array, Array]:
+        """Of the faces at an area's left and right border."""
+        left, right = (self.met(area.origin, area.level(mi.Float(a)), inputs) for a in (-0.5, 0.5))
+        return left, right
+
+    @property
+    def places(self) -> int:
+        """Rows of a world's table of lit bodies; none where light that they reflect is not followed."""
+        return self._illumination.bodies.places if self._reflected else 0
+
+    def lit(self, place: Array, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
+        """Rows of that table, at places of the worlds in which the bodies stand."""
+        return self._illumination.bodies.table(place, bodies, inputs)
 
     def _wall(self, area: Area, piece: Piece, now: Moment, depth: DepthLayers) -> list[Array]:
         patch = piece.patch(area, self._walls.floor, self._columns.top)

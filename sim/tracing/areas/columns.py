@@ -95,19 +95,23 @@ class Columns:
         self._rim = SIDES * len(walls)
         self.tables = {"face_ends": _face_ends(walls).astype(np.float32).ravel()}
 
-    def pieces(self, area: Area, inputs: dict[str, Array]) -> tuple[Piece, Piece]:
-        """The left and the right one; where one wall fills all columns, the right one has none."""
+    def pieces(self, area: Area, met: tuple[Array, Array], inputs: dict[str, Array]) -> tuple[Piece, Piece]:
+        """The left and the right one; where one wall fills all columns, the right one has none.
+
+        met: faces at the area's left and right border, see `met`
+        """
         half = mi.Float(0.5)
-        left, right = (self._met(area, sign * half, inputs) for sign in (-1, 1))
+        left, right = (self._face(index, inputs) for index in met)
         edge = dr.select(left.index == right.index, half, self._edge(area, left, right))
         return self._piece(area, left, -half, edge), self._piece(area, right, edge, half)
 
-    def _met(self, area: Area, a: Array, inputs: dict[str, Array]) -> Face:
-        """The one that is met at a."""
-        level = area.level(a)
-        ray = mi.Ray3f(area.origin, mi.Vector3f(level.x, level.y, 0))
+    def met(self, origin: Array, level: Array, inputs: dict[str, Array]) -> Array:
+        """Number of the face that is met in a level direction (Vector2f)."""
+        ray = mi.Ray3f(origin, mi.Vector3f(level.x, level.y, 0))
         t, face, _ = self._footprints.hit(ray, inputs)
-        face = dr.select(dr.isfinite(t), face, self._rim + self._side_of_floor(ray))
+        return dr.select(dr.isfinite(t), face, self._rim + self._side_of_floor(ray))
+
+    def _face(self, face: Array, inputs: dict[str, Array]) -> Face:
         ends = dr.gather(mi.Vector4f, inputs["face_ends"], face)
         return Face(face, mi.Point2f(ends.x, ends.y), mi.Point2f(ends.z, ends.w))
 

@@ -16,8 +16,8 @@ def test_a_body_shines_as_lamberts_sphere():
     seen, which is as bright as the light falls on it."""
     straight = SimpleNamespace(_levels=np.array([[0.8]]), _directions=[[0.0, 0.0, 1.0]], _colours=[[0.5]], _radii=[0.2])
     with variant():
-        straight._reaching = lambda k, disk, now: [mi.Float(1.0)]
-        now = SimpleNamespace(bodies=[mi.Point3f(0, 0, 1)])
+        straight.bodies = SimpleNamespace(on_side=lambda *_: [mi.Float(1.0)])
+        now = SimpleNamespace(bodies=[mi.Point3f(0, 0, 1)], world=None, lit=None)
         ways = ((0, 0, 1), (1, 0, 0), (0, 0, -1), (0.6, 0, 0.8))
         for nearness, expected in ((0.0, (2 / 3, 2 / (3 * np.pi), 0.0, None)), (1.0, (1.0, 0.0, 0.0, 0.8))):
             for towards, share in zip(ways, expected, strict=True):
@@ -38,8 +38,8 @@ def test_between_near_and_far_a_body_shines_as_its_visible_cap(nearness):
     straight = SimpleNamespace(_levels=np.array([[1.0]]), _directions=[[0.0, 0.0, 1.0]], _colours=[[1.0]], _radii=[0.2])
     errors = {nearness: [], 0.0: [], 1.0: []}
     with variant():
-        straight._reaching = lambda k, disk, now: [mi.Float(1.0)]
-        now = SimpleNamespace(bodies=[mi.Point3f(0, 0, 1)])
+        straight.bodies = SimpleNamespace(on_side=lambda *_: [mi.Float(1.0)])
+        now = SimpleNamespace(bodies=[mi.Point3f(0, 0, 1)], world=None, lit=None)
         for angle in np.linspace(0, np.pi, 19):
             exact = np.maximum(normals @ [np.sin(angle), 0, -np.cos(angle)], 0).mean()
             towards = mi.Vector3f(float(np.sin(angle)), 0, float(np.cos(angle)))

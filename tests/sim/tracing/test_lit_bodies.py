@@ -1,0 +1,126 @@
+"""What share of each light reaches bodies, against very many rays from points of the disks that stand for them."""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from sim.render.prepared_scene import PreparedScene
+from sim.scene.variant import variant
+from sim.tracing.areas import lit_bodies
+from sim.worlds.world import build_world
+from tests.sim.tracing.area_views import COARSE
+
+POINTS = 4096  # of a disk; a share's own error is then .005, twice that at most
+WORLDS = 24
+HALF_ROOM = np.array([11.0, 9.0])  # detection's, between its walls [m]
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return PreparedScene(build_world("detection"), COARSE)
+
+
+def bodies_of(scene):
+    """Centres (world, body, 3), the agent's last: beside walls, and some way apart, so that lights are often shut off
+    by both."""
+    radii, rng, found = scene.static.bodies.radii, np.random.default_rng(4), []
+    heights = [*[0.5] * (len(radii) - 1), 0.2]
+    room = HALF_ROOM - 0.55
+    while len(found) < WORLDS:
+        middle = rng.uniform(-1, 1, 2) * room
+        axis = rng.integers(2)
+        middle[axis] = rng.choice([-1, 1]) * room[axis]
+        places = np.clip(middle + rng.uniform(-2, 2, (len(radii), 2)), -room, room)
+        apart = np.linalg.norm(places[:, None] - places, axis=-1) - radii[:, None] - radii
+        if apart[~np.eye(len(radii), dtype=bool)].min() > 0.05:
+            found.append(np.column_stack([places, heights]))
+    return np.array(found)
+
+
+def table(scene, centres):
+    tracer = scene.areas("all")
+    place = dr.arange(mi.UInt32, tracer.places * WORLDS) % tracer.places
+    bodies = [mi.Point3f(np.repeat(c, tracer.places, axis=0).T.astype(np.float32)) for c in np.moveaxis(centres, 1, 0)]
+    return tracer, tracer.lit(place, bodies, tracer.inputs)
+
+
+def lit_by_rays(scene, disk, radius, centres, others):
+    """Share per light and world of a level disk's points that see it past walls and, if asked, other bodies."""
+    rays, rng = scene.tracers.of("direct"), np.random.default_rng(1)
+    r, turn = np.sqrt(rng.random(POINTS)) * radius, rng.uniform(0, 2 * np.pi, POINTS)
+    points = disk[:, None] + np.stack([r * np.cos(turn), r * np.sin(turn), np.zeros(POINTS)], axis=-1)
+    found = []
+    for light in rays.lights:
+        start = mi.Point3f(points.reshape(-1, 3).T.astype(np.float32))
+        free = ~np.array(rays.footprints.blocks(start, light.direction, rays.inputs)).astype(bool).reshape(WORLDS, -1)
+        for k in others:
+            way = centres[:, None, k] - points
+            ahead = way @ light.direction
+            beside = np.linalg.norm(way, axis=-1) ** 2 - ahead**2
+            free &= ~((ahead > 0) & (beside < scene.static.bodies.radii[k] ** 2))
+        found.append(free.mean(axis=1))
+    return np.array(found)
+
+
+def errors(scene, side):
+    """Of all bodies, as a whole or on a side: root mean square over worlds and lights, and how much is dark."""
+    centres = bodies_of(scene)
+    found, dark, radii = [], [], scene.static.bodies.radii
+    with variant(scene.static.variant):
+        tracer, rows = table(scene, centres)
+        lit = tracer._illumination.bodies
+        world = dr.arange(mi.UInt32, WORLDS)
+        for k, radius in enumerate(radii):
+            if side is None:
+                shares = lit.on_whole(mi.UInt32(k), world, rows)
+                truth = lit_by_rays(scene, centres[:, k], radius, centres, ())
+            else:
+                shares = lit.on_side(mi.UInt32(k), mi.Vector3f(*side), world, rows)
+                disk = centres[:, k] + np.array([*side[:2], 0]) * radius * lit_bodies.MIDDLE
+                others = [j for j in range(len(radii)) if j != k]
+                truth = lit_by_rays(scene, disk, radius / 2, centres, others)
+            found.append(np.array([np.array(s) for s in shares]) - truth)
+            dark.append(1 - truth)
+    return float(np.sqrt(np.mean(np.square(found)))), float(np.mean(dark))
+
+
+@pytest.mark.parametrize("side", [None, (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)])
+def test_shares_are_those_of_disks(scene, side):
+    """Half as much again as measured, the rays' own .005 included: a square of the disk's area stands for it, and edges
+    of shadows are straight."""
+    error, dark = errors(scene, side)
+    assert dark > 0.09  # else there would be little to find
+    assert error < 0.015
+
+
+@pytest.mark.parametrize("side", [(-0.6, 0.0, 0.8), (0.4, 0.3, -0.8)])
+def test_shares_between_the_tables_places_are_near_them(scene, side):
+    """Half as much again as measured; places twice as dense leave .015 there."""
+    assert errors(scene, side)[0] < 0.075
+
+
+def other_bodies_do_not_shade(monkeypatch):
+    monkeypatch.setattr(lit_bodies, "lit_past_sphere", lambda patch, directions, *_: [mi.Float(1) for _ in directions])
+
+
+def sides_are_mirrored(monkeypatch):
+    right = lit_bodies.LitBodies.on_side
+    monkeypatch.setattr(
+        lit_bodies.LitBodies, "on_side", lambda self, k, towards, *rest: right(self, k, -towards, *rest)
+    )
+
+
+def rows_of_the_next_world(monkeypatch):
+    right = lit_bodies.LitBodies._row
+    monkeypatch.setattr(lit_bodies.LitBodies, "_row", lambda self, row, table: right(self, row + 1, table))
+
+
+@pytest.mark.parametrize("wrong", [other_bodies_do_not_shade, sides_are_mirrored, rows_of_the_next_world])
+def test_wrong_tables_are_noticed(scene, monkeypatch, wrong):
+    wrong(monkeypatch)
+    assert max(errors(scene, side)[0] for side in ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0))) > 0.1
+
+
+def test_worlds_without_reflected_light_have_no_table(scene):
+    assert scene.areas("direct").places == 0
