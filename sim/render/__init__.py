@@ -3,6 +3,7 @@
 one_ray             see: one world, one ray for each receptor
 batched_renderer    BatchedRenderer: one wavefront
 wavefront           its kernel, and the poses that it reads
+area_wavefront      its kernels where areas are seen
 reference_renderer  ReferenceRenderer: Mitsuba's integrators, slowly
 fidelity            Fidelity: how finely, and why
 fidelity_choice     choose_fidelity: as little work as noise allows

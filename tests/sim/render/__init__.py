@@ -3,6 +3,7 @@
 one_ray: test_one_ray.py
 batched_renderer: test_batched_renderer.py, test_one_ray.py, test_reference_renderer.py
 wavefront: test_batched_renderer.py, test_one_ray.py
+area_wavefront: test_area_wavefront.py
 reference_renderer: test_reference_renderer.py
 fidelity: test_fidelity.py, eyes/test_depth_layers.py
 fidelity_choice: test_fidelity.py, eyes/test_depth_layers.py

@@ -13,7 +13,7 @@ import sim
 from sim.render.prepared_scene import PreparedScene
 from sim.scene.variant import variant
 from sim.tracing import lighting
-from sim.tracing.areas import illumination, light_baking, light_store, light_table
+from sim.tracing.areas import illumination, light_baking, light_store, light_table, lit_bodies
 from sim.worlds.layout import Starts
 from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
