@@ -4,6 +4,7 @@ main         exit codes
 arguments    arguments of all commands, and suggestions for what was mistyped
 commands     what each command does
 output       the one door to the terminal
+notes        warnings, each said once
 waiting      a bar for every other wait
 progress     how a run is going
 run_plan     what a run is going to do

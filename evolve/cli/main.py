@@ -14,6 +14,7 @@ from importlib import import_module
 
 from evolve.cli.arguments import parse
 from evolve.cli.commands import INTERRUPTED
+from evolve.cli.notes import notes
 from evolve.cli.output import voices
 
 __all__ = ["main"]
@@ -23,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        with voices(patient=given[:1] in (["run"], ["resume"])):  # these go on when nobody reads any more
+        with voices(patient=given[:1] in (["run"], ["resume"])), notes():  # these go on when nobody reads any more
             return _outcome(given)
     except BrokenPipeError:
         return 0  # `evolve genes | head`

@@ -5,6 +5,7 @@ arguments: test_main.py
 waiting: test_products.py
 progress: test_progress.py
 output: test_output.py
+notes: test_notes.py
 run_plan: test_run_plan.py
 pace: test_pace.py, test_run_plan.py
 start_from: test_start_from.py
