@@ -17,7 +17,10 @@ from sim.tracing.areas.half_planes import share_above
 from sim.tracing.areas.patch import Area, Patch, Rectangle
 from sim.tracing.areas.stripes import Texture
 
-STRIPS, PARTS = 3, 3  # chosen: of what is seen of a sphere
+# Chosen: strips across what an area sees of a sphere, and parts of each. Wide areas take more: else they would have to
+# be two (docs/measurements/rendering.md#areas).
+SIDES, SIDES_OF_WIDE = 3, 4
+WIDE = 0.0555  # on the plane at distance 1: 3.2 degrees
 # Cosine below which a surface does not slope further away from the eye: beyond, its patch would be longer than the
 # sphere.
 GRAZING = 0.15
@@ -56,9 +59,10 @@ class Slice:
 
 
 class SphereView:
-    """What an area sees of a sphere, in slices: STRIPS across what it fills, cut to PARTS each."""
+    """What an area sees of a sphere, in slices: strips across what it fills, cut to as many parts each.
 
-    count = STRIPS * PARTS
+    count: of slices
+    """
 
     def __init__(self, area: Area, centre: Array, radius: float) -> None:
         self._area, self._centre = area, centre
@@ -75,18 +79,20 @@ class SphereView:
         self._upright = upright = slope(right) <= slope(up)
         self._along, self._across = dr.select(upright, up, right), dr.select(upright, right, up)
         self._outline = _outline(way, radius, ahead, self._along, self._across)
+        self._sides = sides = dr.select(dr.norm(area.right) > WIDE, mi.UInt32(SIDES_OF_WIDE), mi.UInt32(SIDES))
+        self.count = sides * sides
 
     def slice(self, index: Array) -> Slice:
         """One of them."""
-        strip = mi.UInt32(index // PARTS)
-        outline, number = self._outline, mi.Float(strip)
-        one, other = outline.edge(number), outline.edge(number + 1)
+        n, per = mi.Float(self._sides), dr.rcp(mi.Float(self._sides))
+        outline, number = self._outline, dr.floor((mi.Float(index) + 0.5) * per)
+        one, other = outline.edge(number * per), outline.edge((number + 1) * per)
         place, width = (one.place + other.place) / 2, other.place - one.place
         cut = _chord(self._way, self._tangent, self._ahead + self._across * place, self._along)
         chord = outline.mean_chord(one, other)
         length, middle = (dr.select(outline.closed, mean, open_) for mean, open_ in zip(chord, cut, strict=True))
-        middle = middle + length * ((mi.Float(index - strip * PARTS) + 0.5) / PARTS - 0.5)
-        length = length / PARTS
+        middle = middle + length * ((mi.Float(index) - number * n + 0.5) * per - 0.5)
+        length = length * per
         seen = self._ahead + self._across * place + self._along * middle
         sides = self._along * length, self._across * width
         patch = _patch(self._way, self._tangent, seen, *sides, self._area.origin, self._centre)
@@ -120,11 +126,11 @@ class _Outline:
     low: Array
     high: Array
 
-    def edge(self, number: Array) -> _Edge:
-        """Where a strip begins."""
-        angle = dr.fma((self.high - self.low) / STRIPS, number, self.low)
+    def edge(self, share: Array) -> _Edge:
+        """Of strips, with such a share of them before it."""
+        angle = dr.fma(self.high - self.low, share, self.low)
         sine = dr.sin(angle)
-        place = dr.select(self.closed, dr.fma(self.half[0], sine, self.middle[0]), number / STRIPS - 0.5)
+        place = dr.select(self.closed, dr.fma(self.half[0], sine, self.middle[0]), share - 0.5)
         return _Edge(dr.clip(place, -0.5, 0.5), angle, sine)
 
     def mean_chord(self, one: _Edge, other: _Edge) -> tuple[Array, Array]:

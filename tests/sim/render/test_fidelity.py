@@ -13,6 +13,7 @@ from sim.envs.simulation import Simulation
 from sim.render.fidelity_choice import SHARE_OF_LIGHT
 from sim.render.fidelity_stages import CAUTION
 from sim.render.sample_choice import PERFECT_LENS_AREA, PERFECT_LENS_RAYS, PUPIL_RAYS, _fewest
+from sim.tracing.areas import sphere_areas
 from tests.sim.tracing.area_views import ROW, sees_object, views
 
 DETECTION = sim.Eyes(n_eyes=2, resolution=(9, 11))
@@ -116,6 +117,17 @@ def test_eyes_see_by_areas_where_rays_would_be_many(task, eyes, recwarn):
     truth = signals(world, eyes, state, rays, finely if world.objects else 8 * finely)
     for error in (by_areas - truth, (by_areas - truth)[seen]):
         assert np.sqrt(np.mean(error**2)) < eyes.noise_sigma / 2 if error.size else not world.objects
+
+
+def test_one_wide_area_does_where_it_cuts_spheres_finely_enough(monkeypatch):
+    """With the nine slices of narrow ones it would take two."""
+    world, eyes = (
+        sim.build_world("detection"),
+        sim.Eyes(n_eyes=4, resolution=(12, 12), fov_deg=45, placement_range_deg=120),
+    )
+    assert sim.choose_fidelity(world, eyes).rays_per_receptor == 1
+    monkeypatch.setattr(sphere_areas, "SIDES_OF_WIDE", sphere_areas.SIDES)
+    assert sim.choose_fidelity(world, eyes).rays_per_receptor == 2
 
 
 def test_rays_are_kept_where_few_will_do():

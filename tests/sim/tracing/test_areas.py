@@ -113,7 +113,7 @@ def all_or_nothing(monkeypatch):
     def slice_(self, index):
         found = right(self, index)
         on = dr.dot(self._way, self._ahead) ** 2 > dr.squared_norm(self._ahead) * self._tangent
-        return dataclasses.replace(found, share=dr.select(on, 1 / self.count, 0))
+        return dataclasses.replace(found, share=dr.select(on, dr.rcp(mi.Float(self.count)), 0))
 
     monkeypatch.setattr(sphere_areas.SphereView, "slice", slice_)
 
