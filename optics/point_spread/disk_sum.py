@@ -87,10 +87,10 @@ def _around(light: VectorFocus, towards: Converging, middle: tuple[float, float]
         return light
     wide = radius + _kernel(pitch, cutoff).reach / cutoff
     (cx, cy), (x, y) = towards.image, middle
-    sides = tuple(2 * math.ceil((abs(off) + wide) / pitch) + 1 for off in (y - cy, x - cx))
-    if max(sides) > MOST_AGAIN:
+    height, width = (2 * math.ceil((abs(off) + wide) / pitch) + 1 for off in (y - cy, x - cx))
+    if max(height, width) > MOST_AGAIN:
         raise AccuracyError(
             f"radius = {radius:.3g} m: needs more than {MOST_AGAIN} samples a side: ask for a smaller receptor, or "
-            f"vector_focus for dx={pitch:.3g}, shape={sides}"
+            f"vector_focus for dx={pitch:.3g}, shape=({height}, {width})"
         )
-    return towards.onto(Grid(sides, pitch, towards.image))
+    return towards.onto(Grid((height, width), pitch, towards.image))
