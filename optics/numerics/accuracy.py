@@ -18,7 +18,14 @@ STEEP = 1e-2  # choice: error of scalar theory from which on a plan names it, at
 
 
 class AccuracyError(ValueError):
-    """Asked for more than any method can give here; the message says what can be had."""
+    """Asked for more than any method can give here; the message says what can be had.
+
+    what: is wrong. remedy: what to ask for instead, where only who asked can.
+    """
+
+    def __init__(self, what: str, remedy: str | None = None):
+        super().__init__(what if remedy is None else f"{what}: {remedy}")
+        self.what, self.remedy = what, remedy
 
 
 @dataclass(frozen=True)
