@@ -14,7 +14,7 @@ from optics.eye.geometry import behind_pupil, check_pupil, direction, etendue, f
 from optics.eye.guided_field import check_guide
 from optics.eye.kernel_bank import KernelBank, prepare
 from optics.eye.photoreceptor import throughput
-from optics.eye.polarization import check_rays, microvilli_of, polarised_parts, preferences
+from optics.eye.polarization import check_rays, microvilli_of, taken_by
 from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf
 from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kernel, white_share
 from optics.eye.retinal_image import centred, with_centre
@@ -281,18 +281,9 @@ class Eye:
         shape = self.resolution[0] * s, self.resolution[1] * s
         scene = radiance_cube(radiance, self.bands, shape)
         centred(scene, shape)
-        parts = [(scene, 1.0)] if polarization is None else self._stokes(scene, polarization)
+        parts = taken_by(self.microvilli, self.resolution, scene, polarization)
         found = signals(self, parts, self.sight(s, z) if sight is None else sight.of(shape), s, z)
         return to_user(found if rng is None else with_noise(self, found, rng))
-
-    def _stokes(self, scene: np.ndarray, polarization: Any) -> list[tuple[np.ndarray, Any]]:
-        """I, Q and U of a scene, each with what receptors take of it."""
-        if self.microvilli is None:
-            raise ValueError(
-                "polarization: receptors of this eye know none; give it microvilli=Microvilli(azimuth_deg)"
-            )
-        preferred = preferences(self.microvilli, self.resolution)
-        return [(scene, 1.0), *zip(polarised_parts(scene, polarization), preferred, strict=True)]
 
     def in_bands(self, radiance: Any) -> np.ndarray:
         """(band,): a spectral radiance in this eye's bands, for `see`: each type of receptor then catches of it what it

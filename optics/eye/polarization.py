@@ -23,7 +23,7 @@ from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import reals, shown
 from optics.point_spread.microvilli import Microvilli
 
-__all__ = ["check_rays", "microvilli_of", "polarised_error", "polarised_parts", "preferences"]
+__all__ = ["check_rays", "microvilli_of", "polarised_error", "taken_by"]
 
 Tile = tuple[tuple[Microvilli, ...], ...]
 
@@ -71,7 +71,32 @@ def check_rays(pupil: Pupil | None, distance: float, tolerance: float) -> None:
         )
 
 
-def preferences(tile: Tile, resolution: tuple[int, int]) -> np.ndarray:
+def taken_by(
+    tile: Tile | None, resolution: tuple[int, int], radiance: np.ndarray, polarization: Any
+) -> list[tuple[np.ndarray, Any]]:
+    """I, Q and U of a radiance (band, Y, X), each with what receptors take of it, a number or (h, w).
+
+    polarization: degree in [0, 1] and angle [degrees], each a number, (band,), (Y, X) or (band, Y, X); or None.
+
+    Raises:
+        ValueError: it is neither, or a degree is outside [0, 1]; or receptors have no microvilli.
+    """
+    if polarization is None:
+        return [(radiance, 1.0)]
+    if tile is None:
+        raise ValueError("polarization: receptors of this eye know none; give it microvilli=Microvilli(azimuth_deg)")
+    try:
+        degree, angle = polarization
+    except (TypeError, ValueError):
+        raise ValueError(f"polarization = {shown(polarization)}: must be (degree, angle_deg)") from None
+    p, psi = _over("polarization's degree", degree, radiance), _over("polarization's angle", angle, radiance)
+    if not ((p >= 0) & (p <= 1)).all():
+        raise ValueError(f"polarization's degree = {shown(degree)}: must be in [0, 1]")
+    linear = [radiance * p * turn(np.radians(2 * psi)) for turn in (np.cos, np.sin)]
+    return [(radiance, 1.0), *zip(linear, _preferences(tile, resolution), strict=True)]
+
+
+def _preferences(tile: Tile, resolution: tuple[int, int]) -> np.ndarray:
     """Of each receptor (d - 1)/(d + 1) times cos 2φ and sin 2φ, (2, h, w)."""
     contrast = np.array([[_contrast(cell.dichroic_ratio) for cell in row] for row in tile])
     twice = np.radians([[2 * cell.azimuth_deg for cell in row] for row in tile])
@@ -81,24 +106,6 @@ def preferences(tile: Tile, resolution: tuple[int, int]) -> np.ndarray:
 
 def _contrast(ratio: float) -> float:
     return 1.0 if math.isinf(ratio) else (ratio - 1) / (ratio + 1)
-
-
-def polarised_parts(radiance: np.ndarray, polarization: Any) -> list[np.ndarray]:
-    """Q and U of a radiance (band, Y, X), each of its shape.
-
-    polarization: degree in [0, 1] and angle [degrees], each a number, (band,), (Y, X) or (band, Y, X).
-
-    Raises:
-        ValueError: it is not two such, or a degree is outside [0, 1].
-    """
-    try:
-        degree, angle = polarization
-    except (TypeError, ValueError):
-        raise ValueError(f"polarization = {shown(polarization)}: must be (degree, angle_deg)") from None
-    p, psi = _over("polarization's degree", degree, radiance), _over("polarization's angle", angle, radiance)
-    if not ((p >= 0) & (p <= 1)).all():
-        raise ValueError(f"polarization's degree = {shown(degree)}: must be in [0, 1]")
-    return [radiance * p * turn(np.radians(2 * psi)) for turn in (np.cos, np.sin)]
 
 
 def _over(name: str, value: Any, radiance: np.ndarray) -> np.ndarray:
