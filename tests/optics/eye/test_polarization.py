@@ -3,8 +3,10 @@
 import math
 from dataclasses import replace
 
+import drjit as dr
 import numpy as np
 import pytest
+from drjit.auto.ad import Float64
 
 import optics
 from optics import Eye, Microvilli
@@ -164,6 +166,34 @@ def test_modes_of_rhabdoms_take_polarised_light_as_squares_do():
     known = replace(eye, microvilli=Microvilli(10.0, 7.0))
     found = known.see(scene, 4, polarization=(0.5, 70.0)) / eye.see(scene, 4)
     np.testing.assert_allclose(found, factor(70.0, 0.5, 10.0, 7.0), rtol=1e-5)
+
+
+def test_derivatives_are_those_of_unpolarised_light_times_the_same():
+    """By the pupil's radius and a mask's waist, of a scene that is polarised alike all over."""
+    slopes = {}
+    for polarization in (None, (0.7, 30.0)):
+        radius, waist = Float64(12e-6), Float64(10e-6)
+        dr.enable_grad(radius, waist)
+        pupil = optics.Pupil(radius, mask=optics.GaussianMask(waist), thin_lens_focal_length=120e-6)
+        eye = Eye(pupil, (3, 3), 45.0, 100e-6, bands=1, dtype="float64", microvilli=Microvilli(75.0, 5.0))
+        dr.backward(dr.sum(eye.see(np.ones((1, 6, 6)), 2, polarization=polarization).array))
+        slopes[polarization] = np.array([dr.grad(part).numpy()[0] for part in (radius, waist)])
+    plain, polarised = slopes.values()
+    assert np.abs(plain).min() > 1e3
+    np.testing.assert_allclose(polarised, plain * factor(30.0, 0.7, 75.0, 5.0), rtol=1e-6)
+
+
+def test_photons_are_those_of_the_polarised_signal():
+    """Shot noise: its variance goes with the signal."""
+    eye = replace(
+        PERFECT, resolution=(40, 40), microvilli=Microvilli(0.0, math.inf), photon_budget=optics.PhotonBudget(1.0)
+    )
+    scene, rng = np.ones((2, 40, 40)), np.random.default_rng(0)
+    noises = [
+        (eye.see(scene, 1, rng, polarization=(0.9, at)) - eye.see(scene, 1, polarization=(0.9, at))).var()
+        for at in (0.0, 90.0)
+    ]
+    assert noises[0] / noises[1] == pytest.approx(1.9 / 0.1, rel=0.15)
 
 
 CELLS = Microvilli(0.0)
