@@ -39,7 +39,7 @@ IN_FOCUS = (
 ROUND = 0.25  # mean square of x over a disk, in R²
 # Choice, over what a pupil errs by in focus: aberrations and small windows, by test_scalar_theory.py.
 MARGIN = 1.6
-CYCLES, DIGITS = 2.0, 2.0  # choice: of sums over the pupil
+CYCLES, DIGITS = 0.5, 2.0  # choice: of sums over the pupil
 LEVEL = 1e-2  # choice: of a mask's spectrum
 
 

@@ -90,7 +90,7 @@ def integral(radius, centre, picture):
 @pytest.mark.parametrize("seed", range(30))
 def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
     """Receptors from a twentieth of λ/NA to four, anywhere about the focus; pitches to .7 λ/NA, windows of three
-    samples and more; a sum under a hard disk errs by a third in the median."""
+    samples and more; a sum under a hard disk errs by some 20 % in the median."""
     rng = np.random.default_rng(seed)
     sine = float(rng.choice([0.05, 0.2, 0.5, 0.8, 0.9]))
     lens = optics.Pupil(8e-3 * math.tan(math.asin(sine)), thin_lens_focal_length=8e-3)
