@@ -60,7 +60,7 @@ _CONTENTS = {
     "Spectrum": "spectra.spectrum",
     "Spider": "apertures.shapes",
     "StackResult": "propagation.system",
-    "VectorFocus": "point_spread.vector_focus",
+    "VectorFocus": "point_spread.converging",
     "WavefrontMap": "elements.wavefront",
     "Waveguide": "ommatidia.waveguide",
     "WhitePSF": "point_spread.white",

@@ -10,6 +10,8 @@ kernel_interpolation  how few kernels stand for a range of distances and directi
 kernel_bank           the kernels of an eye for a scene
 band_choice           how few spectral bands will do
 retinal_image         a scene convolved with a kernel
+polarization          microvilli over a retina, and polarised scenes
+signals               from a scene to signals
 photoreceptor         throughput, spectral weighting, noise
 summary               what limits an eye, in one table
 """

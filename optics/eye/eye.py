@@ -13,14 +13,15 @@ from optics.elements.pupil import Pupil
 from optics.eye.geometry import behind_pupil, check_pupil, direction, etendue, focal_length, tangents
 from optics.eye.guided_field import check_guide
 from optics.eye.kernel_bank import KernelBank, prepare
-from optics.eye.photoreceptor import noise_on, own_type, quantum_catch, throughput
+from optics.eye.photoreceptor import throughput
+from optics.eye.polarization import check_rays, microvilli_of, taken_by
 from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf
 from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kernel, white_share
-from optics.eye.retinal_image import at_receptors, blur, centred, receptor_average, with_centre
+from optics.eye.retinal_image import centred, with_centre
+from optics.eye.signals import signals, with_noise
 from optics.eye.summary import Description, describe
 from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
-from optics.numerics.precision import precision
 from optics.ommatidia.waveguide import Waveguide
 from optics.point_spread.psf_result import PSFResult
 from optics.spectra.bands import SpectralBands
@@ -51,6 +52,10 @@ class Eye:
         wavelengths of pigments' peaks [nm], or `Receptors`, which can be a mosaic. The field then holds `Receptors`.
     waveguide: what receptors are: rhabdoms, each in the middle of its square and pointing at the pupil's centre, which
         take light in modes (None: they absorb all light on the square).
+    microvilli: which way those of each receptor run, and how dichroic they are: one `Microvilli` for all, or rows of
+        them, repeated over the retina from its top left corner. Azimuths are of the visual field, from right upwards,
+        across the ray through the pupil's centre. They matter for polarised scenes alone; signals of unpolarised light
+        are what they are without (None: receptors know no polarisation).
     tolerance: relative L2 error asked of the PSF; signal error, relative to white's, of whatever else is chosen.
     dtype: "float32" or "float64", of PSF, kernel and signals.
 
@@ -59,6 +64,7 @@ class Eye:
 
     Raises:
         ValueError: names argument, value and valid range.
+        AccuracyError: microvilli behind a pupil whose rays are too steep for them to the tolerance.
     """
 
     pupil: Pupil | None = None
@@ -74,6 +80,7 @@ class Eye:
     full_aperture: float | None = None
     eccentricity_deg: tuple[float, float] = (0.0, 0.0)
     waveguide: Waveguide | None = None
+    microvilli: Any = None
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -87,6 +94,9 @@ class Eye:
             raise ValueError(f"dtype = {self.dtype!r}: must be 'float32' or 'float64'")
         check_pupil(self.pupil, self.sensor_width, self.full_aperture)
         check_guide(self.waveguide, self.pupil, self.receptor_pitch)
+        object.__setattr__(self, "microvilli", microvilli_of(self.microvilli))
+        if self.microvilli is not None:
+            check_rays(self.pupil, number(self.retina_distance), self.tolerance)
         if self.photon_budget is not None:
             of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
@@ -248,6 +258,7 @@ class Eye:
         rng: np.random.Generator | None = None,
         z: Scalar = math.inf,
         sight: KernelBank | None = None,
+        polarization: Any = None,
     ) -> np.ndarray | Array:
         """Signals (channel, h, w) of a scene in the tangent plane, by convolution (the reference).
 
@@ -257,9 +268,12 @@ class Eye:
         rng: None for signals without noise. Noise carries no derivative.
         z: distance of the scene along the axis [m], a number or one per cell (Y, X).
         sight: the kernels, as `Eye.sight` makes them for these samples_per_receptor; None makes them.
+        polarization: of an eye with microvilli, (degree, angle_deg) of the light: its degree of linear polarisation in
+            [0, 1], and the angle of its field, from right upwards. Each is a number, (band,), (Y, X) or (band, Y, X).
+            None: unpolarised, or circularly polarised, which is the same to microvilli.
 
         Raises:
-            ValueError: radiance of another shape, or not finite.
+            ValueError: radiance of another shape, or not finite; polarised light for receptors that know none.
         """
         s = _whole(samples_per_receptor)
         if rng is not None:
@@ -267,21 +281,9 @@ class Eye:
         shape = self.resolution[0] * s, self.resolution[1] * s
         scene = radiance_cube(radiance, self.bands, shape)
         centred(scene, shape)
-        bank = self.sight(s, z) if sight is None else sight.of(shape)
-        types = precision(self.dtype)
-        scenes = [scene * share for share in bank.shares(scene.shape[1:], z)]
-        image = blur(scenes, list(bank.kernels.values()), shape, types)
-        irradiance = (receptor_average if self.waveguide is None else at_receptors)(image, s, types)
-        signal = quantum_catch(irradiance, self.spectral_bands.weights, self.throughput, types)
-        if self.mosaic is not None:
-            signal = own_type(signal, self.mosaic, types)
-        return (
-            to_user(signal)
-            if rng is None
-            else to_user(
-                signal + types.Tensor(noise_on(plain(signal), self.photons, self.mosaic, self.noise_sigma, rng))
-            )
-        )
+        parts = taken_by(self.microvilli, self.resolution, scene, polarization)
+        found = signals(self, parts, self.sight(s, z) if sight is None else sight.of(shape), s, z)
+        return to_user(found if rng is None else with_noise(self, found, rng))
 
     def in_bands(self, radiance: Any) -> np.ndarray:
         """(band,): a spectral radiance in this eye's bands, for `see`: each type of receptor then catches of it what it

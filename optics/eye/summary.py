@@ -195,7 +195,9 @@ def _known(name: str, measure: Callable[[], float], unknown: list[str]) -> float
     try:
         return measure()
     except AccuracyError as error:
-        unknown.append(f"{name}: {error}")
+        # An eye has its own window: who wants another asks for its pupil's PSF.
+        remedy = "" if error.remedy is None else f"; of optics.psf(eye.pupil), {error.remedy}"
+        unknown.append(f"{name}: {error.what}{remedy}")
         return math.nan
 
 

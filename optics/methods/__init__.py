@@ -15,8 +15,9 @@ low_rank             by one matrix product
 far_field            by one transform onto directions for each of a few nodes of the window
 fresnel              approximate: Fresnel and Fraunhofer, and how wrong they are
 geometric            approximate: density of rays; the pinhole
-richards_wolf        the vector focus of symmetric pupils, and how wrong scalar theory is
+richards_wolf        the vector focus of symmetric pupils
 vector_sum           the vector focus of any pupil
+scalar_theory        how wrong scalar theory is, at most
 rays                 where geometrical optics sends the light
 pupil_sampling       where matrix products sample the pupil
 sine_samples         the same, evenly spaced as seen from the window

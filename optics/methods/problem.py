@@ -12,6 +12,7 @@ from optics.elements.beam import Beam
 from optics.elements.source import PointSource
 from optics.elements.wavefront_slopes import Slopes
 from optics.methods.rays import Rays
+from optics.methods.scalar_theory import ROUND, light_spread, scalar_theory_error
 from optics.numerics.arguments import in_range, positive
 from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
@@ -45,6 +46,7 @@ class Problem:
     slopes: of the wavefront, by whose rays approximations judge themselves (None: these are not weighed).
     medium_n: index behind the pupil.
     masked: whether a mask sends light where rays do not tell, so that approximations cannot judge themselves.
+    spread: of the light over the pupil, see `light_spread`.
     """
 
     aperture: Aperture
@@ -64,6 +66,7 @@ class Problem:
     slopes: Slopes | None = None
     masked: bool = False
     medium_n: float = 1.0
+    spread: float = ROUND
 
     @classmethod
     def of(cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
@@ -112,6 +115,11 @@ class Problem:
         the pupil."""
         from_rim = self.radius / math.hypot(self.radius, self.distance)
         return min(from_rim, self.phase_band_inside * self.wavelength + self.wavelength / self.radius)
+
+    @property
+    def scalar_error(self) -> float:
+        """What scalar theory itself errs by, at most."""
+        return scalar_theory_error(self.steepest_sine, self.spread)
 
     def soft_edge(self, band: float) -> PupilEdge:
         """The aperture as samples can carry it that leave frequencies up to `band` [1/m] untouched."""
@@ -168,4 +176,5 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
         masked=pupil.mask is not None,
         slopes=None if pixels else slopes,
         medium_n=beam.index,
+        spread=light_spread(pupil),
     )

@@ -1,4 +1,4 @@
-"""The vector focus of symmetric light: Richards and Wolf's three integrals; and how wrong scalar theory is.
+"""The vector focus of symmetric light: Richards and Wolf's three integrals.
 
 B. Richards and E. Wolf, Proc. R. Soc. A 253, 358 (1959), eqs. 2.30 to 2.32. Each direction θ brings a plane wave, whose
 field is turned with the ray. With an amplitude a(θ) on the sphere about the focus, light polarised along x has there
@@ -21,24 +21,9 @@ import numpy as np
 
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
-__all__ = ["SCALAR_ERRORS", "Light", "focal_integrals", "scalar_theory_error"]
+__all__ = ["Light", "focal_integrals"]
 
 DIGITS = 9.0  # choice
-
-# Relative L2 error that scalar theory makes in the focus of a flat pupil and unpolarised light, over the squared sine
-# of its steepest ray: (sine, error / sine²). tests/optics/methods/test_richards_wolf.py computes them.
-SCALAR_ERRORS = (
-    (0.0, 0.2091),
-    (0.2, 0.2118),
-    (0.4, 0.2209),
-    (0.5, 0.2286),
-    (0.6, 0.2395),
-    (0.7, 0.2554),
-    (0.8, 0.2798),
-    (0.9, 0.3241),
-    (0.95, 0.3680),
-    (1.0, 0.55),
-)
 
 
 @dataclass(frozen=True)
@@ -47,12 +32,6 @@ class Light:
 
     at: Callable[[np.ndarray], np.ndarray]
     cycles: float = 0.0
-
-
-def scalar_theory_error(sine: float) -> float:
-    """Relative L2 error of scalar theory's intensity where rays up to this sine meet, for unpolarised light."""
-    sines, errors = zip(*SCALAR_ERRORS, strict=True)
-    return float(np.interp(min(sine, 1.0), sines, errors)) * min(sine, 1.0) ** 2
 
 
 def focal_integrals(

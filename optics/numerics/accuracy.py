@@ -14,11 +14,18 @@ MOST_SAMPLES = 4096
 FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}  # of a method's sums, relative to the field's root mean square
 
 
-STEEP = 1e-2  # choice: error of scalar theory from which on a plan names it, at NA 0.22
+STEEP = 1e-2  # choice: error of scalar theory from which on a plan names it, at NA 0.16
 
 
 class AccuracyError(ValueError):
-    """Asked for more than any method can give here; the message says what can be had."""
+    """Asked for more than any method can give here; the message says what can be had.
+
+    what: is wrong. remedy: what to ask for instead, where only who asked can.
+    """
+
+    def __init__(self, what: str, remedy: str | None = None):
+        super().__init__(what if remedy is None else f"{what}: {remedy}")
+        self.what, self.remedy = what, remedy
 
 
 @dataclass(frozen=True)
@@ -39,8 +46,9 @@ class Plan:
     samples: (y, x) samples of the pupil; for nodes (radial, angular) or (count, 1).
     padding: period of the pupil's transform over its samples, where there is one.
     predicted_error: relative L2 error of the intensity over the window.
-    scalar_error: what scalar theory itself errs by where rays as steep as these meet, in unpolarised light, which no
-        method here makes less: see `optics.vector_focus`.
+    scalar_error: what scalar theory itself errs by, at most, where rays as steep as these meet, in light of any
+        polarisation, which no method here makes less: see `optics.vector_focus`. It is meant for windows that hold the
+        brightest place of the light. Where all is dark nothing is promised.
     seconds: predicted time of a warm call on two cores.
     options: every method that was weighed.
     """
@@ -62,7 +70,7 @@ class Plan:
             "padding": f"{self.padding:.2f}",
             "dtype": self.dtype,
             "predicted error": f"{self.predicted_error:.1e}",
-            **({"scalar theory": f"errs by {self.scalar_error:.1g}"} if self.scalar_error >= STEEP else {}),
+            **({"scalar theory": f"errs by up to {self.scalar_error:.2g}"} if self.scalar_error >= STEEP else {}),
             "predicted time": f"{self.seconds:.2g} s",
             "why": self.why,
         }

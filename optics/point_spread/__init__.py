@@ -7,6 +7,8 @@ planner        the cheapest method within the tolerance
 pictures       requests answered, and what becomes of a wrong picture
 spot_check     a picture held against the direct sum at a few points
 vector_focus   vector_focus: beyond scalar theory
+converging     VectorFocus: polarised light on its way, and its field
+disk_sum       what falls on a round receptor
 microvilli     Microvilli: receptors that know polarisation
 population     one plan for many pupils
 batch          psf_batch: many eyes at once

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import in_range, of_kind, positive, without_derivative
-from optics.numerics.grid import Grid
-from optics.point_spread.vector_focus import VectorFocus
+from optics.numerics.arguments import in_range, of_kind, without_derivative
+from optics.point_spread.converging import VectorFocus
+from optics.point_spread.disk_sum import DiskSum
 
 __all__ = ["Microvilli"]
 
@@ -42,13 +43,33 @@ class Microvilli:
         found: np.ndarray = along + (light.psf - along) / self.dichroic_ratio
         return found
 
-    def signal(self, light: VectorFocus, radius: float) -> float:
-        """Share of the light on the pupil that a round receptor of a radius [m] about the window's middle absorbs."""
-        return float((self.absorbed(light) * _disk(light, radius)).sum()) * light.dx**2
+    def signal(
+        self,
+        light: VectorFocus,
+        radius: float,
+        centre: tuple[float, float] | None = None,
+        with_error: bool = False,
+    ) -> Any:
+        """Share of the light on the pupil that a round receptor of a radius [m] absorbs.
 
-    def polarization_sensitivity(self, light: VectorFocus, radius: float) -> float:
+        It does not depend on the light's samples: where they are too coarse, or too few around the receptor, the light
+        is looked at again. centre: (x, y) [m] of the receptor, None for the window's middle. with_error: whether to
+        return (value, predicted error), both of what the sum errs by and of `vector_focus` itself.
+
+        Raises:
+            ValueError: the receptor leaves the window.
+            AccuracyError: it is too large for samples as fine as it needs.
+        """
+        of_kind("light", light, VectorFocus, "vector_focus(pupil)")
+        disk = DiskSum.over(light, radius, centre)
+        found = disk.of(self.absorbed(disk.light))
+        return found if with_error else found[0]
+
+    def polarization_sensitivity(
+        self, light: VectorFocus, radius: float, centre: tuple[float, float] | None = None
+    ) -> float:
         """Largest over least signal as the plane of linear polarisation turns before the pupil: the dichroic ratio
-        where rays are flat, and less where they are steep.
+        where rays are flat, and less where they are steep. See `signal`.
 
         Raises:
             ValueError: light that is not unpolarised, of which alone both planes are known.
@@ -56,9 +77,10 @@ class Microvilli:
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
         if any(light.polarization[1:]):
             raise ValueError("light is polarised: must be vector_focus(pupil, polarization=None), which has all planes")
-        disk, along = _disk(light, radius), self._along(light)
-        every = np.einsum("pcyx,qcyx,yx->pq", light.parts, light.parts.conj(), disk).real
-        own = np.einsum("pyx,qyx,yx->pq", along, along.conj(), disk).real
+        disk = DiskSum.over(light, radius, centre)
+        parts, along = disk.light.parts, self._along(disk.light)
+        every = np.einsum("pcyx,qcyx,yx->pq", parts, parts.conj(), disk.share).real
+        own = np.einsum("pyx,qyx,yx->pq", along, along.conj(), disk.share).real
         least, most = np.linalg.eigvalsh(own + (every - own) / self.dichroic_ratio)
         return float(most / least)
 
@@ -67,18 +89,3 @@ class Microvilli:
         turn = math.radians(self.azimuth_deg)
         found: np.ndarray = math.cos(turn) * light.parts[:, 0] + math.sin(turn) * light.parts[:, 1]
         return found
-
-
-def _disk(light: VectorFocus, radius: float) -> np.ndarray:
-    """1 on a receptor, (y, x).
-
-    Raises:
-        ValueError: the window does not hold it, or it holds no sample but the middle.
-    """
-    positive("radius", without_derivative("radius", radius))
-    if radius < light.dx or radius > (min(light.scalar.shape) - 1) / 2 * light.dx:
-        raise ValueError(
-            f"radius = {radius:.3g} m: must lie between the samples' distance of {light.dx:.3g} m and the window's rim"
-        )
-    own = Grid(light.grid.shape, light.dx)
-    return (np.hypot(own.x, own.y[:, None]) <= radius).astype(float)

@@ -36,7 +36,6 @@ from optics.methods.low_rank import low_rank
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
-from optics.methods.richards_wolf import scalar_theory_error
 from optics.methods.sampling import Sampling
 from optics.numerics.accuracy import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Option, Plan
 from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, WINDOW_SAMPLE
@@ -190,7 +189,7 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
     )
     error = _sampling_error(problem) + best.model_error
     sampled = best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), best.padding
-    return Plan(*sampled, scalar_theory_error(problem.steepest_sine))
+    return Plan(*sampled, problem.scalar_error)
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:

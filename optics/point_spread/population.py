@@ -23,8 +23,9 @@ from optics.apertures.aperture import EDGE_REACH, Aperture
 from optics.elements.pupil import Pupil
 from optics.elements.relief import BSplineRelief
 from optics.methods.problem import SLOPE_MARGIN
+from optics.methods.scalar_theory import light_spread, scalar_theory_error
 from optics.numerics.accuracy import Plan
-from optics.numerics.autodiff import Scalar, is_differentiable
+from optics.numerics.autodiff import Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import cubic_bsplines
 from optics.numerics.precision import precision
@@ -111,12 +112,14 @@ def population_pictures(
             errors = _model_errors(stack, images, window) + SAMPLING * tolerance
             for index, image, error in zip(part, images, errors, strict=True):
                 if error <= tolerance:
-                    yield index, image, _plan(samples, float(error))
+                    yield index, image, _plan(members[index], samples, float(error))
 
 
-def _plan(samples: _Samples, error: float) -> Plan:
-    shape = (samples.at.size, samples.at.size)
-    return Plan("low_rank", shape, "float32", error, "one of a population: rank 1, not spot-checked", SECONDS)
+def _plan(member: Member, samples: _Samples, error: float) -> Plan:
+    shape, radius = (samples.at.size, samples.at.size), member.pupil.radius
+    scalar = scalar_theory_error(radius / math.hypot(radius, number(member.distance)), light_spread(member.pupil))
+    why = "one of a population: rank 1, not spot-checked"
+    return Plan("low_rank", shape, "float32", error, why, SECONDS, scalar_error=scalar)
 
 
 @dataclass(frozen=True, eq=False)

@@ -199,7 +199,7 @@ class PSFResult:
         here = f"{self.tensor.shape[1]} x {self.tensor.shape[2]} samples {self.dx:.3g} m apart"
         needs = f"{what} needs {height} x {width} samples {window.dx:.3g} m apart, and this PSF has {here}"
         if not self.can_be_seen_anew or max(window.shape) > MOST_AGAIN:
-            raise AccuracyError(f"{needs}: ask for dx={window.dx:.3g}, shape=({height}, {width})")
+            raise AccuracyError(needs, f"ask for dx={window.dx:.3g}, shape=({height}, {width})")
         try:
             if self.shares is not None:
                 return spread([_through(request, window) for request in self.requests]).mean(self.shares)

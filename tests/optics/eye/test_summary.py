@@ -155,3 +155,14 @@ def test_what_the_light_cannot_tell_is_one_named_line(monkeypatch):
     assert "not known (1)       image quality: tolerance = 0.02" in str(described)
     monkeypatch.undo()
     assert lens().describe().unknown == ()
+
+
+def test_advice_is_for_who_can_follow_it(monkeypatch):
+    """An eye takes no dx; its pupil's PSF does."""
+
+    def refused(*_, **__):
+        raise AccuracyError("it needs 9 x 9 samples", "ask for dx=1e-07, shape=(9, 9)")
+
+    monkeypatch.setattr(summary, "strehl_ratio", refused)
+    [line] = lens().describe().unknown
+    assert line == "Strehl ratio: it needs 9 x 9 samples; of optics.psf(eye.pupil), ask for dx=1e-07, shape=(9, 9)"

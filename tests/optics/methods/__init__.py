@@ -14,6 +14,7 @@ rayleigh_sommerfeld: test_textbook.py, test_oracles_circular.py
 rays: test_geometric.py
 richards_wolf: test_richards_wolf.py
 sampling: point_spread/test_planner.py
+scalar_theory: test_scalar_theory.py
 sine_samples: test_sine_samples.py
 spectral_taper: test_textbook.py
 textbook: test_textbook.py

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import optics
-from optics.methods.richards_wolf import SCALAR_ERRORS, Light, focal_integrals, scalar_theory_error
 
 WAVELENGTH = 500e-9
 
@@ -71,9 +70,7 @@ def test_at_low_na_it_is_rayleigh_sommerfelds():
     vector = optics.vector_focus(pupil, WAVELENGTH, **window)
     off = np.linalg.norm(vector.scalar - exact) / np.linalg.norm(exact)
     assert off < 1e-3  # 1 / (2k z (1 - cos θ)) of the near term, and what is left of the edge
-    assert np.linalg.norm(vector.psf - exact) / np.linalg.norm(exact) == pytest.approx(
-        scalar_theory_error(0.0995), rel=0.3
-    )
+    assert np.linalg.norm(vector.psf - exact) / np.linalg.norm(exact) == pytest.approx(0.21 * 0.0995**2, rel=0.3)
 
 
 def test_defocus_and_spherical_relief_are_in_it():
@@ -90,29 +87,6 @@ def test_all_components_together_hold_the_light_of_scalar_theory():
     found = focus(0.7, dx=0.1e-6, shape=(201, 201))
     assert found.psf.sum() == pytest.approx(found.scalar.sum(), rel=2e-3)
     assert found.intensity[2].sum() > 0.1 * found.psf.sum()
-
-
-@pytest.mark.parametrize("sine", [0.05, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95])
-def test_scalar_theorys_error_is_as_tabulated(sine):
-    rho = np.linspace(0, 12 / sine, 800) * WAVELENGTH
-    ends, light = (0.0, math.asin(sine)), Light(lambda theta: 1 / np.cos(theta))
-    along, axial, twice, scalar = focal_integrals(rho, 2 * math.pi / WAVELENGTH, 1e-3, ends, light)
-    vector, scalar = along**2 + 2 * axial**2 + twice**2, scalar**2
-    error = math.sqrt(np.sum(rho * (vector - scalar) ** 2) / np.sum(rho * vector**2))
-    assert scalar_theory_error(sine) == pytest.approx(
-        math.sqrt(np.sum(rho * (vector - scalar) ** 2) / np.sum(rho * scalar**2)), rel=0.01
-    )
-    assert scalar_theory_error(sine) == pytest.approx(error, rel=0.3)
-    assert SCALAR_ERRORS[0][1] * sine**2 == pytest.approx(error, rel=0.02 + sine**2)  # of second order
-
-
-def test_steep_plans_name_it_and_others_do_not():
-    steep = optics.plan(lens(0.9, 30e-6), WAVELENGTH, 30e-6, dx=0.1e-6, shape=(33, 33), tolerance=1e-2)
-    assert steep.scalar_error == pytest.approx(0.26, abs=0.02)
-    assert "scalar theory    errs by 0.3" in str(steep)
-    hole = optics.plan(optics.Pupil(30e-6), WAVELENGTH, 30e-6, dx=0.5e-6, shape=(33, 33), tolerance=1e-2)
-    assert hole.scalar_error < 1e-3  # as wide an angle, but the light goes straight on
-    assert "scalar theory" not in str(hole)
 
 
 def test_rings_have_more_light_along_the_axis():

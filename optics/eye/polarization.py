@@ -1,0 +1,120 @@
+"""Receptors that know polarisation: microvilli over a retina, and how polarised a scene is.
+
+Where rays are flat, light keeps its polarisation from the pupil to the retina. Of a radiance I that is polarised to a
+degree p at an angle ψ, microvilli at an azimuth φ with a dichroic ratio d absorb, over what they absorb of it
+unpolarised,
+
+    1 + p (d - 1)/(d + 1) cos 2(ψ - φ),
+
+that is 2(d cos² + sin²)/(d + 1) where p = 1. It is linear in Stokes' parameters I, Q = I p cos 2ψ, U = I p sin 2ψ, and
+these are blurred as the radiance is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from optics.elements.pupil import Pupil
+from optics.methods.scalar_theory import ROUND, light_spread
+from optics.numerics.accuracy import AccuracyError
+from optics.numerics.arguments import reals, shown
+from optics.point_spread.microvilli import Microvilli
+
+__all__ = ["check_rays", "microvilli_of", "polarised_error", "taken_by"]
+
+Tile = tuple[tuple[Microvilli, ...], ...]
+
+# Choice, over the squared sine of the steepest ray: integral of what the vector focus differs from this, over white's.
+# A round pupil in focus has .54 to .59 up to NA .5; tests/optics/eye/test_polarization.py.
+STEEP = 0.62
+
+
+def microvilli_of(given: Any) -> Tile | None:
+    """Rows of microvilli, whatever stands for them: one for all receptors, or rows.
+
+    Raises:
+        ValueError: neither, or rows that are not all as long.
+    """
+    if given is None:
+        return None
+    try:
+        tile = ((given,),) if isinstance(given, Microvilli) else tuple(tuple(row) for row in given)
+    except TypeError:
+        tile = ()
+    plain = all(isinstance(cell, Microvilli) for row in tile for cell in row)
+    if not tile or not plain or len({len(row) for row in tile}) != 1 or not tile[0]:
+        raise ValueError(
+            f"microvilli = {shown(given)}: must be Microvilli(azimuth_deg), or rows of them, all as long, or None"
+        )
+    return tile
+
+
+def polarised_error(pupil: Pupil, distance: float) -> float:
+    """What polarised signals err by at most, in units of white's, where rays to a retina at this distance [m] are not
+    flat."""
+    squared_sine = pupil.radius**2 / (pupil.radius**2 + distance**2)
+    return STEEP * light_spread(pupil) / ROUND * squared_sine
+
+
+def check_rays(pupil: Pupil | None, distance: float, tolerance: float) -> None:
+    """AccuracyError where polarised signals err by more than the tolerance, in units of white's."""
+    error = 0.0 if pupil is None else polarised_error(pupil, distance)
+    if pupil is not None and error > tolerance:
+        sine = pupil.radius / math.hypot(pupil.radius, distance)
+        raise AccuracyError(
+            f"microvilli behind a pupil of NA {sine:.2g}: by steep rays polarised signals err by up to {error:.2g} of "
+            f"white's; tolerance = {tolerance:g} allows NA {sine * math.sqrt(tolerance / error):.2g}: widen it, narrow "
+            "the pupil, or see Microvilli.signal(vector_focus(...))"
+        )
+
+
+def taken_by(
+    tile: Tile | None, resolution: tuple[int, int], radiance: np.ndarray, polarization: Any
+) -> list[tuple[np.ndarray, Any]]:
+    """I, Q and U of a radiance (band, Y, X), each with what receptors take of it, a number or (h, w).
+
+    polarization: degree in [0, 1] and angle [degrees], each a number, (band,), (Y, X) or (band, Y, X); or None.
+
+    Raises:
+        ValueError: it is neither, or a degree is outside [0, 1]; or receptors have no microvilli.
+    """
+    if polarization is None:
+        return [(radiance, 1.0)]
+    if tile is None:
+        raise ValueError("polarization: receptors of this eye know none; give it microvilli=Microvilli(azimuth_deg)")
+    try:
+        degree, angle = polarization
+    except (TypeError, ValueError):
+        raise ValueError(f"polarization = {shown(polarization)}: must be (degree, angle_deg)") from None
+    p, psi = _over("polarization's degree", degree, radiance), _over("polarization's angle", angle, radiance)
+    if not ((p >= 0) & (p <= 1)).all():
+        raise ValueError(f"polarization's degree = {shown(degree)}: must be in [0, 1]")
+    linear = [radiance * p * turn(np.radians(2 * psi)) for turn in (np.cos, np.sin)]
+    return [(radiance, 1.0), *zip(linear, _preferences(tile, resolution), strict=True)]
+
+
+def _preferences(tile: Tile, resolution: tuple[int, int]) -> np.ndarray:
+    """Of each receptor (d - 1)/(d + 1) times cos 2φ and sin 2φ, (2, h, w)."""
+    contrast = np.array([[_contrast(cell.dichroic_ratio) for cell in row] for row in tile])
+    twice = np.radians([[2 * cell.azimuth_deg for cell in row] for row in tile])
+    everywhere = np.ix_(*(np.arange(n) % m for n, m in zip(resolution, contrast.shape, strict=True)))
+    return np.stack([part[everywhere] for part in (contrast * np.cos(twice), contrast * np.sin(twice))])
+
+
+def _contrast(ratio: float) -> float:
+    return 1.0 if math.isinf(ratio) else (ratio - 1) / (ratio + 1)
+
+
+def _over(name: str, value: Any, radiance: np.ndarray) -> np.ndarray:
+    found = reals(name, value)
+    if not np.isfinite(found).all():
+        raise ValueError(f"{name} holds NaN or infinity: must be finite")
+    bands, height, width = radiance.shape
+    if found.shape not in ((), (bands,), (height, width), radiance.shape):
+        raise ValueError(
+            f"{name} has shape {found.shape}: must be a number, ({bands},), ({height}, {width}) or {radiance.shape}"
+        )
+    return found[:, None, None] if found.ndim == 1 else found

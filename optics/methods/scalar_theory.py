@@ -1,0 +1,75 @@
+"""How wrong scalar theory is at most: known before there is a picture.
+
+Two rays whose unit vectors differ by Δs interfere with the contrast e·e' of their fields. To second order that is
+1 - Δs²/4 in unpolarised light and 1 - (Δs·p)²/2 in light polarised along p, and 1 in scalar theory. So what scalar
+theory errs by goes with the square of the steepest sine, and with how far from each other, in the mean square, points
+of the pupil lie whose light meets. For a round pupil in focus Richards and Wolf's integrals say it to all orders.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from optics.apertures.aperture import Aperture, Nodes
+from optics.elements.pupil import Pupil
+from optics.numerics.precision import precision
+
+__all__ = ["IN_FOCUS", "ROUND", "light_spread", "scalar_theory_error"]
+
+# Relative L2 error of scalar theory in the focus of a round flat pupil and linearly polarised light (unpolarised light:
+# .82 to .94 of it), over the squared sine of the steepest ray: (sine, error / sine²). test_scalar_theory.py has them
+# from Richards and Wolf's integrals.
+IN_FOCUS = (
+    (0.0, 0.2562),
+    (0.2, 0.2609),
+    (0.4, 0.2765),
+    (0.5, 0.2900),
+    (0.6, 0.3092),
+    (0.7, 0.3371),
+    (0.8, 0.3805),
+    (0.85, 0.4129),
+    (0.9, 0.4594),
+    (0.95, 0.5371),
+    (0.98, 0.6288),
+    (0.99, 0.6866),
+    (0.999, 0.8100),
+)
+ROUND = 0.25  # mean square of x over a disk, in R²
+# Choice, over what a pupil errs by in focus: aberrations and small windows, by test_scalar_theory.py.
+MARGIN = 1.6
+CYCLES, DIGITS = 0.5, 2.0  # choice: of sums over the pupil
+LEVEL = 1e-2  # choice: of a mask's spectrum
+
+
+def scalar_theory_error(sine: float, spread: float = ROUND) -> float:
+    """Relative L2 error of scalar theory's intensity, at most, where rays up to this sine meet.
+
+    It holds in light of any polarisation, over windows that hold the brightest place of the light and a few samples
+    around it. spread: see `light_spread`.
+    """
+    sines, errors = zip(*IN_FOCUS, strict=True)
+    return MARGIN * spread / ROUND * float(np.interp(sine, sines, errors)) * min(sine, 1.0) ** 2
+
+
+def light_spread(pupil: Pupil) -> float:
+    """Mean square [R²] of the distance from the axis, along the direction in which it is largest, of the points that
+    light comes from: a quarter for a disk, a half for a thin ring, 1 for two holes at the rim."""
+    if pupil.mask is None:
+        return _open_spread(pupil.aperture)
+    types = precision("float64")
+    nodes = pupil.aperture.nodes(CYCLES + pupil.mask.bandwidth(LEVEL, pupil.radius) * pupil.radius, DIGITS)
+    passed = pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types)
+    return _spread(nodes, nodes.weight * np.abs(passed.numpy()))
+
+
+@lru_cache(maxsize=128)
+def _open_spread(aperture: Aperture) -> float:
+    nodes = aperture.nodes(CYCLES, DIGITS)
+    return _spread(nodes, nodes.weight)
+
+
+def _spread(nodes: Nodes, weight: np.ndarray) -> float:
+    xx, yy, xy = (float(weight @ part) for part in (nodes.x**2, nodes.y**2, nodes.x * nodes.y))
+    return float(np.linalg.eigvalsh([[xx, xy], [xy, yy]])[-1] / weight.sum())

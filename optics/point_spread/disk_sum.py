@@ -1,0 +1,96 @@
+"""What falls on a round receptor: sums over samples that are those of a sharp disk, and what they err by."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from optics.apertures.circular import disk_profile
+from optics.apertures.soft_edge import SoftEdge
+from optics.numerics.accuracy import AccuracyError
+from optics.numerics.arguments import point_2d, positive, shown, without_derivative
+from optics.numerics.grid import Grid
+from optics.point_spread.converging import Converging, VectorFocus
+
+__all__ = ["DiskSum"]
+
+RIPPLE = 1e-5  # choice: of a disk's spectrum
+SUM_ERROR = 0.1  # choice: ripples that a sum errs by, at most: test_microvilli.py
+FINE = 1 / 3  # choice: of 1/cutoff, the coarsest pitch; the finer, the less they need around a disk
+MOST_AGAIN = 1025  # choice: samples along a side of a window that is looked at again
+
+
+@dataclass(frozen=True, eq=False)
+class DiskSum:
+    """light: over samples that can be added up. share: of each that counts, (y, x). radius [m] of the disk.
+    model_error: relative, of the light itself."""
+
+    light: VectorFocus
+    share: np.ndarray
+    radius: float
+    model_error: float
+
+    @classmethod
+    def over(cls, light: VectorFocus, radius: float, centre: tuple[float, float] | None = None) -> DiskSum:
+        """Over a disk in the light's window; centre: (x, y) [m], None for the window's middle.
+
+        The disk is convolved with a kernel whose spectrum is 1 where the intensity has one, and 0 beyond what samples
+        can tell apart: see `optics.encircled_energy`. Where samples are too coarse for that, or too few around the
+        disk, the light is looked at again.
+
+        Raises:
+            ValueError: the disk leaves the window.
+            AccuracyError: such samples cannot be had; says which would do.
+        """
+        positive("radius", without_derivative("radius", radius))
+        middle = light.centre if centre is None else point_2d("centre", centre)
+        room = _room(light, middle)
+        if room < 0:
+            raise ValueError(f"centre = {shown(centre)}: must lie within the window, around {shown(light.centre)} m")
+        if radius > room * (1 + 1e-9):
+            raise ValueError(f"radius = {radius:.3g} m: must end within the window, {room:.3g} m from its centre")
+        towards = light.towards
+        if towards is None:
+            raise AccuracyError("light is not from vector_focus: it is not known how fine its samples must be")
+        seen = _around(light, towards, middle, radius)
+        x, y = seen.grid.x - middle[0], seen.grid.y - middle[1]
+        distance, kernel, unit = np.hypot(x[None, :], y[:, None]), _kernel(seen.dx, towards.cutoff), towards.cutoff
+        share = (distance <= radius).astype(np.float64)
+        near = np.abs(distance - radius) < kernel.reach / unit
+        share[near] = disk_profile(kernel, radius * unit, distance[near] * unit)
+        return cls(seen, share, radius, towards.debye_error)
+
+    def of(self, picture: np.ndarray) -> tuple[float, float]:
+        """Integral over the disk of an intensity (y, x) [1/m²] that is the light's, or a part of it; and its error."""
+        found = float((picture * self.share).sum()) * self.light.dx**2
+        bright = min(math.pi * self.radius**2 * float(self.light.psf.max()), 1.0)
+        return found, self.model_error * found + SUM_ERROR * RIPPLE * bright
+
+
+def _room(light: VectorFocus, middle: tuple[float, float]) -> float:
+    """From a place to the outermost samples [m]."""
+    x, y = light.grid.x - middle[0], light.grid.y - middle[1]
+    return float(min(-x[0], x[-1], -y[0], y[-1]))
+
+
+def _kernel(dx: float, cutoff: float) -> SoftEdge:
+    """In units of 1/cutoff: lets the intensity's frequencies pass, and none that samples fold onto them."""
+    return SoftEdge(1.0, 1 / (dx * cutoff) - 1, RIPPLE)
+
+
+def _around(light: VectorFocus, towards: Converging, middle: tuple[float, float], radius: float) -> VectorFocus:
+    """With samples fine enough, and as far beyond the disk as the kernel reaches."""
+    pitch, cutoff = FINE / towards.cutoff, towards.cutoff
+    if light.dx <= pitch and radius + _kernel(light.dx, cutoff).reach / cutoff <= _room(light, middle):
+        return light
+    wide = radius + _kernel(pitch, cutoff).reach / cutoff
+    (cx, cy), (x, y) = towards.image, middle
+    height, width = (2 * math.ceil((abs(off) + wide) / pitch) + 1 for off in (y - cy, x - cx))
+    if max(height, width) > MOST_AGAIN:
+        raise AccuracyError(
+            f"radius = {radius:.3g} m: needs more than {MOST_AGAIN} samples a side: ask for a smaller receptor, or "
+            f"vector_focus for dx={pitch:.3g}, shape=({height}, {width})"
+        )
+    return towards.onto(Grid((height, width), pitch, towards.image))
