@@ -60,6 +60,11 @@ class Relief(ABC):
         """Whether the height depends on the distance from the axis alone, under any change that is asked about."""
         return False
 
+    @property
+    def mirror_symmetric(self) -> bool:
+        """Whether it is the same where x or y is mirrored, under any change that is asked about."""
+        return self.rotationally_symmetric
+
 
 @dataclass(frozen=True, eq=False)
 class BSplineRelief(Relief):
@@ -136,6 +141,10 @@ class BSplineRelief(Relief):
         corner, curvature = points[1, 1], (points[0, 1] - points[1, 1]) / 8
         paraboloid = corner + curvature * (square[:, None] + square[None, :] - 2)
         return bool(np.abs(points - paraboloid).max() <= 1e-12 * np.abs(points).max())
+
+    @property
+    def mirror_symmetric(self) -> bool:
+        return not is_differentiable(self.control_points) and _on_both_sides(self.control_points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,6 +250,15 @@ class HeightMap(Relief):
     @property
     def rotationally_symmetric(self) -> bool:
         return len(self._heights) == 1
+
+    @property
+    def mirror_symmetric(self) -> bool:
+        return not is_differentiable(self.samples) and _on_both_sides(self._heights)
+
+
+def _on_both_sides(heights: np.ndarray) -> bool:
+    """The same numbers left and right, and above and below."""
+    return np.array_equal(heights, heights[::-1]) and np.array_equal(heights, heights[:, ::-1])
 
 
 def square_heights(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
