@@ -47,8 +47,9 @@ def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
     grid = Grid((1, samples), pitch)
     degree = min(DEGREE, (samples - 2) // 2 * 2 + 1)
     knots = _knots(grid.x, degree)
-    count = tiles.count + tiles.from_cell
-    edges = (np.arange(count + 1) - count / 2) * tiles.size
+    # An odd number of samples lies alike on both sides, and so do all tiles: half of them tell the others.
+    own = (tiles.count + 1) // 2 if samples % 2 else tiles.count
+    edges = (np.arange(own + 1 + tiles.from_cell) - (tiles.count + tiles.from_cell) / 2) * tiles.size
     inside = np.clip(edges, grid.x[0], grid.x[-1])
     primitive = _primitive(knots, degree, inside, 1)
     if tiles.from_cell:
@@ -57,7 +58,8 @@ def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
         held = np.diff(second, 2, axis=0) / tiles.size
     else:
         held = np.diff(primitive, axis=0)
-    return _over_samples(held, knots, degree, grid.x)
+    found = _over_samples(held, knots, degree, grid.x)
+    return np.concatenate([found, found[: tiles.count - own][::-1, ::-1]])
 
 
 def _knots(x: np.ndarray, degree: int) -> np.ndarray:

@@ -133,8 +133,9 @@ class GridSampling(SpectrumSampling):
     @property
     def largest(self) -> int:
         """Side of the largest square array."""
-        planes = [self.pupil, self.spectrum] if self.is_whole else [self.pupil, self.spectrum, self.relay]
-        return max(self.part(plane).shape[0] for plane in planes)
+        sides = [self.pupil.shape[0], self.spectrum.shape[0]]
+        side = max(sides if self.is_whole else [*sides, self.output_period])
+        return side // 2 + 1 if self.even else side
 
 
 def whole_spectrum(problem: Problem) -> list[GridSampling]:
@@ -176,10 +177,11 @@ def split_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
 
 
 def _timed(sampling: GridSampling, problem: Problem) -> GridSampling:
-    pupil, spectrum = (sampling.part(plane).shape for plane in (sampling.pupil, sampling.spectrum))
     seconds = sampling.sum_seconds(sampling.pupil, sampling.pupil_period, sampling.spectrum)
     seconds += sampling.seconds_from_spectrum(problem.window)
-    points = pupil[0] ** 2 * (PUPIL_SAMPLE + sampling.edge.seconds_per_point) + spectrum[0] ** 2 * SPECTRUM_SAMPLE
+    pupil, spectrum = sampling.pupil.shape[0], sampling.spectrum.shape[0]
+    points = pupil**2 * (PUPIL_SAMPLE + sampling.edge.seconds_per_point) + spectrum**2 * SPECTRUM_SAMPLE
+    points *= 0.25 if sampling.even else 1.0
     seconds += points + CALL["angular_spectrum"]
     return replace(sampling, seconds=seconds)
 

@@ -1,8 +1,8 @@
 """Fields that stay the same where x or y is mirrored: kept on a quarter of the plane, and their Fourier sums there.
 
 Of exp(2πi jk/period) only the cosine is left, so that a sum takes a sixteenth of the products, and a phase a quarter of the
-sines. Quarters go from the centre sample to the last in x and in y; an even number of samples has one more on the other
-side, whose mirror image counts for nothing.
+sines. Quarters go from the centre sample on to the last of the longer side: an even number of samples has one without a
+mirror image, which counts half on either side.
 """
 
 from __future__ import annotations
