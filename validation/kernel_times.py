@@ -1,4 +1,4 @@
-"""What the kernels of evolving eyes take: `python -m validation.kernel_times [genotypes]`.
+"""What the kernels of evolving eyes take: `OPENBLAS_NUM_THREADS=1 python -m validation.kernel_times [genotypes]`.
 
 Random genotypes of the preset `lens`, on the cells that receptive fields are tabulated on, in its own view and in
 narrower ones; with three genes of a relief (laptop) and with sixteen (paper). Prints CPU seconds of one thread for

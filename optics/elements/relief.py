@@ -9,11 +9,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import reals
+from optics.elements.square_samples import on_both_sides, square_samples
 from optics.numerics.autodiff import Array, is_differentiable, plain
 from optics.numerics.interpolation import cubic_bsplines
 from optics.numerics.matrices import matmul
@@ -144,7 +143,7 @@ class BSplineRelief(Relief):
 
     @property
     def mirror_symmetric(self) -> bool:
-        return not is_differentiable(self.control_points) and _on_both_sides(self.control_points)
+        return not is_differentiable(self.control_points) and on_both_sides(self.control_points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +162,7 @@ class HeightMap(Relief):
     _heights: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        samples = square_heights(self.samples)
+        samples = square_samples(self.samples)
         object.__setattr__(self, "_heights", samples)
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", samples)
@@ -253,27 +252,7 @@ class HeightMap(Relief):
 
     @property
     def mirror_symmetric(self) -> bool:
-        return not is_differentiable(self.samples) and _on_both_sides(self._heights)
-
-
-def _on_both_sides(heights: np.ndarray) -> bool:
-    """The same numbers left and right, and above and below."""
-    return np.array_equal(heights, heights[::-1]) and np.array_equal(heights, heights[:, ::-1])
-
-
-def square_heights(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
-    """The same without derivatives, as an array that nobody can change.
-
-    Raises:
-        ValueError: not square, empty, or not finite.
-    """
-    heights = np.array(plain(samples) if is_differentiable(samples) else reals(name, samples))
-    if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.size == 0:
-        raise ValueError(f"{name} has shape {heights.shape}: must be square (n, n), n at least 1")
-    if not np.isfinite(heights).all():
-        raise ValueError(f"{name} holds NaN or infinity: must be finite {what}")
-    heights.setflags(write=False)
-    return heights
+        return not is_differentiable(self.samples) and on_both_sides(self._heights)
 
 
 def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from optics.elements.relief import HeightMap, square_heights
+from optics.elements.relief import HeightMap
+from optics.elements.square_samples import square_samples
 from optics.numerics.arguments import finite, positive, reals, shown
 from optics.numerics.autodiff import Array, is_differentiable, number, plain
 from optics.numerics.precision import Precision, opaque
@@ -170,7 +171,7 @@ class WavefrontMap(Aberration):
 
     def __post_init__(self) -> None:
         self._check_radius()
-        values = square_heights(self.samples, "samples", "[m], outside the pupil too")
+        values = square_samples(self.samples, "samples", "[m], outside the pupil too")
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", values)
         object.__setattr__(self, "_map", HeightMap(self.samples))

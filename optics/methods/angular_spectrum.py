@@ -68,9 +68,7 @@ class SpectrumSampling:
         return dft2(field, period, end.shape, sign, end.dx, end.centre)
 
     def sum_seconds(self, start: Grid, period: float, end: Grid) -> float:
-        return (
-            even_seconds(start.shape, end.shape) if self.even else predicted_seconds(start.shape, period, end.shape)
-        )
+        return even_seconds(start.shape, end.shape) if self.even else predicted_seconds(start.shape, period, end.shape)
 
     def seconds_from_spectrum(self, window: Grid) -> float:
         """What the transforms from the spectrum to the window take."""

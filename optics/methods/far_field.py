@@ -9,9 +9,9 @@ from functools import lru_cache
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.methods.far_field_nodes import Nodes, all_nodes, few_nodes
+from optics.methods.far_field_nodes import WindowNodes, all_nodes, few_nodes
 from optics.methods.problem import Problem, PupilEdge
-from optics.numerics.autodiff import Array, is_differentiable
+from optics.numerics.autodiff import Array
 from optics.numerics.cost import CALL, MATMUL_FLOPS, PUPIL_SAMPLE, SPECTRUM_SAMPLE, WINDOW_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
@@ -42,7 +42,7 @@ class FarFieldSampling:
     pupil: Grid
     directions: Grid
     period: int
-    nodes: Nodes
+    nodes: WindowNodes
     seconds: float
     method: str = "far_field"
     model_error: float = 0.0
@@ -102,7 +102,7 @@ def _seconds(how: FarFieldSampling, problem: Problem) -> float:
     return kept * once + products / MATMUL_FLOPS[problem.dtype] + soft + window
 
 
-def _nodes(problem: Problem, count: int) -> Nodes:
+def _nodes(problem: Problem, count: int) -> WindowNodes:
     """Of so many along each axis those that are needed."""
     half_angle = math.atan2(problem.window.half_width, problem.distance)
     if count <= FEW:
@@ -171,14 +171,12 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
 
     u = beam.behind(how.edge.aperture, how.pupil, types)
     dr.eval(u.re, u.im)
-    # Which nodes stand for the others is told by the kernel itself, not by its derivative by the distance.
-    nodes = all_nodes(how.nodes.count, how.nodes.half_angle) if is_differentiable(beam.distance) else how.nodes
     s = how.directions.x
     cosine = np.sqrt(np.maximum(1 - s[:, None] ** 2 - s[None, :] ** 2, 1e-6))
     edge = math.asin(min(float(s[-1]), 0.999))  # a margin beyond the window, for the interpolation that follows
-    weights = nodes.weights(np.clip(np.arctan2(s[None, :], cosine), -edge, edge), types.dtype)
+    weights = how.nodes.weights(np.clip(np.arctan2(s[None, :], cosine), -edge, edge), types.dtype)
     total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
-    for (across, along), weight in zip(nodes.tangents, weights, strict=True):
+    for (across, along), weight in zip(how.nodes.tangents, weights, strict=True):
         part = u * _slow_kernel(across, along, beam, how.pupil, types)
         part = dft2(part, how.period, how.directions.shape, -1, how.directions.dx)
         re, im = (types.Float(padded_for_packets(each)) for each in weight)
@@ -222,7 +220,10 @@ def _onto_window(
         cell = dr.clip(dr.floor(place), TAPS // 2 - 1, dr.opaque(types.Float64, side - TAPS // 2 - 1))
         cells.append(types.Index(cell) - (TAPS // 2 - 1))
         weights.append(lagrange_weights(types.Float(place - cell), TAPS))
-    amplitude, columns = types.Float(opaque(types, how.pupil.dx**2 / problem.wavelength) * z / (rho * rho)), dr.opaque(types.Index, side)
+    amplitude, columns = (
+        types.Float(opaque(types, how.pupil.dx**2 / problem.wavelength) * z / (rho * rho)),
+        dr.opaque(types.Index, side),
+    )
     image = types.Float(0)
     for part in parts:
         found = types.Float(0)

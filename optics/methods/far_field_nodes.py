@@ -1,7 +1,7 @@
 """Nodes of the window at which the far field's slow rest is taken: as few as stand for all the others.
 
-Between Chebyshev's nodes in angle the rest is interpolated; and at most of these it is, to the tolerance, a sum over its
-values at a few (an interpolative decomposition: Cheng et al., SIAM J. Sci. Comput. 26 (2005) 1389).
+Between Chebyshev's nodes in angle the rest is interpolated; and at most of these it is, to the tolerance, a sum over
+its values at a few (an interpolative decomposition: Cheng et al., SIAM J. Sci. Comput. 26 (2005) 1389).
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ import numpy as np
 
 from optics.numerics.interpolation import chebyshev_points
 
-__all__ = ["Nodes", "all_nodes", "few_nodes"]
+__all__ = ["WindowNodes", "all_nodes", "few_nodes"]
 
 AT_A_TIME = 4_000_000  # choice, by memory: entries of a product of polynomials
 
 
 @dataclass(frozen=True, eq=False)
-class Nodes:
+class WindowNodes:
     """count: Chebyshev points in angle along each axis, up to half_angle [rad]. kept: places (row, column) among them
     where the rest is taken, (kept, 2). mix: what each of these counts at every node, (kept, row, column), complex."""
 
@@ -49,19 +49,20 @@ class Nodes:
         return found.reshape(len(self.kept), 2, -1)
 
 
-def all_nodes(count: int, half_angle: float) -> Nodes:
+def all_nodes(count: int, half_angle: float) -> WindowNodes:
     """Each stands for itself."""
     kept = np.stack(np.meshgrid(np.arange(count), np.arange(count), indexing="ij"), axis=-1).reshape(-1, 2)
-    return Nodes(count, half_angle, kept, np.eye(count**2).reshape(-1, count, count).astype(complex))
+    return WindowNodes(count, half_angle, kept, np.eye(count**2).reshape(-1, count, count).astype(complex))
 
 
-def few_nodes(count: int, half_angle: float, slow: np.ndarray, error: float) -> Nodes:
+def few_nodes(count: int, half_angle: float, slow: np.ndarray, error: float) -> WindowNodes:
     """Those of whose values every other's is a sum but for `error`, root mean square over the pupil.
 
     slow: the rest at points of the pupil for every node, (row, column, point), of size 1.
     """
     rest = slow.reshape(count**2, -1)
-    kept, shares = [], []
+    kept: list[int] = []
+    shares: list[np.ndarray] = []
     while True:
         size = np.square(np.abs(rest)).mean(axis=1)
         worst = int(size.argmax())
@@ -75,7 +76,9 @@ def few_nodes(count: int, half_angle: float, slow: np.ndarray, error: float) -> 
         shares.append(share)
     found = np.array(shares)  # values = foundᵀ · all of `along`, and so are those of the nodes that are kept
     mix = np.linalg.solve(found[:, kept], found)
-    return Nodes(count, half_angle, np.stack(np.divmod(np.array(kept), count), axis=-1), mix.reshape(-1, count, count))
+    return WindowNodes(
+        count, half_angle, np.stack(np.divmod(np.array(kept), count), axis=-1), mix.reshape(-1, count, count)
+    )
 
 
 def _chebyshev(x: np.ndarray, n: int) -> np.ndarray:

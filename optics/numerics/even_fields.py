@@ -1,8 +1,8 @@
 """Fields that stay the same where x or y is mirrored: kept on a quarter of the plane, and their Fourier sums there.
 
-Of exp(2πi jk/period) only the cosine is left, so that a sum takes a sixteenth of the products, and a phase a quarter of the
-sines. Quarters go from the centre sample on to the last of the longer side: an even number of samples has one without a
-mirror image, which counts half on either side.
+Of exp(2πi jk/period) only the cosine is left, so that a sum takes a sixteenth of the products, and a phase a quarter
+of the sines. Quarters go from the centre sample on to the last of the longer side: an even number of samples has one
+without a mirror image, which counts half on either side.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["even_sum", "even_seconds", "quarter", "whole"]
+__all__ = ["even_seconds", "even_sum", "quarter", "whole"]
 
 Shape = tuple[int, int]
 
@@ -54,7 +54,9 @@ def _cosines(types: Precision, n_out: int, n_in: int, period: Scalar) -> Array:
     x, y = entries.coordinates(types)
     j, k = x + opaque(types, entries.shape[1] // 2), y + opaque(types, entries.shape[0] // 2)
     alone = (j == 0) | (j > opaque(types, (n_in - 1) // 2))
-    wave = Field.from_waves(dr.select(alone, types.Float(1), types.Float(2)), j * k / opaque(types, period), entries, types)
+    wave = Field.from_waves(
+        dr.select(alone, types.Float(1), types.Float(2)), j * k / opaque(types, period), entries, types
+    )
     return types.Tensor(wave.re, entries.shape)
 
 

@@ -1,8 +1,8 @@
 """Fourier sums as matrix products in Dr.Jit, of any period, which may carry a derivative.
 
-A wave e^{iθjk} that is counted from the centre is even in its cosine and odd in its sine, along j and along k: large sums
-take u[j] ± u[-j] for j >= 0, two real matrices of a quarter of the entries, and give both ± k, with a quarter of the
-products.
+A wave e^{iθjk} that is counted from the centre is even in its cosine and odd in its sine, along j and along k: large
+sums take u[j] ± u[-j] for j >= 0, two real matrices of a quarter of the entries, and give both ± k, with a quarter of
+the products.
 """
 
 from __future__ import annotations

@@ -25,8 +25,8 @@ def on_both_sides(seed=0, side=4):
     return heights + heights[:, ::-1]
 
 
-def problem_of(pupil, shape=(65, 65), source=PointSource(), **window):
-    beam = Beam(pupil, source, LAMBDA, Z)
+def problem_of(pupil, shape=(65, 65), source=None, **window):
+    beam = Beam(pupil, source or PointSource(), LAMBDA, Z)
     return beam, Problem.of(beam, Grid(shape, 1.2e-6, **window), 1e-3)
 
 

@@ -7,7 +7,9 @@ from optics.elements.source import PointSource
 from optics.numerics.grid import Grid
 from optics.point_spread.request import Setup
 
-PUPIL = optics.Pupil(30e-6, optics.BSplineRelief(1e-9 * optics.BSplineRelief.paraboloid(0, 1, 1).control_points.cumsum(1)))
+PUPIL = optics.Pupil(
+    30e-6, optics.BSplineRelief(1e-9 * optics.BSplineRelief.paraboloid(0, 1, 1).control_points.cumsum(1))
+)
 SETUP = Setup(240e-6, PointSource(), Grid.square(65, 0.5e-6), 1e-2, "auto", "float32")
 
 
