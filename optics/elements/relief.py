@@ -216,6 +216,17 @@ class HeightMap(Relief):
             total = dr.fma(along[i], line, total)
         return total
 
+    def on_grid(self, at: np.ndarray) -> np.ndarray:
+        """Heights, (y, x), at normalised places along either axis; NumPy arrays, without derivative."""
+        n, width = len(self._heights), len(self._coefficients)
+        place = (at + 1) * (n / 2) + self._margin - 0.5
+        cell = np.clip(np.floor(place), 1, width - 3)
+        basis, row = np.zeros((len(at), width)), np.arange(len(at))
+        for k, weight in enumerate(cubic_bsplines(place - cell)):
+            basis[row, cell.astype(np.intp) - 1 + k] = weight
+        found: np.ndarray = basis @ self._coefficients @ basis.T
+        return found
+
     def _cell(self, position: Array, n: int, width: int, types: Precision) -> tuple[Array, list[Array]]:
         """First of the four coefficients that act at a position, and the four weights."""
         import drjit as dr

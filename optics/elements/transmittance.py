@@ -116,6 +116,10 @@ class MaskMap(Mask):
         scale = 1 / opaque(types, radius if self.reach is None else self.reach)
         return self._map.height(x * scale, y * scale, types)
 
+    def on_grid(self, at: np.ndarray, radius: float) -> np.ndarray:
+        """Amplitudes, (y, x), at places along either axis in units of a pupil's radius [m]; without derivative."""
+        return self._map.on_grid(at if self.reach is None else at * (radius / self.reach))
+
     def bandwidth(self, level: float, radius: float) -> float:
         return self._map.bandwidth(level) / (radius if self.reach is None else self.reach)
 

@@ -98,7 +98,7 @@ class Zernike(Aberration):
     def ahead(self, x: Array, y: Array, types: Precision) -> Array:
         total = types.Float64(0)
         for (n, m), value in self.modes.items():
-            if value != 0 or self._asks:
+            if value != 0 or self.asks:
                 total += self._coefficient(n, m, value, types) * mode(n, m, x, y)
         return total
 
@@ -116,11 +116,11 @@ class Zernike(Aberration):
         return UM * math.sqrt(sum(value**2 for key, value in self.modes.items() if key != (0, 0)))
 
     def bandwidth(self, level: float) -> float:
-        return max(1.0, self._order / 2) if self.span > level or self._asks else 0.0
+        return max(1.0, self.order / 2) if self.span > level or self.asks else 0.0
 
     @property
     def knots(self) -> int:
-        return max(1, self._order)
+        return max(1, self.order)
 
     @property
     def span(self) -> float:
@@ -128,16 +128,18 @@ class Zernike(Aberration):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        return all(m == 0 for (_, m), value in self.modes.items() if value != 0 or self._asks)
+        return all(m == 0 for (_, m), value in self.modes.items() if value != 0 or self.asks)
 
     @cached_property
-    def _asks(self) -> bool:
+    def asks(self) -> bool:
+        """Whether a coefficient carries a derivative."""
         given = self.coefficients_um
         return any(map(is_differentiable, given.values())) if isinstance(given, dict) else is_differentiable(given)
 
     @property
-    def _order(self) -> int:
-        return max((n for (n, _), value in self.modes.items() if value != 0 or self._asks), default=0)
+    def order(self) -> int:
+        """Highest radial order."""
+        return max((n for (n, _), value in self.modes.items() if value != 0 or self.asks), default=0)
 
     def _coefficient(self, n: int, m: int, value: float, types: Precision) -> Array:
         """[m]"""

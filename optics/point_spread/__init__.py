@@ -9,6 +9,7 @@ spot_check     a picture held against the direct sum at a few points
 vector_focus   vector_focus: beyond scalar theory
 microvilli     Microvilli: receptors that know polarisation
 population     one plan for many pupils
+population_members  what it takes of each
 batch          psf_batch: many eyes at once
 contrast       mtf, image_quality
 mixture        sums over wavelengths
