@@ -102,3 +102,14 @@ def test_a_batch_of_all_kinds():
     assert sum("population" in plan.why for plan in batch.plans) > len(pupils) / 2
     for pupil, image in zip(pupils, batch.psf[:, 0, 0], strict=True):
         assert relative_l2(image, optics.psf(pupil, [LAMBDA], Z, **options | {"tolerance": 1e-4}).psf[0]) < 1e-2
+
+
+@pytest.mark.parametrize("waist", [0.03, 0.15])
+def test_a_narrow_mask_is_sampled_finely(waist):
+    """It turns nothing, and changes within a few samples of an open pupil's."""
+    radius = 10e-6
+    pupil = optics.Pupil(radius, thin_lens_focal_length=Z, mask=optics.GaussianMask(waist * radius))
+    member, window = Member(pupil, LAMBDA, Z, math.inf), Grid.square(33, 0.25e-6)
+    [(_, image, plan)] = population_pictures([member], window, 1e-3)
+    exact = optics.psf(pupil, [LAMBDA], Z, dx=0.25e-6, shape=(33, 33), tolerance=1e-5).psf[0]
+    assert relative_l2(image, exact) <= plan.predicted_error
