@@ -81,8 +81,8 @@ def _plan(samples: _Samples, error: float) -> Plan:
 
 @dataclass(frozen=True, eq=False)
 class _Stack:
-    """Numbers of many members, each (member, 1, 1) float32, and reliefs (member, 4, 4); orders of wavefronts, and what
-    powers count in them (member, term); the members."""
+    """Numbers of many members, each (member, 1, 1) float32, and reliefs (member, 4, 4); the highest order of their
+    wavefronts, and what powers count in these (member, term); the members."""
 
     radius: np.ndarray
     wavelength: np.ndarray
@@ -102,7 +102,10 @@ class _Stack:
         relief = np.array([member.relief for member in members], np.float32)
         order = max(member.order for member in members)
         terms = np.array([member.powers for member in members]) if order else np.zeros((len(members), 1))
-        return cls(*columns, relief, order, terms[:, : (order + 1) * (order + 2) // 2], members)
+        radius, wavelength, distance, source, focal, before, waist = columns
+        counted = terms[:, : (order + 1) * (order + 2) // 2]
+        lengths = radius, wavelength, distance, source, focal
+        return cls(*lengths, before, waist, relief, order, counted, members)
 
 
 @dataclass(frozen=True, eq=False)

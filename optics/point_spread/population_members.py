@@ -31,8 +31,8 @@ class Member:
 
     @property
     def plain(self) -> bool:
-        """Whether its relief has 4 x 4 points at most, its wavefront is Zernike's and no order too high, and it asks for
-        no derivative."""
+        """Whether its relief has 4 x 4 points at most, its wavefront is Zernike's of orders that are not too high, and
+        it asks for no derivative."""
         pupil = self.pupil
         numbers = (pupil.aperture_radius, self.distance, self.source, pupil.thin_lens_focal_length)
         if pupil.n.is_differentiable or any(is_differentiable(value) for value in numbers):
@@ -46,10 +46,12 @@ class Member:
 
     @property
     def _plain_wavefront(self) -> bool:
-        wavefront = self.pupil.wavefront
-        if wavefront is None:
-            return True
-        return isinstance(wavefront, Zernike) and not wavefront.asks and wavefront.order <= HIGHEST_ORDER
+        known = self._wavefront
+        return self.pupil.wavefront is known and (not known.asks and known.order <= HIGHEST_ORDER if known else True)
+
+    @property
+    def _wavefront(self) -> Zernike | None:
+        return self.pupil.wavefront if isinstance(self.pupil.wavefront, Zernike) else None
 
     @property
     def _plain_mask(self) -> bool:
@@ -82,8 +84,7 @@ class Member:
     @property
     def powers(self) -> np.ndarray:
         """Of its wavefront's waves: what `powers` count, (term,)."""
-        wavefront = self.pupil.wavefront
-        known = _indices(HIGHEST_ORDER)
+        wavefront, known = self._wavefront, _indices(HIGHEST_ORDER)
         found = np.zeros(len(known))
         if wavefront is None:
             return found
@@ -98,7 +99,7 @@ class Member:
     @property
     def order(self) -> int:
         """Highest of its wavefront."""
-        return 0 if self.pupil.wavefront is None else self.pupil.wavefront.order
+        return 0 if self._wavefront is None else self._wavefront.order
 
     @property
     def detail(self) -> float:
