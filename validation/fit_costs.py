@@ -25,7 +25,8 @@ from optics.methods.hankel import _transform
 from optics.methods.rayleigh_sommerfeld import cached_nodes, direct_sum
 from optics.numerics import cost
 from optics.numerics.field import Field
-from optics.numerics.fourier import _fft, _matrix_dft
+from optics.numerics.fourier import _fft
+from optics.numerics.fourier_matrices import by_whole_matrices
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import TAPS
 from optics.numerics.precision import Precision, precision
@@ -96,7 +97,7 @@ def _random(n: int, types: Precision) -> Field:
 
 def _dft(n: int, types: Precision) -> None:
     """Two complex products of n x n matrices, 8 n³ operations each."""
-    dr.eval(_matrix_dft(_random(n, types), n + 0.5, (n, n), -1))
+    dr.eval(by_whole_matrices(_random(n, types), n + 0.5, (n, n), -1))
 
 
 def _fourier(n: int, types: Precision) -> None:

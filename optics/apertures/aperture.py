@@ -91,6 +91,11 @@ class Aperture(ABC):
         """Whether the aperture is the same seen from every side."""
 
     @property
+    def mirror_symmetric(self) -> bool:
+        """Whether it is known to be the same where x or y is mirrored."""
+        return self.rotationally_symmetric
+
+    @property
     def rings(self) -> tuple[tuple[float, float], ...]:
         """Of a rotationally symmetric aperture: inner and outer radii of the rings that are open, in R."""
         return ((0.0, 1.0),)

@@ -122,6 +122,10 @@ class Slit(Aperture):
         return False
 
     @property
+    def mirror_symmetric(self) -> bool:
+        return True
+
+    @property
     def half_widths(self) -> tuple[float, float]:
         return self.width / 2, self.height / 2
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from optics.apertures.aperture import Aperture
-from optics.elements.relief import Relief, square_heights
+from optics.elements.relief import Relief
+from optics.elements.square_samples import square_samples
 from optics.numerics.autodiff import Array, is_differentiable
 from optics.numerics.precision import Precision
 
@@ -34,7 +35,7 @@ class PixelRelief(Relief):
     _heights: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        heights = square_heights(self.samples)
+        heights = square_samples(self.samples)
         object.__setattr__(self, "_heights", heights)
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", heights)

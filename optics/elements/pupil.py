@@ -203,6 +203,13 @@ class Pupil:
         mask_is = self.mask is None or self.mask.rotationally_symmetric
         return self.aperture.rotationally_symmetric and relief_is and wavefront_is and mask_is
 
+    def mirror_symmetric(self, wavelength: float) -> bool:
+        """Whether nothing changes where x or y is mirrored, under any change that is asked about."""
+        relief_is = not self.bends(wavelength) or self.height.mirror_symmetric
+        wavefront_is = self.wavefront is None or self.wavefront.rotationally_symmetric
+        mask_is = self.mask is None or self.mask.rotationally_symmetric
+        return self.aperture.mirror_symmetric and relief_is and wavefront_is and mask_is
+
     def path(self, x: Array, y: Array, wavelength: float, source: PointSource, types: Precision) -> Array:
         """Optical path [m] through source and pupil at points (x, y) [m], flat float64 arrays."""
         import drjit as dr

@@ -9,11 +9,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import reals
+from optics.elements.square_samples import on_both_sides, square_samples
 from optics.numerics.autodiff import Array, is_differentiable, plain
 from optics.numerics.interpolation import cubic_bsplines
 from optics.numerics.matrices import matmul
@@ -59,6 +58,11 @@ class Relief(ABC):
     def rotationally_symmetric(self) -> bool:
         """Whether the height depends on the distance from the axis alone, under any change that is asked about."""
         return False
+
+    @property
+    def mirror_symmetric(self) -> bool:
+        """Whether it is the same where x or y is mirrored, under any change that is asked about."""
+        return self.rotationally_symmetric
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +141,10 @@ class BSplineRelief(Relief):
         paraboloid = corner + curvature * (square[:, None] + square[None, :] - 2)
         return bool(np.abs(points - paraboloid).max() <= 1e-12 * np.abs(points).max())
 
+    @property
+    def mirror_symmetric(self) -> bool:
+        return not is_differentiable(self.control_points) and on_both_sides(self.control_points)
+
 
 @dataclass(frozen=True, eq=False)
 class HeightMap(Relief):
@@ -154,7 +162,7 @@ class HeightMap(Relief):
     _heights: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        samples = square_heights(self.samples)
+        samples = square_samples(self.samples)
         object.__setattr__(self, "_heights", samples)
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", samples)
@@ -208,6 +216,17 @@ class HeightMap(Relief):
             total = dr.fma(along[i], line, total)
         return total
 
+    def on_grid(self, at: np.ndarray) -> np.ndarray:
+        """Heights, (y, x), at normalised places along either axis; NumPy arrays, without derivative."""
+        n, width = len(self._heights), len(self._coefficients)
+        place = (at + 1) * (n / 2) + self._margin - 0.5
+        cell = np.clip(np.floor(place), 1, width - 3)
+        basis, row = np.zeros((len(at), width)), np.arange(len(at))
+        for k, weight in enumerate(cubic_bsplines(place - cell)):
+            basis[row, cell.astype(np.intp) - 1 + k] = weight
+        found: np.ndarray = basis @ self._coefficients @ basis.T
+        return found
+
     def _cell(self, position: Array, n: int, width: int, types: Precision) -> tuple[Array, list[Array]]:
         """First of the four coefficients that act at a position, and the four weights."""
         import drjit as dr
@@ -242,20 +261,9 @@ class HeightMap(Relief):
     def rotationally_symmetric(self) -> bool:
         return len(self._heights) == 1
 
-
-def square_heights(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
-    """The same without derivatives, as an array that nobody can change.
-
-    Raises:
-        ValueError: not square, empty, or not finite.
-    """
-    heights = np.array(plain(samples) if is_differentiable(samples) else reals(name, samples))
-    if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.size == 0:
-        raise ValueError(f"{name} has shape {heights.shape}: must be square (n, n), n at least 1")
-    if not np.isfinite(heights).all():
-        raise ValueError(f"{name} holds NaN or infinity: must be finite {what}")
-    heights.setflags(write=False)
-    return heights
+    @property
+    def mirror_symmetric(self) -> bool:
+        return not is_differentiable(self.samples) and on_both_sides(self._heights)
 
 
 def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:

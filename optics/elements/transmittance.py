@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from optics.elements.relief import HeightMap, square_heights
+from optics.elements.relief import HeightMap
+from optics.elements.square_samples import square_samples
 from optics.numerics.arguments import positive, shown
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
@@ -88,7 +89,7 @@ class MaskMap(Mask):
     _map: HeightMap = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        values = square_heights(self.samples, "samples", "amplitudes")
+        values = square_samples(self.samples, "samples", "amplitudes")
         if np.abs(values).max() > 1 + 1e-9:
             raise ValueError(f"samples reach {shown(float(np.abs(values).max()))}: must be amplitudes in [-1, 1]")
         if self.reach is not None:
@@ -114,6 +115,10 @@ class MaskMap(Mask):
     def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
         scale = 1 / opaque(types, radius if self.reach is None else self.reach)
         return self._map.height(x * scale, y * scale, types)
+
+    def on_grid(self, at: np.ndarray, radius: float) -> np.ndarray:
+        """Amplitudes, (y, x), at places along either axis in units of a pupil's radius [m]; without derivative."""
+        return self._map.on_grid(at if self.reach is None else at * (radius / self.reach))
 
     def bandwidth(self, level: float, radius: float) -> float:
         return self._map.bandwidth(level) / (radius if self.reach is None else self.reach)

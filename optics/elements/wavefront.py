@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from optics.elements.relief import HeightMap, square_heights
+from optics.elements.relief import HeightMap
+from optics.elements.square_samples import square_samples
 from optics.numerics.arguments import finite, positive, reals, shown
 from optics.numerics.autodiff import Array, is_differentiable, number, plain
 from optics.numerics.precision import Precision, opaque
@@ -97,7 +98,7 @@ class Zernike(Aberration):
     def ahead(self, x: Array, y: Array, types: Precision) -> Array:
         total = types.Float64(0)
         for (n, m), value in self.modes.items():
-            if value != 0 or self._asks:
+            if value != 0 or self.asks:
                 total += self._coefficient(n, m, value, types) * mode(n, m, x, y)
         return total
 
@@ -115,11 +116,11 @@ class Zernike(Aberration):
         return UM * math.sqrt(sum(value**2 for key, value in self.modes.items() if key != (0, 0)))
 
     def bandwidth(self, level: float) -> float:
-        return max(1.0, self._order / 2) if self.span > level or self._asks else 0.0
+        return max(1.0, self.order / 2) if self.span > level or self.asks else 0.0
 
     @property
     def knots(self) -> int:
-        return max(1, self._order)
+        return max(1, self.order)
 
     @property
     def span(self) -> float:
@@ -127,16 +128,18 @@ class Zernike(Aberration):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        return all(m == 0 for (_, m), value in self.modes.items() if value != 0 or self._asks)
+        return all(m == 0 for (_, m), value in self.modes.items() if value != 0 or self.asks)
 
     @cached_property
-    def _asks(self) -> bool:
+    def asks(self) -> bool:
+        """Whether a coefficient carries a derivative."""
         given = self.coefficients_um
         return any(map(is_differentiable, given.values())) if isinstance(given, dict) else is_differentiable(given)
 
     @property
-    def _order(self) -> int:
-        return max((n for (n, _), value in self.modes.items() if value != 0 or self._asks), default=0)
+    def order(self) -> int:
+        """Highest radial order."""
+        return max((n for (n, _), value in self.modes.items() if value != 0 or self.asks), default=0)
 
     def _coefficient(self, n: int, m: int, value: float, types: Precision) -> Array:
         """[m]"""
@@ -170,7 +173,7 @@ class WavefrontMap(Aberration):
 
     def __post_init__(self) -> None:
         self._check_radius()
-        values = square_heights(self.samples, "samples", "[m], outside the pupil too")
+        values = square_samples(self.samples, "samples", "[m], outside the pupil too")
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", values)
         object.__setattr__(self, "_map", HeightMap(self.samples))

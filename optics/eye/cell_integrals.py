@@ -44,14 +44,12 @@ def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
 
     A spline's coefficients c solve C c = s, C its B-splines at the samples; if tiles hold Q c, the matrix is Q C⁻¹.
     """
-    from scipy.interpolate import make_interp_spline
-    from scipy.sparse.linalg import splu
-
     grid = Grid((1, samples), pitch)
     degree = min(DEGREE, (samples - 2) // 2 * 2 + 1)
-    knots = make_interp_spline(grid.x, np.zeros(samples), k=degree).t
-    count = tiles.count + tiles.from_cell
-    edges = (np.arange(count + 1) - count / 2) * tiles.size
+    knots = _knots(grid.x, degree)
+    # An odd number of samples lies alike on both sides, and so do all tiles: half of them tell the others.
+    own = (tiles.count + 1) // 2 if samples % 2 else tiles.count
+    edges = (np.arange(own + 1 + tiles.from_cell) - (tiles.count + tiles.from_cell) / 2) * tiles.size
     inside = np.clip(edges, grid.x[0], grid.x[-1])
     primitive = _primitive(knots, degree, inside, 1)
     if tiles.from_cell:
@@ -60,8 +58,26 @@ def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
         held = np.diff(second, 2, axis=0) / tiles.size
     else:
         held = np.diff(primitive, axis=0)
-    there = _bsplines(knots, degree, grid.x)
-    found: np.ndarray = splu(there.T.tocsc()).solve(np.ascontiguousarray(held.T)).T
+    found = _over_samples(held, knots, degree, grid.x)
+    return np.concatenate([found, found[: tiles.count - own][::-1, ::-1]])
+
+
+def _knots(x: np.ndarray, degree: int) -> np.ndarray:
+    """Of the spline through samples at x: one at each but the first and last few, between which it does not change."""
+    skipped = (degree + 1) // 2
+    return np.concatenate([np.repeat(x[0], degree + 1), x[skipped:-skipped], np.repeat(x[-1], degree + 1)])
+
+
+def _over_samples(held: np.ndarray, knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
+    """Q C⁻¹ of Q = held. C is a band: every sample lies under degree + 1 B-splines."""
+    from scipy.linalg import solve_banded
+
+    there, sample = _bsplines(knots, degree, x), np.arange(len(x))[:, None]
+    above = there.indices.reshape(len(x), degree + 1) - sample
+    lower, upper = int(above.max()), -int(above.min())
+    band = np.zeros((lower + upper + 1, len(x)))
+    band[upper + above, sample] = there.data.reshape(above.shape)
+    found: np.ndarray = solve_banded((lower, upper), band, held.T, overwrite_ab=True, check_finite=False).T
     return found
 
 

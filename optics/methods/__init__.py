@@ -13,6 +13,7 @@ pixelated_spectrum   the same for pupils made of pixels
 hankel               the same for symmetric pupils, along one radius
 low_rank             by one matrix product
 far_field            by one transform onto directions for each of a few nodes of the window
+far_field_nodes      which nodes, and what each counts in every direction
 fresnel              approximate: Fresnel and Fraunhofer, and how wrong they are
 geometric            approximate: density of rays; the pinhole
 richards_wolf        the vector focus of symmetric pupils

@@ -10,8 +10,9 @@ from optics.elements.beam import Beam
 from optics.methods.fresnel import paraxial_integral
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.spectral_taper import Taper, tapers
-from optics.numerics.autodiff import Array
+from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.cost import CALL, PUPIL_SAMPLE, SPECTRUM_SAMPLE
+from optics.numerics.even_fields import even_seconds, even_sum, quarter, whole
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
@@ -34,12 +35,14 @@ class SpectrumSampling:
     method: "angular_spectrum" or "split_angular_spectrum". taper: where the spectrum fades out.
     period: width [m] after which the pupil plane repeats: the spectrum's samples lie 1/period apart.
     output_period: samples over the period of the plane that the last transform starts from or ends on.
+    even: whether the field is the same where x or y is mirrored: a quarter of each plane stands for it.
     """
 
     method: str
     taper: Taper
     period: float
     output_period: int
+    even: bool = False
 
     @property
     def is_whole(self) -> bool:
@@ -54,12 +57,25 @@ class SpectrumSampling:
     def relay(self) -> Grid:
         return Grid.square(self.output_period, self.period / self.output_period)
 
+    def part(self, grid: Grid) -> Grid:
+        """The samples of a plane that stand for it."""
+        return quarter(grid) if self.even else grid
+
+    def sum(self, field: Field, start: Grid, period: Scalar, end: Grid, sign: int) -> Field:
+        """Fourier's, from one plane's samples to another's, see `fourier.dft2`."""
+        if self.even:
+            return even_sum(field, start.shape, period, end)
+        return dft2(field, period, end.shape, sign, end.dx, end.centre)
+
+    def sum_seconds(self, start: Grid, period: float, end: Grid) -> float:
+        return even_seconds(start.shape, end.shape) if self.even else predicted_seconds(start.shape, period, end.shape)
+
     def seconds_from_spectrum(self, window: Grid) -> float:
         """What the transforms from the spectrum to the window take."""
         if self.is_whole:
-            return predicted_seconds(self.spectrum.shape, self.output_period, window.shape)
-        to_relay = predicted_seconds(self.spectrum.shape, self.output_period, self.relay.shape)
-        return to_relay + predicted_seconds(self.relay.shape, 0.5, window.shape)  # no whole period: a matrix
+            return self.sum_seconds(self.spectrum, self.output_period, window)
+        to_relay = self.sum_seconds(self.spectrum, self.output_period, self.relay)
+        return to_relay + self.sum_seconds(self.relay, 0.5, window)  # no whole period: a matrix
 
     def whole_phase(self, field: Field, beam: Beam, problem: Problem) -> Field:
         """What `arrived` leaves out of a split spectrum's field: e^{iπr²/λz}/i."""
@@ -85,6 +101,7 @@ class GridSampling(SpectrumSampling):
     period: float
     pupil_period: int
     output_period: int
+    even: bool = False
     seconds: float = 0.0
     model_error: float = 0.0
 
@@ -114,8 +131,9 @@ class GridSampling(SpectrumSampling):
     @property
     def largest(self) -> int:
         """Side of the largest square array."""
-        arrays = [self.pupil.shape[0], self.spectrum.shape[0]]
-        return max(arrays if self.is_whole else [*arrays, self.output_period])
+        sides = [self.pupil.shape[0], self.spectrum.shape[0]]
+        side = max(sides if self.is_whole else [*sides, self.output_period])
+        return side // 2 + 1 if self.even else side
 
 
 def whole_spectrum(problem: Problem) -> list[GridSampling]:
@@ -133,7 +151,7 @@ def _sampling(problem: Problem, taper: Taper, method: str) -> GridSampling:
     find = whole_period if method == "angular_spectrum" else split_period
     period, output_period = find(problem, taper, edge.outermost)
     pupil_period = fast_length(period * (taper.end + edge.stopband + problem.phase_band))
-    return _timed(GridSampling(method, edge, taper, period, pupil_period, output_period), problem)
+    return _timed(GridSampling(method, edge, taper, period, pupil_period, output_period, problem.even), problem)
 
 
 def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[float, int]:
@@ -157,10 +175,11 @@ def split_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
 
 
 def _timed(sampling: GridSampling, problem: Problem) -> GridSampling:
-    pupil, spectrum = sampling.pupil.shape, sampling.spectrum.shape
-    last = sampling.seconds_from_spectrum(problem.window)
-    seconds = predicted_seconds(pupil, sampling.pupil_period, spectrum) + last
-    points = pupil[0] ** 2 * (PUPIL_SAMPLE + sampling.edge.seconds_per_point) + spectrum[0] ** 2 * SPECTRUM_SAMPLE
+    seconds = sampling.sum_seconds(sampling.pupil, sampling.pupil_period, sampling.spectrum)
+    seconds += sampling.seconds_from_spectrum(problem.window)
+    pupil, spectrum = sampling.pupil.shape[0], sampling.spectrum.shape[0]
+    points = pupil**2 * (PUPIL_SAMPLE + sampling.edge.seconds_per_point) + spectrum**2 * SPECTRUM_SAMPLE
+    points *= 0.25 if sampling.even else 1.0
     seconds += points + CALL["angular_spectrum"]
     return replace(sampling, seconds=seconds)
 
@@ -168,17 +187,17 @@ def _timed(sampling: GridSampling, problem: Problem) -> GridSampling:
 def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
     """U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10), up to a phase of the split one that
     intensity forgets."""
-    u = beam.behind(how.edge.aperture, how.pupil, types)
-    spectrum = dft2(u, how.pupil_period, how.spectrum.shape, -1, how.spectrum.dx)
-    return arrived(spectrum, beam, problem, how).scaled((how.pupil.dx / how.period) ** 2)
+    u = beam.behind(how.edge.aperture, how.part(how.pupil), types)
+    spectrum = how.sum(u, how.pupil, how.pupil_period, how.spectrum, -1)
+    found = arrived(spectrum, beam, problem, how).scaled((how.pupil.dx / how.period) ** 2)
+    return whole(found, problem.window) if how.even else found
 
 
 def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
     """Over the window, of light that has this spectrum at the pupil; up to a phase that intensity forgets."""
     spectrum = spectrum * _transfer(beam, problem, how, precision(problem.dtype))
     if how.is_whole:
-        window = problem.window
-        return dft2(spectrum, how.output_period, window.shape, +1, window.dx, window.centre)
+        return how.sum(spectrum, how.spectrum, how.output_period, problem.window, +1)
     return _paraxial_rest(spectrum, beam, problem, how)
 
 
@@ -190,16 +209,21 @@ def _transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precis
     """
     import drjit as dr
 
-    fx, fy = how.spectrum.coordinates(types)
+    spectrum = how.part(how.spectrum)
+    fx, fy = spectrum.coordinates(types)
     f = dr.sqrt(fx * fx + fy * fy)
     s2 = dr.minimum(dr.square(f * opaque(types, problem.wavelength)), 1)
     q = s2 / (1 + dr.sqrt(1 - s2))
     sag = q if how.is_whole else q * q / 2
     waves = -opaque(types, beam.distance) / opaque(types, problem.wavelength) * sag
-    return Field.from_waves(how.taper.fade(f, types), waves, how.spectrum, types)
+    return Field.from_waves(how.taper.fade(f, types), waves, spectrum, types)
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
     """Fresnel's integral of the relay field."""
-    u = dft2(spectrum, how.output_period, how.relay.shape, +1, how.relay.dx)
-    return paraxial_integral(u, beam.distance, problem.wavelength, problem.window)
+    u = how.sum(spectrum, how.spectrum, how.output_period, how.relay, +1)
+
+    def onto_window(u: Field, period: Scalar) -> Field:
+        return how.sum(u, how.relay, period, problem.window, -1)
+
+    return paraxial_integral(u, beam.distance, problem.wavelength, problem.window, onto_window=onto_window)

@@ -9,9 +9,10 @@ from functools import lru_cache
 import numpy as np
 
 from optics.elements.beam import Beam
+from optics.methods.far_field_nodes import WindowNodes, all_nodes, few_nodes
 from optics.methods.problem import Problem, PupilEdge
 from optics.numerics.autodiff import Array
-from optics.numerics.cost import CALL, PUPIL_SAMPLE, SPECTRUM_SAMPLE, WINDOW_SAMPLE
+from optics.numerics.cost import CALL, MATMUL_FLOPS, PUPIL_SAMPLE, SPECTRUM_SAMPLE, WINDOW_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length, predicted_seconds
 from optics.numerics.grid import Grid
@@ -26,21 +27,22 @@ GRAZING = 0.98  # choice: sine that interpolation beyond the window's rim may re
 TRIED = 41  # choice: places between, for each of 8 on the rim
 # Choice: counts to try.
 CHEBYSHEV_NODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16)
+FEW = 2  # choice: nodes along an axis of which it does not pay to leave any out
+POINTS = 150  # choice: of the pupil, at which nodes are compared
 
 
 @dataclass(frozen=True)
 class FarFieldSampling:
-    """Pupil samples, direction cosines (pitch 1/period of their transform), and nodes per axis over the window.
+    """Pupil samples, direction cosines (pitch 1/period of their transform), and nodes over the window.
 
-    The nodes are Chebyshev points in the angle atan(x/z) up to half_angle [rad]: in x the kernel has a pole at ±iz.
+    The nodes are Chebyshev points in the angle atan(x/z): in x the kernel has a pole at ±iz.
     """
 
     edge: PupilEdge
     pupil: Grid
     directions: Grid
     period: int
-    nodes: int
-    half_angle: float
+    nodes: WindowNodes
     seconds: float
     method: str = "far_field"
     model_error: float = 0.0
@@ -67,33 +69,50 @@ class FarFieldSampling:
 
 
 def far_field(problem: Problem) -> list[FarFieldSampling]:
-    """Directions beyond the intensity's Nyquist rate; as many nodes as the kernel's slow part needs."""
+    """Directions beyond the field's Nyquist rate; as many nodes as the kernel's slow part needs."""
     half = problem.window.half_width
-    nodes = _nodes_needed(problem, problem.ripple)
-    if nodes is None:
+    sine = half / math.hypot(half, problem.distance)
+    corner = math.sqrt(2) * half / math.hypot(half, half, problem.distance)
+    count = _nodes_needed(problem, problem.ripple)
+    if count is None or corner >= STEEPEST_CORNER:
         return []
     edge = problem.soft_edge(problem.turning)
     pitch = 1 / (problem.turning + edge.stopband)
     pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
-    oversampling = math.pi / _step(problem.ripple)  # of the intensity's Nyquist rate
-    sine = half / math.hypot(half, problem.distance)
-    corner = math.sqrt(2) * half / math.hypot(half, half, problem.distance)
-    if corner >= STEEPEST_CORNER:
-        return []
+    oversampling = math.pi / _step(problem.ripple / 2)  # of the field's Nyquist rate
     # Interpolation reaches over the window's rim, but must not reach grazing incidence.
     finest = problem.wavelength * max(TAPS / (GRAZING - sine), TAPS / (GRAZING - corner))
     if finest / pitch >= MOST_DIRECTIONS:
         return []
-    period = fast_length(max(4 * oversampling * problem.radius, finest) / pitch)  # a whole number, for the FFT
+    period = fast_length(max(2 * oversampling * edge.outermost, finest) / pitch)  # a whole number, for the FFT
     step = problem.wavelength / (period * pitch)
     directions = Grid.square(2 * (math.ceil(sine / step) + TAPS) + 1, step)
-    once = predicted_seconds(pupil.shape, period, directions.shape) + CALL["far_field"]
-    once += (
-        pupil.shape[0] ** 2 * (PUPIL_SAMPLE + edge.seconds_per_point / nodes**2)
-        + directions.shape[0] ** 2 * SPECTRUM_SAMPLE
-    )
-    seconds = nodes**2 * once + math.prod(problem.window.shape) * WINDOW_SAMPLE
-    return [FarFieldSampling(edge, pupil, directions, period, nodes, math.atan2(half, problem.distance), seconds)]
+    nodes = _nodes(problem, count)
+    seconds = _seconds(FarFieldSampling(edge, pupil, directions, period, nodes, 0.0), problem)
+    return [FarFieldSampling(edge, pupil, directions, period, nodes, seconds)]
+
+
+def _seconds(how: FarFieldSampling, problem: Problem) -> float:
+    kept, count, directions = len(how.nodes.kept), how.nodes.count, how.directions.shape[0] ** 2
+    once = predicted_seconds(how.pupil.shape, how.period, how.directions.shape) + CALL["far_field"]
+    once += how.pupil.shape[0] ** 2 * PUPIL_SAMPLE + directions * SPECTRUM_SAMPLE
+    products = directions * count**2 * (1 + 4 * kept)
+    soft = how.pupil.shape[0] ** 2 * how.edge.seconds_per_point
+    window = math.prod(problem.window.shape) * WINDOW_SAMPLE
+    return kept * once + products / MATMUL_FLOPS[problem.dtype] + soft + window
+
+
+def _nodes(problem: Problem, count: int) -> WindowNodes:
+    """Of so many along each axis those that are needed."""
+    half_angle = math.atan2(problem.window.half_width, problem.distance)
+    if count <= FEW:
+        return all_nodes(count, half_angle)
+    turns = (np.arange(POINTS) + 0.5) * (math.sqrt(5) - 1) / 2
+    r = problem.radius * np.sqrt((np.arange(POINTS) + 0.5) / POINTS)
+    x, y = (r * part(2 * np.pi * turns) for part in (np.cos, np.sin))
+    at = half_angle * chebyshev_points(count)
+    slow = _slow_part(problem, (x, y), at[None, :, None], problem.distance * np.tan(at)[:, None, None])
+    return few_nodes(count, half_angle, slow, problem.ripple)
 
 
 def _step(error: float) -> float:
@@ -109,7 +128,7 @@ def _nodes_needed(problem: Problem, error: float) -> int | None:
     rows = 0.0, problem.window.half_width
 
     def along(angles: np.ndarray) -> np.ndarray:
-        return np.stack([_slow_part(problem, rim_x, rim_y, half_angle * angles, row) for row in rows])
+        return np.stack([_slow_part(problem, (rim_x, rim_y), half_angle * angles, row) for row in rows])
 
     exact = along(np.linspace(-1, 1, TRIED))
     for n in CHEBYSHEV_NODES:
@@ -124,14 +143,20 @@ def _between(n: int) -> np.ndarray:
     return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(n))
 
 
-def _slow_part(problem: Problem, rim_x: np.ndarray, rim_y: np.ndarray, angle: np.ndarray, y: float) -> np.ndarray:
-    """exp(ik(D - ρ + s·ξ)), D the distance from ξ to (z tan(angle), y, z), ρ that from the axis, s the direction."""
+def _slow_part(
+    problem: Problem, points: tuple[np.ndarray, np.ndarray], angle: np.ndarray, y: np.ndarray | float
+) -> np.ndarray:
+    """(ρ/D)² (1 + i/(kD)) exp(ik(D - ρ + s·ξ)), D the distance from ξ to (z tan(angle), y, z), ρ that from the axis, s
+    the direction."""
     x = problem.distance * np.tan(angle)
     rho = np.sqrt(x * x + y * y + problem.distance**2)
-    along = (x * rim_x + y * rim_y) / rho
-    excess = problem.radius**2 - 2 * rho * along
-    distance = excess / (np.sqrt(rho**2 + excess) + rho)
-    return np.exp(2j * np.pi / problem.wavelength * (distance + along))
+    along = (x * points[0] + y * points[1]) / rho
+    excess = points[0] ** 2 + points[1] ** 2 - 2 * rho * along
+    distance = np.sqrt(rho**2 + excess)
+    waves = (excess / (distance + rho) + along) / problem.wavelength
+    near = problem.wavelength / (2 * np.pi * distance)
+    found: np.ndarray = np.square(rho / distance) * (1 + 1j * near) * np.exp(2j * np.pi * waves)
+    return found
 
 
 def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Array:
@@ -148,19 +173,16 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
     dr.eval(u.re, u.im)
     s = how.directions.x
     cosine = np.sqrt(np.maximum(1 - s[:, None] ** 2 - s[None, :] ** 2, 1e-6))
-    nodes = how.half_angle * chebyshev_points(how.nodes)
     edge = math.asin(min(float(s[-1]), 0.999))  # a margin beyond the window, for the interpolation that follows
-    angle = np.clip(np.arctan2(s[None, :], cosine), -edge, edge)
-    along_x = lagrange_basis(angle, nodes)
+    weights = how.nodes.weights(np.clip(np.arctan2(s[None, :], cosine), -edge, edge), types.dtype)
     total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
-    for a, across in enumerate(np.tan(nodes)):
-        for b, along in enumerate(np.tan(nodes)):
-            part = u * _slow_kernel(float(across), float(along), beam, how.pupil, types)
-            part = dft2(part, how.period, how.directions.shape, -1, how.directions.dx)
-            weight = types.Float(padded_for_packets((along_x[a] * along_x[b].T).astype(types.dtype)))
-            total_re, total_im = total_re + weight * part.re, total_im + weight * part.im
-            dr.eval(total_re, total_im)
-    return _onto_window(total_re * total_re + total_im * total_im, beam, problem, how, types)
+    for (across, along), weight in zip(how.nodes.tangents, weights, strict=True):
+        part = u * _slow_kernel(across, along, beam, how.pupil, types)
+        part = dft2(part, how.period, how.directions.shape, -1, how.directions.dx)
+        re, im = (types.Float(padded_for_packets(each)) for each in weight)
+        total_re, total_im = total_re + re * part.re - im * part.im, total_im + re * part.im + im * part.re
+        dr.eval(total_re, total_im)
+    return _onto_window((total_re, total_im), beam, problem, how, types)
 
 
 def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Precision) -> Field:
@@ -182,8 +204,10 @@ def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Prec
     )
 
 
-def _onto_window(squared: Array, beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Array:
-    """Eight-point Lagrange interpolation from direction cosines to the window."""
+def _onto_window(
+    parts: tuple[Array, Array], beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision
+) -> Array:
+    """Eight-point Lagrange interpolation of the field from direction cosines to the window; its intensity there."""
     import drjit as dr
 
     x, y = problem.window.coordinates(types)
@@ -196,14 +220,19 @@ def _onto_window(squared: Array, beam: Beam, problem: Problem, how: FarFieldSamp
         cell = dr.clip(dr.floor(place), TAPS // 2 - 1, dr.opaque(types.Float64, side - TAPS // 2 - 1))
         cells.append(types.Index(cell) - (TAPS // 2 - 1))
         weights.append(lagrange_weights(types.Float(place - cell), TAPS))
-    image, columns = types.Float(0), dr.opaque(types.Index, side)
-    for i, down in enumerate(weights[0]):
-        start, line = (cells[0] + i) * columns + cells[1], types.Float(0)
-        for j, across in enumerate(weights[1]):
-            line = dr.fma(across, dr.gather(types.Float, squared, start + j), line)
-        image = dr.fma(down, line, image)
-    amplitude = types.Float(opaque(types, how.pupil.dx**2 / problem.wavelength) * z / (rho * rho))
-    image = dr.maximum(image, 0) * amplitude * amplitude
+    amplitude, columns = (
+        types.Float(opaque(types, how.pupil.dx**2 / problem.wavelength) * z / (rho * rho)),
+        dr.opaque(types.Index, side),
+    )
+    image = types.Float(0)
+    for part in parts:
+        found = types.Float(0)
+        for i, down in enumerate(weights[0]):
+            start, line = (cells[0] + i) * columns + cells[1], types.Float(0)
+            for j, across in enumerate(weights[1]):
+                line = dr.fma(across, dr.gather(types.Float, part, start + j), line)
+            found = dr.fma(down, line, found)
+        image = image + dr.square(amplitude * found)
     if problem.reach is not None:
         image = dr.select(x * x + y * y > opaque(types, problem.reach**2), 0, image)
     return image

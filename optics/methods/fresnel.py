@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -144,20 +145,29 @@ def _places(problem: Problem, ends: Rays) -> tuple[np.ndarray, np.ndarray]:
     return np.clip(x, window.x[0], window.x[-1]), np.clip(y, window.y[0], window.y[-1])
 
 
-def paraxial_integral(u: Field, distance: Scalar, wavelength: float, window: Grid, curved: bool = True) -> Field:
+def paraxial_integral(
+    u: Field,
+    distance: Scalar,
+    wavelength: float,
+    window: Grid,
+    curved: bool = True,
+    onto_window: Callable[[Field, Scalar], Field] | None = None,
+) -> Field:
     """Field over the window at `distance`, up to a phase that intensity forgets:
 
     U(x) = 1/(iλz) ∫ u(ξ) e^{iπξ²/λz} e^{-2πi x·ξ/λz} dξ   (Goodman, Introduction to Fourier Optics, eq. 4-17);
 
     with curved=False the quadratic phase is 1 (eq. 4-25). wavelength [m] in the medium. One Fourier sum of free output
-    pitch.
+    pitch. onto_window: how it is taken, of a field and a period (None: by `fourier.dft2`).
     """
     types, grid = u.types, u.grid
     scale = opaque(types, distance) * opaque(types, wavelength)
     if curved:
         x, y = grid.coordinates(types)
         u = u * Field.from_waves(1.0, (x * x + y * y) * (0.5 / scale), grid, types)
-    period = scale if is_differentiable(distance) else wavelength * number(distance)
-    return dft2(u, period / (grid.dx * window.dx), window.shape, -1, window.dx, window.centre).scaled(
-        grid.dx**2 / scale
-    )
+    period = (scale if is_differentiable(distance) else wavelength * number(distance)) / (grid.dx * window.dx)
+    if onto_window is None:
+        found = dft2(u, period, window.shape, -1, window.dx, window.centre)
+    else:
+        found = onto_window(u, period)
+    return found.scaled(grid.dx**2 / scale)

@@ -39,7 +39,7 @@ class Problem:
     turning: highest spatial frequency [1/m] in the phase of the pupil and of the path to any point of the window
         together; for a lens in focus far less than the sum of both.
     phase_band_inside, turning_inside: the same over the disk without its soft edge, where a relief may bend steeply.
-    symmetric: nothing depends on the azimuth.
+    symmetric: nothing depends on the azimuth. even: nothing changes where x or y is mirrored.
     widest_band: frequencies beyond it may be dropped (infinite: whatever reaches the window counts).
     reach: given where all but a tolerance's share of the light stays within this distance of the axis [m]: what lies
         beyond may be wrong, and edge-diffracted light less exact (None: the window counts to its corners).
@@ -67,6 +67,7 @@ class Problem:
     masked: bool = False
     medium_n: float = 1.0
     spread: float = ROUND
+    even: bool = False
 
     @classmethod
     def of(cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
@@ -158,6 +159,7 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
     pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
     slopes = pupil.slopes(wavelength, beam.source)
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
+    on_axis = beam.source.angle == (0.0, 0.0)
     detail = pupil.bandwidth(wavelength, tolerance / 10)  # choice: a tenth, of the phase [rad]
     turning, inside = slopes.turning(distance, window, beam.index)
     return Problem(
@@ -170,11 +172,12 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
         phase_band_inside=SLOPE_MARGIN * slopes.steepest_inside / wavelength + detail,
         turning=SLOPE_MARGIN * turning / wavelength + detail,
         turning_inside=SLOPE_MARGIN * inside / wavelength + detail,
-        symmetric=pupil.rotationally_symmetric(wavelength) and beam.source.angle == (0.0, 0.0),
+        symmetric=pupil.rotationally_symmetric(wavelength) and on_axis,
         tolerance=tolerance,
         dtype=dtype,
         masked=pupil.mask is not None,
         slopes=None if pixels else slopes,
         medium_n=beam.index,
         spread=light_spread(pupil),
+        even=on_axis and window.centre == (0.0, 0.0) and pupil.mirror_symmetric(wavelength),
     )

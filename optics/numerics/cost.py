@@ -13,6 +13,7 @@ __all__ = [
     "FFT_COPY",
     "FFT_FLOPS",
     "FFT_LINE_SAMPLE",
+    "FOLDED_SAMPLE",
     "FOURIER_ENTRY",
     "KERNEL_ENTRY",
     "MATMUL_FLOPS",
@@ -50,6 +51,7 @@ DFT_CALL = 2e-4  # of each Fourier sum
 
 # Seconds of each sample, entry, node or pair.
 FFT_LINE_SAMPLE = 5e-9  # on its way into a transform's line
+FOLDED_SAMPLE = 5e-9  # of a sum by matrices of halves
 FFT_COPY = 8e-9  # between Dr.Jit and SciPy
 PUPIL_SAMPLE = 5e-8  # optical path and phase, but for the soft edge
 SOFT_EDGE_SAMPLE = 1e-8  # of a table along one edge

@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.autodiff import Array, Scalar, is_differentiable
-from optics.numerics.cost import DFT_CALL, FFT_COPY, FFT_FLOPS, FFT_LINE_SAMPLE, MATMUL_FLOPS
+from optics.numerics.cost import DFT_CALL, FFT_COPY, FFT_FLOPS, FFT_LINE_SAMPLE
 from optics.numerics.field import Field
+from optics.numerics.fourier_matrices import matrix_seconds, matrix_sum
 from optics.numerics.grid import Grid
-from optics.numerics.matrices import complex_matmul
 from optics.numerics.precision import ROOM, Precision, opaque
 
 __all__ = [
@@ -73,7 +73,7 @@ def dft2(
     if not is_differentiable(period) and _fft_wins(field.grid.shape, period, shape):
         re, im = _fft(field, int(period), shape, sign)
     else:
-        re, im = _matrix_dft(field, period, shape, sign)
+        re, im = matrix_sum(field, period, shape, sign)
     return Field(re, im, grid, field.types)
 
 
@@ -147,44 +147,18 @@ def predicted_seconds(shape_in: tuple[int, int], period: float, shape_out: tuple
     """Time one `dft2` takes, roughly."""
     if _fft_wins(shape_in, period, shape_out):
         return _fft_seconds(shape_in, int(period), shape_out)
-    return _matrix_seconds(shape_in, shape_out)
+    return matrix_seconds(shape_in, shape_out)
 
 
 def _fft_wins(shape_in: tuple[int, int], period: float, shape_out: tuple[int, int]) -> bool:
     if not float(period).is_integer():
         return False
-    return _fft_seconds(shape_in, int(period), shape_out) < _matrix_seconds(shape_in, shape_out)
-
-
-def _matrix_seconds(shape_in: tuple[int, int], shape_out: tuple[int, int]) -> float:
-    (ny, nx), (my, mx) = shape_in, shape_out
-    return 8 * (ny * nx * mx + ny * mx * my) / MATMUL_FLOPS["float32"] + DFT_CALL
+    return _fft_seconds(shape_in, int(period), shape_out) < matrix_seconds(shape_in, shape_out)
 
 
 def _fft_seconds(shape_in: tuple[int, int], period: int, shape_out: tuple[int, int]) -> float:
     lines, copied = shape_in[0] + shape_out[1], shape_in[0] * shape_in[1] + shape_out[0] * shape_out[1]
     return lines * period * (5 * log2(period + 1) / FFT_FLOPS + FFT_LINE_SAMPLE) + copied * FFT_COPY + DFT_CALL
-
-
-def _fourier_matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) -> tuple[Array, Array]:
-    """The same matrix in Dr.Jit: two tensors (k, j), real and imaginary part; a period may carry a derivative."""
-    entries = Grid((n_out, n_in), 1.0)
-    j, k = entries.coordinates(types)
-    waves = j * k / opaque(types, sign * period)
-    matrix = Field.from_waves(1.0, waves, entries, types)
-    return types.Tensor(matrix.re, entries.shape), types.Tensor(matrix.im, entries.shape)
-
-
-def _matrix_dft(field: Field, period: Scalar, shape: tuple[int, int], sign: int) -> tuple[Array, Array]:
-    """A_y u A_xᵀ, one matrix per axis."""
-    types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
-    u = types.Tensor(field.re, (ny, nx)), types.Tensor(field.im, (ny, nx))
-    along_x = along_y = _fourier_matrix(types, mx, nx, period, sign)
-    u = complex_matmul(u, along_x, transposed=True)
-    if (my, ny) != (mx, nx):
-        along_y = _fourier_matrix(types, my, ny, period, sign)
-    re, im = complex_matmul(along_y, u)
-    return re.array, im.array
 
 
 def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class Grid:
             and type(self.dx) is float
             and SMALLEST <= self.dx <= LARGEST
             and type(self.centre) is tuple
-            and all(type(at) is float and at == 0 for at in self.centre)
+            and all(type(at) is float and isfinite(at) for at in self.centre)
             and len(self.centre) == 2
         )
 

@@ -11,6 +11,7 @@ converging     VectorFocus: polarised light on its way, and its field
 disk_sum       what falls on a round receptor
 microvilli     Microvilli: receptors that know polarisation
 population     one plan for many pupils
+population_members  what it takes of each
 batch          psf_batch: many eyes at once
 contrast       mtf, image_quality
 mixture        sums over wavelengths

@@ -17,7 +17,8 @@ from optics.numerics.autodiff import Array, Scalar, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, padded_for_packets, precision
 from optics.point_spread.pictures import pictures
-from optics.point_spread.population import Member, population_pictures
+from optics.point_spread.population import population_pictures
+from optics.point_spread.population_members import Member
 from optics.point_spread.request import Setup
 
 __all__ = ["PSFBatch", "psf_batch"]
@@ -60,9 +61,9 @@ def psf_batch(
 
     sensor_distance: None: where each pupil's ideal lens images the first source; see `optics.psf`.
 
-    Pupils with smooth reliefs of 4 x 4 points, or none, share one plan and one stack of matrix products where the
-    tolerance is 1e-3 or more and that is good enough: thousands a second. The others are all planned before any is
-    computed, and each is being computed while the next is prepared.
+    Pupils with smooth reliefs of 4 x 4 points or none, wavefronts of Zernike's modes, masks and two media share one
+    plan and one stack of matrix products where the tolerance is 1e-3 or more and that is good enough: thousands a
+    second. The others are all planned before any is computed, and each is being computed while the next is prepared.
 
     Raises:
         ValueError: a bad argument, or an empty sequence.

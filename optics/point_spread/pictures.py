@@ -107,7 +107,7 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
 
     planned: list[tuple[Request, tuple[Plan, Sampling]]] = []
     for request in requests:
-        told = request.after(planned[-1][0], planned[-1][1][0].method) if alike and planned else request
+        told = request.after(planned[-1][0], planned[-1][1][0]) if alike and planned else request
         planned.append((told, told.planned()))
     started = [_Attempt.at(*each) for each in planned]
     for attempt in started:

@@ -2,11 +2,11 @@
 
 Each picture is low_rank's of rank 1: a Fourier kernel times a slow rest that is taken at the window's centre,
 
-    U(x) ≈ Σ_ξ P(ξ) z/(λD²) e^{ik(D - z)} e^{-ik ξ·x/c},   D = √(ξ² + z²),
+    U(x) ≈ (z/ρ)² Σ_ξ P(ξ) z/(λD²) e^{ik(D - z)} Π (1 + 2ξx/z²) e^{-ik ξ·x/c},   D = √(ξ² + z²), ρ = √(x² + z²),
 
-with pupils sampled in units of their own radius, so that all share a soft edge, positions and B-splines. What the rest
-does away from the centre is this method's own error: it is told for each picture from its own light, and who asks for
-less gets the picture in the ordinary way.
+with pupils sampled in units of their own radius, so that all share a soft edge, positions, B-splines and powers. What
+the rest's phase does away from the centre is this method's own error: it is told for each picture from its own light,
+and who asks for less gets the picture in the ordinary way.
 """
 
 from __future__ import annotations
@@ -20,71 +20,30 @@ from functools import lru_cache
 import numpy as np
 
 from optics.apertures.aperture import EDGE_REACH, Aperture
-from optics.elements.pupil import Pupil
-from optics.elements.relief import BSplineRelief
 from optics.methods.problem import SLOPE_MARGIN
 from optics.methods.scalar_theory import light_spread, scalar_theory_error
 from optics.numerics.accuracy import Plan
-from optics.numerics.autodiff import Scalar, is_differentiable, number
+from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import cubic_bsplines
 from optics.numerics.precision import precision
+from optics.point_spread.population_members import Member, powers
 
-__all__ = ["Member", "population_pictures"]
+__all__ = ["population_pictures"]
 
 LOOSEST = 1e-3  # choice: tolerance from which on float32 and rank 1 are worth trying
 FEW_WAVES = 3000.0  # choice: that float32 may carry
 FAR = 200.0  # choice: kz from which on the kernel's near term is nothing
 RIPPLE = 0.3  # choice: of the soft edge, of the tolerance; test_population.py
 SAMPLING = 0.2  # choice: of the tolerance, what the soft edge may make of it
-SPREAD = 1.4  # choice: error of the intensity per spread of the phase; test_population.py
+SPREAD = 1.1  # choice: error of the intensity per spread of the phase; test_population.py, test_population_members.py
 TURNS = 1.3  # choice: steps between numbers of samples: neighbours share a plan
 STACK = 2_000_000  # choice, by memory: pupil samples in a stack
 SECONDS = 3e-4  # that a picture takes, roughly
 RINGS = 12  # choice: of the window, over which the error is told
 SLOPES = np.linspace(-1, 1, 9) * (1 + EDGE_REACH)  # places where a relief's slope is looked at
-
-
-@dataclass(frozen=True, eq=False)
-class Member:
-    """One picture of a population. wavelength in vacuum, distances [m]."""
-
-    pupil: Pupil
-    wavelength: float
-    distance: Scalar
-    source: Scalar
-
-    @property
-    def plain(self) -> bool:
-        """Whether it has a relief of 4 x 4 points at most and no more, in one medium, and asks for no derivative."""
-        pupil = self.pupil
-        numbers = (pupil.aperture_radius, self.distance, self.source, pupil.thin_lens_focal_length)
-        more = pupil.wavefront, pupil.mask, pupil.object_n
-        if (
-            any(part is not None for part in more)
-            or pupil.n.is_differentiable
-            or any(is_differentiable(value) for value in numbers)
-        ):
-            return False
-        relief = pupil.height
-        return relief is None or (isinstance(relief, BSplineRelief) and not is_differentiable(relief.control_points))
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Radius, wavelength in the medium, distances of sensor and source, focal length [m]."""
-        focal = self.pupil.thin_lens_focal_length
-        wavelength = self.wavelength / self.pupil.index_behind(self.wavelength)
-        return self.pupil.radius, wavelength, self.distance, self.source, math.inf if focal is None else focal
-
-    @property
-    def relief(self) -> np.ndarray:
-        """Control points of its waves."""
-        if self.pupil.height is None:
-            return np.zeros((4, 4))
-        waves: np.ndarray = self.pupil.height.control_points * (
-            self.pupil.index_step(self.wavelength) / self.wavelength
-        )
-        return waves
+PER_ORDER = 4  # choice: and a wavefront's, for each order
+STEP = 1e-4  # choice [radii]: of a wavefront's differences
 
 
 def population_pictures(
@@ -104,6 +63,8 @@ def population_pictures(
             groups[members[index].pupil.aperture, step].append(index)
     for (aperture, step), group in groups.items():
         samples = _samples(aperture, TURNS**step, RIPPLE * tolerance)
+        if samples.at.size**2 > STACK:
+            continue
         size = max(1, STACK // max(samples.at.size**2, math.prod(window.shape)))
         for start in range(0, len(group), size):
             part = group[start : start + size]
@@ -124,22 +85,31 @@ def _plan(member: Member, samples: _Samples, error: float) -> Plan:
 
 @dataclass(frozen=True, eq=False)
 class _Stack:
-    """Numbers of many members, each (member, 1, 1) float32, and reliefs (member, 4, 4)."""
+    """Numbers of many members, each (member, 1, 1) float32, and reliefs (member, 4, 4); the highest order of their
+    wavefronts, and what powers count in these (member, term); the members."""
 
     radius: np.ndarray
     wavelength: np.ndarray
     distance: np.ndarray
     source: np.ndarray
     focal: np.ndarray
+    before: np.ndarray
+    waist: np.ndarray
     relief: np.ndarray
+    order: int
+    powers: np.ndarray
+    members: Sequence[Member]
 
     @classmethod
     def of(cls, members: Sequence[Member]) -> _Stack:
         columns = np.array([member.numbers for member in members], np.float32).T[:, :, None, None]
-        radius, wavelength, distance, source, focal = columns
-        return cls(
-            radius, wavelength, distance, source, focal, np.array([member.relief for member in members], np.float32)
-        )
+        relief = np.array([member.relief for member in members], np.float32)
+        order = max(member.order for member in members)
+        terms = np.array([member.powers for member in members]) if order else np.zeros((len(members), 1))
+        radius, wavelength, distance, source, focal, before, waist = columns
+        counted = terms[:, : (order + 1) * (order + 2) // 2]
+        lengths = radius, wavelength, distance, source, focal
+        return cls(*lengths, before, waist, relief, order, counted, members)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,15 +137,24 @@ def _samples(aperture: Aperture, turns: float, ripple: float) -> _Samples:
 def _turns(stack: _Stack, window: Grid) -> np.ndarray:
     """Turns per radius of pupil and path to any point of the window together, (member,); infinite where float32 or the
     far kernel does not do."""
-    r = stack.radius * np.hypot(SLOPES[:, None], SLOPES[None, :]).astype(np.float32)
-    outward = r / np.hypot(r, stack.distance) + r / np.hypot(r, stack.source)
+    slopes = SLOPES if stack.order < 2 else np.linspace(-1, 1, PER_ORDER * stack.order + 1) * (1 + EDGE_REACH)
+    r = stack.radius * np.hypot(slopes[:, None], slopes[None, :]).astype(np.float32)
+    outward = r / np.hypot(r, stack.distance) + stack.before * r / np.hypot(r, stack.source)
     outward -= np.sign(stack.focal) * r / np.hypot(r, stack.focal)
     steep = outward * stack.radius / stack.wavelength / np.maximum(r / stack.radius, 1e-6)
-    splines = [np.stack(part, axis=1).astype(np.float32) for part in _splines_and_slopes((SLOPES + 1) / 2)]
-    along_x = splines[0] @ stack.relief @ splines[1].T + steep * SLOPES[None, None, :].astype(np.float32)
-    along_y = splines[1] @ stack.relief @ splines[0].T + steep * SLOPES[None, :, None].astype(np.float32)
+    splines = [np.stack(part, axis=1).astype(np.float32) for part in _splines_and_slopes((slopes + 1) / 2)]
+    along_x = splines[0] @ stack.relief @ splines[1].T + steep * slopes[None, None, :].astype(np.float32)
+    along_y = splines[1] @ stack.relief @ splines[0].T + steep * slopes[None, :, None].astype(np.float32)
+    if stack.order:
+        x, y = np.meshgrid(slopes, slopes)
+        for along, (dx, dy) in ((along_x, (STEP, 0.0)), (along_y, (0.0, STEP))):
+            rise = powers(x + dx, y + dy, stack.order) - powers(x - dx, y - dy, stack.order)
+            # In the corners, beyond all light, high powers would count most.
+            rise = np.where(np.hypot(x, y) <= 1 + EDGE_REACH, rise / (2 * STEP), 0)
+            along += np.tensordot(stack.powers, rise, 1).astype(np.float32)
     found = SLOPE_MARGIN * np.hypot(along_x, along_y).max(axis=(1, 2))
     found += (stack.radius * window.half_diagonal / (stack.wavelength * stack.distance))[:, 0, 0]
+    found += np.array([member.detail for member in stack.members], np.float32)
     waves = np.abs(found) + (np.square(stack.radius) / (stack.distance * stack.wavelength))[:, 0, 0]
     near = (stack.distance / stack.wavelength)[:, 0, 0] * 2 * math.pi < FAR
     return np.where((waves > FEW_WAVES) | near | ~np.isfinite(found), math.inf, found)
@@ -202,25 +181,44 @@ def _images(stack: _Stack, samples: _Samples, window: Grid) -> np.ndarray:
     square_z = np.square(stack.distance)
     path = r2 / (np.sqrt(r2 + square_z) + stack.distance)
     if np.isfinite(stack.source).any():
-        path += r2 / (np.sqrt(r2 + np.square(stack.source)) + stack.source)
+        path += stack.before * (r2 / (np.sqrt(r2 + np.square(stack.source)) + stack.source))
     if np.isfinite(stack.focal).any():
         path -= np.sign(stack.focal) * r2 / (np.sqrt(r2 + np.square(stack.focal)) + np.abs(stack.focal))
     waves = path / stack.wavelength
     if stack.relief.any():
         waves += samples.splines @ stack.relief @ samples.splines.T
+    if stack.order:
+        waves += np.tensordot(stack.powers, _powers(samples.at.tobytes(), stack.order), 1).astype(np.float32)
     size = samples.soft * (square_z / (r2 + square_z))
+    if np.isfinite(stack.waist).any():
+        size *= np.exp(-r2 / np.square(stack.waist))
+    for index, member in enumerate(stack.members):
+        amplitudes = member.mask(samples.at)
+        if amplitudes is not None:
+            size[index] *= amplitudes
     size *= np.float32(samples.pitch**2) * stack.radius / (stack.distance * stack.wavelength)
     field = _turned(size, waves)
     across = _fourier(stack, u, window, window.x)
     down = across if window.shape[0] == window.shape[1] else _fourier(stack, u, window, window.y)
     out = np.matmul(np.matmul(down, field), across.swapaxes(1, 2))
     found: np.ndarray = np.square(out.real) + np.square(out.imag)
+    # The rest's size, which falls with the distance from the pupil's centre.
+    nearness = square_z / (square_z + np.square(window.x)[None, None, :] + np.square(window.y)[None, :, None])
+    found *= np.square(nearness, dtype=np.float32)
     return found
 
 
+@lru_cache(maxsize=16)
+def _powers(at: bytes, order: int) -> np.ndarray:
+    places = np.frombuffer(at, np.float32).astype(np.float64)
+    return powers(*np.meshgrid(places, places), order)
+
+
 def _fourier(stack: _Stack, u: np.ndarray, window: Grid, at: np.ndarray) -> np.ndarray:
-    sines = _sine(stack, window, stack.radius * u) / stack.wavelength
-    return _turned(np.ones(1, np.float32), -sines * at.astype(np.float32)[None, :, None])
+    """Along one axis, (member, place, sample): Fourier's kernel, and z²/D² as far as it tells a place's side."""
+    xi, places = stack.radius * u, at.astype(np.float32)[None, :, None]
+    sines = _sine(stack, window, xi) / stack.wavelength
+    return _turned(1 + 2 * xi * places / np.square(stack.distance), -sines * places)
 
 
 def _turned(size: np.ndarray, waves: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from optics.point_spread.planner import EXACT, choose
 __all__ = ["Request", "Setup"]
 
 MOST_SECONDS_OF_JUMPS = 2.0  # choice
+GROWN = 1.25  # choice: time, of the wavelength before, from which on all methods are weighed anew
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Request:
 
     beam: the light; problem: the same in numbers, with the window and the tolerance.
     method: "auto", "exact" or a method's name. most_seconds: what the picture may take. keeps_field: whether its
-        complex amplitude is wanted, too. like: a method to try before all are weighed.
+        complex amplitude is wanted, too. like: a plan whose method to try before all are weighed.
     """
 
     beam: Beam
@@ -33,15 +34,15 @@ class Request:
     method: str = "auto"
     most_seconds: float = 60.0
     keeps_field: bool = False
-    like: str | None = None
+    like: Plan | None = None
 
-    def after(self, other: Request, method: str) -> Request:
+    def after(self, other: Request, plan: Plan) -> Request:
         """This request, told what another was answered by that differs by its wavelength and samples alone: what did
         for one wavelength does for the next, and weighing takes as long as a small picture."""
         mine, its = self.beam, other.beam
         same = mine.pupil is its.pupil and mine.source == its.source and mine.distance is its.distance
         alike = self.method == other.method == "auto" and self.keeps_field == other.keeps_field
-        return replace(self, like=method) if same and alike and method in EXACT else self
+        return replace(self, like=plan) if same and alike and plan.method in EXACT else self
 
     def planned(self) -> tuple[Plan, Sampling]:
         """How it is best answered.
@@ -69,8 +70,10 @@ class Request:
         if self.like is None:
             return None
         try:
-            plan, sampling = choose(self.problem, self.like, self.most_seconds)
+            plan, sampling = choose(self.problem, self.like.method, self.most_seconds)
         except AccuracyError:
+            return None
+        if plan.seconds > GROWN * self.like.seconds:
             return None
         return replace(plan, why=plan.why.replace("asked for", "as at the wavelength before")), sampling
 

@@ -7,6 +7,7 @@ pupil: test_pupil.py
 refractive_index: test_refractive_index.py, test_media.py
 relief: test_relief.py
 source: test_source.py
+square_samples: test_relief.py, methods/test_even_pupils.py
 transmittance: test_transmittance.py
 wavefront: test_wavefront.py
 wavefront_slopes: test_pupil.py

@@ -1,8 +1,9 @@
 """Which test fails when a module of optics/methods is broken. The oracles are closed forms that all methods meet.
 
-angular_spectrum: test_textbook.py, test_oracles_waves.py
+angular_spectrum: test_textbook.py, test_oracles_waves.py, test_even_pupils.py
 carrier: point_spread/test_field.py
-far_field: test_textbook.py
+far_field: test_textbook.py, test_far_field.py
+far_field_nodes: test_far_field.py
 fresnel: test_fresnel.py
 geometric: test_geometric.py
 hankel: test_textbook.py, test_oracles_circular.py

@@ -7,8 +7,10 @@ backend: test_backend.py
 device: test_device.py
 bessel: test_bessel.py
 cost: test_fourier.py, point_spread/test_planner.py
+even_fields: test_even_fields.py, methods/test_even_pupils.py
 field: test_fourier.py, methods/test_textbook.py
 fourier: test_fourier.py
+fourier_matrices: test_fourier.py
 grid: test_grid.py
 interpolation: test_interpolation.py
 matrices: test_fourier.py

@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from scipy.fft import next_fast_len
 
-from optics.numerics import fourier
+from optics.numerics import fourier, fourier_matrices
 from optics.numerics.field import Field
 from optics.numerics.precision import precision
 
+WAYS = [fourier._fft, fourier_matrices.by_halves, fourier_matrices.by_whole_matrices]
 CASES = [((5, 6), 8, (4, 3)), ((7, 8), 12, (12, 12)), ((17, 20), 6, (5, 6)), ((9, 4), 5, (13, 11)), ((6, 6), 6, (6, 6))]
 
 
@@ -27,10 +28,10 @@ def random_field(shape, dtype="float64", seed=0):
 
 @pytest.mark.parametrize("sign", [-1, 1])
 @pytest.mark.parametrize(("shape", "period", "out"), CASES)
-@pytest.mark.parametrize("way", ["_fft", "_matrix_dft"])
+@pytest.mark.parametrize("way", WAYS)
 def test_sum_is_as_defined(way, shape, period, out, sign):
     u, field = random_field(shape)
-    re, im = getattr(fourier, way)(field, period, out, sign)
+    re, im = way(field, period, out, sign)
     result = (re.numpy() + 1j * im.numpy()).reshape(out)
     np.testing.assert_allclose(result, by_definition(u, period, out, sign), atol=1e-12)
 
@@ -43,25 +44,47 @@ def test_period_need_not_be_whole():
 
 def test_float32_carries_six_digits():
     u, field = random_field((200, 200), "float32")
-    for way in (fourier._fft, fourier._matrix_dft):
+    for way in WAYS:
         re, im = way(field, 256, (256, 256), -1)
         exact = by_definition(u, 256, (256, 256), -1)
         error = np.linalg.norm((re.numpy() + 1j * im.numpy()).reshape(256, 256) - exact) / np.linalg.norm(exact)
         assert error < 1e-6
 
 
-@pytest.mark.parametrize("way", ["_fft", "_matrix_dft"])
+@pytest.mark.parametrize("way", WAYS)
 def test_derivative_is_the_adjoint(way):
     """d/du of Σ w·re + v·im of a linear sum is its adjoint applied to (w, v)."""
     _, field = random_field((5, 6))
     (w, v), out = np.random.default_rng(1).normal(size=(2, 42)), (6, 7)
     dr.enable_grad(field.re, field.im)
-    re, im = getattr(fourier, way)(field, 11, out, 1)
+    re, im = way(field, 11, out, 1)
     loss = dr.sum(re * type(re)(w) + im * type(re)(v))
     dr.backward(loss)
     adjoint = by_definition((w + 1j * v).reshape(out), 11, (5, 6), -1)
     np.testing.assert_allclose(field.re.grad.numpy(), adjoint.real.ravel(), atol=1e-12)
     np.testing.assert_allclose(field.im.grad.numpy(), adjoint.imag.ravel(), atol=1e-12)
+
+
+@pytest.mark.parametrize("way", [fourier_matrices.by_halves, fourier_matrices.by_whole_matrices])
+def test_derivative_by_the_period(way):
+    """Against differences of fourth order."""
+    _, field = random_field((9, 6))
+    weight, step = field.types.Float(np.random.default_rng(1).normal(size=56)), 1e-3
+
+    def loss(period):
+        re, im = way(field, period, (7, 8), -1)
+        return dr.sum(weight * (re + 2 * im))
+
+    period = field.types.Float64(11.3)
+    dr.enable_grad(period)
+    dr.backward(loss(period))
+    far, near = (loss(11.3 + k * step)[0] - loss(11.3 - k * step)[0] for k in (2, 1))
+    assert period.grad[0] == pytest.approx((8 * near - far) / (12 * step), rel=1e-8)
+
+
+def test_large_sums_go_by_halves():
+    assert fourier_matrices.halves_pay((300, 300), (500, 500))
+    assert not fourier_matrices.halves_pay((33, 33), (65, 65))
 
 
 def test_small_windows_go_by_matrix_and_large_ones_by_fft():

@@ -9,9 +9,10 @@ contrast: test_measures.py, test_measure_errors.py
 mixture: test_mixture.py
 pictures: test_pictures.py
 planner: test_planner.py
-population: test_population.py
+population: test_population.py, test_population_members.py
+population_members: test_population_members.py
 psf: test_psf.py, test_field.py, test_derivatives.py, test_robustness.py
-request: test_psf.py
+request: test_request.py, test_psf.py
 psf_result: test_psf.py, test_measure_errors.py
 spot_check: test_spot_check.py
 vector_focus: test_vector_focus.py, methods/test_richards_wolf.py

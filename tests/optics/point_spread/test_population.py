@@ -8,7 +8,8 @@ from drjit.auto.ad import Float64
 
 import optics
 from optics import Grid
-from optics.point_spread.population import Member, _sine, _spread, _Stack, population_pictures
+from optics.point_spread.population import _sine, _spread, _Stack, population_pictures
+from optics.point_spread.population_members import Member
 from validation.reference import relative_l2
 
 Z, LAMBDA = 240e-6, 550e-9

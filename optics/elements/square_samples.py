@@ -1,0 +1,32 @@
+"""Numbers on a square, as users give them: heights of a relief, amplitudes of a mask, samples of a wavefront."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.arguments import reals
+from optics.numerics.autodiff import is_differentiable, plain
+
+__all__ = ["on_both_sides", "square_samples"]
+
+
+def on_both_sides(heights: np.ndarray) -> bool:
+    """The same numbers left and right, and above and below."""
+    return np.array_equal(heights, heights[::-1]) and np.array_equal(heights, heights[:, ::-1])
+
+
+def square_samples(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
+    """The same without derivatives, as an array that nobody can change.
+
+    Raises:
+        ValueError: not square, empty, or not finite.
+    """
+    heights = np.array(plain(samples) if is_differentiable(samples) else reals(name, samples))
+    if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.size == 0:
+        raise ValueError(f"{name} has shape {heights.shape}: must be square (n, n), n at least 1")
+    if not np.isfinite(heights).all():
+        raise ValueError(f"{name} holds NaN or infinity: must be finite {what}")
+    heights.setflags(write=False)
+    return heights

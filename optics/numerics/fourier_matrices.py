@@ -1,0 +1,145 @@
+"""Fourier sums as matrix products in Dr.Jit, of any period, which may carry a derivative.
+
+A wave e^{iθjk} that is counted from the centre is even in its cosine and odd in its sine, along j and along k: large
+sums take u[j] ± u[-j] for j >= 0, two real matrices of a quarter of the entries, and give both ± k, with a quarter of
+the products.
+"""
+
+from __future__ import annotations
+
+from optics.numerics.autodiff import Array, Scalar
+from optics.numerics.cost import DFT_CALL, FOLDED_SAMPLE, MATMUL_FLOPS
+from optics.numerics.field import Field
+from optics.numerics.grid import Grid
+from optics.numerics.matrices import complex_matmul, matmul
+from optics.numerics.precision import Precision, opaque
+
+__all__ = ["by_halves", "by_whole_matrices", "halves_pay", "matrix_seconds", "matrix_sum"]
+
+Parts = tuple[Array, Array]
+Shape = tuple[int, int]
+
+
+def matrix_sum(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
+    """As `fourier.dft2` has it: real and imaginary part, flat."""
+    way = by_halves if halves_pay(field.grid.shape, shape) else by_whole_matrices
+    return way(field, period, shape, sign)
+
+
+def matrix_seconds(shape_in: Shape, shape_out: Shape) -> float:
+    """Time that takes, roughly."""
+    halves, whole = _halves_seconds(shape_in, shape_out), _whole_seconds(shape_in, shape_out)
+    return DFT_CALL + min(halves, whole)
+
+
+def halves_pay(shape_in: Shape, shape_out: Shape) -> bool:
+    return _halves_seconds(shape_in, shape_out) < _whole_seconds(shape_in, shape_out)
+
+
+def _products(shape_in: Shape, shape_out: Shape) -> int:
+    (ny, nx), (my, mx) = shape_in, shape_out
+    return ny * nx * mx + ny * mx * my
+
+
+def _whole_seconds(shape_in: Shape, shape_out: Shape) -> float:
+    return 8 * _products(shape_in, shape_out) / MATMUL_FLOPS["float32"]
+
+
+def _halves_seconds(shape_in: Shape, shape_out: Shape) -> float:
+    (ny, nx), (my, mx) = shape_in, shape_out
+    folded = ny * nx + 2 * ny * mx + 2 * my * mx
+    return 2 * _products(shape_in, shape_out) / MATMUL_FLOPS["float32"] + folded * FOLDED_SAMPLE + 2 * DFT_CALL
+
+
+def by_whole_matrices(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
+    """A_y u A_xᵀ, one matrix per axis."""
+    types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
+    u = types.Tensor(field.re, (ny, nx)), types.Tensor(field.im, (ny, nx))
+    along_x = along_y = _matrix(types, mx, nx, period, sign)
+    u = complex_matmul(u, along_x, transposed=True)
+    if (my, ny) != (mx, nx):
+        along_y = _matrix(types, my, ny, period, sign)
+    re, im = complex_matmul(along_y, u)
+    return re.array, im.array
+
+
+def _matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) -> Parts:
+    """exp(±2πi k j / period) in row k and column j, both counted from n//2: two tensors, real and imaginary part."""
+    entries = Grid((n_out, n_in), 1.0)
+    j, k = entries.coordinates(types)
+    matrix = Field.from_waves(1.0, j * k / opaque(types, sign * period), entries, types)
+    return types.Tensor(matrix.re, entries.shape), types.Tensor(matrix.im, entries.shape)
+
+
+def by_halves(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
+    """The same: along x and then along y, each of u[j] + u[-j] and u[j] - u[-j]."""
+    types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
+    cosine, sine = along_y = _quarter(types, mx, nx, period, sign)
+    even, odd = _folded_columns(field)
+    across = [matmul(part, cosine, transposed=True) for part in even] + [matmul(part, sine, True) for part in odd]
+    if (my, ny) != (mx, nx):
+        along_y = _quarter(types, my, ny, period, sign)
+    even, odd = _folded_rows(across, (ny, mx), types)
+    down = [matmul(along_y[0], part) for part in even] + [matmul(along_y[1], part) for part in odd]
+    return _unfolded_rows(down, shape, types)
+
+
+def _quarter(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) -> Parts:
+    """cos(2πkj/period) and ± sin(2πkj/period) for k and j from 0 on: row k, column j."""
+    entries = Grid((n_out // 2 + 1, n_in // 2 + 1), 1.0)
+    j, k = _counted(entries.shape, types)
+    wave = Field.from_waves(1.0, j * k / opaque(types, sign * period), entries, types)
+    return types.Tensor(wave.re, entries.shape), types.Tensor(wave.im, entries.shape)
+
+
+def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
+    """[re, im] of u[y, j] + u[y, -j] and of u[y, j] - u[y, -j], j from 0 on."""
+    types, (ny, nx) = field.types, field.grid.shape
+    shape = ny, nx // 2 + 1
+    j, y = _counted(shape, types)
+    middle = y * opaque(types, nx) + opaque(types, nx // 2)
+    there = (j > 0) & (j < opaque(types, nx - nx // 2))
+    ahead, behind = types.Index(middle + j), types.Index(middle - j)
+    parts = [_read(part, ahead, behind, there) for part in (field.re, field.im)]
+    return [types.Tensor(a + b, shape) for a, b in parts], [types.Tensor(a - b, shape) for a, b in parts]
+
+
+def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[list[Array], list[Array]]:
+    """The same of rows j and -j of (ny, mx) numbers, given as what `_both_sides` reads."""
+    ny, mx = size
+    shape = ny // 2 + 1, mx
+    column, j = _counted(shape, types)
+    k = column - opaque(types, mx // 2)
+    middle, width = opaque(types, ny // 2), opaque(types, mx // 2 + 1)
+    there = (j > 0) & (j < opaque(types, ny - ny // 2))
+    ahead = _both_sides(across, (middle + j) * width + abs(k), k, types, there)
+    behind = _both_sides(across, (middle - j) * width + abs(k), k, types)
+    pairs = list(zip(ahead, behind, strict=True))
+    return [types.Tensor(a + b, shape) for a, b in pairs], [types.Tensor(a - b, shape) for a, b in pairs]
+
+
+def _unfolded_rows(down: list[Array], shape: Shape, types: Precision) -> Parts:
+    column, row = _counted(shape, types)
+    k = row - opaque(types, shape[0] // 2)
+    return _both_sides(down, abs(k) * opaque(types, shape[1]) + column, k, types)
+
+
+def _both_sides(halves: list[Array], place: Array, k: Array, types: Precision, there: Array = True) -> Parts:
+    """Real and imaginary part of Σ (even cos + i odd sin), for k of either sign; halves: of |k|, even parts first."""
+    import drjit as dr
+
+    index, sign = types.Index(place), dr.select(k < 0, types.Float(-1), types.Float(1))
+    even_re, even_im, odd_re, odd_im = (dr.gather(types.Float, part.array, index, there) for part in halves)
+    return even_re - sign * odd_im, even_im + sign * odd_re
+
+
+def _read(part: Array, ahead: Array, behind: Array, there: Array) -> Parts:
+    import drjit as dr
+
+    return dr.gather(type(part), part, ahead, there), dr.gather(type(part), part, behind)
+
+
+def _counted(shape: Shape, types: Precision) -> Parts:
+    """Column and row of every entry, from 0 on, float64."""
+    x, y = Grid(shape, 1.0).coordinates(types)
+    return x + opaque(types, shape[1] // 2), y + opaque(types, shape[0] // 2)

@@ -1,0 +1,152 @@
+"""Members of a population: what the plan for all takes of each, in numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from optics.elements.pupil import Pupil
+from optics.elements.relief import BSplineRelief
+from optics.elements.transmittance import GaussianMask, MaskMap
+from optics.elements.wavefront import UM, Zernike
+from optics.numerics.autodiff import Scalar, is_differentiable
+
+__all__ = ["HIGHEST_ORDER", "Member", "powers"]
+
+HIGHEST_ORDER = 12  # choice: of Zernike's polynomials; as sums of powers higher ones lose digits
+MASK_LEVEL = 1e-3  # choice: amplitude beyond whose frequencies a mask has nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """One picture of a population. wavelength in vacuum, distances [m]."""
+
+    pupil: Pupil
+    wavelength: float
+    distance: Scalar
+    source: Scalar
+
+    @property
+    def plain(self) -> bool:
+        """Whether its relief has 4 x 4 points at most, its wavefront is Zernike's of orders that are not too high, and
+        it asks for no derivative."""
+        pupil = self.pupil
+        numbers = (pupil.aperture_radius, self.distance, self.source, pupil.thin_lens_focal_length)
+        if pupil.n.is_differentiable or any(is_differentiable(value) for value in numbers):
+            return False
+        return self._plain_relief and self._plain_wavefront and self._plain_mask
+
+    @property
+    def _plain_relief(self) -> bool:
+        relief = self.pupil.height
+        return relief is None or (isinstance(relief, BSplineRelief) and not is_differentiable(relief.control_points))
+
+    @property
+    def _plain_wavefront(self) -> bool:
+        known = self._wavefront
+        return self.pupil.wavefront is known and (not known.asks and known.order <= HIGHEST_ORDER if known else True)
+
+    @property
+    def _wavefront(self) -> Zernike | None:
+        return self.pupil.wavefront if isinstance(self.pupil.wavefront, Zernike) else None
+
+    @property
+    def _plain_mask(self) -> bool:
+        mask = self.pupil.mask
+        if isinstance(mask, GaussianMask):
+            return not is_differentiable(mask.waist)
+        return mask is None or (isinstance(mask, MaskMap) and not is_differentiable(mask.samples))
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Radius, wavelength in the medium behind, distances of sensor and source, focal length [m]; index before the
+        pupil over that behind; waist of a mask [m]."""
+        pupil, vacuum = self.pupil, self.wavelength
+        focal = math.inf if pupil.thin_lens_focal_length is None else pupil.thin_lens_focal_length
+        waist = pupil.mask.waist if isinstance(pupil.mask, GaussianMask) else math.inf
+        behind = pupil.index_behind(vacuum)
+        before = pupil.index_before(vacuum) / behind
+        return pupil.radius, vacuum / behind, self.distance, self.source, focal, before, waist
+
+    @property
+    def relief(self) -> np.ndarray:
+        """Control points of its waves."""
+        if self.pupil.height is None:
+            return np.zeros((4, 4))
+        waves: np.ndarray = self.pupil.height.control_points * (
+            self.pupil.index_step(self.wavelength) / self.wavelength
+        )
+        return waves
+
+    @property
+    def powers(self) -> np.ndarray:
+        """Of its wavefront's waves: what `powers` count, (term,)."""
+        wavefront, known = self._wavefront, _indices(HIGHEST_ORDER)
+        found = np.zeros(len(known))
+        if wavefront is None:
+            return found
+        scale = 1.0 if wavefront.radius is None else self.pupil.radius / wavefront.radius
+        for (n, m), value in wavefront.modes.items():
+            if value == 0:
+                continue
+            for power, share in _radial(n, m):
+                found[known[power, m]] -= value * UM / self.wavelength * share * scale**power
+        return found
+
+    @property
+    def order(self) -> int:
+        """Highest of its wavefront."""
+        return 0 if self._wavefront is None else self._wavefront.order
+
+    @property
+    def detail(self) -> float:
+        """Turns per radius that slopes do not tell: a wavefront's, and a mask's."""
+        pupil, found = self.pupil, 0.0
+        if pupil.wavefront is not None:
+            found = pupil.wavefront.bandwidth(0.0)
+            found *= 1.0 if pupil.wavefront.radius is None else pupil.radius / pupil.wavefront.radius
+        return found if pupil.mask is None else found + pupil.mask.bandwidth(MASK_LEVEL, pupil.radius) * pupil.radius
+
+    def mask(self, at: np.ndarray) -> np.ndarray | None:
+        """Amplitudes of a map at places in radii along either axis, (y, x)."""
+        mask = self.pupil.mask
+        if not isinstance(mask, MaskMap):
+            return None
+        return mask.on_grid(at.astype(np.float64), self.pupil.radius)
+
+
+def powers(x: np.ndarray, y: np.ndarray, order: int) -> np.ndarray:
+    """(term, *x.shape): ρ^k cos mθ and, for m < 0, ρ^k sin |m|θ, all |m| <= k <= order with k - m even."""
+    turned, square = [np.ones(x.shape, complex)], x * x + y * y
+    for _ in range(order):
+        turned.append(turned[-1] * (x + 1j * y))
+    found = [
+        square ** ((k - abs(m)) // 2) * (turned[m].real if m >= 0 else turned[-m].imag) for k, m in _indices(order)
+    ]
+    return np.stack(found)
+
+
+@lru_cache(maxsize=HIGHEST_ORDER + 1)
+def _indices(order: int) -> dict[tuple[int, int], int]:
+    """Place of every (k, m), lower k first: those of a lower order come before."""
+    pairs = [(k, m) for k in range(order + 1) for m in range(-k, k + 1, 2)]
+    return {pair: place for place, pair in enumerate(pairs)}
+
+
+@lru_cache(maxsize=(HIGHEST_ORDER + 1) * (HIGHEST_ORDER + 2))
+def _radial(n: int, m: int) -> list[tuple[int, float]]:
+    """Powers of ρ in Z_n^m, and what they count (Thibos et al. 2002, eq. 3)."""
+    m, norm = abs(m), math.sqrt((2 - (m == 0)) * (n + 1))
+    return [
+        (
+            n - 2 * s,
+            norm
+            * (-1) ** s
+            * math.factorial(n - s)
+            / (math.factorial(s) * math.factorial((n + m) // 2 - s) * math.factorial((n - m) // 2 - s)),
+        )
+        for s in range((n - m) // 2 + 1)
+    ]

@@ -1,0 +1,115 @@
+"""Wavefronts, masks and two media in a population's plan, against the exact integral; and what it leaves to others."""
+
+import math
+
+import numpy as np
+import pytest
+from drjit.auto.ad import Float64
+
+import optics
+from optics import Grid
+from optics.elements.wavefront import mode
+from optics.point_spread.population import population_pictures
+from optics.point_spread.population_members import HIGHEST_ORDER, Member, powers
+from validation.reference import relative_l2
+
+Z, LAMBDA = 240e-6, 550e-9
+
+
+def zernike(rng, radius=None):
+    order = rng.integers(3, 7)
+    modes = {(n, m): 0.05 * rng.normal() / (n - 1) for n in range(2, order + 1) for m in range(-n, n + 1, 2)}
+    return optics.Zernike(modes, radius)
+
+
+def smooth_map(rng, reach=None):
+    x = np.linspace(-1, 1, 6)
+    a, b, c = 0.2 * rng.normal(size=3)
+    values = 0.6 + a * x[None, :] + b * x[:, None] + c * x[:, None] * x[None, :]
+    return optics.MaskMap(values / max(1.0, 1.1 * np.abs(values).max()), reach)
+
+
+LENS = {"thin_lens_focal_length": Z}
+KINDS = {
+    "wavefront": lambda rng, radius: LENS | {"wavefront": zernike(rng)},
+    "wavefront of a wider pupil": lambda rng, radius: LENS | {"wavefront": zernike(rng, radius * rng.uniform(1, 2))},
+    "gaussian mask": lambda rng, radius: LENS | {"mask": optics.GaussianMask(radius * rng.uniform(0.5, 2))},
+    "map": lambda rng, radius: LENS | {"mask": smooth_map(rng)},
+    "map of a wider pupil": lambda rng, radius: LENS | {"mask": smooth_map(rng, radius * rng.uniform(1.1, 1.5))},
+    "two media": lambda rng, radius: LENS | {"object_n": 1.0, "medium_n": rng.uniform(1.2, 1.5)},
+    "all of it": lambda rng, radius: {
+        "height": optics.BSplineRelief.paraboloid(0, 1.336 / (0.164 * Z), radius),
+        "wavefront": zernike(rng),
+        "mask": optics.GaussianMask(radius),
+        "object_n": 1.336,
+        "medium_n": 1.336,
+        "aperture": optics.Annulus(0.4),
+    },
+}
+
+
+def members(kind, count, radii, seed=0):
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        radius = rng.uniform(*radii)
+        source = rng.choice([math.inf, rng.uniform(2e-3, 1e-2)])
+        yield Member(optics.Pupil(radius, **KINDS[kind](rng, radius)), LAMBDA, Z, float(source))
+
+
+@pytest.mark.parametrize(("tolerance", "radii", "side"), [(1e-2, (10e-6, 24e-6), 49), (1e-3, (5e-6, 10e-6), 33)])
+@pytest.mark.parametrize("kind", KINDS)
+def test_predicted_errors_hold(kind, tolerance, radii, side):
+    population, window = list(members(kind, 12, radii)), Grid.square(side, 0.25e-6)
+    found = list(population_pictures(population, window, tolerance))
+    assert len(found) >= 4
+    for index, image, plan in found:
+        member = population[index]
+        ask = {"dx": 0.25e-6, "shape": (side, side), "tolerance": 1e-5}
+        exact = optics.psf(member.pupil, [LAMBDA], Z, member.source, **ask).psf[0]
+        error = relative_l2(image, exact)
+        assert error <= plan.predicted_error <= tolerance
+
+
+def test_powers_are_zernike_s_polynomials():
+    """Every mode up to the highest order, to float32's digits, within the circle and its soft edge."""
+    x, y = 1.1 * np.random.default_rng(0).uniform(-0.7, 0.7, (2, 40))
+    known = powers(x, y, HIGHEST_ORDER)
+    for n in range(HIGHEST_ORDER + 1):
+        for m in range(-n, n + 1, 2):
+            pupil = optics.Pupil(10e-6, wavefront=optics.Zernike({(n, m): 1.0}))
+            waves = Member(pupil, 1e-6, Z, math.inf).powers @ known
+            np.testing.assert_allclose(waves, -mode(n, m, x, y), atol=1e-8)
+
+
+def test_what_it_leaves_to_others():
+    plain = optics.Pupil(10e-6, wavefront=optics.Zernike({(2, 0): 0.1}), mask=optics.GaussianMask(10e-6), object_n=1.2)
+    assert Member(plain, LAMBDA, Z, math.inf).plain
+    others = [
+        optics.Pupil(10e-6, wavefront=optics.Zernike({(2, 0): Float64(0.1)})),
+        optics.Pupil(10e-6, wavefront=optics.Zernike({(HIGHEST_ORDER + 1, 1): 0.1})),
+        optics.Pupil(10e-6, wavefront=optics.WavefrontMap(1e-7 * np.ones((4, 4)))),
+        optics.Pupil(10e-6, mask=optics.GaussianMask(Float64(10e-6))),
+        optics.Pupil(10e-6, np.zeros((5, 5))),
+    ]
+    assert not any(Member(pupil, LAMBDA, Z, math.inf).plain for pupil in others)
+
+
+def test_a_batch_of_all_kinds():
+    """Each picture is its own, whichever way it goes."""
+    pupils = [member.pupil for kind in KINDS for member in members(kind, 2, (15e-6, 25e-6))]
+    options = {"dx": 0.25e-6, "shape": (33, 33), "tolerance": 1e-2}
+    batch = optics.psf_batch(pupils, [LAMBDA], Z, **options)
+    assert sum("population" in plan.why for plan in batch.plans) > len(pupils) / 2
+    for pupil, image in zip(pupils, batch.psf[:, 0, 0], strict=True):
+        assert relative_l2(image, optics.psf(pupil, [LAMBDA], Z, **options | {"tolerance": 1e-4}).psf[0]) < 1e-2
+
+
+@pytest.mark.parametrize("waist", [0.03, 0.15])
+def test_a_narrow_mask_is_sampled_finely(waist):
+    """It turns nothing, and changes within a few samples of an open pupil's."""
+    radius = 10e-6
+    pupil = optics.Pupil(radius, thin_lens_focal_length=Z, mask=optics.GaussianMask(waist * radius))
+    member, window = Member(pupil, LAMBDA, Z, math.inf), Grid.square(33, 0.25e-6)
+    [(_, image, plan)] = population_pictures([member], window, 1e-3)
+    exact = optics.psf(pupil, [LAMBDA], Z, dx=0.25e-6, shape=(33, 33), tolerance=1e-5).psf[0]
+    assert relative_l2(image, exact) <= plan.predicted_error
