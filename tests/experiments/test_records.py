@@ -27,8 +27,8 @@ PAGES = {
         "navigation": ("scaling-navigation",),
     },
     "goals_shape_eyes": {
-        "navigation": ("navigation-0", "navigation-1"),
-        "detection": ("detection-0", "detection-1"),
+        "navigation": ("course-navigation-0", "course-navigation-1"),
+        "detection": ("course-detection-0",),
     },
     "learning_through_holes": {"0.0003": ("pupil-0003",), "0.001": ("pupil-001",), "0.003": ("pupil-003",)},
     "seeing_ultraviolet": {"foraging": ("ultraviolet-0", "ultraviolet-1")},
