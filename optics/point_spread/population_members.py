@@ -73,12 +73,11 @@ class Member:
 
     @property
     def relief(self) -> np.ndarray:
-        """Control points of its waves."""
+        """Control points of its waves, less what all have in common: no light differs by that, but float32's would."""
         if self.pupil.height is None:
             return np.zeros((4, 4))
-        waves: np.ndarray = self.pupil.height.control_points * (
-            self.pupil.index_step(self.wavelength) / self.wavelength
-        )
+        heights = self.pupil.height.control_points - np.mean(self.pupil.height.control_points)
+        waves: np.ndarray = heights * (self.pupil.index_step(self.wavelength) / self.wavelength)
         return waves
 
     @property
@@ -94,6 +93,7 @@ class Member:
                 continue
             for power, share in _radial(n, m):
                 found[known[power, m]] -= value * UM / self.wavelength * share * scale**power
+        found[known[0, 0]] = 0.0  # as of a relief: what all of the pupil has in common
         return found
 
     @property
