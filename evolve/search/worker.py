@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 import traceback
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
@@ -95,8 +96,12 @@ def evaluate_candidate(
 ) -> Evaluation:
     """`evolve.learning.fitness.evaluate`, whose libraries are loaded in workers alone."""
     from evolve.learning.fitness import evaluate
+    from sim.scene.mirror import MirrorWarning
 
-    return evaluate(phenotype, config, seed, policy_path, progress, stage)
+    with warnings.catch_warnings():
+        if config.own_task is not None:  # every candidate lives in its model: whoever began the run has been told
+            warnings.simplefilter("ignore", MirrorWarning)
+        return evaluate(phenotype, config, seed, policy_path, progress, stage)
 
 
 def evaluated(

@@ -22,17 +22,18 @@ from sim.tracing.areas.patch import Area
 class AreaWavefront(Wavefront):
     """Sees areas.
 
-    in_agent_frame: turns every eye's directions, (direction, 3), into the agent's frame, (eye, direction, 3)"""
+    in_agent_frame: turns every eye's directions, (direction, 3), into the agent's frame, (eye, direction, 3)
+    """
 
     def __init__(
         self,
-        sizes: tuple[int, int],
+        n_envs: int,
+        n_eyes: int,
         sensor: Sensor,
         tracer: AreaTracer,
         poses: PoseBuffer,
         in_agent_frame: Callable[[np.ndarray], np.ndarray],
     ) -> None:
-        n_envs, n_eyes = sizes
         super().__init__(n_envs, n_eyes, sensor, poses)
         assert sensor.extent is not None
         self._by_areas, self._extent = tracer, sensor.extent

@@ -142,10 +142,10 @@ class BatchedRenderer:
             self._sums: Any = dr.freeze(lambda scene, poses, inputs: wavefront(scene, poses, inputs, reduced))
 
     def _wavefront(self) -> Wavefront:
+        n_envs, n_eyes = self.n_envs, self.eyes.n_eyes
         if isinstance(self.tracer, AreaTracer):
-            sizes = self.n_envs, self.eyes.n_eyes
-            return AreaWavefront(sizes, self.sensor, self.tracer, self._poses, self._in_agent_frame)
-        return RayWavefront(self.n_envs, self.eyes.n_eyes, self.sensor, self.tracer, self._poses)
+            return AreaWavefront(n_envs, n_eyes, self.sensor, self.tracer, self._poses, self._in_agent_frame)
+        return RayWavefront(n_envs, n_eyes, self.sensor, self.tracer, self._poses)
 
     def _in_agent_frame(self, directions: np.ndarray) -> np.ndarray:
         """Every eye's directions (ray, 3) in the agent's frame, (eye, ray, 3)."""

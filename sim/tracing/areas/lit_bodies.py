@@ -56,10 +56,11 @@ class LitBodies:
 
     def on_side(self, k: Array, towards: Array, world: Array, table: list[Array]) -> list[Array]:
         """The same of its side in a direction, a unit vector."""
-        first = mi.Float((world * len(self._radii) + k) * PLACES)
+        first = (world * len(self._radii) + k) * PLACES  # beyond what float32 counts to, in very many worlds
         found = [mi.Float(0) for _ in self._directions]
-        for row, weight in corners(first, ((towards.x + 1) / 2, SIDES), ((towards.y + 1) / 2, SIDES)):
-            found = [dr.fma(weight, share, sum_) for share, sum_ in zip(self._row(row, table), found, strict=True)]
+        for side, weight in corners(mi.Float(0), ((towards.x + 1) / 2, SIDES), ((towards.y + 1) / 2, SIDES)):
+            shares = self._row(first + side, table)
+            found = [dr.fma(weight, share, sum_) for share, sum_ in zip(shares, found, strict=True)]
         return found
 
     def _row(self, row: Array, table: list[Array]) -> list[Array]:

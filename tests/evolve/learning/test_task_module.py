@@ -3,12 +3,14 @@
 import dataclasses
 import pickle
 import re
+import warnings
 from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import sim
 from evolve.config.assemble import assemble, to_toml
 from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
@@ -20,6 +22,7 @@ from evolve.learning.task_trial import try_task
 from evolve.learning.worlds import own_task_for, worlds_of
 from evolve.search import dask_worker
 from evolve.search.job import Job
+from evolve.search.worker import evaluate_candidate
 from evolve.store.evaluation import Evaluation
 from optics.numerics import backend
 
@@ -84,6 +87,20 @@ def test_rays_are_the_runs_or_the_tasks_and_few_in_lessons():
                 part.renderer.fidelity.rays_per_receptor for part in (life.lessons, life.checkpoints, life.finals)
             ]
     assert worlds == {"auto": [1, 1, 2], "12": [1, 1, 12]}
+
+
+def test_what_eyes_do_not_see_of_a_model_is_said_before_and_not_by_every_candidate(tmp_path):
+    mirror = (
+        '<asset><material name="mirror" reflectance=".9"/></asset>'
+        '<worldbody><geom type="box" size=".1 .1 .1" pos="5 5 .1" material="mirror"/>'
+    )
+    config, animal = small(named=written(tmp_path, "<worldbody>", mirror))
+    with pytest.warns(sim.MirrorWarning, match="eyes do not see: reflections"):
+        try_task(config)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        outcome = evaluate_candidate(animal, config, 3, tmp_path / "policy", progress=lambda *_: None)
+    assert outcome.failure is None
 
 
 def test_success_is_what_holds_at_the_end(tmp_path):
