@@ -1,0 +1,139 @@
+"""Human eyes as they were published: wavefronts with the chromatic aberration of humans, and a mean MTF."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from optics.elements.pupil import Pupil
+from optics.elements.refractive_index import medium
+from optics.elements.relief import BSplineRelief
+from optics.elements.wavefront import UM, Zernike, mode
+from optics.numerics.arguments import in_range, of_kind, one_of, positive, reals
+
+__all__ = ["HUMAN_WAVEFRONTS", "HumanEye", "mean_human_mtf"]
+
+# Autrusseau, Thibos & Shevell, Vision Research 51, 2282 (2011), table 1, µm for a pupil of 6 mm that is looked at in
+# 570 nm, in the order of OSA and ANSI. Unit, order and sign are those that reproduce their figure 11 (contrast of L, M
+# and S cones): tests/optics/elements/test_human_eye.py. Piston and tilts, which move a picture alone, are left out.
+HUMAN_WAVEFRONTS = {
+    "standard_observer": Zernike(
+        {
+            (2, -2): -0.1115,
+            (2, 0): 0.8638,
+            (2, 2): 0.0148,
+            (3, -3): -0.1116,
+            (3, -1): -0.1644,
+            (3, 1): 0.3053,
+            (3, 3): -0.0673,
+            (4, -4): -0.0273,
+            (4, -2): -0.0115,
+            (4, 0): 0.2394,
+            (4, 2): 0.0228,
+            (4, 4): 0.0784,
+        },
+        radius=3e-3,
+    ),
+}
+IN_FOCUS = 570e-9  # [m], of Autrusseau et al.
+SURFACE = 5.55e-3  # [m], of Thibos, Ye, Zhang & Bradley, Appl. Opt. 31, 3594 (1992): the reduced eye's one surface
+ASPHERIC = (2, 4, 6)  # orders by which its aspheric form is met; order 8 is below 1 nm
+NODES = 24  # of their integrals, polynomials of order 12 and less
+CHROMATIC = 555.0  # [nm], of `mean_human_mtf`
+
+
+@dataclass(frozen=True, eq=False)
+class HumanEye:
+    """One refracting surface between air and Thibos' medium, with a human eye's chromatic aberration, free of others in
+    570 nm; and a wavefront.
+
+    aperture_radius: of its pupil [m], at most that of the circle over which the wavefront is known.
+    wavefront: one of `optics.human_eye.HUMAN_WAVEFRONTS`, here "standard_observer" (Autrusseau, Thibos & Shevell 2011,
+        to 3 mm); a Zernike; or None.
+
+    Raises:
+        ValueError: names argument, value and valid range.
+    """
+
+    aperture_radius: float = 1.5e-3
+    wavefront: Zernike | str | None = "standard_observer"
+
+    def __post_init__(self) -> None:
+        positive("aperture_radius", self.aperture_radius)
+        if isinstance(self.wavefront, str):
+            one_of("wavefront", self.wavefront, HUMAN_WAVEFRONTS)
+        elif self.wavefront is not None:
+            of_kind("wavefront", self.wavefront, Zernike, 'Zernike({(2, 0): 0.1}), or "standard_observer"')
+            if self.wavefront.asks:
+                raise ValueError("wavefront asks for a derivative, which it does not carry: give it to a Pupil")
+
+    @cached_property
+    def focal_length(self) -> float:
+        """From the pupil to the retina [m]."""
+        index = medium("chromatic_eye").at(IN_FOCUS)
+        return index * SURFACE / (index - 1)
+
+    @cached_property
+    def pupil(self) -> Pupil:
+        """The eye as `optics.psf` and others take it, with `focal_length` as their distance."""
+        humour = medium("chromatic_eye")
+        paraboloid = BSplineRelief.paraboloid(0.0, 1 / SURFACE, self.aperture_radius)
+        reported = self._reported
+        radius = self.aperture_radius if reported.radius is None else reported.radius
+        modes = {(n, 0): self._aspheric(n, radius) for n in ASPHERIC}
+        for key, value in reported.modes.items():
+            modes[key] = modes.get(key, 0.0) + value
+        return Pupil(
+            self.aperture_radius,
+            paraboloid,
+            n=humour,
+            medium_n=humour,
+            object_n=1.0,
+            wavefront=Zernike(modes, radius),
+        )
+
+    def frequency(self, cycles_per_degree: Any) -> np.ndarray:
+        """On the retina [cycles per metre], as `optics.MTF.profile` takes it: an array of any shape."""
+        nodal_distance = self.focal_length / medium("chromatic_eye").at(IN_FOCUS)
+        return reals("cycles_per_degree", cycles_per_degree) * (180 / math.pi) / nodal_distance
+
+    @property
+    def _reported(self) -> Zernike:
+        if self.wavefront is None:
+            return Zernike({})
+        return HUMAN_WAVEFRONTS[self.wavefront] if isinstance(self.wavefront, str) else self.wavefront
+
+    def _aspheric(self, order: int, radius: float) -> float:
+        """Coefficient [µm] of what the path to the retina, n (√(r² + f²) - f), has beyond the paraboloid's n r²/2f."""
+        at, weights = np.polynomial.legendre.leggauss(NODES)
+        rho = (at + 1) / 2
+        r, f = radius * rho, self.focal_length
+        beyond = medium("chromatic_eye").at(IN_FOCUS) * (np.hypot(r, f) - f - r * r / (2 * f))
+        return float(np.sum(weights * rho * beyond * mode(order, 0, rho, np.zeros_like(rho)))) / UM
+
+
+def mean_human_mtf(cycles_per_degree: Any, pupil_diameter: float) -> np.ndarray:
+    """Mean contrast of 200 healthy eyes at their best focus, all orientations, in white light:
+
+        M(u, d) = √D(u, d) (1 + (u/u₁)²)^-.62,   u₁ = 21.95 - 5.512 d + .3922 d²  [cycles per degree], d in mm
+
+    with D the contrast of a perfect lens in 555 nm (Watson, J. Vision 13(6):18, 2013, eq. 4 and 5; stray light apart).
+
+    cycles_per_degree: 0 or more, an array of any shape, which is the result's. pupil_diameter: d [m], 2 to 6 mm.
+
+    Raises:
+        ValueError: names argument, value and valid range.
+    """
+    u = reals("cycles_per_degree", cycles_per_degree)
+    if (u < 0).any():
+        raise ValueError(f"cycles_per_degree holds {float(u.min()):g}: must not be below 0")
+    d = in_range("pupil_diameter", pupil_diameter, 2e-3, 6e-3) * 1e3
+    share = np.minimum(u / (d * math.pi * 1e6 / (CHROMATIC * 180)), 1)
+    perfect = 2 / math.pi * (np.arccos(share) - share * np.sqrt(1 - share * share))
+    slower = 21.95 - 5.512 * d + 0.3922 * d * d
+    mean: np.ndarray = np.sqrt(perfect) * (1 + (u / slower) ** 2) ** -0.62
+    return mean
