@@ -7,6 +7,7 @@ pixel_relief      PixelRelief: steps
 square_samples    the numbers of reliefs, masks and wavefronts, as users give them
 wavefront         Zernike, WavefrontMap
 transmittance     GaussianMask, MaskMap
+human_eye         HumanEye, mean_human_mtf: as they were published
 exit_pupil        read_exit_pupil: lenses of other programs
 refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
 wavefront_slopes  where the rays of a wavefront go

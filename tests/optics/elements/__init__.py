@@ -2,6 +2,7 @@
 
 beam: methods/test_textbook.py
 exit_pupil: test_exit_pupil.py
+human_eye: test_human_eye.py
 pixel_relief: test_pixel_relief.py
 pupil: test_pupil.py
 refractive_index: test_refractive_index.py, test_media.py
