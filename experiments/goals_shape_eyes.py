@@ -35,6 +35,7 @@ QUANTITIES: dict[str, Callable[[Row], float]] = {
     "fitness": lambda row: row.fitness,
     "success rate": lambda row: row.success_rate,
 }
+COLUMNS = 4  # of panels
 CONTRASTED = ("navigation", "detection")
 PUBLISHED = {
     "navigation": ("-0.92", "10", "4", "1", "135", "", "", "", ""),
@@ -123,12 +124,17 @@ def _shown(rows: Sequence[Row], value: Callable[[Row], float]) -> str:
 
 
 def draw(store: Store, path: Path) -> None:
-    """A panel per quantity, a line per seed."""
+    """A panel per quantity that is not the same in all animals, a line per seed."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
+    from matplotlib.ticker import MaxNLocator
 
-    figure, axes = new_figure(11, 7.4, columns=3, rows=3, sharex=True)
-    for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=True):
+    moved = {name: value for name, value in QUANTITIES.items() if len({value(row) for row in store.rows}) > 1}
+    lines_of_panels = math.ceil(len(moved) / COLUMNS)
+    figure, axes = new_figure(13, 0.8 + 2.4 * lines_of_panels, columns=COLUMNS, rows=lines_of_panels, sharex=True)
+    for place in axes.flat[len(moved) :]:
+        place.set_axis_off()
+    for place, (name, value) in zip(axes.flat, moved.items(), strict=False):
         for i, group in enumerate(store.groups):
             rows, color = store.group(group), COLORS.get(group, "#777777")
             shade(place, store.drift_of(group, name), color)
@@ -140,6 +146,7 @@ def draw(store: Store, path: Path) -> None:
                 place.plot([end, end], [found.low, found.high], color=color, lw=2.5, alpha=0.5)
                 place.plot(end, found.mean, "o", color=color, ms=4)
         place.set_title(name, fontsize=10)
+        place.xaxis.set_major_locator(MaxNLocator(integer=True))
     for place in axes[-1]:
         place.set_xlabel("generation")
     lines = [Line2D([], [], color=COLORS.get(group, "#777777"), label=group) for group in store.groups]
@@ -148,7 +155,7 @@ def draw(store: Store, path: Path) -> None:
     )
     lines.append(Patch(color="#777777", alpha=0.25, label="null model: selection by luck"))
     figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), frameon=False)
-    figure.suptitle("What each task makes of one photoreceptor, generation by generation")
+    figure.suptitle("From one photoreceptor, the way makes many simple eyes, and telling apart fewer and finer ones")
     save(figure, path)
 
 
