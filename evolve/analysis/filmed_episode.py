@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -116,11 +116,13 @@ def film(
     )
 
 
-def moments(task: Task, n: int, seed: int) -> tuple[mujoco.MjModel, Mapping[str, Sequence[str]], Poses]:
-    """The model, which of its geoms differ, and where everything is at the beginnings of n episodes."""
+def moments(task: Task, n: int, seed: int) -> tuple[mujoco.MjModel, dict[str, Any], Poses]:
+    """The model; what a `sim.ModelRenderer` must know of spectra and of geoms that differ; and where everything is at
+    the beginnings of n episodes."""
     with contextlib.closing(TaskVecEnv(task, n, seed)) as worlds:
         worlds.reset()
-        return worlds.worlds.model, worlds.worlds.bodies.varied, Poses.of(worlds.worlds.datas)
+        how = {"spectra": worlds.worlds.spectra, "varied": worlds.worlds.bodies.varied}
+        return worlds.worlds.model, how, Poses.of(worlds.worlds.datas)
 
 
 def _play(
@@ -171,7 +173,7 @@ def _perfect_views(worlds: TaskWorlds, task: Task, poses: list[Poses], every: in
     factor = max(1, -(-FINE_PIXELS // max(height, width)))
     fine = replace(perfect, resolution=(factor * height, factor * width))
     fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
-    how: dict[str, Any] = {"spectra": task.spectra, "varied": worlds.bodies.varied}
+    how: dict[str, Any] = {"spectra": worlds.spectra, "varied": worlds.bodies.varied}
     receptors, pictures = (
         sim.ModelRenderer(worlds.model, eye, kind.mounts, 1, fidelity, **how) for eye in (perfect, fine)
     )

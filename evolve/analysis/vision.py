@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,8 +77,7 @@ def seen_and_perfect(eyes: sim.Eyes, task: str, world: WorldConfig | None = None
 def _own_views(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
     """The same in a task of somebody's own."""
     task = own_task_for(animal, config)
-    model, varied, poses = moments(task, SCENES, 0)
-    how: dict[str, Any] = {"spectra": task.spectra, "varied": varied}
+    model, how, poses = moments(task, SCENES, 0)
     (kind,) = kinds_of(task)
     fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
     seen, sharp = (

@@ -13,8 +13,9 @@ from sim.envs.assembly import prepared_scene, vec_env_in
 from sim.envs.task_fidelity import fidelity_of
 from sim.envs.task_vec_env import TaskVecEnv
 from sim.envs.vec_env import EyesVecEnv
-from sim.render.fidelity import Fidelity
+from sim.render.fidelity import EDGES, RAYS, Fidelity
 from sim.render.fidelity_choice import fidelity_for
+from sim.robots.edge_rays import FIRST
 from sim.robots.task import Task, grown
 from sim.robots.variation import Variation
 
@@ -98,4 +99,7 @@ def _own_worlds(phenotype: Phenotype, config: RunConfig, learning: int, evaluati
 
 
 def _at_most(fidelity: Fidelity, rays_per_receptor: float) -> Fidelity:
-    return replace(fidelity, rays_per_receptor=min(fidelity.rays_per_receptor, rays_per_receptor))
+    """Of rays; where these are fewer than those that look for edges, the same everywhere."""
+    rays = min(fidelity.rays_per_receptor, rays_per_receptor)
+    samples = RAYS if fidelity.samples == EDGES and rays < FIRST else fidelity.samples
+    return replace(fidelity, rays_per_receptor=rays, samples=samples)

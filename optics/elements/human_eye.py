@@ -52,8 +52,7 @@ class HumanEye:
     570 nm; and a wavefront.
 
     aperture_radius: of its pupil [m], at most that of the circle over which the wavefront is known.
-    wavefront: one of `optics.human_eye.HUMAN_WAVEFRONTS`, here "standard_observer" (Autrusseau, Thibos & Shevell 2011,
-        to 3 mm); a Zernike; or None.
+    wavefront: "standard_observer" (Autrusseau, Thibos & Shevell 2011, known to 3 mm); a Zernike; or None.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -70,6 +69,11 @@ class HumanEye:
             of_kind("wavefront", self.wavefront, Zernike, 'Zernike({(2, 0): 0.1}), or "standard_observer"')
             if self.wavefront.asks:
                 raise ValueError("wavefront asks for a derivative, which it does not carry: give it to a Pupil")
+        known = self._reported.radius
+        if known is not None and self.aperture_radius > known * (1 + 1e-9):
+            raise ValueError(
+                f"aperture_radius = {self.aperture_radius:g}: must be at most {known:g} m, where the wavefront is known"
+            )
 
     @cached_property
     def focal_length(self) -> float:
@@ -97,9 +101,13 @@ class HumanEye:
         )
 
     def frequency(self, cycles_per_degree: Any) -> np.ndarray:
-        """On the retina [cycles per metre], as `optics.MTF.profile` takes it: an array of any shape."""
+        """On the retina [cycles per metre], as `optics.MTF.profile` takes it: an array of any shape.
+
+        Raises:
+            ValueError: a number below 0, or none.
+        """
         nodal_distance = self.focal_length / medium("chromatic_eye").at(IN_FOCUS)
-        return reals("cycles_per_degree", cycles_per_degree) * (180 / math.pi) / nodal_distance
+        return _not_negative(cycles_per_degree) * (180 / math.pi) / nodal_distance
 
     @property
     def _reported(self) -> Zernike:
@@ -116,6 +124,13 @@ class HumanEye:
         return float(np.sum(weights * rho * beyond * mode(order, 0, rho, np.zeros_like(rho)))) / UM
 
 
+def _not_negative(cycles_per_degree: Any) -> np.ndarray:
+    u = reals("cycles_per_degree", cycles_per_degree)
+    if not (u >= 0).all():
+        raise ValueError(f"cycles_per_degree holds {float(u.min()):g}: must be 0 or more")
+    return u
+
+
 def mean_human_mtf(cycles_per_degree: Any, pupil_diameter: float) -> np.ndarray:
     """Mean contrast of 200 healthy eyes at their best focus, all orientations, in white light:
 
@@ -128,9 +143,7 @@ def mean_human_mtf(cycles_per_degree: Any, pupil_diameter: float) -> np.ndarray:
     Raises:
         ValueError: names argument, value and valid range.
     """
-    u = reals("cycles_per_degree", cycles_per_degree)
-    if (u < 0).any():
-        raise ValueError(f"cycles_per_degree holds {float(u.min()):g}: must not be below 0")
+    u = _not_negative(cycles_per_degree)
     d = in_range("pupil_diameter", pupil_diameter, 2e-3, 6e-3) * 1e3
     share = np.minimum(u / (d * math.pi * 1e6 / (CHROMATIC * 180)), 1)
     perfect = 2 / math.pi * (np.arccos(share) - share * np.sqrt(1 - share * share))

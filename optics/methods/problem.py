@@ -12,7 +12,7 @@ from optics.elements.beam import Beam
 from optics.elements.source import PointSource
 from optics.elements.wavefront_slopes import Slopes
 from optics.methods.rays import Rays
-from optics.methods.scalar_theory import ROUND, light_spread, scalar_theory_error
+from optics.methods.scalar_theory import ROUND, light_spread, scalar_theory_error, steepest_sine
 from optics.numerics.arguments import in_range, positive
 from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
@@ -112,10 +112,9 @@ class Problem:
 
     @property
     def steepest_sine(self) -> float:
-        """Of rays that meet in a point of the window: no steeper than from the rim to the axis, nor than light leaves
-        the pupil."""
-        from_rim = self.radius / math.hypot(self.radius, self.distance)
-        return min(from_rim, self.phase_band_inside * self.wavelength + self.wavelength / self.radius)
+        """Of rays that meet in a point of the window, at most."""
+        leaving = self.phase_band_inside * self.wavelength + self.wavelength / self.radius
+        return steepest_sine(self.radius, self.distance, leaving)
 
     @property
     def scalar_error(self) -> float:

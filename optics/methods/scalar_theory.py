@@ -8,6 +8,7 @@ of the pupil lie whose light meets. For a round pupil in focus Richards and Wolf
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +17,7 @@ from optics.apertures.aperture import Aperture, Nodes
 from optics.elements.pupil import Pupil
 from optics.numerics.precision import precision
 
-__all__ = ["IN_FOCUS", "ROUND", "light_spread", "scalar_theory_error"]
+__all__ = ["IN_FOCUS", "ROUND", "light_spread", "scalar_theory_error", "steepest_sine"]
 
 # Relative L2 error of scalar theory in the focus of a round flat pupil and linearly polarised light (unpolarised light:
 # .82 to .94 of it), over the squared sine of the steepest ray: (sine, error / sine²). test_scalar_theory.py has them
@@ -41,6 +42,15 @@ ROUND = 0.25  # mean square of x over a disk, in R²
 MARGIN = 1.6
 CYCLES, DIGITS = 0.5, 2.0  # choice: of sums over the pupil
 LEVEL = 1e-2  # choice: of a mask's spectrum
+
+
+def steepest_sine(radius: float, distance: float, leaving: float) -> float:
+    """Of rays that meet in a point of a window: no steeper than from the rim to the axis, nor than light leaves the
+    pupil, which its edge bends a little, too.
+
+    leaving: sine with which slopes send light on, and a wavelength over the radius.
+    """
+    return min(radius / math.hypot(radius, distance), leaving)
 
 
 def scalar_theory_error(sine: float, spread: float = ROUND) -> float:

@@ -21,7 +21,7 @@ import numpy as np
 
 from optics.apertures.aperture import EDGE_REACH, Aperture
 from optics.methods.problem import SLOPE_MARGIN
-from optics.methods.scalar_theory import light_spread, scalar_theory_error
+from optics.methods.scalar_theory import light_spread, scalar_theory_error, steepest_sine
 from optics.numerics.accuracy import Plan
 from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
@@ -57,7 +57,9 @@ def population_pictures(
     plain = [index for index, member in enumerate(members) if member.plain]
     if tolerance < LOOSEST or window.centre != (0.0, 0.0) or not plain:
         return
-    for index, turns in zip(plain, _turns(_Stack.of([members[index] for index in plain]), window), strict=True):
+    leaving = {}
+    for index, turns, sine in zip(plain, *_turns(_Stack.of([members[index] for index in plain]), window), strict=True):
+        leaving[index] = float(sine)
         if math.isfinite(turns):
             step = math.ceil(math.log(max(turns, 1.0)) / math.log(TURNS))
             groups[members[index].pupil.aperture, step].append(index)
@@ -73,12 +75,13 @@ def population_pictures(
             errors = _model_errors(stack, images, window) + SAMPLING * tolerance
             for index, image, error in zip(part, images, errors, strict=True):
                 if error <= tolerance:
-                    yield index, image, _plan(members[index], samples, float(error))
+                    yield index, image, _plan(members[index], samples, float(error), leaving[index])
 
 
-def _plan(member: Member, samples: _Samples, error: float) -> Plan:
+def _plan(member: Member, samples: _Samples, error: float, leaving: float) -> Plan:
     shape, radius = (samples.at.size, samples.at.size), member.pupil.radius
-    scalar = scalar_theory_error(radius / math.hypot(radius, number(member.distance)), light_spread(member.pupil))
+    sine = steepest_sine(radius, number(member.distance), leaving)
+    scalar = scalar_theory_error(sine, light_spread(member.pupil))
     why = "one of a population: rank 1, not spot-checked"
     return Plan("low_rank", shape, "float32", error, why, SECONDS, scalar_error=scalar)
 
@@ -134,14 +137,14 @@ def _samples(aperture: Aperture, turns: float, ripple: float) -> _Samples:
     return _Samples(grid.x.astype(np.float32), pitch, inside.astype(np.float32), splines.astype(np.float32))
 
 
-def _turns(stack: _Stack, window: Grid) -> np.ndarray:
-    """Turns per radius of pupil and path to any point of the window together, (member,); infinite where float32 or the
-    far kernel does not do."""
+def _turns(stack: _Stack, window: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Turns per radius of pupil and path to any point of the window together, (member,), infinite where float32 or the
+    far kernel does not do; and the sine with which light leaves the pupil, at most."""
     slopes = SLOPES if stack.order < 2 else np.linspace(-1, 1, PER_ORDER * stack.order + 1) * (1 + EDGE_REACH)
     r = stack.radius * np.hypot(slopes[:, None], slopes[None, :]).astype(np.float32)
-    outward = r / np.hypot(r, stack.distance) + stack.before * r / np.hypot(r, stack.source)
-    outward -= np.sign(stack.focal) * r / np.hypot(r, stack.focal)
-    steep = outward * stack.radius / stack.wavelength / np.maximum(r / stack.radius, 1e-6)
+    outward = stack.before * r / np.hypot(r, stack.source) - np.sign(stack.focal) * r / np.hypot(r, stack.focal)
+    per_place = stack.radius / stack.wavelength / np.maximum(r / stack.radius, 1e-6)
+    steep, path = outward * per_place, r / np.hypot(r, stack.distance) * per_place
     splines = [np.stack(part, axis=1).astype(np.float32) for part in _splines_and_slopes((slopes + 1) / 2)]
     along_x = splines[0] @ stack.relief @ splines[1].T + steep * slopes[None, None, :].astype(np.float32)
     along_y = splines[1] @ stack.relief @ splines[0].T + steep * slopes[None, :, None].astype(np.float32)
@@ -152,12 +155,17 @@ def _turns(stack: _Stack, window: Grid) -> np.ndarray:
             # In the corners, beyond all light, high powers would count most.
             rise = np.where(np.hypot(x, y) <= 1 + EDGE_REACH, rise / (2 * STEP), 0)
             along += np.tensordot(stack.powers, rise, 1).astype(np.float32)
+    detail = np.array([member.detail for member in stack.members], np.float32)
+    inside = np.hypot(slopes[:, None], slopes[None, :]) <= 1 + EDGE_REACH
+    leaving = SLOPE_MARGIN * (np.hypot(along_x, along_y) * inside).max(axis=(1, 2)) + detail
+    along_x, along_y = along_x + path * slopes[None, None, :], along_y + path * slopes[None, :, None]
     found = SLOPE_MARGIN * np.hypot(along_x, along_y).max(axis=(1, 2))
     found += (stack.radius * window.half_diagonal / (stack.wavelength * stack.distance))[:, 0, 0]
-    found += np.array([member.detail for member in stack.members], np.float32)
+    found += detail
     waves = np.abs(found) + (np.square(stack.radius) / (stack.distance * stack.wavelength))[:, 0, 0]
     near = (stack.distance / stack.wavelength)[:, 0, 0] * 2 * math.pi < FAR
-    return np.where((waves > FEW_WAVES) | near | ~np.isfinite(found), math.inf, found)
+    turns = np.where((waves > FEW_WAVES) | near | ~np.isfinite(found), math.inf, found)
+    return turns, (leaving + 1) * (stack.wavelength / stack.radius)[:, 0, 0]
 
 
 def _splines_and_slopes(t: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:

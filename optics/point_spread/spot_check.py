@@ -145,7 +145,7 @@ def _chances(bright: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """With which each point is drawn, flat: a sixth each evenly, in proportion to the intensity, to its square, to the
     nearness of a side, of a corner, and to the intensity near sides and corners.
 
-    An even error of the amplitude weighs as the intensity's root: the second fifth sees it where a focus leaves the
+    An even error of the amplitude weighs as the intensity's root: the second sixth sees it where a focus leaves the
     others blind. A focus of one sample has its errors beside it: the square is spread over its neighbours. Phases turn
     fastest at the sides and the corners: a quadrature fails there first, and within a few samples; of a slit's light
     few places at the sides have any, and errors are where there is light.

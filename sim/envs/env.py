@@ -9,6 +9,7 @@ import numpy as np
 
 from sim.envs.assembly import make_vec_env
 from sim.envs.follow_camera import RENDER_MODES
+from sim.envs.vec_env import EyesVecEnv
 from sim.eyes.eyes import Eyes
 from sim.robots.encounter import Encounter
 from sim.robots.task import Task
@@ -41,7 +42,13 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     @property
     def state(self) -> WorldState:
-        """The world as it is now, a batch of one."""
+        """The world as it is now, a batch of one: of rhabdom's own tasks.
+
+        Raises:
+            RuntimeError: of a task of one's own, whose worlds are mjData.
+        """
+        if not isinstance(self._batch, EyesVecEnv):
+            raise RuntimeError("state: is for rhabdom's own tasks: `get_state` of make_vec_env says where others stand")
         return self._batch.state
 
     def reset(

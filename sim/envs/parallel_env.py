@@ -48,8 +48,8 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         if seed is not None:
             self._animals.seed(seed)
         self.agents, self._begun = list(self.possible_agents), True
-        infos = {name: {"reward_terms": {}, "is_success": False} for name in self.agents}
-        return self._observed(self._animals.reset()), infos
+        observations, varied = self._observed(self._animals.reset()), self._animals.worlds.told(0)
+        return observations, {name: {"reward_terms": {}, "is_success": False, **varied} for name in self.agents}
 
     def step(
         self, actions: Mapping[str, np.ndarray]
@@ -77,7 +77,8 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         rewards = {name: float(sum(outcome.terms.values())) for name, outcome in outcomes.items()}
         if any(terminated.values()) or any(truncated.values()):
             self.agents = []  # an episode ends for all
-        return observations, rewards, terminated, truncated, {name: _info(one) for name, one in outcomes.items()}
+        infos = {name: {**_info(one), **self._animals.worlds.told(0)} for name, one in outcomes.items()}
+        return observations, rewards, terminated, truncated, infos
 
     def render(self) -> np.ndarray | list[np.ndarray] | None:
         """A picture (y, x, 3) uint8 of the world, or what each animal's eyes see, as `render_mode` asks."""

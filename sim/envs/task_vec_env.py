@@ -125,8 +125,7 @@ class TaskVecEnv(OneEnvironment):
         Raises:
             RuntimeError: before the first reset.
         """
-        if not self._learners[0].begun:
-            raise RuntimeError("the worlds have not begun: call reset first")
+        self._require_begun()
         returns = self._returns.reshape(len(self._learners), -1).T
         return {**self.animals.state(), "returns": returns.copy()}
 
@@ -147,12 +146,26 @@ class TaskVecEnv(OneEnvironment):
         self.worlds.close()
 
     def get_images(self) -> list[np.ndarray]:
-        """Pictures (y, x, 3) uint8 of every world, as `render_mode` asks; none without."""
+        """Pictures (y, x, 3) uint8 of every world, as `render_mode` asks; none without.
+
+        Raises:
+            RuntimeError: before the first reset.
+        """
+        self._require_begun()
         return self._pictures.taken()
 
     def _moved(self) -> list[StepOfWorld]:
-        """One action later."""
+        """One action later.
+
+        Raises:
+            RuntimeError: before the first reset.
+        """
+        self._require_begun()
         return self.animals.act(np.split(self._commanded, len(self._learners)))
+
+    def _require_begun(self) -> None:
+        if not self._learners[0].begun:
+            raise RuntimeError("the worlds have not begun: call reset first")
 
     def _infos(self, outcomes: list[StepOfWorld]) -> list[dict[str, Any]]:
         infos: list[dict[str, Any]] = []
@@ -173,9 +186,7 @@ class TaskVecEnv(OneEnvironment):
 
     def _varied(self, row: int) -> dict[str, Any]:
         """How the world of a row differs from others, if they differ."""
-        world = row % len(self._everyone)
-        varied = {name: _plain(values[world]) for name, values in self.worlds.varied.items()}
-        return {"varied": varied} if varied else {}
+        return self.worlds.told(row % len(self._everyone))
 
     def _count(self, failure: str, row: int) -> None:
         """And warn once of each. Where several learn, the episode is one of all of them."""
@@ -184,13 +195,6 @@ class TaskVecEnv(OneEnvironment):
         self.failures[failure] += 1
         if self.failures[failure] == 1:
             warnings.warn(f"{type(self.task).__name__}: {failure}; its episode ends here", stacklevel=4)
-
-
-def _plain(value: np.ndarray) -> str | float | tuple[float, ...]:
-    """A name, a number, or three."""
-    if value.dtype.kind == "U":
-        return str(value)
-    return tuple(map(float, value)) if value.ndim else float(value)
 
 
 def _rows(observations: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from sim.robots import task as task_module
-from sim.robots.encounter import Encounter, cast, name_of, of_world
+from sim.robots.encounter import Encounter, cast, name_of, of_world, require_own_actuators
 from sim.robots.eye_kinds import kinds_of
 from sim.robots.task import Task, compiled, named_terms
 from sim.robots.variation import Variation
@@ -59,6 +59,7 @@ class TaskWorlds:
         self.model = compiled(self.animals[0])
         for animal in self.animals[1:]:
             compiled(animal, self.model)
+        require_own_actuators(self.animals, self.model)
         self.spectra = of_world(self.animals, "spectra")
         self.episode_steps = self.animals[0].episode_steps if episode_steps is None else episode_steps
         vary = of_world(self.animals, "vary")
@@ -123,6 +124,11 @@ class TaskWorlds:
         self.steps += 1
         judged = [self._judged(i, failure) for i, failure in enumerate(failures)]
         return [outcome for of_learner in zip(*judged, strict=True) for outcome in of_learner]
+
+    def told(self, world: int) -> dict[str, Any]:
+        """How a world differs from others, for its `info`; nothing where they do not differ."""
+        varied = {name: _plain(values[world]) for name, values in self.varied.items()}
+        return {"varied": varied} if varied else {}
 
     def light(self, wavelengths: np.ndarray) -> np.ndarray | None:
         """What lights are multiplied by now, (n, band); None: nothing."""
@@ -205,3 +211,10 @@ def _told(error: Exception) -> str:
             place = f"{frame.name}, line {frame.lineno} of {Path(frame.filename).name}"
             return f"{place}: {type(error).__name__}: {error}"
     return str(error)
+
+
+def _plain(value: np.ndarray) -> str | float | tuple[float, ...]:
+    """A name, a number, or three."""
+    if value.dtype.kind == "U":
+        return str(value)
+    return tuple(map(float, value)) if value.ndim else float(value)

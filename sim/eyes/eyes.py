@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 BODY_RADIUS = 0.2  # [m]
 MOST = 10**6  # of anything that is counted; memory ends long before
+MOST_BANDS = 64  # as `optics.Eye` has it
 EYE_HEIGHT = BODY_RADIUS  # [m] above the floor: the equator of a sphere that stands on it
 
 
@@ -30,12 +31,12 @@ class Eyes:
 
     n_eyes: number of eyes, >= 1
     resolution: receptors of one eye (height, width), each >= 1
-    fov_deg: horizontal field of view of one eye [deg], in (0, 180)
+    fov_deg: horizontal field of view of one eye [deg], in [0.001, 170]
     placement_range_deg: azimuth from the leftmost to the rightmost eye [deg], in [0, 360]
     optics: pupil of every eye; None is the perfect lens
     sensor_width: width of the retina [m]
     noise_sigma: standard deviation of a receptor's noise, in units of its signal
-    bands: spectral bands
+    bands: spectral bands, 1 to 64
     receptors: types of receptor: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", wavelengths of
         visual pigments' peaks [nm] such as (350, 440, 530), or `optics.Receptors`, which can be a mosaic; the field
         then holds optics.Receptors
@@ -79,11 +80,11 @@ class Eyes:
             lambda r: len(r) == 2 and all(map(counts, r)),
             f"(height, width), whole numbers, each at least 1 and at most {MOST}",
         )
-        check("fov_deg", lambda x: 0.0 < x < 180.0, "in (0, 180)")
+        check("fov_deg", lambda x: 1e-3 <= x <= 170.0, "in [0.001, 170]")
         check("placement_range_deg", lambda x: 0.0 <= x <= 360.0, "in [0, 360]")
         check("sensor_width", lambda x: 0.0 < x < math.inf, "positive and finite")
         check("noise_sigma", lambda x: 0.0 <= x < math.inf, "non-negative and finite")
-        check("bands", counts, f"a whole number, at least 1 and at most {MOST}")
+        check("bands", lambda x: counts(x) and x <= MOST_BANDS, f"a whole number, at least 1 and at most {MOST_BANDS}")
         for name in ("n_eyes", "bands"):
             object.__setattr__(self, name, int(getattr(self, name)))
         object.__setattr__(self, "resolution", tuple(map(int, self.resolution)))

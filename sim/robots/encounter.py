@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from optics.numerics.arguments import did_you_mean, of_kind
 from sim.robots.task import Task
 
 FRAMES_AXES = 5  # memory, eye, channel, height, width: of what eyes see in an observation, and of nothing else
+SAID_BY_ANY = ("spectra", "vary")  # what belongs to the world, too, and may be left to one animal
 SHARED = ("substeps", "episode_steps")  # what belongs to the world: every animal must say the same of it
 
 
@@ -136,7 +138,25 @@ def cast(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen, ...]]:
 
 def of_world(animals: Sequence[Task], what: str) -> Any:
     """What belongs to the world and may be said by any animal: that of the first who says it."""
-    return next((said for animal in animals if (said := getattr(animal, what)) is not None), None)
+    return next((said for animal in animals if (said := getattr(animal, what))), None)
+
+
+def require_own_actuators(animals: Sequence[Task], model: mujoco.MjModel) -> None:
+    """Those that act by `actuators` each have their own.
+
+    Raises:
+        ValueError: two animals drive the same one: the last would have its way.
+    """
+    owner: dict[int, str] = {}
+    for animal in animals:
+        if type(animal).act is not Task.act:
+            continue
+        named, name = animal.actuators, name_of(animal)
+        for i in range(model.nu) if named is None else (model.actuator(one).id for one in named):
+            if owner.setdefault(i, name) != name:
+                raise ValueError(
+                    f"{owner[i]} and {name}: actuators: both drive {model.actuator(i).name!r}: must name their own"
+                )
 
 
 def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
@@ -160,6 +180,11 @@ def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
             values = getattr(first, what), getattr(animal, what)
             if values[0] != values[1]:
                 raise ValueError(f"{where}: {what} = {values[0]} of {first_name}, {values[1]} of {name}: must be equal")
+    for what in SAID_BY_ANY:
+        said = [(name, value) for name, animal in zip(names, animals, strict=True) if (value := getattr(animal, what))]
+        for name, value in said[1:]:
+            if value != said[0][1]:
+                raise ValueError(f"{where}: {what} of {said[0][0]} and of {name} differ: must be equal, or one's alone")
     return tuple(animals)
 
 

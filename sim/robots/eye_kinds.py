@@ -45,7 +45,7 @@ def kinds_of(task: Task) -> tuple[EyeKind, ...]:
     if not isinstance(eye, Mapping) and not isinstance(mounts, Mapping):
         if isinstance(fidelity, Mapping):
             raise ValueError(f"{where}: fidelity has kinds {_listed(fidelity)}: eye and mounts must have the same")
-        return (EyeKind(EYES, eye, tuple(mounts), fidelity),)
+        return (EyeKind(EYES, _an_eye(f"{where}: eye", eye), mounts_of(f"{where}: mounts", mounts), fidelity),)
     eyes, places = _by_name(f"{where}: eye", eye, ()), _by_name(f"{where}: mounts", mounts, ())
     if eyes.keys() != places.keys():
         raise ValueError(f"{where}: eye has kinds {_listed(eyes)}, mounts {_listed(places)}: must be the same")
@@ -62,8 +62,31 @@ def kinds_of(task: Task) -> tuple[EyeKind, ...]:
                 raise ValueError(
                     f"{where}: eye: kind '{name}_{what}': must have another name, {name!r} has {what!r}, too"
                 )
-        of_kind(f"{where}: eye[{name!r}]", eyes[name], optics.Eye, "optics.Eye(resolution=(15, 15))")
-    return tuple(EyeKind(name, eyes[name], tuple(places[name]), fidelities[name]) for name in eyes)
+    return tuple(
+        EyeKind(
+            name,
+            _an_eye(f"{where}: eye[{name!r}]", eyes[name]),
+            mounts_of(f"{where}: mounts[{name!r}]", places[name]),
+            fidelities[name],
+        )
+        for name in eyes
+    )
+
+
+def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
+    """Several places of eyes.
+
+    Raises:
+        ValueError: `said` is one mount, or something else.
+    """
+    if not isinstance(said, Sequence) or not all(isinstance(mount, Mount) for mount in said):
+        raise ValueError(f"{where} = {said!r:.80}: must be several of sim.Mount, such as (sim.Mount('head'),)")
+    return tuple(said)
+
+
+def _an_eye(where: str, said: Any) -> optics.Eye:
+    eye: optics.Eye = of_kind(where, said, optics.Eye, "optics.Eye(resolution=(15, 15))")
+    return eye
 
 
 def _by_name(where: str, said: Any, names: Mapping[str, Any] | Sequence[str]) -> Mapping[str, Any]:

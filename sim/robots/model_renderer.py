@@ -17,6 +17,7 @@ from sim.render.memory_budget import Demand, check_memory
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.robots.appearances import Varied
 from sim.robots.edge_rays import FIRST, EdgeRays, allowed_error
+from sim.robots.eye_kinds import mounts_of
 from sim.robots.inside import depth_inside
 from sim.robots.model_scene import ModelScene
 from sim.robots.model_tracer import ModelTracer
@@ -72,7 +73,7 @@ class ModelRenderer:
         self.n_envs = whole("n_envs", n_envs, 1, MOST_ENVS)
         of_kind("eye", eye, optics.Eye, "optics.Eye(resolution=(15, 15))")
         _check(fidelity, eye)
-        self.model, self.mounts, self.fidelity = source.load(model), tuple(mounts), fidelity
+        self.model, self.mounts, self.fidelity = source.load(model), mounts_of("mounts", mounts), fidelity
         self.eye = replace(eye, bands=fidelity.bands)
         self._places = [_Place(mount, self.model) for mount in self.mounts]
         if not self._places:
@@ -272,5 +273,10 @@ def _check(fidelity: Fidelity, eye: optics.Eye) -> None:
         )
     if fidelity.samples == EDGES and fidelity.light == lighting.BOUNCE:
         raise ValueError("fidelity: samples = 'edges': is for direct light; light that bounces differs from ray to ray")
+    if fidelity.samples == EDGES and fidelity.rays_per_receptor < FIRST:
+        raise ValueError(
+            f"fidelity: rays_per_receptor = {fidelity.rays_per_receptor:g}: must be at least {FIRST} where samples = "
+            f"'edges', which looks with {FIRST} everywhere first"
+        )
     if fidelity.samples == EDGES and eye.pupil is not None:
         raise ValueError("fidelity: samples = 'edges': is for perfect lenses; behind a pupil receptors share all rays")

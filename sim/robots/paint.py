@@ -46,10 +46,18 @@ class Paint:
         if not len(self):
             return rows
         each = rows.reshape(poses.n, len(self), -1)
-        colors = poses.geom_rgba[:, self.geoms, :3] if poses.geom_rgba is not None else self._own[None]
+        colors = self._colors(poses)
         for world, k in np.ndindex(poses.n, len(self)):
             each[world, k, : self._bands] = self._reflectance(tuple(map(float, colors[world % len(colors), k])))
         return rows
+
+    def _colors(self, poses: Poses) -> np.ndarray:
+        """(world or 1, geom, 3) sRGB: a world's own or, where it has none, the material's, as MuJoCo has it."""
+        if poses.geom_rgba is None:
+            return self._own[None]
+        here = poses.geom_rgba[:, self.geoms]
+        unset = (here == surfaces.UNSET_RGBA).all(axis=-1, keepdims=True)
+        return np.where(unset, self._own, here[..., :3])
 
     def of(self, which: Array, rows: Array, first: Array, inputs: dict[str, Array], seen: Array) -> list[Array]:
         """What a mover's reflectances are multiplied by, as spectra; first: of the world's rows."""

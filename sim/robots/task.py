@@ -138,7 +138,8 @@ def grown(task: Task, eyes: Eyes, elevation_deg: float = 0.0) -> Task:
     """The same task for an animal with such eyes, where the task places them.
 
     Raises:
-        ValueError: the task places another number of eyes, or none, since it has no mounts, or has several kinds.
+        ValueError: the task places another number of eyes, or none, since it has no mounts, or has several kinds; its
+            `place` fails.
     """
     name, animal = type(task).__name__, copy.copy(task)
     if several(task):
@@ -146,7 +147,12 @@ def grown(task: Task, eyes: Eyes, elevation_deg: float = 0.0) -> Task:
     if not task.mounts and type(task).place is Task.place:
         raise ValueError(f"{name}: mounts = {task.mounts!r}: must hold one sim.Mount at least, where the eyes are")
     animal.eye, animal.auxiliary = eyes.eye(), ()
-    animal.mounts = tuple(task.place(eyes.n_eyes, eyes.placement_range_deg, elevation_deg))
+    try:
+        animal.mounts = tuple(task.place(eyes.n_eyes, eyes.placement_range_deg, elevation_deg))
+    except ValueError:
+        raise
+    except Exception as error:
+        raise ValueError(f"{name}: place: {type(error).__name__}: {error}") from error
     if len(animal.mounts) != eyes.n_eyes or not all(isinstance(mount, Mount) for mount in animal.mounts):
         raise ValueError(f"{name}: place returned {animal.mounts!r:.200}: must be {eyes.n_eyes} of sim.Mount")
     return animal

@@ -47,6 +47,8 @@ class Variation:
     ranges: Mapping[str, Range]
 
     def __post_init__(self) -> None:
+        if not isinstance(self.ranges, Mapping):
+            raise ValueError(f"vary = {self.ranges!r:.80}: must be ranges by name, such as {{'light': (0.1, 1)}}")
         for name, given in self.ranges.items():
             what = kind_of(name)
             if what == MATERIAL:

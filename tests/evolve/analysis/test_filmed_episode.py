@@ -125,9 +125,9 @@ def test_eyes_are_judged_by_the_scenes_of_the_task(path):
     run = Run.open(path, NAMED)
     seen = vision(run.best.phenotype, run.config)
     assert seen.psnr_db > 60  # a perfect lens against itself: the same rays
-    model, varied, poses = moments(own_task_for(run.best.phenotype, run.config), 3, 0)
+    model, how, poses = moments(own_task_for(run.best.phenotype, run.config), 3, 0)
     assert poses.n == 3
-    assert not varied
+    assert how == {"spectra": None, "varied": ()}
     assert len(np.unique(poses.xpos[:, model.nbody - 1, 1])) == 3  # the ball, elsewhere in each
 
 

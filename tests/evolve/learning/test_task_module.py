@@ -196,6 +196,13 @@ def test_place_must_give_as_many_eyes_as_the_animal_has(tmp_path):
         try_task(config)
 
 
+def test_a_place_that_fails_is_named(tmp_path):
+    text = "    def place(self, n_eyes, *where):\n        return {1: ()}[n_eyes]\n\n    def reset("
+    config, _ = small(named=written(tmp_path, "    def reset(", text))
+    with pytest.raises(ConfigError, match="FindBall: place: KeyError: 2"):
+        try_task(config)
+
+
 def test_of_a_stranger_nothing_is_executed():
     config, animal = small()
     stranger = dataclasses.replace(config, own=None)

@@ -28,6 +28,19 @@ class Untied(Predator):
         self.mounts = (sim.Mount("predatr"),)
 
 
+class Greedy(Predator):
+    """Drives all that there is."""
+
+    def __init__(self):
+        super().__init__()
+        self.actuators = None
+
+
+def lit(animal, *levels):
+    animal.vary = {"light": levels}
+    return animal
+
+
 class Unwired(Predator):
     def __init__(self):
         super().__init__()
@@ -42,6 +55,14 @@ class Unwired(Predator):
         (lambda: sim.Encounter(Prey(), Predator), "Encounter = .*Predator.*: must be"),
         (lambda: sim.Encounter(Prey(), Other()), "Encounter: Prey and Other have different models: must be one model"),
         (lambda: sim.Encounter(Prey(), Longer()), "Encounter: episode_steps = 20 of Prey, 30 of Longer: must be equal"),
+        (
+            lambda: sim.Encounter(lit(Prey(), 1, 2), lit(Predator(), 0.1, 0.2)),
+            "Encounter: vary of Prey and of Predator differ: must be equal, or one's alone",
+        ),
+        (
+            lambda: sim.make_vec_env(sim.Encounter(Prey(), Greedy()).alone("Prey", {})),
+            "Prey and Greedy: actuators: both drive 'prey_x': must name their own",
+        ),
         (lambda: sim.Encounter(Prey(), Accompanied()), "Encounter: Accompanied has others of its own: must be a task "),
         (lambda: hunt().alone("Pray", {}), "Encounter: no animal 'Pray'; did you mean 'Prey'"),
         (lambda: hunt().alone("Prey", {"Cat": None}), "Encounter: no animal 'Cat': it has Prey, Predator"),

@@ -244,3 +244,12 @@ def test_renderers_take_the_materials_of_datas_own_models():
 def test_what_cannot_differ_is_refused(vary, said):
     with pytest.raises(ValueError, match=f"vary: .*{said}"):
         sim.make_vec_env(with_ranges(vary), n_envs=1)
+
+
+def test_what_differs_in_size_keeps_the_colour_of_its_material():
+    env = sim.make_vec_env(with_ranges({"thing.size": (1, 1)}, room('material="plain"')), n_envs=1)
+    env.reset()
+    (seen,) = env.renderer.signals(env.worlds.datas)
+    assert seen == pytest.approx(built(env.worlds.datas[0], thing='material="plain"'), abs=1e-5)
+    red, _, blue = seen.reshape(3, -1)
+    assert (red > 2 * blue + 0.1).any()

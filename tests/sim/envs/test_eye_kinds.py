@@ -161,6 +161,10 @@ def test_an_animal_of_several_kinds_among_others():
         ({"eye": {"a.b": WIDE}, "mounts": {"a.b": SIDES}}, "eye: kind 'a.b': must be a name such as"),
         ({"eye": {"wide": 3, "sharp": SHARP}}, r"Looker: eye\['wide'\]"),
         ({"eye": {}}, "Looker: eye = {}: must have an entry"),
+        ({"eye": WIDE, "mounts": sim.Mount("cart")}, r"Looker: mounts = .*: must be several of sim\.Mount"),
+        ({"eye": WIDE, "mounts": ("cart",)}, r"Looker: mounts = \('cart',\): must be several of sim\.Mount"),
+        ({"eye": sim.Eyes(), "mounts": SIDES}, "Looker: eye = .*: must be"),
+        ({"mounts": {"wide": SIDES, "sharp": sim.Mount("cart")}}, r"Looker: mounts\['sharp'\] = .*: must be several"),
         ({"fidelity": {"wide": "auto", "sharp": "fine"}}, "fidelity = 'fine': must be a sim.Fidelity, or 'auto'"),
     ],
 )

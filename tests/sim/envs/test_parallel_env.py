@@ -41,6 +41,17 @@ def test_everybody_acts_and_sees_with_its_own_eyes(env):
     assert all(env.observation_space(name).contains(observations[name]) for name in env.agents)
 
 
+def test_everybody_is_told_how_the_world_differs():
+    class Dusk(Prey):
+        name, vary = "Prey", {"light": (0.1, 10)}
+
+    env = sim.make_parallel_env(sim.Encounter(Dusk(), Predator()), seed=1)
+    *_, infos = env.reset()
+    *_, later = env.step({name: np.zeros(2) for name in env.agents})
+    level = env._animals.worlds.varied["light"][0]
+    assert all(info["varied"] == {"light": level} for info in (*infos.values(), *later.values()))
+
+
 def test_it_is_the_world_that_one_of_them_learns_in(env):
     """The same seed, the same actions: what the learner sees is the same, bit for bit."""
     env.reset(seed=5)

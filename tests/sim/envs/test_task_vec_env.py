@@ -157,6 +157,15 @@ def test_a_failing_method_ends_its_world_and_the_others_go_on(task, words):
         assert r == (0 if failed else 1)
 
 
+def test_nothing_happens_before_the_first_reset():
+    env = sim.make_vec_env(Face(), n_envs=2, render_mode="eyes")
+    for early in (lambda: env.step(np.zeros((2, 1))), env.get_images, env.get_state):
+        with pytest.raises(RuntimeError, match="call reset first"):
+            early()
+    with pytest.raises(RuntimeError, match="state: is for rhabdom's own tasks"):
+        _ = sim.make_env(Face()).state
+
+
 def test_actions_and_physics_that_are_not_finite():
     env = sim.make_vec_env(Face(), n_envs=3)
     env.reset()

@@ -99,6 +99,8 @@ def test_edges_are_asked_for_where_the_first_rays_are_few():
 
 
 def test_who_cannot_look_at_edges_says_so():
+    with pytest.raises(ValueError, match="rays_per_receptor = 2: must be at least 4 where samples = 'edges'"):
+        renderer(1, rays=2)
     blurred = eye(pupil=optics.Pupil(20e-6, thin_lens_focal_length=240e-6))
     with pytest.raises(ValueError, match="samples = 'edges': is for perfect lenses"):
         renderer(1, one=blurred)

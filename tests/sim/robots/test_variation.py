@@ -184,3 +184,10 @@ def test_brighter_worlds_are_looked_at_more_finely():
 def test_bad_ranges_are_refused(vary, said):
     with pytest.raises(ValueError, match=said):
         sim.make_vec_env(Lit(**vary), n_envs=1)
+
+
+def test_ranges_have_names():
+    task = Lit()
+    task.vary = [("light", (1, 2))]
+    with pytest.raises(ValueError, match=r"vary = .*: must be ranges by name, such as {'light'"):
+        sim.make_vec_env(task, n_envs=1)
