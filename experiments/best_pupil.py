@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import sys
 import time
+from argparse import Namespace
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 import optics
 from evolve.analysis.statistics import polychromatic
-from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
+from experiments.page import Figure, Page, markdown_table, new_figure, parser, save, told
 from experiments.store import DATA, Origin, read_rows, write_rows
 from sim.worlds import materials
 
@@ -224,14 +225,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Compute and store if asked; make the page from the store."""
     options = parser(__doc__ or "")
     options.add_argument("--compute", action="store_true", help="compute the stored numbers anew")
-    chosen = options.parse_args(arguments)
+    return told("best_pupil", lambda: _made(options.parse_args(arguments)))
+
+
+def _made(chosen: Namespace) -> None:
     data, origin = (chosen.docs / "data" / f"best_pupil.{kind}" for kind in ("csv", "json"))
     if chosen.compute:
         began = time.process_time()
         write_rows(computed(), data)
         Origin.here((time.process_time() - began) / 3600).write(origin)
-    page(read_rows(Row, data), Origin.read(origin)).publish(chosen.docs)
-    return 0
+    page(_stored(data), Origin.read(origin)).publish(chosen.docs)
+
+
+def _stored(data: Path) -> list[Row]:
+    rows = read_rows(Row, data)
+    if not rows:
+        raise ValueError(f"{data} holds no numbers; compute them with --compute")
+    return rows
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from evolve.analysis.vision import vision
 from evolve.config.run_config import EyeConfig, RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.policy import PolicyConfig, build_policy, learnt
+from evolve.search import successive_halving
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from experiments.best_pupil import contrast_of, measures
@@ -88,9 +89,8 @@ def rows_of(run: Run, group: str) -> list[Row]:
 
 
 def complete(run: Run) -> list[int]:
-    """Generations of which all candidates are on record."""
-    search = run.config.search
-    return [g for g in range(search.generations) if len(run.generation(g)) == search.population]
+    """Generations of which all candidates are on record, through all stages of their budget."""
+    return [g for g in range(run.config.search.generations) if successive_halving.complete(run, g)]
 
 
 def _row(run: Run, group: str, candidate: Candidate, champion: bool) -> Row:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-import sys
 import tempfile
+from argparse import Namespace
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -16,8 +16,9 @@ from evolve.genome.phenotype import NEURONS_PER_FEATURE, Phenotype
 from evolve.search.job import Job
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.worker import evaluate_candidate, prepare_device
+from evolve.store.atomic_files import write_whole
 from evolve.store.evaluation import Evaluation
-from experiments.page import Page, parser
+from experiments.page import Page, parser, told
 from experiments.store import Origin, read_rows, write_rows
 
 __all__ = ["Design", "Experiment", "Trained", "crossed", "main", "train_all"]
@@ -106,10 +107,10 @@ def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, wo
         for job, outcome in executor.run(jobs):
             row = Trained.of(waiting[job.id], outcome)
             known[row.design] = row
-            write_rows([known[design] for design in designs if design in known], path)
-            print(f"{len(known)} of {len(designs)}: {row}", flush=True)
             hours = sum(each.seconds for each in known.values()) / 3600
             Origin.here(hours, "worker").write(path.with_suffix(".json"))
+            write_rows([known[design] for design in designs if design in known], path)
+            print(f"{len(known)} of {len(designs)}: {row}", flush=True)
     written = {row.design: row for row in read_rows(Trained, path)}
     return [written[design] for design in designs]
 
@@ -142,7 +143,10 @@ def main(experiment: Experiment, arguments: Sequence[str] | None = None) -> int:
     options.add_argument("--compute", action="store_true", help="train the animals that the stored numbers lack")
     options.add_argument("--workers", type=int, default=0, help="processes; 0: one per core")
     options.add_argument("--answer", help="the page's answer; kept from now on")
-    chosen = options.parse_args(arguments)
+    return told(experiment.name, lambda: _made(experiment, options.parse_args(arguments)))
+
+
+def _made(experiment: Experiment, chosen: Namespace) -> None:
     data = chosen.docs / "data" / f"{experiment.name}.csv"
     data.parent.mkdir(parents=True, exist_ok=True)
     said = data.with_suffix(".txt")
@@ -150,10 +154,8 @@ def main(experiment: Experiment, arguments: Sequence[str] | None = None) -> int:
         train_all(experiment.designs(), experiment.settings, data, chosen.workers)
     rows = read_rows(Trained, data)
     if not rows:
-        print(f"{experiment.name}: error: {data} holds no animals; train some with --compute", file=sys.stderr)
-        return 2
+        raise ValueError(f"{data} holds no animals; train some with --compute")
     if chosen.answer:
-        said.write_text(chosen.answer + "\n", encoding="utf-8")
+        write_whole(said, f"{chosen.answer}\n".encode())
     answer = said.read_text(encoding="utf-8").strip() if said.exists() else "(not written yet)"
     experiment.page(rows, Origin.read(data.with_suffix(".json")), answer).publish(chosen.docs)
-    return 0

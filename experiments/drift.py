@@ -24,6 +24,7 @@ __all__ = ["POOLS", "SEEDS", "Drift", "drifted", "of_the_end", "shade"]
 
 SEEDS = 1000
 POOLS = 20_000  # of searches drawn together, where several runs are compared with the null model as one
+TIE = 1e-5  # relative: what `ends` tell, six digits, may be equal to a value that has more
 FIRST_SEED = 10_000  # none that anybody takes for a run
 
 
@@ -51,8 +52,8 @@ class Drift:
         mean, among the means of as many searches drawn at random, and no less than of one."""
         ends, asked = np.array(self.ends.split(), float), float(np.mean(values))
         several = np.random.default_rng(0).choice(ends, (POOLS, len(values))).mean(axis=1)
-        drawn = ends if len(values) == 1 else several
-        share = min((drawn <= asked).sum(), (drawn >= asked).sum()) / drawn.size
+        drawn, near = ends if len(values) == 1 else several, TIE * abs(asked)
+        share = min((drawn <= asked + near).sum(), (drawn >= asked - near).sum()) / drawn.size
         return min(1.0, 2 * (float(share) * ends.size + 1) / (ends.size + 1))
 
     def __str__(self) -> str:
@@ -65,7 +66,7 @@ def drifted(
     """Of SEEDS searches with these settings and so many generations; quantities that are no numbers without a life are
     left out."""
     searches = [_means(replace(config, seed=FIRST_SEED + i), quantities, generations) for i in range(SEEDS)]
-    means = np.array(searches)  # (search, quantity, generation)
+    means, counts = np.moveaxis(np.array(searches), 2, 0)  # (search, quantity, generation) each
     starts = sorted({use.opens_at for use in config.genome.values() if use.open and use.opens_at < generations})
     rows = []
     for place, name in enumerate(quantities):
@@ -73,8 +74,10 @@ def drifted(
         if np.isfinite(mine).any(axis=0).all():
             rows += [_drift(group, name, generation, mine[:, generation]) for generation in range(generations)]
             for start, end in zip(starts, [*starts[1:], generations], strict=True):
-                late = mine[:, max(start, end - LAST) : end]
-                ends = np.nanmean(late[np.isfinite(late).any(axis=1)], axis=1)
+                late = slice(max(start, end - LAST), end)
+                known = counts[:, place, late]
+                some = known.any(axis=1)
+                ends = np.nansum(mine[some, late] * known[some], axis=1) / known[some].sum(axis=1)  # as `last_values`
                 rows.append(replace(_drift(group, name, end - 1, ends), ends=" ".join(f"{one:.6g}" for one in ends)))
     return rows
 
@@ -99,18 +102,21 @@ def _drift(group: str, quantity: str, generation: int, means: NDArray[np.float64
     return Drift(group, quantity, generation, low, median, high)
 
 
-def _means(config: RunConfig, quantities: Mapping[str, Callable[[Row], float]], generations: int) -> list[list[float]]:
-    """Of each quantity, for the first generations of one search."""
+def _means(
+    config: RunConfig, quantities: Mapping[str, Callable[[Row], float]], generations: int
+) -> list[tuple[list[float], list[int]]]:
+    """Of each quantity, for the first generations of one search: means, and of how many candidates."""
     search, chance = Search(config), np.random.default_rng(config.seed)
-    means: list[list[float]] = [[] for _ in quantities]
+    found: list[tuple[list[float], list[int]]] = [([], []) for _ in quantities]
     for generation in range(generations):
         proposals = search.propose_generation()
         rows = [_row(develop(proposal.vector, config), config.eye, generation) for proposal in proposals]
         search.tell([(proposal.id, chance.normal()) for proposal in proposals])
-        for mine, value in zip(means, quantities.values(), strict=True):
+        for (means, counts), value in zip(found, quantities.values(), strict=True):
             finite = [v for v in map(value, rows) if math.isfinite(v)]
-            mine.append(float(np.mean(finite)) if finite else NO_NUMBER)
-    return means
+            means.append(float(np.mean(finite)) if finite else NO_NUMBER)
+            counts.append(len(finite))
+    return found
 
 
 def _row(animal: Phenotype, eye: EyeConfig, generation: int) -> Row:

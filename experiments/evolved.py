@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from evolve.store.atomic_files import write_whole
-from evolve.store.directory import Run, RunError
+from evolve.store.directory import Run
 from evolve.store.versions import commits, recorded
 from experiments.candidates import Row, complete, rows_of
 from experiments.drift import Drift, drifted, of_the_end
 from experiments.means import last_mean
-from experiments.page import Page, markdown_table, parser
+from experiments.page import Page, markdown_table, parser, told
 from experiments.store import Origin, read_rows, write_rows
 
 __all__ = ["Conduct", "Quantities", "Store", "conduct_table", "main", "null_model", "null_table", "stored"]
@@ -162,13 +161,12 @@ def main(
     options.add_argument("--answer", help="what came out, in Markdown; kept until another is given or numbers change")
     chosen = options.parse_args(arguments)
     stem = chosen.docs / "data" / name
-    try:
+
+    def work() -> None:
         _collect(chosen, stem, quantities or {})
         page(stored(stem)).publish(chosen.docs)
-    except (RunError, ValueError, OSError) as error:
-        print(f"{name}: error: {error}", file=sys.stderr)
-        return 2
-    return 0
+
+    return told(name, work)
 
 
 def _beside(stem: Path, what: str) -> Path:
@@ -180,18 +178,20 @@ def _collect(chosen: Namespace, stem: Path, quantities: Quantities) -> None:
     if chosen.runs:
         runs = _named(chosen.runs)
         before = _text(stem.with_suffix(".csv"))
-        write_rows([row for group, run in runs for row in rows_of(run, group)], stem.with_suffix(".csv"))
+        rows = [row for group, run in runs for row in rows_of(run, group)]
+        conduct = [Conduct.of(run, group) for group, run in runs]
+        furthest = {one.group: max(o.generations for o in conduct if o.group == one.group) for one in conduct}
+        configs = {group: run.config for group, run in runs if quantities and furthest[group] > 0}
+        found = [row for g, config in configs.items() for row in drifted(config, g, quantities, furthest[g])]
+        here = Origin.here(sum(one.worker_hours for one in conduct), "worker")
+        # All that takes time is done: what is stored goes together, also where somebody stops it here.
+        if quantities:
+            write_rows(found, _beside(stem, "drift"))
+        write_rows(conduct, _beside(stem, "runs"))
+        replace(here, versions=recorded(runs[0][1].path) or here.versions).write(stem.with_suffix(".json"))
+        write_rows(rows, stem.with_suffix(".csv"))
         if _text(stem.with_suffix(".csv")) != before:
             answer.unlink(missing_ok=True)  # it was given to other numbers
-        conduct = [Conduct.of(run, group) for group, run in runs]
-        write_rows(conduct, _beside(stem, "runs"))
-        if quantities:
-            furthest = {one.group: max(o.generations for o in conduct if o.group == one.group) for one in conduct}
-            configs = {group: run.config for group, run in runs if furthest[group] > 0}
-            found = [row for g, config in configs.items() for row in drifted(config, g, quantities, furthest[g])]
-            write_rows(found, _beside(stem, "drift"))
-        here = Origin.here(sum(one.worker_hours for one in conduct), "worker")
-        replace(here, versions=recorded(runs[0][1].path) or here.versions).write(stem.with_suffix(".json"))
     if chosen.answer:
         write_whole(answer, f"{chosen.answer}\n".encode())
 

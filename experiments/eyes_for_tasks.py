@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ SEEDS, SEEDS_IN_DIM_LIGHT = range(6), range(3)
 # Eyes, receptors across each, and the arc over which they are spread: from a compound eye to a camera.
 SHAPES = ((10, 4, 135.0), (5, 8, 90.0), (2, 15, 45.0), (2, 15, 30.0), (1, 15, 0.0))
 COMPOUND, CAMERA = (10, 4), (2, 15)
+FEWEST_LIVES = 2  # of any eyes: of one there is no spread
 RESAMPLES = 10_000
 Floats = NDArray[np.float64]
 
@@ -60,8 +62,14 @@ class Crossing:
 
 
 def crossing(rows: Sequence[Trained], chance: np.random.Generator) -> Crossing:
-    """Of the trainings in one light."""
+    """Of the trainings in one light.
+
+    Raises:
+        ValueError: fewer than two lives of some eyes in a task.
+    """
     fitness = {task: (_of(rows, task, COMPOUND), _of(rows, task, CAMERA)) for task in TASKS}
+    if min(one.size for both in fitness.values() for one in both) < FEWEST_LIVES:
+        raise ValueError(f"a crossing takes {FEWEST_LIVES} lives of each kind of eyes in each task, or more")
     spread = {task: float(np.concatenate(both).std(ddof=1)) for task, both in fitness.items()}
     drawn = {task: _resampled(*both, chance) for task, both in fitness.items()}
     means = {task: float(camera.mean() - compound.mean()) for task, (compound, camera) in fitness.items()}
@@ -75,8 +83,9 @@ def crossing(rows: Sequence[Trained], chance: np.random.Generator) -> Crossing:
 
 
 def _of(rows: Sequence[Trained], task: str, eyes: tuple[int, int]) -> Floats:
-    """Fitness of all animals with such eyes, wherever they sit."""
-    return np.array([row.fitness for row in rows if row.task == task and (row.n_eyes, row.width) == eyes])
+    """Fitness of all animals with such eyes that did not fail, wherever the eyes sit."""
+    mine = [row for row in rows if not row.failed and row.task == task and (row.n_eyes, row.width) == eyes]
+    return np.array([row.fitness for row in mine])
 
 
 def _resampled(compound: Floats, camera: Floats, chance: np.random.Generator) -> Floats:
@@ -145,7 +154,10 @@ def _cell(rows: Sequence[Trained], task: str, sigma: float, shape: tuple[int, in
     return [
         row
         for row in rows
-        if row.task == task and row.noise_sigma == sigma and (row.n_eyes, row.width, row.placement_range_deg) == shape
+        if not row.failed
+        and row.task == task
+        and row.noise_sigma == sigma
+        and (row.n_eyes, row.width, row.placement_range_deg) == shape
     ]
 
 
@@ -154,13 +166,22 @@ def _named(n: int, w: int, arc: float) -> str:
 
 
 def _of_lights(rows: Sequence[Trained]) -> dict[float, Crossing]:
-    by_light = {sigma: [row for row in rows if row.noise_sigma == sigma] for sigma in _lights(rows)}
-    return {sigma: crossing(mine, np.random.default_rng(0)) for sigma, mine in by_light.items()}
+    """Of those lights in which enough lives have been lived."""
+    found = {}
+    for sigma in _lights(rows):
+        with suppress(ValueError):
+            found[sigma] = crossing([row for row in rows if row.noise_sigma == sigma], np.random.default_rng(0))
+    return found
 
 
 def _crossings(rows: Sequence[Trained]) -> str:
     lines = []
-    for sigma, found in _of_lights(rows).items():
+    crossings = _of_lights(rows)
+    for sigma in _lights(rows):
+        found = crossings.get(sigma)
+        if found is None:
+            lines.append([f"σ = {sigma:g}", *(["-"] * (len(TASKS) + 2))])
+            continue
         differences = [str(found.differences[task]) for task in TASKS]
         lines.append([f"σ = {sigma:g}", *differences, str(found.interaction), f"{found.p:.2g}"])
     header = ["light", *(f"{task}: two of 15 less ten of 4" for task in TASKS), "interaction", "p"]
@@ -173,7 +194,14 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
     for place, task in zip(axes[0], TASKS, strict=False):
         for x, shape in enumerate(SHAPES):
             found = [row.fitness for row in _cell(rows, task, BRIGHT, shape)]
-            place.bar(x, np.mean(found), color=COLORS[task], alpha=0.35, width=0.7, label="mean" if x == 0 else None)
+            place.bar(
+                x,
+                np.mean(found) if found else 0.0,
+                color=COLORS[task],
+                alpha=0.35,
+                width=0.7,
+                label="mean" if x == 0 else None,
+            )
             place.plot([x] * len(found), found, "o", color=COLORS[task], ms=4, label="one life" if x == 0 else None)
         place.set_xticks(range(len(SHAPES)), [_named(*shape).replace(" over ", "\n") for shape in SHAPES], fontsize=8)
         place.set(title=f"{task}: {_best(rows, task)} fare best", ylabel="fitness")
@@ -181,10 +209,11 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
         _draw_heads(place)
         place.legend(fontsize=8, frameon=False)
     for task in TASKS:
-        ahead = [found.differences[task] for found in _of_lights(rows).values()]
+        crossings = _of_lights(rows)
+        ahead = [found.differences[task] for found in crossings.values()]
         y = [one.mean for one in ahead]
         error = [[one.mean - one.low for one in ahead], [one.high - one.mean for one in ahead]]
-        axes[0, 2].errorbar(_lights(rows), y, error, color=COLORS[task], marker="o", capsize=3, label=task)
+        axes[0, 2].errorbar(list(crossings), y, error, color=COLORS[task], marker="o", capsize=3, label=task)
     axes[0, 2].axhline(0, color="#777777", lw=0.6)
     axes[0, 2].set(xscale="log", xlabel="noise σ of a receptor (less light: →)", ylabel="two of 15 less ten of 4")
     axes[0, 2].set_title("who is ahead, as light fades")
@@ -193,7 +222,10 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
 
 
 def _best(rows: Sequence[Trained], task: str) -> str:
-    return _named(*max(SHAPES, key=lambda shape: float(np.mean([r.fitness for r in _cell(rows, task, BRIGHT, shape)]))))
+    """Of the eyes that have lived in bright light."""
+    lived = {shape: [row.fitness for row in _cell(rows, task, BRIGHT, shape)] for shape in SHAPES}
+    means = {shape: float(np.mean(found)) for shape, found in lived.items() if found}
+    return _named(*max(means, key=lambda shape: means[shape])) if means else "none"
 
 
 def _draw_heads(place: Any) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import optics
 from evolve.config.run_config import EyeConfig
+from evolve.genome.anatomy import retina_width
 from evolve.genome.phenotype import Phenotype
 from evolve.report.eye_figures import relief_heights
 
@@ -29,7 +30,8 @@ def power(animal: Phenotype, config: EyeConfig) -> float:
     heights = np.array(animal.relief)
     fall = float(_fall(math.isqrt(heights.size)) @ (heights - heights[0]))  # exactly 0 where it is flat
     way = (animal.refractive_index - 1) * config.relief_height * fall + 0.0  # no -0
-    return 4 * way / (animal.relative_aperture**2 * config.sensor_width * math.tan(math.radians(animal.fov_deg) / 2))
+    width = retina_width(animal.resolution[1], config)
+    return 4 * way / (animal.relative_aperture**2 * width * math.tan(math.radians(animal.fov_deg) / 2))
 
 
 def relief_of(heights: NDArray[np.float64]) -> optics.BSplineRelief | NDArray[np.float64]:

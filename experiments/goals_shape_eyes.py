@@ -70,10 +70,12 @@ def page(store: Store) -> Page:
 
 def contrast(store: Store, less: str, more: str) -> str:
     """TOGETHER in one group less that in the other, and as much under the null model, in words; seeds are drawn from
-    the null model's searches as often as there were runs of each group. "-" where it was not computed."""
+    the null model's searches as often as there were runs of each group, and p is no less than that of one run alone
+    can be. "-" where that was not computed, or runs of a group ended in different generations."""
     found = {group: list(last_values(store.group(group), QUANTITIES[TOGETHER])) for group in (less, more)}
     null = {group: null_model(store, group, TOGETHER, store.group(group)) for group in (less, more)}
-    if not all(found.values()) or not all(null.values()):
+    together = all(len(ends) == 1 for ends in (_ends(store, group) for group in found))
+    if not all(found.values()) or not all(null.values()) or not together:
         return "-"
     value = {group: float(np.mean([seed.mean() for seed in found[group]])) for group in found}
     chance = np.random.default_rng(0)
@@ -85,7 +87,16 @@ def contrast(store: Store, less: str, more: str) -> str:
     apart, by_luck = value[more] - value[less], drawn[more] - drawn[less]
     low, high = np.quantile(by_luck, [0.025, 0.975])
     p = (1 + int((np.abs(by_luck - by_luck.mean()) >= abs(apart - by_luck.mean())).sum())) / (1 + by_luck.size)
+    p = max(p, 2 / (1 + min(len(one.ends.split()) for one in null.values() if one is not None)))
     return f"{apart:.2f} (null model: {np.median(by_luck):.2f} [{low:.2f}, {high:.2f}]; p = {p:.2g})"
+
+
+def _ends(store: Store, group: str) -> set[int]:
+    """Generations in which a group's runs ended."""
+    last: dict[int, int] = {}
+    for row in store.group(group):
+        last[row.seed] = max(row.generation, last.get(row.seed, 0))
+    return set(last.values())
 
 
 def _legend(store: Store) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import statistics
 import sys
+from argparse import Namespace
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
@@ -25,7 +26,7 @@ from experiments.lens_optimizers import (
     best_lens,
     searched,
 )
-from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
+from experiments.page import Figure, Page, markdown_table, new_figure, parser, save, told
 from experiments.store import Origin, read_rows, write_rows
 
 __all__ = ["found_after", "page"]
@@ -129,7 +130,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser(__doc__ or "")
     options.add_argument("--run", type=int, nargs="+", metavar="SEED", help="search anew from these seeds")
     options.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS), help="by these (default: all)")
-    chosen = options.parse_args(arguments)
+    return told("lens_search", lambda: _made(options.parse_args(arguments)))
+
+
+def _made(chosen: Namespace) -> None:
     data, origin = (chosen.docs / "data" / f"lens_search.{kind}" for kind in ("csv", "json"))
     if chosen.run:
         import drjit as dr
@@ -145,8 +149,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         write_rows([*rows, *bounds], data)
         ends = {(row.method, row.seed): row.cpu_seconds for row in rows}
         Origin.here(sum(ends.values()) / 3600).write(origin)
-    page(read_rows(Row, data), Origin.read(origin)).publish(chosen.docs)
-    return 0
+    rows = read_rows(Row, data)
+    if not rows:
+        raise ValueError(f"{data} holds no searches; search with --run SEED ...")
+    page(rows, Origin.read(origin)).publish(chosen.docs)
 
 
 if __name__ == "__main__":

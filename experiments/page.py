@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 from typing import Any
 
+from evolve.search.job import ExecutorError
 from evolve.store.atomic_files import write_whole
+from evolve.store.directory import RunError
 from experiments.store import Origin
 
-__all__ = ["Figure", "Page", "markdown_table", "new_figure", "parser", "save"]
+__all__ = ["Figure", "Page", "markdown_table", "new_figure", "parser", "save", "told"]
 
 DPI = 130
 TEMPLATES = Path(__file__).parent / "pages"
@@ -76,6 +79,16 @@ def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table; the first column is flush left, the others right."""
     lines = [header, ["---", *("---:" for _ in header[1:])], *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def told(name: str, work: Callable[[], None]) -> int:
+    """0 once the work is done; 2, and one line, where it cannot be."""
+    try:
+        work()
+    except (RunError, ExecutorError, ValueError, OSError) as error:
+        print(f"{name}: error: {error}", file=sys.stderr)
+        return 2
+    return 0
 
 
 def new_figure(width: float, height: float, columns: int = 1, rows: int = 1, **options: Any) -> tuple[Any, Any]:

@@ -17,7 +17,8 @@ import numpy as np
 
 import sim
 from evolve.store.directory import Run
-from experiments.page import new_figure, save
+from experiments.page import new_figure, save, told
+from optics.numerics.arguments import one_of
 from sim.envs.retina_images import side_by_side
 from sim.worlds.state import WorldState
 from sim.worlds.world import World
@@ -98,14 +99,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     options.add_argument("--runs", nargs="+", default=[], metavar="TASK=DIR", help="draw the fittest of these runs")
     options.add_argument("--out", type=Path, default=Path("docs/images/portraits.png"), help="file to draw into")
-    chosen = options.parse_args(arguments)
+    return told("portraits", lambda: _drawn(options.parse_args(arguments)))
+
+
+def _drawn(chosen: argparse.Namespace) -> None:
     animals = designed()
     for task, _, path in (text.partition("=") for text in chosen.runs):
+        one_of("--runs: task", task, COLORS)
         run = Run.open(Path(path))
         animals[task] = replace(run.candidate().phenotype.eyes(run.config.eye), noise_sigma=0.0)
     draw(animals, chosen.out, "evolved" if chosen.runs else "designed by hand, and trained")
     print(f"picture: {chosen.out}")
-    return 0
 
 
 if __name__ == "__main__":

@@ -79,12 +79,14 @@ def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
     """A life of four rollouts: from one to the next, with an evaluation between the second and the third."""
     rollout = config.learning.n_envs * config.learning.n_steps
     short = replace(config.learning, total_steps=ROLLOUTS * rollout, eval_interval=ROLLOUTS // 2 * rollout)
+    # Stages of the budget would be shorter than a rollout.
+    once = replace(config, learning=short, search=replace(config.search, rungs=1))
     marks: list[float] = []
     with TemporaryDirectory() as folder:
         policy = Path(folder) / "policy"
         began = time.perf_counter()
         evaluate_candidate(
-            *(animal, replace(config, learning=short), seed, policy),
+            *(animal, once, seed, policy),
             progress=lambda steps, planned: marks.append(time.perf_counter()),
         )
         size = policy.stat().st_size

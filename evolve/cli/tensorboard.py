@@ -19,7 +19,7 @@ from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.regular_files import folder
 
-__all__ = ["TensorBoardWriter"]
+__all__ = ["TensorBoardWriter", "require_tensorboard"]
 
 FOLDER = "tensorboard"
 
@@ -81,6 +81,11 @@ class TensorBoardWriter:
         summary = Summary(value=[Summary.Value(tag=tag, simple_value=value) for tag, value in values.items()])
         self._writers[name].add_event(Event(wall_time=time.time(), step=step, summary=summary))
         self._writers[name].flush()
+
+
+def require_tensorboard() -> None:
+    """Raises ExecutorError where there is no TensorBoard."""
+    _writer_class()
 
 
 def _writer_class() -> Any:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from evolve.config.own_task import is_own
-from evolve.config.run_config import RunConfig
+from evolve.config.run_config import EyeConfig, RunConfig, SearchConfig
 from evolve.genome.genes import INHERITED, LAMBDA_MAX
 
-__all__ = ["coarse_bands", "idle_genes", "idle_starts", "lint"]
+__all__ = ["coarse_bands", "idle_genes", "idle_settings", "idle_starts", "lint"]
 
 GREY_TASKS = ("navigation", "maze", "detection", "tracking")
 PEAKS = 17  # of an open gene's range, at which its pigment is tried
@@ -18,7 +18,7 @@ LEAST_ERROR = 1e-3  # of white's signal: what the 64 bands that others are held 
 
 def lint(config: RunConfig) -> list[str]:
     """Lint messages, one line each."""
-    return [*idle_genes(config), *idle_starts(config), *coarse_bands(config)]
+    return [*idle_genes(config), *idle_starts(config), *idle_settings(config), *coarse_bands(config)]
 
 
 def coarse_bands(config: RunConfig) -> list[str]:
@@ -89,6 +89,25 @@ def idle_genes(config: RunConfig) -> list[str]:
     most = int(types.high if types.open else types.start)
     for name in [name for name in list(LAMBDA_MAX)[most:] if uses[name].open]:
         notes.append(f"genome.{name} is open but has no effect: genome.receptor_types is at most {most}")
+    return notes
+
+
+def idle_settings(config: RunConfig) -> list[str]:
+    """Settings that were set although nothing reads them, one line each."""
+    notes, search, eye = [], config.search, config.eye
+    for name, gene in config.genes.items():
+        use, alike = config.genome[name], [other for other in config.genes.values() if other.cluster == gene.cluster]
+        together = {config.genome[other.name].opens_at for other in alike} == {
+            use.opens_at
+        }  # said of the whole cluster
+        if use.opens_at and not use.open and not gene.default.open and not together:
+            notes.append(f"genome.{name}.opens_at has no effect: the gene is held; set genome.{name}.open = true")
+    if search.rungs == 1 and search.promoted != SearchConfig.promoted:
+        notes.append("search.promoted has no effect: search.rungs = 1")
+    if not eye.optics:
+        reliefs = ("relief_height", "relief_points", "relief_symmetric")
+        given = [name for name in reliefs if getattr(eye, name) != getattr(EyeConfig, name)]
+        notes += [f"eye.{name} has no effect: eye.optics = false" for name in given]
     return notes
 
 

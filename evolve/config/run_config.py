@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
-from evolve.config.checks import ConfigError
+from evolve.config.checks import ConfigError, check_value
 from evolve.config.own_task import OwnTask, is_own
 from evolve.config.settings import (
     SECTIONS,
@@ -69,6 +69,11 @@ class RunConfig:
     own: OwnTask | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
+        for name in ("seed", "workers"):
+            check_value(RunConfig, name, getattr(self, name), name)
+        for section, cls in SECTIONS.items():
+            for one in fields(cls):
+                check_value(cls, one.name, getattr(getattr(self, section), one.name), f"{section}.{one.name}")
         self._check_task()
         if self.eye.receptors not in (known := (*RECEPTORS, INHERITED)):
             raise ConfigError(

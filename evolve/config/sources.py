@@ -120,8 +120,13 @@ def read_assignment(text: str) -> Source:
     if not equals or not all(parts) or not value:
         raise ConfigError(f"--set {text!r}: must look like section.key=value")
     try:
-        leaf: Any = tomllib.loads(f"value = {value}")["value"]
+        found: Tree = tomllib.loads(f"value = {value}")
     except tomllib.TOMLDecodeError:
-        leaf = value
+        found = {"value": value}
+    except (ValueError, RecursionError) as error:  # a number of 6,000 digits, brackets within brackets
+        raise ConfigError(f"--set {key}: {_first_line(error)}") from error
+    if found.keys() != {"value"}:
+        raise ConfigError(f"--set {text!r}: must be one setting")
+    leaf: Any = found["value"]
     tree: Tree = reduce(lambda inner, part: {part: inner}, reversed(parts), leaf)
     return Source(f"--set {text.strip()}", tree)

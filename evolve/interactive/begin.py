@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from evolve.cli.start_from import starts_from
 from evolve.config.assemble import assemble
 from evolve.interactive.carry_on import Callback, carry_on
@@ -67,5 +69,5 @@ def run(
 
 
 def _toml(value: Any) -> str:
-    """A setting as `--set` takes it: JSON writes numbers, texts, true and false as TOML does."""
-    return json.dumps(value)
+    """A setting as `--set` takes it: JSON writes numbers, texts, true and false as TOML does; NumPy's are those."""
+    return json.dumps(value.item() if isinstance(value, np.generic) else value)

@@ -59,6 +59,8 @@ class LocalExecutor:
     _workers: list[_Worker] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        if self.count < 0:
+            raise ValueError(f"count = {self.count}: must be 0, one per core, or more")
         self.count = self.count or cores()
 
     def __enter__(self) -> LocalExecutor:
@@ -132,7 +134,7 @@ class LocalExecutor:
             worker = by_connection[ready]  # type: ignore[index]
             try:
                 yield worker, worker.connection.recv()
-            except (EOFError, ConnectionResetError):
+            except (EOFError, OSError):  # a pipe that closed, be it within a message
                 yield worker, Message("died")
 
     def _bury(self, worker: _Worker) -> str:

@@ -2,11 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from evolve.config.assemble import assemble
+from evolve.genome.phenotype import develop
+from evolve.search.search import Search
 from experiments.candidates import Row
-from experiments.drift import Drift, drifted, of_the_end
+from experiments.drift import FIRST_SEED, Drift, _row, drifted, of_the_end
 from experiments.evolved import Conduct, Store, null_table
 from experiments.store import Origin
 
@@ -79,3 +82,25 @@ def test_runs_are_compared_where_the_null_model_was_computed():
     assert table[2:] == ["| a, seed 0 | 0.5 |", "| a, seed 1 | - |", "| a, 2 seeds together | - |"]
     both = replace(store, rows=[replace(row, seed=seed) for row in rows if row.seed == 0 for seed in (0, 1)])
     assert null_table(both, {"fov": lambda row: row.fov_deg}).splitlines()[-1] == "| a, 2 seeds together | 0.5 |"
+
+
+def test_ties_are_ties_although_ends_have_six_digits():
+    end = Drift("a", "eyes", 5, 1.0, 1.0, 1.1, " ".join(["1.02083"] * 10 + ["1"] * 90))
+    assert end.p(49 / 48) == pytest.approx(2 * 11 / 101)
+    third = Drift("a", "eyes", 5, 0.3, 0.3, 0.3, " ".join(["0.333333"] * 100))
+    assert third.p(1 / 3) == 1.0
+
+
+def test_ends_are_means_over_candidates_as_those_of_runs_are():
+    """A quantity that few candidates have: generations count by how many have it, as in `last_values`."""
+    config = assemble("detection", "bifurcation-detection", assignments=("search.generations=3",))
+    some = {"several": lambda row: row.placement_range_deg if row.n_eyes > 1 else float("nan")}
+    [end] = [one for one in drifted(config, "detection", some, 3) if one.ends]
+    search, values = Search(replace(config, seed=FIRST_SEED)), []
+    chance = np.random.default_rng(FIRST_SEED)
+    for generation in range(3):
+        proposals = search.propose_generation()
+        rows = [_row(develop(one.vector, config), config.eye, generation) for one in proposals]
+        values += [v for v in map(some["several"], rows) if np.isfinite(v)]
+        search.tell([(one.id, chance.normal()) for one in proposals])
+    assert float(end.ends.split()[0]) == pytest.approx(np.mean(values), rel=1e-5)

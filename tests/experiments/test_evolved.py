@@ -143,6 +143,9 @@ def test_in_a_maze_what_is_missing_of_a_full_return_is_the_error():
 def test_unfinished_generations_do_not_count(tmp_path):
     rows = rows_of(run_of(tmp_path / "run", "bifurcation-detection", SMALL, (1.0, 2.0, 30.0)), "detection")
     assert [row.generation for row in rows] == [0, 0]
+    stages = (*SMALL, "search.rungs=2")
+    rows = rows_of(run_of(tmp_path / "stages", "bifurcation-detection", stages, (1.0, 2.0)), "detection")
+    assert not rows, "half of the training is not all of it"
     steady = (*SMALL, "search.steady_state=true")
     rows = rows_of(run_of(tmp_path / "steady", "bifurcation-detection", steady, (1.0, 2.0, 30.0)), "detection")
     assert len(rows) == 3, "one by one, candidates are of no generation"

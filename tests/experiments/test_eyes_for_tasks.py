@@ -119,3 +119,21 @@ def test_the_published_page_says_what_its_store_says():
     answer = data.with_suffix(".txt").read_text(encoding="utf-8").strip()
     made = page(read_rows(Trained, data), Origin.read(data.with_suffix(".json")), answer)
     assert made.markdown == (results / "eyes_for_tasks.md").read_text(encoding="utf-8")
+
+
+def test_lives_that_failed_count_for_nothing():
+    """A training that diverged has no fitness: p is that of the others."""
+    found = rows(0.0, spread=1.0)
+    one = next(i for i, row in enumerate(found) if (row.task, row.n_eyes, row.width) == ("detection", 2, 15))
+    without = crossing([*found[:one], *found[one + 1 :]], np.random.default_rng(0))
+    found[one] = replace(found[one], failed=1, fitness=-np.inf)
+    assert crossing(found, np.random.default_rng(0)) == without
+    assert without.p > 0.01
+
+
+def test_without_two_lives_of_each_there_is_no_crossing():
+    few = [row for row in rows(2.0, spread=0.3) if row.seed == 0 or row.width != 15]
+    few = [row for row in few if not (row.width == 15 and row.task == "detection")]
+    with pytest.raises(ValueError, match="a crossing takes 2 lives of each kind of eyes in each task"):
+        crossing(few, np.random.default_rng(0))
+    assert "| σ = 0.01 | - | - | - | - |" in eyes_for_tasks._crossings(few)

@@ -63,3 +63,10 @@ def test_finer_reliefs_and_no_glass():
     heights = 0.5 - np.add.outer(at**2, at**2) / (2 * 0.6 * distance * EYE.relief_height)
     assert power(replace(ANIMAL, relief=tuple(heights.ravel())), EYE) == pytest.approx(1.0, rel=0.01)
     assert math.isnan(power(replace(ANIMAL, relief=None, relative_aperture=None, refractive_index=None), EYE))
+
+
+def test_retinas_as_wide_as_their_receptors_have_the_same_power():
+    """15 receptors of 4 µm are 60 µm of retina, however that was said."""
+    lens = replace(ANIMAL, relief=paraboloid(1.0, 0.5 * 0.4 * EYE.sensor_width))
+    pitched, wide = replace(EYE, receptor_pitch=4e-6), replace(EYE, sensor_width=60e-6)
+    assert power(lens, pitched) == pytest.approx(power(lens, wide)) != pytest.approx(power(lens, EYE))

@@ -42,8 +42,9 @@ class Products:
 
 
 def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
-    """The best animal's episode as report and EXR files, and, if asked for, as a page that plays it; a bar meanwhile,
-    if `shown`."""
+    """The best animal's episode as EXR files and report, and, if asked for, as a page that plays it; a bar meanwhile,
+    if `shown`. The report comes last: where it is, all is there."""
+    (run.path / REPORT).unlink(missing_ok=True)
     with Waiting(3 + replay, shown) as wait:
         wait.step("the best agent plays an episode")
         from evolve.analysis import episode
@@ -55,10 +56,10 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
         if replay:
             wait.step("writing the replay")
             played = write_page(run, best)
-        wait.step("writing the report")
-        page = write(run, best, doing=wait.within)
         wait.step("writing EXR files")
-        return Products(page, exr_export.export_episode(best, run.path / "exr", wait.within), played)
+        frames = exr_export.export_episode(best, run.path / "exr", wait.within)
+        wait.step("writing the report")
+        return Products(write(run, best, doing=wait.within), frames, played)
 
 
 def replay(arguments: Namespace) -> int:

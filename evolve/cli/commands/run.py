@@ -14,7 +14,7 @@ from evolve.cli.commands.products import REPORT, Products, finished_products, op
 from evolve.cli.progress import Bar, Events, Lines, Silent, Watchers, watcher
 from evolve.cli.run_plan import RunPlan, steps_each
 from evolve.cli.start_from import starts_from
-from evolve.cli.tensorboard import TensorBoardWriter
+from evolve.cli.tensorboard import TensorBoardWriter, require_tensorboard
 from evolve.config.assemble import assemble
 from evolve.config.lint import lint
 from evolve.config.run_config import ConfigError, RunConfig
@@ -37,6 +37,8 @@ __all__ = ["resume", "start"]
 def start(arguments: Namespace) -> int:
     """Begin a run and carry it to its end."""
     scheduler = _scheduler(arguments)
+    if arguments.tensorboard:
+        require_tensorboard()
     flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
     starts = starts_from(arguments.start_from) if arguments.start_from else None
     config = assemble(
@@ -64,6 +66,8 @@ def start(arguments: Namespace) -> int:
 def resume(arguments: Namespace) -> int:
     """Carry an interrupted run to its end."""
     scheduler = _scheduler(arguments)
+    if arguments.tensorboard:
+        require_tensorboard()
     run = Run.open(arguments.directory, arguments.task)
     device.make_ready()
     with run.lock():
@@ -159,6 +163,8 @@ def _scheduler(arguments: Namespace) -> Scheduler | None:
         raise ConfigError("--executor dask needs --scheduler ADDRESS, and no other executor takes one")
     if not wanted:
         return None
+    if getattr(arguments, "workers", None) is not None:
+        raise ConfigError("--workers: is for this machine's processes; of Dask's workers all take part that are there")
     scheduler = Scheduler(arguments.scheduler, *files)
     if not getattr(arguments, "dry_run", False):
         scheduler.require_answer()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import statistics
 import sys
 import time
@@ -43,7 +44,8 @@ def status(arguments: Namespace) -> int:
 
 def listing(arguments: Namespace) -> int:
     """Print the runs in a directory, one line each, the latest last; what cannot be read says why."""
-    folders = [path for path in arguments.directory.iterdir() if (path / "config.toml").exists()]
+    # Of a folder that cannot be read pathlib raises; it holds no run of ours.
+    folders = [path for path in arguments.directory.iterdir() if os.path.exists(path / "config.toml")]
     found = [_standing_or_reason(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime)]
     if arguments.json:
         print(json.dumps(found, indent=1, allow_nan=False, default=vars))

@@ -149,6 +149,13 @@ def test_deleted_policy_is_named_and_nothing_is_lost(call, finished, tmp_path, c
     assert call("status", run)[0] == 0
 
 
+def test_workers_are_not_dasks(call, tmp_path):
+    cluster = ("--executor", "dask", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2")
+    code, _, err = call("run", "detection", "--out", tmp_path / "run", *cluster)
+    assert code == 2
+    assert "--workers: is for this machine's processes" in err
+
+
 @pytest.mark.parametrize(
     "flags",
     [("--executor", "dask"), ("--scheduler", "tcp://127.0.0.1:1"), ("--executor", "dask", "--scheduler", "no:1")],

@@ -28,7 +28,9 @@ def test_pace_is_measured_with_the_real_thing(tmp_path, short_episodes):
     backend.require()
     config = small_config()
     animal = develop(Genotype(config.genome).start, config)
-    pace = measure_pace(config, {"start": animal}, 1)["start"]
+    learning = replace(config.learning, total_steps=64 * config.learning.n_envs * config.learning.n_steps)
+    stages = replace(config, learning=learning, search=replace(config.search, rungs=4))  # more than four rollouts have
+    pace = measure_pace(stages, {"start": animal}, 1)["start"]
     assert evaluate(animal, config, 0, tmp_path / "policy").failure is None
     assert pace.policy_bytes == (tmp_path / "policy").stat().st_size
     assert pace.steps_per_s > 0

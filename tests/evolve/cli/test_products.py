@@ -8,6 +8,7 @@ import pytest
 
 from evolve.cli import waiting
 from evolve.cli.commands import products
+from evolve.store.directory import Run
 
 
 @pytest.fixture
@@ -80,3 +81,17 @@ def test_a_wait_shows_what_is_done_on_a_terminal_alone():
     assert "its second half" in seen.getvalue()
     assert "\x1b]0;" not in seen.getvalue()
     assert unseen.getvalue() == quiet.getvalue() == ""
+
+
+def test_who_is_stopped_among_the_exr_files_has_no_report_yet(finished, monkeypatch):
+    """So that `resume` knows that something is missing."""
+
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("evolve.analysis.episode.record", lambda run: None)
+    monkeypatch.setattr("evolve.report.exr_export.export_episode", stopped)
+    (finished / "report.html").write_text("of an hour ago")
+    with pytest.raises(KeyboardInterrupt):
+        products.finished_products(Run.open(finished), shown=False)
+    assert not (finished / "report.html").exists()

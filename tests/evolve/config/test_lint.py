@@ -1,7 +1,7 @@
 """Odd settings are named: genes and starts that change nothing, and bands too few for the colours of a world."""
 
 from evolve.config.assemble import assemble
-from evolve.config.lint import idle_genes, idle_starts, lint
+from evolve.config.lint import idle_genes, idle_settings, idle_starts, lint
 
 
 def test_genes_that_cannot_change_anything_are_named():
@@ -56,3 +56,18 @@ def test_bands_too_few_for_the_colours_of_a_world_are_named():
         in notes("foraging", "eye.receptors=honeybee", "eye.bands=40", "eye.noise_sigma=0")[0]
     )
     assert notes("detection", "eye.bands=1") == [], "a grey world has no colours to misjudge"
+
+
+def test_settings_that_nothing_reads_are_named():
+    def notes(*settings):
+        return idle_settings(assemble("detection", assignments=settings))
+
+    assert notes() == notes("eye.optics=false") == notes("genome.optical.opens_at=3") == []
+    held = "genome.layers.opens_at=2"
+    assert notes(held) == ["genome.layers.opens_at has no effect: the gene is held; set genome.layers.open = true"]
+    assert notes(held, "genome.layers.open=true") == []
+    assert notes("search.promoted=0.3") == ["search.promoted has no effect: search.rungs = 1"]
+    assert notes("search.promoted=0.3", "search.rungs=2") == []
+    assert notes("eye.optics=false", "eye.relief_height=2e-6") == [
+        "eye.relief_height has no effect: eye.optics = false"
+    ]

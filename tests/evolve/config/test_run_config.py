@@ -3,7 +3,7 @@
 import pytest
 
 from evolve.config.assemble import assemble
-from evolve.config.run_config import ConfigError, WorldConfig
+from evolve.config.run_config import ConfigError, RunConfig, SearchConfig, WorldConfig
 from evolve.genome.genotype import group_members
 
 
@@ -63,3 +63,18 @@ def test_photons_are_counted_in_some_light():
         assemble("detection", assignments=["eye.illuminance=1e-3"])
     with pytest.raises(ConfigError, match=r"eye\.integration_time = 0\.1: counts photons, and there are none"):
         assemble("detection", assignments=["eye.integration_time=0.1"])
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"seed": -1}, "seed = -1: must be in"),
+        ({"seed": 1.5}, "seed = 1.5: must be"),
+        ({"workers": -4}, "workers = -4: must be in"),
+        ({"search": SearchConfig(population=0)}, "search.population = 0: must be in"),
+        ({"search": SearchConfig(sigma=-1.0)}, "search.sigma = -1"),
+    ],
+)
+def test_values_from_python_are_checked_as_those_of_files_are(settings, words):
+    with pytest.raises(ConfigError, match=words):
+        RunConfig("detection", **settings)

@@ -55,3 +55,17 @@ def test_assignments_are_toml_or_bare_words(text, tree):
     source = read_assignment(text)
     assert source.tree == tree
     assert source.name == f"--set {text.strip()}"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("seed=" + "1" * 5000, "--set seed: "),
+        ("seed=" + "[" * 3000, "--set seed: "),
+        ("search.population=8\nsearch.generations=3", "must be one setting"),
+    ],
+)
+def test_assignments_that_are_none_are_refused_in_one_line(text, words):
+    with pytest.raises(ConfigError, match=words) as caught:
+        read_assignment(text)
+    assert "\n" not in str(caught.value)
