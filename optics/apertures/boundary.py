@@ -16,6 +16,7 @@ __all__ = ["Boundary", "boundary"]
 SHORTEST = 1e-9  # choice, radii: pieces that are shorter are left out
 ASIDE = 1e-7  # choice, radii: where it is looked which side is open
 PARALLEL = 1e-12
+TOUCHING = 1e-9  # choice, squared shares: a tangent is a cut, too
 
 Contains = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -91,7 +92,8 @@ def _cut_segments(pieces: Outline) -> np.ndarray:
             offset = start - (cx, cy)
             middle = -(offset @ along) / size**2
             rest = (radius**2 - np.sum((offset + middle * along) ** 2)) / size**2
-            places.append(middle + np.sqrt(rest) * np.array([-1, 1]) if rest > 0 else np.zeros(0))
+            met = middle + np.sqrt(max(rest, 0.0)) * np.array([-1, 1])
+            places.append(met if rest > -TOUCHING else np.zeros(0))
         at = _between(np.concatenate(places), 0.0, 1.0, SHORTEST / size)
         found += [(start + first * along, start + last * along) for first, last in itertools.pairwise(at)]
     return np.array(found, dtype=np.float64).reshape(-1, 2, 2)
@@ -119,15 +121,15 @@ def _cut_arcs(pieces: Outline) -> np.ndarray:
             size = float(along @ along)
             middle = -(offset @ along) / size
             rest = (radius**2 - np.sum((offset + middle * along) ** 2)) / size
-            if rest > 0:
-                points = offset + (middle + np.sqrt(rest) * np.array([[-1], [1]])) * along
+            if rest > -TOUCHING:
+                points = offset + (middle + np.sqrt(max(rest, 0.0)) * np.array([[-1], [1]])) * along
                 angles.append(np.arctan2(points[:, 1], points[:, 0]))
         for other_x, other_y, other, *ends in pieces.arcs:
             apart, towards = np.hypot(other_x - cx, other_y - cy), np.arctan2(other_y - cy, other_x - cx)
             if apart > PARALLEL:
                 cosine = (radius**2 + apart**2 - other**2) / (2 * radius * apart)
-                turns = np.array([-1, 1]) * np.arccos(cosine) if abs(cosine) < 1 else np.zeros(0)
-                angles.append(towards + turns)
+                turns = np.array([-1, 1]) * np.arccos(np.clip(cosine, -1, 1))
+                angles.append(towards + turns if abs(cosine) < 1 + TOUCHING else np.zeros(0))
             elif abs(other - radius) < ASIDE:
                 angles.append(np.array(ends))
         at = begin + (np.concatenate(angles) - begin) % TURN

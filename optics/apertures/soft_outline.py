@@ -23,6 +23,7 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["SoftOutline"]
 
+EMPTY = 1e-9  # [rad]: an arc that is none
 MOST_OF_A_TURN = pi / 2  # choice: of an arc that is looked at as one
 
 
@@ -121,7 +122,8 @@ class _Arc:
         (sin_a, cos_a), (sin_b, cos_b) = dr.sincos(first), dr.sincos(last)
         ax, ay, bx, by = radius * cos_a - x, radius * sin_a - y, radius * cos_b - x, radius * sin_b - y
         cross, dot = ax * by - ay * bx, ax * bx + ay * by
-        between = (cross < 0) & (x * x + y * y < radius * radius)
+        # Of an arc that is empty, cross is rounding: no turn is missing there.
+        between = (cross < 0) & (x * x + y * y < radius * radius) & (last - first > EMPTY)
         return dr.atan2(cross, dot + TINY) + dr.select(between, 2 * pi, 0)
 
     def _integral(self, x: Array, y: Array, radius: Array, first: Array, last: Array, zero: Array) -> Array:

@@ -17,6 +17,7 @@ __all__ = ["strips"]
 
 EDGE_DEGREE = 4  # choice: more than the digits asked for: of the polynomials that a curved edge is to these digits
 ROUNDING = 1e-12
+TANGENT = 1e-7  # choice: within which places agree where shapes touch
 STEEPNESS = 3.0  # choice: of panels' lengths beside a square root
 
 Box = tuple[float, float, float, float]
@@ -39,6 +40,8 @@ def strips(
         turns = cycles * float(np.hypot(slide, high - low))
         y, weight = _panel(low, high, outline.tangent, turns, digits, 2 * degree + EDGE_DEGREE + ceil(digits))
         sides = np.clip(outline.crossings(y), left, right)
+        if sides.shape[1] % 2 and high - low < TANGENT:
+            continue  # where shapes touch, heights agree no better, and nothing is between
         for start, end in zip(sides.T[::2], sides.T[1::2], strict=True):
             if not (end > start).any():
                 continue

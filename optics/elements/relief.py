@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from optics.elements.square_samples import on_both_sides, square_samples
+from optics.numerics.arguments import reals
 from optics.numerics.autodiff import Array, is_differentiable, plain
 from optics.numerics.interpolation import cubic_bsplines
 from optics.numerics.matrices import matmul
@@ -82,7 +83,8 @@ class BSplineRelief(Relief):
     control_points: np.ndarray | Array
 
     def __post_init__(self) -> None:
-        points = np.array(plain(self.control_points))
+        given = self.control_points
+        points = np.array(plain(given) if is_differentiable(given) else reals("control_points", given))
         if is_differentiable(self.control_points) and points.size == 16:
             points = points.reshape(4, 4)
         if points.shape != (4, 4) or not np.isfinite(points).all():

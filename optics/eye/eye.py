@@ -267,7 +267,8 @@ class Eye:
             outside.
         rng: None for signals without noise. Noise carries no derivative.
         z: distance of the scene along the axis [m], a number or one per cell (Y, X).
-        sight: the kernels, as `Eye.sight` makes them for these samples_per_receptor; None makes them.
+        sight: the kernels, as `Eye.sight` makes them for these samples_per_receptor; None makes them. What is nearer
+            or farther than they were made for is seen as their nearest or farthest.
         polarization: of an eye with microvilli, (degree, angle_deg) of the light: its degree of linear polarisation in
             [0, 1], and the angle of its field, from right upwards. Each is a number, (band,), (Y, X) or (band, Y, X).
             None: unpolarised, or circularly polarised, which is the same to microvilli.

@@ -45,8 +45,12 @@ class KernelBank:
         """Share of every node in each cell of a scene, (Y, X) per node; distances z [m], a number or (Y, X).
 
         Raises:
-            ValueError: z of another shape.
+            ValueError: z of another shape, or no distance.
         """
+        if is_differentiable(z):
+            positive("z", z, infinite=True, carried=True)
+        else:
+            _distances(z)
         if not is_differentiable(z) and np.ndim(z) and np.shape(z) != shape:
             raise ValueError(f"z has shape {np.shape(z)}: must be one distance or one per cell, {shape}")
         if len(self.kernels) == 1:

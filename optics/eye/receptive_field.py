@@ -176,7 +176,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
     pupil, z, radius = beam.pupil, number(retina.distance), beam.pupil.radius
     wavelength = beam.wavelength / beam.index
     # Pixels send light off its direction, too, and lose as much beyond what is counted.
-    diffracted = _beyond_edge(radius, retina.tolerance / 2) + pupil.scatter(beam.wavelength, retina.tolerance / 4)
+    diffracted = _beyond_edge(pupil, retina.tolerance / 2) + pupil.scatter(beam.wavelength, retina.tolerance / 4)
     half = WIDEST_TANGENT * z + radius
     shadow = _shadow(beam, retina, centre)
     if math.isfinite(shadow):
@@ -198,13 +198,14 @@ def _shadow(beam: Beam, retina: Retina, centre: tuple[float, float]) -> float:
     return float(np.quantile(farthest, 1 - retina.tolerance / 2, method="higher"))
 
 
-def _beyond_edge(radius: float, share: float) -> float:
+def _beyond_edge(pupil: Pupil, share: float) -> float:
     """Frequency δ [1/m] off its geometric direction beyond which an aperture's hard edge sends a share of the light.
 
-    Airy's pattern has J0²(v) + J1²(v) of its light beyond v = 2πRδ (Born & Wolf, §8.5.2), which falls like 2/(πv). That
-    is 1/(π²Rδ), and equal to the share.
+    A straight edge has 1/(2π²f) of |its spectrum|² per length beyond the frequency f, an aperture of perimeter P and
+    area A thus P/(2π²Aδ) of its light: of a disk 1/(π²Rδ), as Airy's pattern has (Born & Wolf, §8.5.2).
     """
-    return 1 / (math.pi**2 * radius * share)
+    opening = pupil.aperture
+    return opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * share)
 
 
 def _cells_within(half: float, cell: float) -> int:

@@ -220,7 +220,7 @@ def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
 
 
 def _number(name: str, value: Any, carried: bool = False) -> float:
-    if not carried:
+    if not carried or getattr(value, "requires_grad", False):  # PyTorch's would be dropped where Dr.Jit's are carried
         without_derivative(name, value)
     try:
         if isinstance(value, (str, bytes)):

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from optics.numerics.arguments import in_range, of_kind, positive, vacuum_wavelength, whole
+from optics.numerics.arguments import finite, in_range, of_kind, positive, vacuum_wavelength, whole
 from optics.ommatidia.ommatidium import Ommatidium
 
 __all__ = ["AppositionEye", "hexagonal_directions"]
@@ -87,8 +87,16 @@ class AppositionEye:
 
     def contrast(self, cycles_per_degree: float, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
         """Of a sine grating as an ommatidium sees it, the transform of its angular sensitivity: what falls as the
-        grating becomes finer. (Neighbours tell gratings apart up to 1/(√3 Δφ).)"""
+        grating becomes finer; none beyond 2R/λ cycles per radian. (Neighbours tell gratings apart up to 1/(√3 Δφ).)
+
+        Raises:
+            ValueError: a frequency below 0, or numbers that are not finite.
+        """
+        in_range("cycles_per_degree", cycles_per_degree, 0.0, 1e9)
+        turn = math.radians(finite("azimuth_deg", azimuth_deg))
+        per_radian = math.degrees(cycles_per_degree)
+        if per_radian >= 2 * self.ommatidium.pupil.radius / vacuum_wavelength(wavelength):
+            return 0.0
         x, y, weights = self.field(wavelength)
-        turn = math.radians(azimuth_deg)
         phase = 2 * np.pi * np.degrees(x * math.cos(turn) + y * math.sin(turn)) * cycles_per_degree
         return float(np.abs(np.sum(weights * np.exp(1j * phase))))

@@ -17,7 +17,7 @@ from optics.numerics.arguments import point_2d, reals, shown
 from optics.numerics.autodiff import Array, to_user
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
-from optics.point_spread.mixture import Mixture, flat
+from optics.point_spread.mixture import Mixture, a_mixture, flat
 from optics.point_spread.psf_result import SUM_ERROR, PSFResult
 
 __all__ = ["encircled_energy", "strehl_ratio"]
@@ -56,7 +56,7 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     import drjit as dr
 
     if not isinstance(result, PSFResult):
-        return result.strehl_ratio(with_error)
+        return a_mixture(result).strehl_ratio(with_error)
     types = precision("float64")
     peaks, errors = zip(*(_peak(result, index) for index in range(result.tensor.shape[0])), strict=True)
     peak = types.Float(peaks[0] if len(peaks) == 1 else dr.concat(list(peaks)))
@@ -202,7 +202,7 @@ def encircled_energy(
     import drjit as dr
 
     if not isinstance(result, PSFResult):
-        return result.encircled_energy(radii, centre, with_error)
+        return a_mixture(result).encircled_energy(radii, centre, with_error)
     wanted = np.atleast_1d(reals("radii", radii))
     if wanted.ndim > 1:
         raise ValueError(f"radii has shape {wanted.shape}: must be a number or a row of them [m]")

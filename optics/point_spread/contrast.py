@@ -19,7 +19,7 @@ from optics.numerics.field import Field
 from optics.numerics.fourier import dft2
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
-from optics.point_spread.mixture import Mixture, flat, mixed
+from optics.point_spread.mixture import Mixture, a_mixture, flat, mixed
 from optics.point_spread.psf_result import PSFResult
 from optics.point_spread.request import Request
 
@@ -100,7 +100,7 @@ def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.
     if not isinstance(result, PSFResult):
         if arriving is not None:
             raise ValueError("arriving: must be None for a mixture of wavelengths, each of which has its own")
-        mixture: MTF = result.mtf(tolerance)
+        mixture: MTF = a_mixture(result).mtf(tolerance)
         return mixture
     light, unsure = _arriving(result, arriving)
     known = light.numpy()
@@ -200,7 +200,7 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     light, rim = pupil.transmission, 1.0
     if pupil.mask is not None:
         x, y = (types.Float64(np.ascontiguousarray(at)) for at in outline.points().T)
-        rim = float(np.mean(np.square(pupil.amplitude(x, y, types).numpy()))) / number(light)
+        rim = dr.mean(dr.square(pupil.amplitude(x, y, types))) / light
     edge = dr.minimum(wavelength * ratio / opaque(types, pupil.aperture_radius) * rim, 0.5)
     bent = np.zeros(len(result.wavelengths))
     if result.can_be_seen_anew:

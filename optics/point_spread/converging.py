@@ -138,8 +138,8 @@ def _symmetric(towards: Converging, window: Grid) -> np.ndarray:
 def _flat(pupil: Pupil, wavelength: float, z: float) -> tuple[tuple[float, float], Light]:
     """r = z tan θ; W is what the path through the pupil and on to the axis has more than the axial one."""
     types = precision("float64")
-    inner = pupil.aperture.rings[0][0] * pupil.radius
-    r = np.linspace(inner, pupil.radius, PATH_SAMPLES)
+    inner, outer = (share * pupil.radius for share in pupil.aperture.rings[0])
+    r = np.linspace(inner, outer, PATH_SAMPLES)
 
     def waves(r: np.ndarray) -> np.ndarray:
         path = pupil.path(types.Float64(r), types.Float64(0 * r), wavelength, PointSource(), types).numpy()
@@ -155,10 +155,10 @@ def _flat(pupil: Pupil, wavelength: float, z: float) -> tuple[tuple[float, float
         return found
 
     turns = float(np.abs(np.diff(waves(r))).max()) * (PATH_SAMPLES - 1)
-    return (math.atan2(inner, z), math.atan2(pupil.radius, z)), Light(at, turns)
+    return (math.atan2(inner, z), math.atan2(outer, z)), Light(at, turns)
 
 
 def _aplanatic(pupil: Pupil, z: float) -> tuple[tuple[float, float], Light]:
     """r = z sin θ, all rays in phase."""
-    inner = pupil.aperture.rings[0][0] * pupil.radius
-    return (math.asin(inner / z), math.asin(pupil.radius / z)), Light(lambda theta: np.sqrt(np.cos(theta)))
+    inner, outer = (share * pupil.radius for share in pupil.aperture.rings[0])
+    return (math.asin(inner / z), math.asin(outer / z)), Light(lambda theta: np.sqrt(np.cos(theta)))

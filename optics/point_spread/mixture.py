@@ -9,7 +9,7 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from optics.numerics.precision import padded_for_packets, precision
 
-__all__ = ["Mixture", "flat", "mixed"]
+__all__ = ["Mixture", "a_mixture", "flat", "mixed"]
 
 
 class Mixture(Protocol):
@@ -25,6 +25,14 @@ class Mixture(Protocol):
         centre: tuple[float, float] | None = None,
         with_error: bool = False,
     ) -> Any: ...
+
+
+def a_mixture(result: Any) -> Mixture:
+    """ValueError where there is nothing to measure: a batch, or numbers."""
+    if not hasattr(result, "strehl_ratio"):
+        raise ValueError(f"result is a {type(result).__name__}: must be a PSFResult or a WhitePSF")
+    found: Mixture = result
+    return found
 
 
 def mixed(tensor: np.ndarray | Array, weights: np.ndarray) -> Array:

@@ -175,6 +175,8 @@ class PSFResult:
         parts = reals("shares", shares)
         if parts.shape != self.wavelengths.shape or not math.isclose(float(parts.sum()), 1, rel_tol=1e-6):
             raise ValueError(f"shares = {shown(shares)}: must be {self.wavelengths.size} that sum to 1")
+        if self.shares is not None:
+            return self  # of one picture, which is a mean already
         image = mixed(self.tensor, parts[None])
         wavelength, asked = np.array([parts @ self.wavelengths]), self.requests if self.can_be_seen_anew else ()
         return replace(

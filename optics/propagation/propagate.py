@@ -108,7 +108,7 @@ def propagate(
     how, planes = _with_room(sources, passage, (source, window), tolerance, precision(dtype))
     out = np.stack([plane.u for plane in planes]).reshape(*given.shape[:-2], *window.shape)
     error = max(plane.error for plane in planes)
-    if error > tolerance:
+    if not error <= tolerance:
         raise AccuracyError(
             f"tolerance = {tolerance:g}: too much of the light leaves so flat, or so little of it meets the window, "
             f"that the error reaches {error:.1g}; ask for that, or for a larger out_shape"
@@ -169,10 +169,12 @@ def _with_room(
 
 
 def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carried:
-    plane = np.ascontiguousarray(plane, dtype=types.complex_dtype)
-    total = _power(plane)
-    if total == 0:
+    brightest = float(np.abs(plane).max(initial=0.0))
+    if brightest == 0:
         return _Carried(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
+    # As a part of the brightest, so that float32 holds its powers, however faint or bright it is.
+    plane = np.ascontiguousarray(plane / brightest, dtype=types.complex_dtype)
+    total = _power(plane)
     space = _free_space(how, types.dtype)
     if how.step:
         spectrum = periodic_spectrum(plane, how.period, how.across)
@@ -195,7 +197,7 @@ def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carrie
         faded = max(faded - total * _evanescent_share(plane, how), 0.0)
     rounding = FLOAT_NOISE[types.dtype] * (1 + math.sqrt(total / arrived))
     error = 2 * math.sqrt(grazing / arrived) + rounding + 2 * how.passage.ripple * math.sqrt(faded / arrived)
-    return _Carried(result, error, 2 * math.sqrt(blurred / arrived))
+    return _Carried(result * result.dtype.type(brightest), error, 2 * math.sqrt(blurred / arrived))
 
 
 def _evanescent_share(plane: np.ndarray, how: TransformSampling) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.refractive_index import Dispersion
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
-from optics.numerics.arguments import in_range, positive, vacuum_wavelength
+from optics.numerics.arguments import in_range, positive, vacuum_wavelength, without_derivative
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.propagation.planes import PlaneField, PupilSampling, StepSettings, Stop
@@ -91,7 +91,7 @@ def propagate_through(
         ValueError: bad argument, named with its value and valid range; or a parameter that carries derivatives.
         AccuracyError: the tolerance cannot be met; says what can.
     """
-    field, window = _start(u, dx, out_dx, out_shape)
+    field, window, brightest = _start(u, dx, out_dx, out_shape)
     stops = _stops(elements, backward, window)
     if field is None and (stops[0].pupil is None or stops[0].distance != 0):
         raise ValueError("u = None: must be given, unless the first element is a Pupil for a source to shine on")
@@ -116,24 +116,29 @@ def propagate_through(
         if sampling is not None:
             field = sampling.transmitted(1.0 if field is None else field.u, settings)
     assert field is not None
-    return StackResult(field.u, window.dx, tuple(steps), _error(steps, tolerance, settings))
+    error, power = _error(steps, tolerance, settings), brightest**2
+    told = (replace(one, power_in=one.power_in * power, power_out=one.power_out * power) for one in steps)
+    return StackResult(field.u * field.u.dtype.type(brightest), window.dx, tuple(told), error)
 
 
 def _start(
     u: np.ndarray | None, dx: float | None, out_dx: float | None, out_shape: tuple[int, int] | None
-) -> tuple[PlaneField | None, Grid]:
-    """The field before the first stop (None: a source's, on the first pupil), and the output window."""
+) -> tuple[PlaneField | None, Grid, float]:
+    """The field before the first stop (None: a source's, on the first pupil) in parts of its brightest sample, the
+    output window, and the size of that sample: float32 does not hold powers of all fields."""
     if u is None:
         if out_dx is None or out_shape is None:
             raise ValueError("out_dx, out_shape: must be given where u is not")
-        return None, Grid(out_shape, out_dx)
-    samples = np.asarray(u)
+        return None, Grid(out_shape, out_dx), 1.0
+    samples = np.asarray(without_derivative("u", u))
     if samples.ndim != 2 or samples.size == 0 or not np.isfinite(samples).all():
         raise ValueError(f"u has shape {samples.shape}: must be (y, x), not empty, and finite everywhere")
     if dx is None:
         raise ValueError("dx: must be given with u")
-    field = PlaneField(samples, positive("dx", dx), math.sqrt(0.5) / dx)
-    return field, Grid(out_shape or (samples.shape[0], samples.shape[1]), field.dx if out_dx is None else out_dx)
+    brightest = float(np.abs(samples).max()) or 1.0
+    field = PlaneField(samples / brightest, positive("dx", dx), math.sqrt(0.5) / dx)
+    window = Grid(out_shape or (samples.shape[0], samples.shape[1]), field.dx if out_dx is None else out_dx)
+    return field, window, brightest
 
 
 def _stops(elements: Sequence[Pupil | FreeSpace], backward: bool, window: Grid) -> list[Stop]:
@@ -187,7 +192,7 @@ def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings) ->
     error = sum(step.plan.predicted_error * math.sqrt(max(step.power_out / last, 1)) for step in steps)
     edges = 8 * settings.ripple + 4 * FLOAT_NOISE[settings.dtype]
     error += sum(edges * math.sqrt(max(step.power_in / last, 1)) for step in steps)
-    if error > tolerance:
+    if not error <= tolerance:
         raise AccuracyError(
             f"tolerance = {tolerance:g}: so little of the light meets the last window that the error reaches "
             f"{error:.1g}; ask for that, or for a larger out_shape"

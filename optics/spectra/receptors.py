@@ -46,6 +46,10 @@ class Receptors:
             object.__setattr__(self, "mosaic", _mosaic(self.mosaic, len(self.types)))
         if self.range_nm is not None:
             object.__setattr__(self, "range_nm", _range(self.range_nm))
+            seen = self.catch(np.arange(self.range_nm[0], self.range_nm[1] + 1)).max(axis=1) > 0
+            if not seen.all():
+                dark = int(np.argmin(seen))
+                raise ValueError(f"range_nm = {shown(self.range_nm)}: type {dark} sees nothing within")
 
     @cached_property
     def limits_nm(self) -> tuple[float, float]:
@@ -71,10 +75,11 @@ class Receptors:
     def catch(self, nm: np.ndarray) -> np.ndarray:
         """What each type catches of unit daylight per wavelength [nm], (type, wavelength), up to a common factor.
 
-        Receptors count photons, radiance is energy: hence the factor λ beside the quantal sensitivity.
+        Receptors count photons, radiance is energy: hence the factor λ beside the quantal sensitivity, whose peak is 1.
         """
         light = daylight(nm * 1e-9)
-        return np.stack([kind.at(nm * 1e-9) * nm * light for kind in self.types])
+        peaks = [max(kind.values) if isinstance(kind, Spectrum) else 1.0 for kind in self.types]
+        return np.stack([kind.at(nm * 1e-9) / peak * nm * light for kind, peak in zip(self.types, peaks, strict=True)])
 
 
 def _types(types: Any) -> tuple[Pigment | Spectrum, ...]:

@@ -130,3 +130,20 @@ def test_torch_asks_too():
 
 def test_plain_arrays_of_drjit_are_numbers():
     assert optics.Annulus(Float64(0.5)).area == pytest.approx(np.pi * 0.75)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda asked: optics.Pupil(asked),
+        lambda asked: optics.Pupil(1e-5, thin_lens_focal_length=asked),
+        lambda asked: optics.Zernike({(2, 0): asked}),
+        lambda asked: optics.GaussianMask(asked),
+    ],
+    ids=["radius", "focal length", "coefficient", "waist"],
+)
+def test_torch_asks_in_vain_where_drjit_is_carried(make):
+    """PyTorch's derivatives would be dropped: `optics.torch` takes what it carries."""
+    torch = pytest.importorskip("torch")
+    with pytest.raises(ValueError, match="asks for a derivative, which it does not carry"):
+        make(torch.tensor(1e-5, dtype=torch.float64, requires_grad=True))

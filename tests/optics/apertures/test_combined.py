@@ -12,12 +12,14 @@ from optics import (
     Disk,
     Oblong,
     Polygon,
+    Pupil,
     Rings,
     Slit,
     Spider,
     difference,
     hexagonal_segments,
     intersection,
+    psf,
     union,
 )
 from tests.optics.apertures.test_aperture import at, frequencies, grid_spectrum
@@ -186,3 +188,32 @@ def test_zones_of_a_zone_plate_end_where_paths_are_half_waves_longer():
 def test_bad_input_names_itself(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+# Shapes that touch in a point, or along a tangent: (opening, its area).
+TOUCHING = {
+    "a strip between tangents": (lambda: intersection(Circle(), Oblong(0.5, 2.0)), 0.989484),
+    "two disks": (lambda: union(Disk(0.5, (0.5, 0)), Disk(0.5, (-0.5, 0))), math.pi / 2),
+    "four disks": (lambda: union(*(Disk(0.25, (x, 0)) for x in (-0.75, -0.25, 0.25, 0.75))), math.pi / 4),
+    "a disk at the rim, taken away": (lambda: difference(Circle(), Disk(0.5, (-0.5, 0))), 0.75 * math.pi),
+    "a square around a hole": (lambda: difference(Annulus(0.3), Oblong(0.6, 0.6)), math.pi - 0.36),
+    "half of a disk": (lambda: intersection(Circle(), Oblong(1, 2, (0.5, 0))), math.pi / 2),
+}
+
+
+@pytest.mark.parametrize("name", TOUCHING)
+def test_shapes_that_touch_are_cut_where_they_touch(name):
+    make, area = TOUCHING[name]
+    shape = make()
+    assert shape.area == pytest.approx(area, rel=1e-5)
+    nodes = shape.nodes(3.0, 5.0)
+    assert nodes.weight.sum() == pytest.approx(area, rel=1e-4)
+    seen = psf(Pupil(10e-6, aperture=shape, thin_lens_focal_length=80e-6), [550e-9], dx=1e-6, shape=(9, 9))
+    assert seen.psf[0, 4, 4] == pytest.approx(area * (10e-6 / (550e-9 * 80e-6)) ** 2, rel=0.02)
+
+
+def test_a_small_hole_within_the_soft_edge_is_a_ring():
+    """Of arcs that are empty no turn is missing: the softened difference is the softened ring."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 101), np.linspace(-1, 1, 101))
+    hole, ring = (at(shape.soften(3.0, 1e-5), x, y) for shape in (difference(Circle(), Disk(0.1)), Annulus(0.1)))
+    assert np.abs(hole - ring).max() < 1e-5

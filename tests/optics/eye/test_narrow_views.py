@@ -1,5 +1,7 @@
 """Narrow views through strong reliefs: light goes everywhere, and kernels are had all the same."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -30,3 +32,17 @@ def test_cells_hold_the_light_that_the_direct_sum_sends_there(seed):
             tolerance=1e-4,
         )
         assert kernel.flat[at] == pytest.approx(there.psf.sum() * dx**2, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    "aperture", [optics.Circle(), optics.Slit(0.05, 1.0), optics.Annulus(0.95)], ids=["circle", "slit", "ring"]
+)
+def test_kernels_lose_no_more_than_the_tolerance_whatever_the_edge(aperture):
+    """Diffracted light goes with perimeter over area: of a slit it is twenty times a circle's."""
+    focal = 2e-3
+    width = 2 * focal * math.tan(math.radians(22.5))
+    pupil = optics.Pupil(100e-6, thin_lens_focal_length=focal, aperture=aperture)
+    eye = optics.Eye(pupil, resolution=(41, 41), fov_deg=45, sensor_width=width, bands=1, tolerance=1e-2)
+    outline = aperture.outline.length / (2 * math.pi**2 * aperture.area)
+    evanescent = outline * float(eye.spectral_bands.wavelengths[0]) / 100e-6
+    assert eye.kernel(1).sum() > 1 - 1.3e-2 - evanescent

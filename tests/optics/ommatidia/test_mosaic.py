@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from optics import AppositionEye, Ommatidium, Pupil, Waveguide, hexagonal_directions
+from optics import AppositionEye, FacetLens, Ommatidium, Pupil, Waveguide, hexagonal_directions
 
 LENS = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.0)
 FLY = AppositionEye(Ommatidium(LENS, Waveguide(1.4e-6)), 3, 1.5)
@@ -54,3 +54,12 @@ def test_contrast_falls_as_a_gaussian_of_the_acceptance_angle():
 def test_bad_input_names_itself(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_nothing_is_left_of_gratings_finer_than_a_facet_passes():
+    eye = AppositionEye(Ommatidium(FacetLens(25e-6, 14e-6), Waveguide(2e-6)), 1, 1.5)
+    finest = math.radians(2 * eye.ommatidium.pupil.radius / 500e-9)
+    assert eye.contrast(0.99 * finest) < 1e-2
+    assert [eye.contrast(factor * finest) for factor in (1.01, 3.7, 4.0)] == [0.0, 0.0, 0.0]
+    with pytest.raises(ValueError, match="cycles_per_degree = nan"):
+        eye.contrast(math.nan)

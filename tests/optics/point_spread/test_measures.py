@@ -149,3 +149,36 @@ def test_the_cutoff_is_the_mediums():
     measured = transfer.profile(f)[0]
     np.testing.assert_allclose(measured, circular_mtf(f, transfer.cutoff[0]), atol=0.02)
     assert np.abs(measured - circular_mtf(f, transfer.cutoff[0] / 1.33)).max() > 0.1
+
+
+def test_contrasts_know_how_much_light_a_mask_leaves_at_the_rim():
+    """The derivative by the mask's width, against differences: what is evanescent goes with the light at the rim."""
+    import drjit as dr
+    from drjit.llvm.ad import Float64
+
+    def total(waist):
+        pupil = optics.Pupil(15e-6, thin_lens_focal_length=110e-6, mask=optics.GaussianMask(waist))
+        view = {"sensor_distance": 120e-6, "dx": 0.6e-6, "shape": (40, 41), "dtype": "float64", "tolerance": 1e-5}
+        seen = optics.mtf(optics.psf(pupil, [500e-9], **view), tolerance=0.05)
+        return seen.profile([5e4, 2e5])
+
+    waist = Float64(10e-6)
+    dr.enable_grad(waist)
+    dr.backward(dr.sum(total(waist).array))
+    step = 1e-4 * 10e-6
+    across = (np.sum(np.asarray(total(10e-6 + step))) - np.sum(np.asarray(total(10e-6 - step)))) / (2 * step)
+    assert waist.grad[0] == pytest.approx(across, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    "measure", [optics.mtf, optics.strehl_ratio, lambda seen: optics.encircled_energy(seen, 1e-6)], ids=["m", "s", "e"]
+)
+def test_a_batch_is_no_picture(measure):
+    with pytest.raises(ValueError, match="result is a ndarray: must be a PSFResult or a WhitePSF"):
+        measure(np.ones((1, 9, 9)))
+
+
+def test_a_mean_of_a_mean_is_the_mean():
+    pupil = optics.Pupil(30e-6, thin_lens_focal_length=240e-6)
+    seen = optics.psf(pupil, [450e-9, 550e-9], dx=0.5e-6, shape=(33, 33)).mean([0.3, 0.7])
+    assert optics.strehl_ratio(seen.mean([1.0])) == optics.strehl_ratio(seen)

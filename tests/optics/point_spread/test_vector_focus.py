@@ -131,3 +131,12 @@ def test_stokes_parameters_say_the_same_as_jones_vectors():
     np.testing.assert_allclose(half.intensity, mean, atol=1e-9 * plain.psf.max())
     assert half.field is None
     assert len(half.parts) == 2
+
+
+def test_one_ring_ends_where_it_ends():
+    """A disk of .6 R is a circle of that radius."""
+    view = {"dx": 0.4e-6, "shape": (9, 9)}
+    part = optics.Pupil(200e-6, thin_lens_focal_length=800e-6, aperture=optics.Rings([0, 0.6]))
+    disk = optics.Pupil(120e-6, thin_lens_focal_length=800e-6)
+    seen, whole = (optics.vector_focus(one, 550e-9, **view) for one in (part, disk))
+    assert seen.intensity == pytest.approx(whole.intensity, rel=1e-4, abs=1e-6 * whole.intensity.max())

@@ -209,3 +209,17 @@ def test_evanescent_power_is_the_given_fields_whatever_becomes_of_it():
     result = optics.propagate(u, dx=dx, wavelength=WAVELENGTH, distance=0.5e-6, tolerance=2e-2)
     u[:] = 1
     assert result.evanescent_power == pytest.approx(reference.gaussian_evanescent_power(WAVELENGTH, waist), rel=0.02)
+
+
+@pytest.mark.parametrize("size", [1e-23, 1e20])
+def test_faint_and_bright_fields_are_carried_alike(size):
+    """Powers of these leave the range of float32; what is asked is linear."""
+    x = (np.arange(48) - 24) * 1e-6
+    u = np.exp(-np.add.outer(x**2, x**2) / 8e-6**2).astype(complex)
+    plain, scaled = (optics.propagate(f * u, dx=1e-6, wavelength=5e-7, distance=1e-4) for f in (1.0, size))
+    assert scaled.u / size == pytest.approx(plain.u, rel=1e-5, abs=1e-6)
+    assert scaled.plan.predicted_error == pytest.approx(plain.plan.predicted_error, rel=1e-3)
+    way = [optics.FreeSpace(1e-4)]
+    plain, scaled = (optics.propagate_through(way, f * u, dx=1e-6, wavelength=5e-7) for f in (1.0, size))
+    assert scaled.u / size == pytest.approx(plain.u, rel=1e-5, abs=1e-6)
+    assert scaled.steps[0].power_in == pytest.approx(size**2 * plain.steps[0].power_in)

@@ -183,3 +183,15 @@ def test_derivatives_flow_through_a_mosaic():
     dr.backward(seen(radius))
     assert dr.grad(radius)[0] == pytest.approx(expected, rel=1e-4)
     assert abs(expected) > 1e-2
+
+
+def test_a_sensitivity_in_per_cent_is_the_same_sensitivity():
+    kinds = [Receptors((Spectrum((400, 500, 600), (0, height, 0)),)) for height in (1.0, 100.0)]
+    one, other = (Eye(resolution=(5, 5), receptors=kind, photon_budget=PhotonBudget()) for kind in kinds)
+    assert one.photons == pytest.approx(other.photons)
+
+
+def test_types_that_see_nothing_of_the_range_are_named():
+    violet = Spectrum((300, 350, 351), (0, 1, 0))
+    with pytest.raises(ValueError, match=r"range_nm = .*: type 0 sees nothing within"):
+        Receptors((violet, Pigment(550.0)), range_nm=(500, 700))
