@@ -84,7 +84,11 @@ class TensorBoardWriter:
 
 
 def require_tensorboard() -> None:
-    """Raises ExecutorError where there is no TensorBoard."""
+    """Fail early where there is no TensorBoard.
+
+    Raises:
+        ExecutorError: it is not installed.
+    """
     _writer_class()
 
 

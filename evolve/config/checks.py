@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any
 
-from evolve.genome.genes import Gene
+from evolve.genome.genes import Gene, GeneConfig
 from evolve.genome.interval import Interval
 from optics.numerics.arguments import close_match
 
-__all__ = ["AUTO", "ConfigError", "check_gene_value", "check_value", "suggestion"]
+__all__ = ["AUTO", "ConfigError", "check_gene_use", "check_gene_value", "check_value", "check_values", "suggestion"]
 
 SHOWN = 200  # letters of a value that a message quotes
 MOST_LISTED = 36  # of known words: all genes and tasks, and not all settings
@@ -44,6 +45,16 @@ def check_value(cls: type, name: str, value: Any, key: str) -> Any:
     return _checked(value, kind, definition.metadata.get("valid"), key)
 
 
+def check_values(settings: Any, names: Iterable[str] | None = None, prefix: str = "") -> None:
+    """Those of a frozen dataclass of settings, or the named ones of them.
+
+    Raises:
+        ConfigError: see above.
+    """
+    for name in [one.name for one in fields(settings)] if names is None else names:
+        check_value(type(settings), name, getattr(settings, name), f"{prefix}{name}")
+
+
 def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
     """`value` as a gene's "open", "low", "high", "start" or "opens_at" takes it.
 
@@ -55,6 +66,26 @@ def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
     if name == "opens_at":
         return _checked(value, int, Interval(0, 100_000), key)
     return float(_checked(value, int if gene.kind == "integer" else float, gene.range, key))
+
+
+def check_gene_use(gene: Gene, use: GeneConfig) -> None:
+    """A gene's search range must be one, and hold its start.
+
+    Raises:
+        ConfigError: it is none, or does not.
+    """
+    key = f"genome.{gene.name}"
+    if use.start not in gene.range or math.isnan(use.start):
+        raise ConfigError(f"{key}.start = {use.start:g}: must be in {gene.range}", f"{key}.start")
+    if not use.open:
+        return
+    keys = (f"{key}.low", f"{key}.high", f"{key}.start")
+    if not use.low < use.high:
+        raise ConfigError(f"{key}: open, but low = {use.low:g} is not below high = {use.high:g}", *keys[:2])
+    if not use.low <= use.start <= use.high:
+        raise ConfigError(
+            f"{key}.start = {use.start:g}: must be in the searched range [{use.low:g}, {use.high:g}]", *keys
+        )
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

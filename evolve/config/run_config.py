@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
-from evolve.config.checks import ConfigError, check_value
+from evolve.config.checks import ConfigError, check_gene_use, check_values
 from evolve.config.own_task import OwnTask, is_own
 from evolve.config.settings import (
     SECTIONS,
@@ -69,11 +69,9 @@ class RunConfig:
     own: OwnTask | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name in ("seed", "workers"):
-            check_value(RunConfig, name, getattr(self, name), name)
-        for section, cls in SECTIONS.items():
-            for one in fields(cls):
-                check_value(cls, one.name, getattr(getattr(self, section), one.name), f"{section}.{one.name}")
+        check_values(self, ("seed", "workers"))
+        for section in SECTIONS:
+            check_values(getattr(self, section), prefix=f"{section}.")
         self._check_task()
         if self.eye.receptors not in (known := (*RECEPTORS, INHERITED)):
             raise ConfigError(
@@ -83,7 +81,7 @@ class RunConfig:
         self._check_rhabdoms()
         self._check_world()
         for name, gene in self.genes.items():
-            _check_gene_use(gene, self.genome[name])
+            check_gene_use(gene, self.genome[name])
         self._check_clusters()
         self._check_phases()
         rollout = self.learning.n_envs * self.learning.n_steps
@@ -287,19 +285,3 @@ class RunConfig:
 def _default_genome() -> Mapping[str, GeneConfig]:
     """Of animals in rhabdom's own tasks."""
     return {name: gene.default for name, gene in GENES.items() if name != TILT}
-
-
-def _check_gene_use(gene: Gene, use: GeneConfig) -> None:
-    """A gene's search range must be one, and hold its start."""
-    key = f"genome.{gene.name}"
-    if use.start not in gene.range or math.isnan(use.start):
-        raise ConfigError(f"{key}.start = {use.start:g}: must be in {gene.range}", f"{key}.start")
-    if not use.open:
-        return
-    keys = (f"{key}.low", f"{key}.high", f"{key}.start")
-    if not use.low < use.high:
-        raise ConfigError(f"{key}: open, but low = {use.low:g} is not below high = {use.high:g}", *keys[:2])
-    if not use.low <= use.start <= use.high:
-        raise ConfigError(
-            f"{key}.start = {use.start:g}: must be in the searched range [{use.low:g}, {use.high:g}]", *keys
-        )

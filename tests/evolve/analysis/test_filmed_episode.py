@@ -127,7 +127,7 @@ def test_eyes_are_judged_by_the_scenes_of_the_task(path):
     assert seen.psnr_db > 60  # a perfect lens against itself: the same rays
     model, how, poses = moments(own_task_for(run.best.phenotype, run.config), 3, 0)
     assert poses.n == 3
-    assert how == {"spectra": None, "varied": ()}
+    assert how == {"spectra": None, "varied": {}}
     assert len(np.unique(poses.xpos[:, model.nbody - 1, 1])) == 3  # the ball, elsewhere in each
 
 
