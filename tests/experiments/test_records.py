@@ -27,8 +27,8 @@ PAGES = {
         "navigation": ("scaling-navigation",),
     },
     "goals_shape_eyes": {
-        "navigation": ("course-navigation-0", "course-navigation-1"),
-        "detection": ("course-detection-0",),
+        "navigation": ("course-navigation-0", "course-navigation-1", "course-navigation-2"),
+        "detection": ("course-detection-0", "course-detection-1"),
     },
     "learning_through_holes": {"0.0003": ("pupil-0003",), "0.001": ("pupil-001",), "0.003": ("pupil-003",)},
     "seeing_ultraviolet": {"foraging": ("ultraviolet-0", "ultraviolet-1")},
