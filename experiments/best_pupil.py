@@ -225,7 +225,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Compute and store if asked; make the page from the store."""
     options = parser(__doc__ or "")
     options.add_argument("--compute", action="store_true", help="compute the stored numbers anew")
-    return told("best_pupil", lambda: _made(options.parse_args(arguments)))
+    chosen = options.parse_args(arguments)
+    return told("best_pupil", lambda: _made(chosen))
 
 
 def _made(chosen: Namespace) -> None:

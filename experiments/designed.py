@@ -143,7 +143,8 @@ def main(experiment: Experiment, arguments: Sequence[str] | None = None) -> int:
     options.add_argument("--compute", action="store_true", help="train the animals that the stored numbers lack")
     options.add_argument("--workers", type=int, default=0, help="processes; 0: one per core")
     options.add_argument("--answer", help="the page's answer; kept from now on")
-    return told(experiment.name, lambda: _made(experiment, options.parse_args(arguments)))
+    chosen = options.parse_args(arguments)
+    return told(experiment.name, lambda: _made(experiment, chosen))
 
 
 def _made(experiment: Experiment, chosen: Namespace) -> None:

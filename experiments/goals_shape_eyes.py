@@ -134,6 +134,16 @@ def _shown(rows: Sequence[Row], value: Callable[[Row], float]) -> str:
     return "-" if found is None else str(found)
 
 
+def message(store: Store) -> str:
+    """The figure's title: what all seeds agree on, if they do."""
+    ends = {
+        group: [float(v.mean()) for v in last_values(store.group(group), QUANTITIES[TOGETHER])] for group in CONTRASTED
+    }
+    if all(ends.values()) and max(ends["navigation"]) < min(ends["detection"]):
+        return "From one photoreceptor, the way makes many simple eyes, and telling apart fewer and finer ones"
+    return "What each task makes of one photoreceptor, generation by generation"
+
+
 def draw(store: Store, path: Path) -> None:
     """A panel per quantity that is not the same in all animals, a line per seed."""
     from matplotlib.lines import Line2D
@@ -166,7 +176,7 @@ def draw(store: Store, path: Path) -> None:
     )
     lines.append(Patch(color="#777777", alpha=0.25, label="null model: selection by luck"))
     figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), frameon=False)
-    figure.suptitle("From one photoreceptor, the way makes many simple eyes, and telling apart fewer and finer ones")
+    figure.suptitle(message(store))
     save(figure, path)
 
 

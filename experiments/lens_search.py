@@ -130,7 +130,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser(__doc__ or "")
     options.add_argument("--run", type=int, nargs="+", metavar="SEED", help="search anew from these seeds")
     options.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS), help="by these (default: all)")
-    return told("lens_search", lambda: _made(options.parse_args(arguments)))
+    chosen = options.parse_args(arguments)
+    return told("lens_search", lambda: _made(chosen))
 
 
 def _made(chosen: Namespace) -> None:

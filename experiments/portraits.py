@@ -99,7 +99,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     options.add_argument("--runs", nargs="+", default=[], metavar="TASK=DIR", help="draw the fittest of these runs")
     options.add_argument("--out", type=Path, default=Path("docs/images/portraits.png"), help="file to draw into")
-    return told("portraits", lambda: _drawn(options.parse_args(arguments)))
+    chosen = options.parse_args(arguments)
+    return told("portraits", lambda: _drawn(chosen))
 
 
 def _drawn(chosen: argparse.Namespace) -> None:

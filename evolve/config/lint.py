@@ -97,9 +97,8 @@ def idle_settings(config: RunConfig) -> list[str]:
     notes, search, eye = [], config.search, config.eye
     for name, gene in config.genes.items():
         use, alike = config.genome[name], [other for other in config.genes.values() if other.cluster == gene.cluster]
-        together = {config.genome[other.name].opens_at for other in alike} == {
-            use.opens_at
-        }  # said of the whole cluster
+        # What is said of a whole cluster is meant for those that are open.
+        together = {config.genome[other.name].opens_at for other in alike} == {use.opens_at}
         if use.opens_at and not use.open and not gene.default.open and not together:
             notes.append(f"genome.{name}.opens_at has no effect: the gene is held; set genome.{name}.open = true")
     if search.rungs == 1 and search.promoted != SearchConfig.promoted:

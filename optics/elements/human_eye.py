@@ -18,8 +18,9 @@ from optics.numerics.arguments import in_range, of_kind, one_of, positive, reals
 __all__ = ["HUMAN_WAVEFRONTS", "HumanEye", "mean_human_mtf"]
 
 # Autrusseau, Thibos & Shevell, Vision Research 51, 2282 (2011), table 1, µm for a pupil of 6 mm that is looked at in
-# 570 nm, in the order of OSA and ANSI. Unit, order and sign are those that reproduce their figure 11 (contrast of L, M
-# and S cones): tests/optics/elements/test_human_eye.py. Piston and tilts, which move a picture alone, are left out.
+# 570 nm, in the order of OSA and ANSI. Unit, order and sign are those that reproduce their figure 11: contrast of L and
+# M cones in tests/optics/elements/test_human_eye.py, of S cones in decision 051.
+# Piston and tilts, which move a picture alone, are left out.
 HUMAN_WAVEFRONTS = {
     "standard_observer": Zernike(
         {
@@ -43,7 +44,7 @@ IN_FOCUS = 570e-9  # [m], of Autrusseau et al.
 SURFACE = 5.55e-3  # [m], of Thibos, Ye, Zhang & Bradley, Appl. Opt. 31, 3594 (1992): the reduced eye's one surface
 ASPHERIC = (2, 4, 6)  # orders by which its aspheric form is met; order 8 is below 1 nm
 NODES = 24  # of their integrals, polynomials of order 12 and less
-CHROMATIC = 555.0  # [nm], of `mean_human_mtf`
+PERFECT_NM = 555.0  # of the perfect lens in `mean_human_mtf`
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +146,7 @@ def mean_human_mtf(cycles_per_degree: Any, pupil_diameter: float) -> np.ndarray:
     """
     u = _not_negative(cycles_per_degree)
     d = in_range("pupil_diameter", pupil_diameter, 2e-3, 6e-3) * 1e3
-    share = np.minimum(u / (d * math.pi * 1e6 / (CHROMATIC * 180)), 1)
+    share = np.minimum(u / (d * math.pi * 1e6 / (PERFECT_NM * 180)), 1)
     perfect = 2 / math.pi * (np.arccos(share) - share * np.sqrt(1 - share * share))
     slower = 21.95 - 5.512 * d + 0.3922 * d * d
     mean: np.ndarray = np.sqrt(perfect) * (1 + (u / slower) ** 2) ** -0.62

@@ -51,8 +51,8 @@ class KernelBank:
             positive("z", z, infinite=True, carried=True)
         else:
             _distances(z)
-        if not is_differentiable(z) and np.ndim(z) and np.shape(z) != shape:
-            raise ValueError(f"z has shape {np.shape(z)}: must be one distance or one per cell, {shape}")
+            if np.ndim(z) and np.shape(z) != shape:
+                raise ValueError(f"z has shape {np.shape(z)}: must be one distance or one per cell, {shape}")
         if len(self.kernels) == 1:
             return [1]
         layers, rows, columns = (1 + max(node[axis] for node in self.kernels) for axis in range(3))

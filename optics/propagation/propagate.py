@@ -39,6 +39,7 @@ CLEARLY = 1.5
 # Choice. So many times the light that arrives may be missing and cost next to nothing of the tolerance.
 MUCH = 100.0
 
+HELD = (1e-20, 1e30)  # powers [Σ|u|²] of which float32 holds the parts that errors are told by, too
 ONE = np.ones(1)  # the weight of what counts whole
 
 
@@ -169,12 +170,16 @@ def _with_room(
 
 
 def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carried:
-    brightest = float(np.abs(plane).max(initial=0.0))
-    if brightest == 0:
-        return _Carried(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
-    # As a part of the brightest, so that float32 holds its powers, however faint or bright it is.
-    plane = np.ascontiguousarray(plane / brightest, dtype=types.complex_dtype)
-    total = _power(plane)
+    given, brightest = plane, 1.0
+    with np.errstate(over="ignore"):
+        plane = np.ascontiguousarray(given, dtype=types.complex_dtype)
+        total = _power(plane)
+    if not HELD[0] < total < HELD[1]:  # in parts of the brightest, of which float32 holds the powers
+        brightest = float(np.abs(given).max(initial=0.0))
+        if brightest == 0:
+            return _Carried(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
+        plane = np.ascontiguousarray(given / brightest, dtype=types.complex_dtype)
+        total = _power(plane)
     space = _free_space(how, types.dtype)
     if how.step:
         spectrum = periodic_spectrum(plane, how.period, how.across)
@@ -197,7 +202,8 @@ def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carrie
         faded = max(faded - total * _evanescent_share(plane, how), 0.0)
     rounding = FLOAT_NOISE[types.dtype] * (1 + math.sqrt(total / arrived))
     error = 2 * math.sqrt(grazing / arrived) + rounding + 2 * how.passage.ripple * math.sqrt(faded / arrived)
-    return _Carried(result * result.dtype.type(brightest), error, 2 * math.sqrt(blurred / arrived))
+    result = result if brightest == 1 else result * result.dtype.type(brightest)
+    return _Carried(result, error, 2 * math.sqrt(blurred / arrived))
 
 
 def _evanescent_share(plane: np.ndarray, how: TransformSampling) -> float:

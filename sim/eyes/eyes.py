@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from optics.spectra.bands import FINEST
 from optics.spectra.photon_budget import PhotonBudget
 from optics.spectra.receptors import receptors_of
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 BODY_RADIUS = 0.2  # [m]
 MOST = 10**6  # of anything that is counted; memory ends long before
-MOST_BANDS = 64  # as `optics.Eye` has it
 EYE_HEIGHT = BODY_RADIUS  # [m] above the floor: the equator of a sphere that stands on it
 
 
@@ -84,7 +84,7 @@ class Eyes:
         check("placement_range_deg", lambda x: 0.0 <= x <= 360.0, "in [0, 360]")
         check("sensor_width", lambda x: 0.0 < x < math.inf, "positive and finite")
         check("noise_sigma", lambda x: 0.0 <= x < math.inf, "non-negative and finite")
-        check("bands", lambda x: counts(x) and x <= MOST_BANDS, f"a whole number, at least 1 and at most {MOST_BANDS}")
+        check("bands", lambda x: counts(x) and x <= FINEST, f"a whole number, at least 1 and at most {FINEST}")
         for name in ("n_eyes", "bands"):
             object.__setattr__(self, name, int(getattr(self, name)))
         object.__setattr__(self, "resolution", tuple(map(int, self.resolution)))

@@ -92,7 +92,7 @@ def test_mean_mtf():
 
 
 def test_standard_observer_is_near_the_mean_of_two_hundred():
-    """White light and 6 mm, where aberrations count most: within .05, a third of what a perfect lens is off."""
+    """White light and 6 mm, where aberrations count most: within .05, where a perfect lens is off by more than .7."""
     seen = contrasts(HumanEye(3e-3), axis=1).mean(axis=0)
     mean = mean_human_mtf(CYCLES, 6e-3)
     assert np.abs(seen[1:] - mean[1:]).max() < 0.05

@@ -185,3 +185,8 @@ def test_an_error_of_reflectances_is_the_worst_channels():
     phase = np.exp(2j * np.pi * wavelengths / 300e-9)
     assert found == pytest.approx(0.25 * abs(weights[1] @ (daylight(wavelengths) * phase)))
     assert found > 0.01
+
+
+def test_light_that_is_no_spectrum_is_refused():
+    with pytest.raises(ValueError, match="radiance = 'D65': must be a Spectrum"):
+        SpectralBands.uniform(4).of("D65", "rgb")
