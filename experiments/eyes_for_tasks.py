@@ -6,7 +6,7 @@ python -m experiments.eyes_for_tasks [--compute] [--workers N] [--docs DIR]
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -216,9 +216,22 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
         axes[0, 2].errorbar(list(crossings), y, error, color=COLORS[task], marker="o", capsize=3, label=task)
     axes[0, 2].axhline(0, color="#777777", lw=0.6)
     axes[0, 2].set(xscale="log", xlabel="noise σ of a receptor (less light: →)", ylabel="two of 15 less ten of 4")
-    axes[0, 2].set_title("who is ahead, as light fades")
+    axes[0, 2].set_title(_told_of_light(_of_lights(rows)))
     axes[0, 2].legend(fontsize=8, frameon=False)
     save(figure, path)
+
+
+def _told_of_light(crossings: Mapping[float, Crossing]) -> str:
+    """Whether eyes that are ahead in bright light fall behind in less, by more than chance."""
+    if len(crossings) < 2:
+        return "who is ahead"
+    bright, *dim = (crossings[sigma].differences for sigma in sorted(crossings))
+    turned = any(
+        (one[task].high < 0 < bright[task].mean) or (bright[task].mean < 0 < one[task].low)
+        for one in dim
+        for task in TASKS
+    )
+    return "less light turns the answer" if turned else "less light does not turn the answer"
 
 
 def _best(rows: Sequence[Trained], task: str) -> str:

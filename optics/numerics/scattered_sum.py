@@ -1,6 +1,6 @@
-"""Fourier sums over scattered points, onto a grid: each point is spread over a few cells, and these are transformed.
+"""Fourier sums between scattered points and a grid: each point is spread over a few cells, and these are transformed.
 
-    S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)},   k counted from n//2.
+    S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)},   u(j) = Σ_k S_k e^{2πi (p_j k_x + q_j k_y)},   k counted from n//2.
 
 The spread is e^{β(√(1 - z²) - 1)} (Barnett, Magland & af Klinteberg, SIAM J. Sci. Comput. 41, C479, 2019), on a period
 of twice as many cells as the sum has samples; its own transform is divided out.
@@ -10,13 +10,16 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
+from optics.numerics.autodiff import Array
 from optics.numerics.fourier import fast_length, fourier_sum
+from optics.numerics.precision import padded_for_packets, precision
 from optics.numerics.quadrature import gauss_legendre
 
-__all__ = ["ScatteredSum"]
+__all__ = ["ScatteredSum", "sums_at"]
 
 FINER = 2.0  # choice: cells of the period per sample of the sum
 SLOPE = 2.30  # β per cell of the spread, at that (eq. 4.5)
@@ -46,12 +49,46 @@ class ScatteredSum:
         """S (sum, y, x), complex, of amplitudes (sum, point)."""
         held = (self.cells.T @ np.ascontiguousarray(u.T)).T.reshape(len(u), *self.held)
         found = np.stack([fourier_sum(np.ascontiguousarray(one), self.period, self.shape, 1) for one in held])
-        for axis, (first, n) in enumerate(zip(self.first, self.shape, strict=True)):
-            k = np.arange(n) - n // 2
-            turns = k * first / self.period
-            factor = np.exp(2j * np.pi * (turns - np.round(turns))) / _transform(self.width, self.period, n)
-            found = found * (factor[:, None] if axis == 0 else factor)
+        return found * self._factor()
+
+    def at(self, samples: np.ndarray) -> np.ndarray:
+        """u (sum, point), complex, of samples (sum, y, x): the transpose of `of`."""
+        parts = samples * self._factor()
+        held = np.stack([fourier_sum(np.ascontiguousarray(one), self.period, self.held, 1) for one in parts])
+        found: np.ndarray = (self.cells @ held.reshape(len(samples), -1).T).T
         return found
+
+    def _factor(self) -> np.ndarray:
+        """(y, x): of the cells' place, over the spread's transform."""
+        axes = []
+        for first, n in zip(self.first, self.shape, strict=True):
+            turns = (np.arange(n) - n // 2) * first / self.period
+            axes.append(np.exp(2j * np.pi * (turns - np.round(turns))) / _transform(self.width, self.period, n))
+        return np.outer(axes[0], axes[1])
+
+
+def sums_at(sums: ScatteredSum, samples: Array) -> tuple[Array, Array]:
+    """Real and imaginary parts of `sums.at` of real samples, flat Float64 arrays (sum, point); with derivatives."""
+    import drjit as dr
+
+    types = precision("float64")
+
+    class SumsAt(dr.CustomOp):
+        """Its adjoint is the sum onto the samples, of which the real part is kept."""
+
+        def eval(self, samples: Array) -> tuple[Array, Array]:
+            found = sums.at(samples.numpy().reshape(-1, *sums.shape))
+            return types.Float(padded_for_packets(found.real)), types.Float(padded_for_packets(found.imag))
+
+        def forward(self) -> None:
+            self.set_grad_out(self.eval(self.grad_in("samples")))
+
+        def backward(self) -> None:
+            grad: Any = self.grad_out()
+            re, im = (part.numpy().reshape(-1, sums.cells.shape[0]) for part in grad)
+            self.set_grad_in("samples", types.Float(padded_for_packets(sums.of(re - 1j * im).real)))
+
+    return dr.custom(SumsAt, samples)
 
 
 def _spread(turns: np.ndarray, period: int, width: int) -> tuple[np.ndarray, np.ndarray]:

@@ -6,8 +6,7 @@ Where the PSF carries derivatives, so do these numbers: they are Dr.Jit arrays t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,70 +14,18 @@ import numpy as np
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import in_range, positive, reals, shown
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
-from optics.numerics.field import Field
-from optics.numerics.fourier import dft2
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
 from optics.point_spread.mixture import Mixture, a_mixture, flat, mixed
 from optics.point_spread.psf_result import PSFResult
 from optics.point_spread.request import Request
+from optics.point_spread.transfer_function import MTF
 
-__all__ = ["MTF", "combined_mtf", "image_quality", "mtf"]
+__all__ = ["combined_mtf", "image_quality", "mtf"]
 
-ORIENTATIONS = 64  # choice: over which a profile is a mean
 HELD_TOO_MUCH = 1e-2  # choice: above all that arrives, by which sums may err
 GROWTHS = 3  # choice: windows that are tried
 ROOM = 0.5  # choice: half steps, each a factor of √2, that a grown window is wider than it must be
-
-
-@dataclass(frozen=True, eq=False)
-class MTF:
-    """Modulation transfer function on a square grid of spatial frequencies, zero frequency at n//2.
-
-    tensor: (wavelength, fy, fx) in Dr.Jit, 1 at zero frequency; mtf: the same as a NumPy array.
-    fx, fy: cycles per metre on the sensor, 1 / (widest side of the window) apart.
-    cutoff: (wavelength,) frequency [1/m] beyond which a pupil of this size passes nothing, 2 sin θ / λ.
-    predicted_error: (wavelength,) of any contrast.
-    """
-
-    tensor: Array
-    fx: np.ndarray
-    fy: np.ndarray
-    cutoff: np.ndarray
-    predicted_error: np.ndarray
-
-    @cached_property
-    def mtf(self) -> np.ndarray:
-        return np.asarray(self.tensor.numpy())
-
-    def profile(self, frequencies: np.ndarray) -> np.ndarray | Array:
-        """Mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency); 0 beyond the grid.
-
-        Interpolated linearly between the grid's frequencies.
-
-        Raises:
-            ValueError: the MTF of a single sample.
-        """
-        import drjit as dr
-
-        if self.fx.size < 2:
-            raise ValueError("a PSF of one sample has no frequencies but 0: must be at least 2 x 2")
-        types = precision("float64")
-        f = np.atleast_1d(reals("frequencies", frequencies))
-        angle = 2 * np.pi * (np.arange(ORIENTATIONS) + 0.5) / ORIENTATIONS
-        side, waves = self.fx.size, self.tensor.shape[0]
-        places = [np.outer(f, part) / (self.fx[1] - self.fx[0]) + side // 2 for part in (np.sin(angle), np.cos(angle))]
-        y, x = (np.tile(place.ravel(), waves) for place in places)
-        inside = (y >= 0) & (y <= side - 1) & (x >= 0) & (x <= side - 1)
-        row, column = (np.clip(np.floor(place), 0, side - 2).astype(np.int64) for place in (y, x))
-        plane = np.repeat(np.arange(waves), f.size * ORIENTATIONS) * side * side
-        total = types.Float(0)
-        for i, down in enumerate((1 - (y - row), y - row)):
-            for j, across in enumerate((1 - (x - column), x - column)):
-                at = types.Index((plane + (row + i) * side + column + j).astype(np.uint32))
-                total += dr.gather(types.Float, self.tensor.array, at) * types.Float(down * across * inside)
-        mean = dr.block_reduce(dr.ReduceOp.Add, total, ORIENTATIONS) / ORIENTATIONS
-        return to_user(types.Tensor(mean, (waves, f.size)))
 
 
 def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.02) -> MTF:
@@ -153,23 +100,11 @@ def _transformed(seen: PSFResult, light: Array, error: np.ndarray) -> MTF:
     import drjit as dr
 
     types = precision("float64")
-    waves, height, width = seen.tensor.shape
-    side = max(height, width)
-    pitch, middle = 1 / (side * seen.dx), (side // 2) * side + side // 2
-    values, planes, held = types.Float(flat(seen.tensor)), [], plain(seen.held)
-    at_zero, known = dr.arange(types.Index, side * side) == middle, light.numpy()
-    for index in range(waves):
-        plane = dr.gather(types.Float, values, dr.arange(types.Index, height * width) + index * height * width)
-        field = Field(plane, dr.zeros(types.Float, height * width), Grid((height, width), seen.dx), types)
-        otf = dft2(field, side, (side, side), -1, pitch)
-        size = dr.sqrt(dr.maximum(otf.intensity, 1e-300))
-        if known[index] <= held[index]:
-            planes.append(size / dr.gather(types.Float, size, types.Index(middle)))
-            continue
-        planes.append(dr.select(at_zero, 1, size * seen.dx**2 / dr.gather(types.Float, light, types.Index(index))))
-    tensor = types.Tensor(planes[0] if waves == 1 else dr.concat(planes), (waves, side, side))
-    f = Grid.square(side, pitch).x
-    return MTF(tensor, f, f, seen.cutoff, error)
+    waves, (height, width) = seen.tensor.shape[0], seen.tensor.shape[1:]
+    values, arrives = types.Float(flat(seen.tensor)), types.Float(light)
+    held = dr.block_reduce(dr.ReduceOp.Add, values, height * width) * seen.dx**2
+    whole = dr.repeat(dr.maximum(arrives, held), height * width)
+    return MTF.of(types.Tensor(values * seen.dx**2 / whole, (waves, height, width)), seen.dx, seen.cutoff, error)
 
 
 def _arriving(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]:
@@ -248,10 +183,23 @@ def image_quality(
         return (np.zeros(waves), np.zeros(waves)) if with_error else np.zeros(waves)
     types = precision("float64")
     f = np.linspace(0, nyquist, 257)
-    weight = np.full(f.size, 1 / (f.size - 1))
-    weight[[0, -1]] /= 2
     light = opaque(types, throughput)
     contrast = types.Float(flat(transfer.profile(f)))
-    above = dr.maximum(contrast - noise_sigma / light, 0) * types.Float(np.tile(weight, waves))
-    value = to_user(types.Tensor(light * dr.block_reduce(dr.ReduceOp.Add, above, f.size), (waves,)))
-    return (value, number(throughput) * transfer.predicted_error) if with_error else value
+    above = light * dr.maximum(contrast - noise_sigma / light, 0)
+    value = to_user(types.Tensor(_mean_over(above, f.size, 1), (waves,)))
+    if not with_error:
+        return value
+    # Twice the step would be four times as far off, or twice at a corner.
+    unsure = np.abs(plain(value) - plain(_mean_over(above, f.size, 2)))
+    return value, number(throughput) * transfer.predicted_error + unsure
+
+
+def _mean_over(values: Array, n: int, step: int) -> Array:
+    """Trapezoidal mean of every n values of a flat array, of which each `step`-th is taken."""
+    import drjit as dr
+
+    weight = np.zeros(n)
+    weight[::step] = step / (n - 1)
+    weight[[0, -1]] /= 2
+    types, sums = precision("float64"), len(values) // n
+    return dr.block_reduce(dr.ReduceOp.Add, values * types.Float(np.tile(weight, sums)), n)

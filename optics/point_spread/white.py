@@ -16,10 +16,11 @@ from optics.numerics.arguments import in_range, reals, shown, whole
 from optics.numerics.autodiff import Array, plain, to_user
 from optics.numerics.precision import precision
 from optics.point_spread.concentration import encircled_energy, strehl_ratio
-from optics.point_spread.contrast import MTF, combined_mtf
+from optics.point_spread.contrast import combined_mtf
 from optics.point_spread.mixture import mixed
 from optics.point_spread.psf import psf
 from optics.point_spread.psf_result import PSFResult
+from optics.point_spread.transfer_function import MTF
 from optics.spectra.receptors import receptors_of
 from optics.spectra.spectrum import Spectrum, illuminant
 
@@ -73,15 +74,10 @@ class WhitePSF:
         Raises:
             AccuracyError: see `optics.mtf`.
         """
-        import drjit as dr
-
-        found = combined_mtf(self.waves, np.vstack([self.weights, self.coarse]), tolerance)
-        types, count, (height, width) = precision("float64"), len(self.weights), found.tensor.shape[1:]
+        found, count = combined_mtf(self.waves, np.vstack([self.weights, self.coarse]), tolerance), len(self.weights)
         fine, rough = found.mtf[:count], found.mtf[count:]
-        kept = dr.gather(types.Float, found.tensor.array, dr.arange(types.Index, count * height * width))
         error = found.predicted_error[:count] + LEFT * np.abs(fine - rough).max(axis=(1, 2))
-        tensor = types.Tensor(kept, (count, height, width))
-        return replace(found, tensor=tensor, cutoff=found.cutoff[:count], predicted_error=error)
+        return replace(found.first(count), predicted_error=error)
 
     def strehl_ratio(self, with_error: bool = False) -> np.ndarray | Array:
         """White peak over that of the same light without aberration, (type,). See `optics.strehl_ratio`.

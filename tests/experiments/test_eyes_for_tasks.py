@@ -137,3 +137,13 @@ def test_without_two_lives_of_each_there_is_no_crossing():
     with pytest.raises(ValueError, match="a crossing takes 2 lives of each kind of eyes in each task"):
         crossing(few, np.random.default_rng(0))
     assert "| σ = 0.01 | - | - | - | - |" in eyes_for_tasks._crossings(few)
+
+
+@pytest.mark.parametrize("effect, message", [(1.5, "does not turn"), (-1.5, "light turns")])
+def test_the_figure_says_whether_less_light_turns_the_answer(effect, message):
+    found = rows(2.0, spread=0.3) + rows(effect, spread=0.3, noises=(0.05,), seed=1)
+    lights = {
+        sigma: crossing([row for row in found if row.noise_sigma == sigma], np.random.default_rng(0))
+        for sigma in (BRIGHT, 0.05)
+    }
+    assert message in eyes_for_tasks._told_of_light(lights)

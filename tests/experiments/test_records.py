@@ -28,7 +28,7 @@ PAGES = {
     },
     "goals_shape_eyes": {
         "navigation": ("course-navigation-0", "course-navigation-1", "course-navigation-2"),
-        "detection": ("course-detection-0", "course-detection-1"),
+        "detection": ("course-detection-0", "course-detection-1", "course-detection-2"),
     },
     "learning_through_holes": {"0.0003": ("pupil-0003",), "0.001": ("pupil-001",), "0.003": ("pupil-003",)},
     "seeing_ultraviolet": {"foraging": ("ultraviolet-0", "ultraviolet-1")},

@@ -188,7 +188,7 @@ class TestQuality:
         light that arrives, only the sharp edge of the window is left; what is missing is the predicted error."""
         f = np.linspace(0.1, 0.9, 9) / (50 * WAVELENGTH)
         expected = reference.circular_mtf(f, WAVELENGTH, 0.5e-3, 50e-3)
-        rings, lifted, errors, predicted = (8, 16, 32), [], [], []
+        rings, lifted, errors, predicted = (4, 8, 16), [], [], []
         for count in rings:
             result = self.window(count, 4)
             transfer = optics.mtf(result, tolerance=1)  # as the window is
@@ -198,9 +198,10 @@ class TestQuality:
             predicted.append(transfer.predicted_error[0])
         assert reference.order_of_convergence(rings, lifted) == pytest.approx(-1, abs=0.25)
         assert reference.order_of_convergence(rings, predicted) == pytest.approx(-1, abs=0.25)
-        assert reference.order_of_convergence(rings, [error.mean() for error in errors]) < -1.2
-        assert all(error.max() < bound < 0.03 for error, bound in zip(errors, predicted, strict=True))
-        assert errors[-1].mean() < 2e-3
+        # Fast, since frequencies lie where they are asked for: on straight lines between a grid's the order was -1.2.
+        assert reference.order_of_convergence(rings, [error.mean() for error in errors]) < -2
+        assert all(error.max() < bound < 0.05 for error, bound in zip(errors, predicted, strict=True))
+        assert errors[-1].mean() < 1e-4
         wrong = reference.circular_mtf(1.05 * f, WAVELENGTH, 0.5e-3, 50e-3)
         assert np.abs(wrong - expected).mean() > 10 * errors[-1].mean()
 

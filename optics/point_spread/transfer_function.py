@@ -1,0 +1,126 @@
+"""Contrast by spatial frequency: on a grid, and anywhere.
+
+Where the PSF carries derivatives, so do contrasts: they are Dr.Jit arrays then, NumPy arrays otherwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from optics.numerics.accuracy import AccuracyError
+from optics.numerics.arguments import reals
+from optics.numerics.autodiff import Array, plain, to_user
+from optics.numerics.field import Field
+from optics.numerics.fourier import dft2
+from optics.numerics.grid import Grid
+from optics.numerics.precision import precision
+from optics.numerics.scattered_sum import ScatteredSum, sums_at
+from optics.point_spread.mixture import flat
+
+__all__ = ["MTF"]
+
+ORIENTATIONS = 16  # choice: within half a turn, of which a profile is a mean at first; contrasts at f and -f are alike
+MOST_ORIENTATIONS = 1024
+PART = 0.1  # choice: of the predicted error, within which means over half of the orientations must agree
+FINEST = 1e-5  # choice: such means are not asked to agree more closely
+DIGITS = 7.0  # choice: of sums over the PSF
+
+
+@dataclass(frozen=True, eq=False)
+class MTF:
+    """Modulation transfer function on a square grid of spatial frequencies, zero frequency at n//2.
+
+    tensor: (wavelength, fy, fx) in Dr.Jit, 1 at zero frequency; mtf: the same as a NumPy array.
+    fx, fy: cycles per metre on the sensor, 1 / (widest side of the window) apart.
+    cutoff: (wavelength,) frequency [1/m] beyond which a pupil of this size passes nothing, 2 sin θ / λ.
+    predicted_error: (wavelength,) of any contrast, at the grid's frequencies and between them.
+    shares: (wavelength, y, x) in Dr.Jit, of all the light that arrives what each of the PSF's samples holds.
+    """
+
+    tensor: Array
+    fx: np.ndarray
+    fy: np.ndarray
+    cutoff: np.ndarray
+    predicted_error: np.ndarray
+    shares: Array
+
+    @classmethod
+    def of(cls, shares: Array, dx: float, cutoff: np.ndarray, error: np.ndarray) -> MTF:
+        """Of samples that lie dx [m] apart."""
+        import drjit as dr
+
+        types = precision("float64")
+        waves, (height, width) = shares.shape[0], shares.shape[1:]
+        side = max(height, width)
+        pitch, cells = 1 / (side * dx), dr.arange(types.Index, height * width)
+        at_zero = dr.arange(types.Index, side * side) == (side // 2) * side + side // 2
+        planes, nothing = [], dr.zeros(types.Float, height * width)
+        for index in range(waves):
+            plane = dr.gather(types.Float, shares.array, cells + index * height * width)
+            otf = dft2(Field(plane, nothing, Grid((height, width), dx), types), side, (side, side), -1, pitch)
+            planes.append(dr.select(at_zero, 1, dr.sqrt(dr.maximum(otf.intensity, 1e-300))))
+        tensor = types.Tensor(planes[0] if waves == 1 else dr.concat(planes), (waves, side, side))
+        f = Grid.square(side, pitch).x
+        return cls(tensor, f, f, cutoff, error, shares)
+
+    @cached_property
+    def mtf(self) -> np.ndarray:
+        return np.asarray(self.tensor.numpy())
+
+    def first(self, count: int) -> MTF:
+        """The first `count` of its wavelengths."""
+        tensor, shares = (_first(part, count) for part in (self.tensor, self.shares))
+        return MTF(tensor, self.fx, self.fy, self.cutoff[:count], self.predicted_error[:count], shares)
+
+    def profile(self, frequencies: np.ndarray) -> np.ndarray | Array:
+        """Mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency), whether they lie on the
+        grid or not; 0 beyond what samples this far apart tell, half a cycle for each.
+
+        Raises:
+            ValueError: the MTF of a single sample.
+            AccuracyError: contrasts change with orientation so fast that a mean of 1024 may err by more than predicted.
+        """
+        if self.fx.size < 2:
+            raise ValueError("a PSF of one sample has no frequencies but 0: must be at least 2 x 2")
+        f = np.atleast_1d(reals("frequencies", frequencies)).astype(np.float64).ravel()
+        found, n = self._mean(f, ORIENTATIONS, 0.0), ORIENTATIONS
+        allowed = np.maximum(self.predicted_error, FINEST)[:, None]
+        while n < MOST_ORIENTATIONS:
+            between = self._mean(f, n, 0.5)
+            unsure = float((np.abs(plain(found) - plain(between)) / 2 / allowed).max(initial=0))
+            found, n = (found + between) / 2, 2 * n
+            if unsure <= PART:
+                return to_user(found)
+        if unsure > 1:
+            raise AccuracyError(
+                f"frequencies: a mean over {n} orientations errs by {unsure:.2g} times what is predicted", "see `mtf`"
+            )
+        return to_user(found)
+
+    def _mean(self, f: np.ndarray, n: int, shift: float) -> Array:
+        """Over n orientations within half a turn, which begin at `shift` of a step, (wavelength, frequency)."""
+        import drjit as dr
+
+        types, waves = precision("float64"), self.shares.shape[0]
+        angle = np.pi * (np.arange(n) + shift) / n
+        dx = 1 / (self.fx.size * (self.fx[1] - self.fx[0]))
+        turns = np.array([np.outer(f, part).ravel() * dx for part in (np.cos(angle), np.sin(angle))])
+        told = (np.abs(turns) <= 0.5 * (1 + 1e-9)).all(axis=0)
+        p, q = np.where(told, turns, 0)
+        sums = ScatteredSum(p, q, self.shares.shape[1:], DIGITS)
+        re, im = sums_at(sums, types.Float(flat(self.shares)))
+        contrast = dr.sqrt(dr.maximum(re * re + im * im, 1e-300)) * types.Float(np.tile(told, waves))
+        mean = dr.block_reduce(dr.ReduceOp.Add, contrast, n) / n
+        zero = types.Float(np.tile(f == 0, waves))
+        return types.Tensor(dr.select(zero > 0, 1, mean), (waves, f.size))
+
+
+def _first(tensor: Array, count: int) -> Array:
+    import drjit as dr
+
+    types, (_, height, width) = precision("float64"), tensor.shape
+    kept = dr.gather(types.Float, tensor.array, dr.arange(types.Index, count * height * width))
+    return types.Tensor(kept, (count, height, width))
