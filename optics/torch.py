@@ -14,6 +14,7 @@ import torch
 
 from optics.elements.pupil import Pupil
 from optics.elements.relief import BSplineRelief, HeightMap
+from optics.numerics.arguments import of_kind
 from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.precision import precision
 from optics.point_spread.psf import psf as drjit_psf
@@ -37,6 +38,9 @@ def psf(
     """
     import drjit as dr
 
+    of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)")
+    if "field" in view:
+        raise ValueError("field: is `optics.psf`'s alone; this is the intensity")
     precision(view.get("dtype", "float32"))  # proves the backend before Dr.Jit is asked for anything
 
     @dr.wrap(source="torch", target="drjit")
@@ -74,6 +78,8 @@ class PointSpread(torch.nn.Module):
         **view: Any,
     ) -> None:
         super().__init__()
+        if heights is not None:
+            of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)")
         start = torch.zeros(4, 4, dtype=torch.float64) if heights is None else heights.detach().double()
         self.relief = torch.nn.Parameter(start / unit)
         self.radius, self.n, self.unit = radius, n, unit

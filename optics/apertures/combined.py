@@ -52,8 +52,8 @@ class Combined(Aperture):
         if len(self.shapes) < least:
             raise ValueError(f"{len(self.shapes)} shapes: a {self.rule} must have {least} or more")
         for shape in self.shapes:
-            if not (hasattr(shape, "outline") and hasattr(shape, "contains")):
-                raise ValueError(f"shape = {shown(shape)}: must be an aperture, a Disk, a Oblong or a Spider")
+            if isinstance(shape, type) or not (hasattr(shape, "outline") and hasattr(shape, "contains")):
+                raise ValueError(f"shape = {shown(shape)}: must be an aperture, a Disk, an Oblong or a Spider")
         if self.area < SMALLEST:
             raise ValueError(f"{self.rule} of {len(self.shapes)} shapes: must leave something open within the pupil")
 
@@ -139,6 +139,8 @@ def hexagonal_segments(
         corners = ring * np.exp(1j * np.pi * (np.arange(7) / 3 + 1 / 6))
         for first, last in itertools.pairwise(corners):
             centres += [first + (last - first) * step / ring for step in range(ring)]
+    if not isinstance(without, (tuple, list, set, frozenset)):
+        raise ValueError(f"without = {shown(without)}: must hold numbers of segments, such as (0,)")
     for number in without:
         whole("without", number, 0, len(centres) - 1)
     corners = (1 - gap) / sqrt(3) * np.exp(1j * np.pi / 3 * np.arange(6))

@@ -200,7 +200,10 @@ class Eye:
         """
         positive("z", z, infinite=True, carried=True)
         asked = self.eccentricity_deg if direction_deg is None else direction("direction_deg", direction_deg)
-        retina, guided = self._retina(_whole(samples_per_receptor)), self.waveguide is not None
+        retina, guided = (
+            self._retina(whole("samples_per_receptor", samples_per_receptor, 1, 64)),
+            self.waveguide is not None,
+        )
         return to_user(receptor_kernel(self, retina, z, tangents(asked), guided))
 
     def _retina(self, samples_per_receptor: int) -> Retina:
@@ -236,7 +239,7 @@ class Eye:
             AccuracyError: see `optics.psf`, or the tolerance needs more kernels than any eye is given.
         """
         within = self.tolerance if tolerance is None else in_range("tolerance", tolerance, 1e-6, 0.5)
-        s, from_cell = _whole(samples_per_receptor), light_from == LIGHT_FROM[0]
+        s, from_cell = whole("samples_per_receptor", samples_per_receptor, 1, 64), light_from == LIGHT_FROM[0]
         if light_from not in LIGHT_FROM:
             raise ValueError(f"light_from = {light_from!r}: must be {' or '.join(map(repr, LIGHT_FROM))}")
         half = self.sensor_width / (2 * number(self.sensor_distance))
@@ -276,14 +279,15 @@ class Eye:
         Raises:
             ValueError: radiance of another shape, or not finite; polarised light for receptors that know none.
         """
-        s = _whole(samples_per_receptor)
+        s = whole("samples_per_receptor", samples_per_receptor, 1, 64)
         if rng is not None:
             of_kind("rng", rng, np.random.Generator, "np.random.default_rng(0), or None for no noise")
         shape = self.resolution[0] * s, self.resolution[1] * s
         scene = radiance_cube(radiance, self.bands, shape)
         centred(scene, shape)
         parts = taken_by(self.microvilli, self.resolution, scene, polarization)
-        found = signals(self, parts, self.sight(s, z) if sight is None else sight.of(shape), s, z)
+        bank = self.sight(s, z) if sight is None else of_kind("sight", sight, KernelBank, "eye.sight(4)").of(shape)
+        found = signals(self, parts, bank, s, z)
         return to_user(found if rng is None else with_noise(self, found, rng))
 
     def in_bands(self, radiance: Any) -> np.ndarray:
@@ -294,7 +298,3 @@ class Eye:
     def describe(self, z: Scalar = math.inf) -> Description:
         """What limits the eye, as a table: see `summary.Description`."""
         return describe(self, z)
-
-
-def _whole(samples_per_receptor: int) -> int:
-    return whole("samples_per_receptor", samples_per_receptor, 1, 64)

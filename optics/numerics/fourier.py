@@ -111,13 +111,13 @@ def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
 
 def periodic_spectrum(u: np.ndarray, period: int, across: int) -> np.ndarray:
     """Σ_j u[j] exp(-2πi j·k / period) of a complex NumPy array u (y, x) no larger than a period, as (across fx, period
-    fy): FFT order, along fx only `kept_indices(period, across)`. Lines that lie in one piece transform twice as fast,
+    fy): FFT order, along fx only `kept_indices(across)`. Lines that lie in one piece transform twice as fast,
     hence fy is last."""
     from scipy import fft
 
     rows = fft.fft(_wrap(u, period, 1), axis=1, overwrite_x=True)
     if across < period:
-        rows = rows[:, kept_indices(period, across)]
+        rows = rows[:, kept_indices(across)]
     return fft.fft(_wrap(np.ascontiguousarray(rows.T), period, 1), axis=1, overwrite_x=True)
 
 
@@ -130,15 +130,15 @@ def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int,
     lines = fft.ifft(spectrum, axis=1, norm="forward", overwrite_x=True)[:, rows].T
     if spectrum.shape[0] < period:
         whole = np.zeros((len(rows), period), spectrum.dtype)
-        whole[:, kept_indices(period, spectrum.shape[0])] = lines
+        whole[:, kept_indices(spectrum.shape[0])] = lines
         lines = whole
     else:
         lines = np.ascontiguousarray(lines)
     return fft.ifft(lines, axis=1, norm="forward", overwrite_x=True)[:, columns]
 
 
-def kept_indices(period: int, across: int) -> np.ndarray:
-    """The `across` indices nearest 0, in FFT order: 0, 1, …, -2, -1."""
+def kept_indices(across: int) -> np.ndarray:
+    """The `across` indices nearest 0, in FFT order: 0, 1, …, -2, -1, of whatever period."""
     kept = np.arange(across) - across // 2
     return np.roll(kept, -(across // 2))
 

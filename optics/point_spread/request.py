@@ -10,9 +10,10 @@ from optics.elements.source import PointSource
 from optics.methods.problem import Problem
 from optics.methods.sampling import Sampling
 from optics.numerics.accuracy import AccuracyError, Plan
+from optics.numerics.arguments import one_of
 from optics.numerics.autodiff import Scalar
 from optics.numerics.grid import Grid
-from optics.point_spread.planner import EXACT, choose
+from optics.point_spread.planner import EXACT, METHODS, choose
 
 __all__ = ["Request", "Setup"]
 
@@ -98,6 +99,9 @@ class Setup:
     tolerance: float
     method: str
     dtype: str
+
+    def __post_init__(self) -> None:
+        one_of("method", self.method, ("auto", "exact", *METHODS))
 
     def request(self, pupil: Pupil, wavelength: float) -> Request:
         """Of a pupil's light at a vacuum wavelength [m].

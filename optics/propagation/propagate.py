@@ -233,7 +233,7 @@ def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
     more than the transforms."""
     step = 1 / (how.period * how.source.dx)
     if how.step:  # the spectrum is (fx, fy)
-        fx, fy = (kept_indices(how.period, n) * step for n in (how.across, how.period))
+        fx, fy = (kept_indices(n) * step for n in (how.across, how.period))
         space = replace(how.passage, centre=how.passage.centre[::-1]).over(fy, fx, precision(dtype))
     else:
         fx = fy = Grid.square(how.across, step).x

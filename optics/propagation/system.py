@@ -13,7 +13,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.refractive_index import Dispersion
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
-from optics.numerics.arguments import in_range, positive, vacuum_wavelength, without_derivative
+from optics.numerics.arguments import in_range, of_kind, positive, shown, vacuum_wavelength, without_derivative
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.propagation.planes import PlaneField, PupilSampling, StepSettings, Stop
@@ -91,6 +91,10 @@ def propagate_through(
         ValueError: bad argument, named with its value and valid range; or a parameter that carries derivatives.
         AccuracyError: the tolerance cannot be met; says what can.
     """
+    if not isinstance(elements, (list, tuple)):
+        raise ValueError(f"elements = {shown(elements)}: must be a list of Pupil and FreeSpace")
+    if source is not None:
+        of_kind("source", source, PointSource, "PointSource(), a plane wave")
     field, window, brightest = _start(u, dx, out_dx, out_shape)
     stops = _stops(elements, backward, window)
     if field is None and (stops[0].pupil is None or stops[0].distance != 0):

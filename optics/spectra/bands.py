@@ -70,7 +70,7 @@ class SpectralBands:
         at = radiance.at if isinstance(radiance, Spectrum) else radiance
         nm, catch = _catch(receptors_of(receptors))
         catch /= catch.sum(axis=1, keepdims=True)
-        of_daylight = np.broadcast_to(at(nm * 1e-9), nm.shape) / daylight(nm * 1e-9)
+        of_daylight = _values(at(nm * 1e-9), nm.shape) / daylight(nm * 1e-9)
         seen = catch.sum(axis=0)
         shares = linear_weights(nm, self.wavelengths * 1e9) * (
             seen + 1e-6 * seen.max()
@@ -93,6 +93,17 @@ def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> 
     wanted = np.concatenate([caught * CATCHES_FIRST, means])
     found: np.ndarray = lsq_linear(equations, wanted, bounds=(0, np.inf), method="bvls").x
     return found
+
+
+def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """What a function said of wavelengths."""
+    try:
+        values = np.broadcast_to(np.asarray(found, np.float64), shape)
+    except (TypeError, ValueError):
+        raise ValueError(f"radiance: must be a number for each of {shape[0]} wavelengths, not {shown(found)}") from None
+    if not np.isfinite(values).all():
+        raise ValueError("radiance: must be finite at every wavelength that receptors see")
+    return values
 
 
 def _catch(kinds: Receptors) -> tuple[np.ndarray, np.ndarray]:

@@ -166,6 +166,7 @@ def test_zones_of_a_zone_plate_end_where_paths_are_half_waves_longer():
         (lambda: union(), "0 shapes: a union must have 1"),
         (lambda: difference(Circle()), "1 shapes: a difference must have 2"),
         (lambda: difference(Circle(), 0.3), "shape = 0.3"),
+        (lambda: difference(Circle(), Disk), "shape = <class .*Disk'>: must be an aperture"),
         (lambda: difference(Disk(0.3), Circle()), "must leave something open"),
         (lambda: union(Disk(0.1, (3.0, 0.0))), "must leave something open"),
         (lambda: Combined("xor", (Circle(),)), "rule = 'xor'"),
@@ -183,6 +184,7 @@ def test_zones_of_a_zone_plate_end_where_paths_are_half_waves_longer():
         (lambda: hexagonal_segments(1, gap=1.0), "gap = 1.0"),
         (lambda: hexagonal_segments(1, without=(7,)), "without = 7"),
         (lambda: hexagonal_segments(0, without=(0,)), "must leave a segment"),
+        (lambda: hexagonal_segments(2, without=0), "without = 0: must hold numbers"),
     ],
 )
 def test_bad_input_names_itself(make, message):

@@ -119,6 +119,8 @@ def test_what_is_of_another_kind_is_named():
         Eye(pupil="lens")
     with pytest.raises(ValueError, match="rng = 0: must be a kind of Generator"):
         Eye(bands=1).see(np.zeros((1, 15, 15)), 1, rng=0)
+    with pytest.raises(ValueError, match="sight = 'auto': must be a kind of KernelBank"):
+        Eye(bands=1).see(np.zeros((1, 15, 15)), 1, sight="auto")
     with pytest.raises(ValueError, match="radiance: must be real numbers, not complex"):
         Eye(bands=1).see(np.zeros((1, 15, 15)) * 1j, 1)
 

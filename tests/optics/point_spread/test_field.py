@@ -83,6 +83,12 @@ def test_without_being_asked_for_there_is_none():
         optics.psf(PUPILS["lens"], **ASKED, method="far_field", field=True)
 
 
+@pytest.mark.parametrize("method", ["far-field", "field", ["auto"]])
+def test_methods_that_are_none_are_named(method):
+    with pytest.raises(ValueError, match="method = .* must be one of 'auto', 'exact', "):
+        optics.psf(PUPILS["lens"], **ASKED, method=method)
+
+
 def test_the_phase_carries_derivatives():
     """By the distance, carrier included: d arg U / dz is about k."""
 

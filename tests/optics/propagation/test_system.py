@@ -140,6 +140,12 @@ def test_what_decays_does_not_come_back():
     ("elements", "changed", "message"),
     [
         ([], {}, "elements is empty"),
+        (Pupil(1e-5), {}, "elements = Pupil.* must be a list"),
+        (
+            [Pupil(1e-5)],
+            {"u": None, "out_dx": 1e-6, "out_shape": (3, 3), "source": 2.0},
+            "source = 2.0: must be a kind",
+        ),
         ([FreeSpace(1e-5), "lens"], {}, "elements holds 'lens'"),
         ([Pupil(1e-5), Pupil(1e-5)], {}, "two pupils touch"),
         ([FreeSpace(1e-5), Pupil(1e-5, medium_n=1.33)], {}, r"medium_n = 1, 1\.33"),

@@ -190,3 +190,7 @@ def test_an_error_of_reflectances_is_the_worst_channels():
 def test_light_that_is_no_spectrum_is_refused():
     with pytest.raises(ValueError, match="radiance = 'D65': must be a Spectrum"):
         SpectralBands.uniform(4).of("D65", "rgb")
+    with pytest.raises(ValueError, match="radiance: must be finite at every wavelength"):
+        SpectralBands.uniform(4).of(lambda wavelengths: wavelengths * np.nan, "rgb")
+    with pytest.raises(ValueError, match=r"radiance: must be a number for each of \d+ wavelengths, not \[1, 2\]"):
+        SpectralBands.uniform(4).of(lambda wavelengths: [1, 2], "rgb")
