@@ -13,6 +13,7 @@ microvilli     Microvilli: receptors that know polarisation
 population     one plan for many pupils
 population_members  what it takes of each
 batch          psf_batch: many eyes at once
+modulation_transfer  MTF: contrast at any frequency
 contrast       mtf, image_quality
 mixture        sums over wavelengths
 white          white_psf: a lamp's light as receptors weigh it

@@ -17,9 +17,9 @@ from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
 from optics.point_spread.mixture import Mixture, a_mixture, flat, mixed
+from optics.point_spread.modulation_transfer import MTF
 from optics.point_spread.psf_result import PSFResult
 from optics.point_spread.request import Request
-from optics.point_spread.transfer_function import MTF
 
 __all__ = ["combined_mtf", "image_quality", "mtf"]
 

@@ -18,9 +18,9 @@ from optics.numerics.precision import precision
 from optics.point_spread.concentration import encircled_energy, strehl_ratio
 from optics.point_spread.contrast import combined_mtf
 from optics.point_spread.mixture import mixed
+from optics.point_spread.modulation_transfer import MTF
 from optics.point_spread.psf import psf
 from optics.point_spread.psf_result import PSFResult
-from optics.point_spread.transfer_function import MTF
 from optics.spectra.receptors import receptors_of
 from optics.spectra.spectrum import Spectrum, illuminant
 

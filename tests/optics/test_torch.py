@@ -74,7 +74,7 @@ def test_errors_pass_through():
         optics.torch.psf(np.zeros((4, 4)), radius=1e-5, **VIEW)
     with pytest.raises(ValueError, match=r"heights = .*must be a kind of Tensor"):
         optics.torch.PointSpread(1e-5, heights=np.zeros((4, 4)), **VIEW)
-    with pytest.raises(ValueError, match="field: is `optics.psf`'s alone"):
+    with pytest.raises(ValueError, match=r"field: is `optics.psf`'s alone"):
         optics.torch.psf(torch.zeros(4, 4), radius=1e-5, field=True, **VIEW)
     with pytest.raises(AccuracyError, match="float32 carries"):
         optics.torch.psf(torch.zeros(4, 4), radius=1e-5, tolerance=1e-8, **VIEW)

@@ -85,7 +85,7 @@ def test_without_being_asked_for_there_is_none():
 
 @pytest.mark.parametrize("method", ["far-field", "field", ["auto"]])
 def test_methods_that_are_none_are_named(method):
-    with pytest.raises(ValueError, match="method = .* must be one of 'auto', 'exact', "):
+    with pytest.raises(ValueError, match=r"method = .* must be one of 'auto', 'exact', "):
         optics.psf(PUPILS["lens"], **ASKED, method=method)
 
 

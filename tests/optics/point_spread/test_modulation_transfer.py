@@ -7,7 +7,7 @@ from drjit.auto.ad import Float64
 
 import optics
 from optics.numerics.precision import precision
-from optics.point_spread.transfer_function import MTF
+from optics.point_spread.modulation_transfer import MTF
 
 LENS, FOCUS, WAVELENGTH = optics.Pupil(1e-3, thin_lens_focal_length=4e-3), 4e-3, 550e-9
 
