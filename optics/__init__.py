@@ -36,6 +36,7 @@ _CONTENTS = {
     "Grid": "numerics.grid",
     "HeightMap": "elements.relief",
     "HumanEye": "elements.human_eye",
+    "MTF": "point_spread.modulation_transfer",
     "MaskMap": "elements.transmittance",
     "Microvilli": "point_spread.microvilli",
     "Mode": "ommatidia.waveguide",

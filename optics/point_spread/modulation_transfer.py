@@ -66,6 +66,10 @@ class MTF:
         f = Grid.square(side, pitch).x
         return cls(tensor, f, f, cutoff, error, shares)
 
+    def __repr__(self) -> str:
+        planes = f"{self.tensor.shape[0]} wavelengths or types, to {self.fx[-1]:.3g} cycles per metre"
+        return f"<MTF of {planes}, predicted error {self.predicted_error.max():.1e}>"
+
     @cached_property
     def mtf(self) -> np.ndarray:
         return np.asarray(self.tensor.numpy())

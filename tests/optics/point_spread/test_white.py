@@ -200,4 +200,5 @@ def test_results_are_printed_in_a_line():
     assert repr(white.waves).startswith(waves)
     assert repr(white).startswith(f"<WhitePSF of 3 types from {waves}")
     assert repr(focus).startswith("<VectorFocus 9 x 11 samples 2e-06 m apart, scalar error ")
+    assert repr(white.mtf(tolerance=0.3)).startswith("<MTF of 3 wavelengths or types, to ")
     assert max(map(len, map(repr, (white, focus)))) < 240
