@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy import signal
-from scipy.special import j0
+from scipy.special import j0, j1
 
 from optics.apertures.soft_edge import SoftEdge, kaiser_beta
 from optics.numerics.quadrature import gauss_legendre
@@ -55,3 +55,17 @@ def test_kaisers_rule_is_his(attenuation):
     """Below an attenuation of about 25 dB ours stays at 1."""
     assert kaiser_beta(10 ** (-attenuation / 20)) == pytest.approx(signal.kaiser_beta(attenuation), rel=1e-9)
     assert kaiser_beta(0.1) == 1.0
+
+
+@pytest.mark.parametrize(("passband", "ripple"), [(0.01, 0.1), (3.0, 1e-3), (200.0, 1e-3), (100.0, 1e-10)])
+def test_the_kernel_is_a_jinc_under_its_window_and_sums_to_one(passband, ripple):
+    """Near the axis, too, relative to what it is there."""
+    edge = SoftEdge(passband, 1.01 * passband + 0.5, ripple)
+    r = np.append(np.linspace(0, edge.reach, 5000), edge.reach * 10.0 ** np.arange(-9, 0))
+    cutoff = (edge.passband + edge.stopband) / 2
+    jinc = j1(2 * np.pi * cutoff * r) * np.i0(edge.beta * np.sqrt(1 - (r / edge.reach) ** 2))
+    u, weight = gauss_legendre(int(60 + 8 * edge.cycles + edge.beta))
+    assert np.sum(weight * edge.reach * edge.ring(edge.reach * u)) == pytest.approx(1, abs=1e-12)
+    scale = edge.ring(r) @ jinc / (jinc @ jinc)
+    np.testing.assert_allclose(edge.ring(r), scale * jinc, rtol=1e-11, atol=1e-13 * np.abs(edge.ring(r)).max())
+    assert edge.ring(r[-9:]) == pytest.approx(scale * jinc[-9:], rel=1e-11)
