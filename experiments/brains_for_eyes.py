@@ -20,7 +20,7 @@ from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.powers import PowerLaw, power_law
 from experiments.store import Origin
 
-__all__ = ["DEFINITIONS", "best_brains", "designs", "frontier", "missed", "over_both", "page", "shortfall"]
+__all__ = ["DEFINITIONS", "best_brains", "designs", "frontier", "missed", "needed", "over_both", "page", "shortfall"]
 
 NAME = "brains_for_eyes"
 WIDTHS = (1, 2, 4, 8, 16, 24)
@@ -32,6 +32,7 @@ EYES = {"detection": (2, 45.0), "tracking": (2, 45.0), "navigation": (10, 135.0)
 PUBLISHED = {"navigation": 0.69, "detection": 0.74, "tracking": 0.59}
 # One evaluation on the way: of 320 episodes each takes a sixth of the training's steps.
 SETTINGS = ("learning.total_steps=500000", "learning.eval_interval=500000", "evaluation.episodes=320")
+GAIN = 0.5  # choice: of the coarsest eyes' errors, below which finer eyes pay
 SHADES = ("#c6dbef", "#9ecae1", "#6baed6", "#2171b5", "#08306b")  # of brains, small to large
 Errors = dict[tuple[int, int], float]  # by width and brain
 Definition = Callable[[Sequence[Trained]], Errors]
@@ -171,13 +172,38 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
             ends = [errors[w, brain] for w in widths]
             place.loglog([acuity[w] for w in widths], ends, "o-", color=shade, ms=4, lw=1)
         _draw_frontier(place, mine)
-        place.set(title=task, xlabel="acuity [cycles/°]")
+        place.set(title=_of_task(task, mine), xlabel="acuity [cycles/°]")
         label(place.xaxis, place.get_xlim())
         label(place.yaxis, place.get_ylim())
     axes[0, 0].set_ylabel("share of episodes missed")
     figure.legend(handles=_key(), loc="outside lower center", ncols=6, frameon=False)
-    figure.suptitle("How far each acuity carries, and how large a brain it wants")
+    figure.suptitle(_message(rows))
     save(figure, path)
+
+
+def needed(rows: Sequence[Trained]) -> int | None:
+    """Smallest brain from which on, in every larger one too, the finest eyes miss less than half of what the coarsest
+    do; None: there is none."""
+    errors, found = missed(rows), None
+    for brain in sorted({b for _, b in errors}, reverse=True):
+        widths = [w for w, b in errors if b == brain]
+        if len(widths) < 2 or errors[max(widths), brain] >= GAIN * errors[min(widths), brain]:
+            break
+        found = brain
+    return found
+
+
+def _of_task(task: str, rows: Sequence[Trained]) -> str:
+    brain = needed(rows)
+    return f"{task}: acuity pays for no brain" if brain is None else f"{task}: acuity pays from {brain} units on"
+
+
+def _message(rows: Sequence[Trained]) -> str:
+    least = min(row.neurons for row in rows)
+    brains = [needed(_of(rows, task)) for task in _tasks(rows)]
+    if all(brain is not None and brain > least for brain in brains):
+        return "Fine eyes are worth nothing to a brain that is too small for what they see"
+    return "What acuity is worth to brains of each size"
 
 
 def _draw_frontier(place: Any, rows: Sequence[Trained]) -> None:

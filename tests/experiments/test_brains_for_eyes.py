@@ -15,6 +15,7 @@ from experiments.brains_for_eyes import (
     frontier,
     main,
     missed,
+    needed,
     over_both,
     page,
     shortfall,
@@ -54,6 +55,17 @@ def test_a_shortfall_is_between_the_worst_and_the_best_life():
     animals = designs()[:3]
     found = shortfall([lived(a, 0.5, fitness) for a, fitness in zip(animals, (10.0, 30.0, 50.0), strict=True)])
     assert list(found.values()) == pytest.approx([1.5 / 2, 1.0 / 2, 0.5 / 2])
+
+
+@pytest.mark.parametrize(("least", "found"), [(1, 1), (16, 16), (1000, None)])
+def test_the_brain_that_fine_eyes_need(least, found):
+    """Error falls with acuity for those that are large enough; one of 4 units by less than half."""
+    lives = of_law(lambda acuity, units: 0.01 / acuity if units >= least else 0.9 - 0.3 * acuity * (units == 4))
+    assert needed(lives) == found
+
+
+def test_one_brain_that_gains_below_others_that_do_not_is_chance():
+    assert needed(of_law(lambda acuity, units: 0.01 / acuity if units == 4 else 0.9)) is None
 
 
 def test_a_failed_life_says_nothing():
