@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import reals
+from optics.numerics.arguments import reals, shown
 from optics.numerics.autodiff import Array, plain, to_user
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2
@@ -84,12 +84,14 @@ class MTF:
         grid or not; 0 beyond what samples this far apart tell, half a cycle for each.
 
         Raises:
-            ValueError: the MTF of a single sample.
+            ValueError: the MTF of a single sample, or frequencies that are none.
             AccuracyError: contrasts change with orientation so fast that a mean of 1024 may err by more than predicted.
         """
         if self.fx.size < 2:
             raise ValueError("a PSF of one sample has no frequencies but 0: must be at least 2 x 2")
-        f = np.atleast_1d(reals("frequencies", frequencies)).astype(np.float64).ravel()
+        f = np.atleast_1d(reals("frequencies", frequencies)).ravel()
+        if f.size == 0 or not np.isfinite(f).all():
+            raise ValueError(f"frequencies = {shown(frequencies)}: must be finite, and at least one")
         found, n = self._mean(f, ORIENTATIONS, 0.0), ORIENTATIONS
         allowed = np.maximum(self.predicted_error, FINEST)[:, None]
         while n < MOST_ORIENTATIONS:

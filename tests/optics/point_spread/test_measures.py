@@ -133,6 +133,12 @@ def test_bad_arguments_are_named():
         optics.image_quality(result, nyquist=1e4, throughput=1.5)
 
 
+@pytest.mark.parametrize("frequencies", [[], [np.nan], [1e5, np.inf], "1e5"])
+def test_frequencies_that_are_none_are_named(frequencies):
+    with pytest.raises(ValueError, match="frequencies"):
+        optics.mtf(ideal(8, 2e-6, 33), tolerance=1).profile(frequencies)
+
+
 def test_one_sample_has_no_profile():
     with pytest.raises(ValueError, match="must be at least 2 x 2"):
         optics.mtf(optics.Eye().psf()).profile([0.0])
