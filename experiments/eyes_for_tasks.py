@@ -231,7 +231,7 @@ def _told_of_light(crossings: Mapping[float, Crossing]) -> str:
         for one in dim
         for task in TASKS
     )
-    return "less light turns the answer" if turned else "less light does not turn the answer"
+    return "dim light turns the answer" if turned else "dim light turns nothing"
 
 
 def _best(rows: Sequence[Trained], task: str) -> str:
