@@ -231,7 +231,7 @@ def _told_of_light(crossings: Mapping[float, Crossing]) -> str:
         for one in dim
         for task in TASKS
     )
-    return "dim light turns the answer" if turned else "dim light turns nothing"
+    return "dim light turns the order" if turned else "dim light keeps the order"
 
 
 def _best(rows: Sequence[Trained], task: str) -> str:

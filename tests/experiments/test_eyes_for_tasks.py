@@ -139,7 +139,7 @@ def test_without_two_lives_of_each_there_is_no_crossing():
     assert "| σ = 0.01 | - | - | - | - |" in eyes_for_tasks._crossings(few)
 
 
-@pytest.mark.parametrize(("effect", "message"), [(1.5, "turns nothing"), (-1.5, "turns the answer")])
+@pytest.mark.parametrize(("effect", "message"), [(1.5, "keeps the order"), (-1.5, "turns the order")])
 def test_the_figure_says_whether_less_light_turns_the_answer(effect, message):
     found = rows(2.0, spread=0.3) + rows(effect, spread=0.3, noises=(0.05,), seed=1)
     lights = {
