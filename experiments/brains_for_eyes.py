@@ -200,15 +200,18 @@ def _of_task(task: str, rows: Sequence[Trained]) -> str:
 
 def _message(rows: Sequence[Trained]) -> str:
     least = min(row.neurons for row in rows)
-    brains = [needed(_of(rows, task)) for task in _tasks(rows)]
-    if all(brain is not None and brain > least for brain in brains):
-        return "Fine eyes are worth nothing to a brain that is too small for what they see"
-    return "What acuity is worth to brains of each size"
+    brains = {task: needed(_of(rows, task)) for task in _tasks(rows)}
+    in_vain = [task for task, brain in brains.items() if brain is None]
+    if len(in_vain) == len(brains) or least in brains.values():
+        return "What acuity is worth to brains of each size"
+    besides = f", and in {' and '.join(in_vain)} not at all" if in_vain else ""
+    return f"Fine eyes pay only for brains that are large enough{besides}"
 
 
 def _draw_frontier(place: Any, rows: Sequence[Trained]) -> None:
+    """Where error does fall with acuity."""
     law, acuity = frontier(rows, missed), np.array(sorted(_acuities(rows).values()))
-    if law is not None:
+    if law is not None and law.exponents[0].low > 0:
         place.loglog(acuity, law.error(acuity), color="#D55E00", lw=1.4, ls="--")
 
 

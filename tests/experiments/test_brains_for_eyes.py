@@ -1,6 +1,7 @@
 """Every width with every brain: errors are what they say, ceilings and exponents those of made-up laws."""
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -21,7 +22,7 @@ from experiments.brains_for_eyes import (
     shortfall,
 )
 from experiments.designed import Trained
-from experiments.store import Origin
+from experiments.store import Origin, read_rows
 
 
 def lived(design, success_rate, fitness=0.0, episodes=10**6):
@@ -104,6 +105,14 @@ def test_the_page_shows_every_cell_and_what_is_missing(tmp_path):
         assert name in made.markdown
     made.publish(tmp_path)
     assert (tmp_path / "figures/brains_for_eyes.png").stat().st_size > 10_000
+
+
+def test_the_published_page_says_what_its_store_says():
+    results = Path(__file__).parents[2] / "docs/results"
+    data = results / "data/brains_for_eyes.csv"
+    answer = data.with_suffix(".txt").read_text(encoding="utf-8").strip()
+    made = page(read_rows(Trained, data), Origin.read(data.with_suffix(".json")), answer)
+    assert made.markdown == (results / "brains_for_eyes.md").read_text(encoding="utf-8")
 
 
 def test_without_animals_there_is_no_page(tmp_path, capsys):
