@@ -183,11 +183,12 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
 
 def needed(rows: Sequence[Trained]) -> int | None:
     """Smallest brain from which on, in every larger one too, the finest eyes miss less than half of what the coarsest
-    do; None: there is none."""
+    do with the best of brains; None: there is none."""
     errors, found = missed(rows), None
+    _, coarsest = min(best_brains(errors).items())[1]
     for brain in sorted({b for _, b in errors}, reverse=True):
         widths = [w for w, b in errors if b == brain]
-        if len(widths) < 2 or errors[max(widths), brain] >= GAIN * errors[min(widths), brain]:
+        if errors[max(widths), brain] >= GAIN * coarsest:
             break
         found = brain
     return found

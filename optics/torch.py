@@ -39,7 +39,7 @@ def psf(
     import drjit as dr
 
     of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)")
-    if "field" in view:
+    if view.get("field"):
         raise ValueError("field: is `optics.psf`'s alone; this is the intensity")
     precision(view.get("dtype", "float32"))  # proves the backend before Dr.Jit is asked for anything
 

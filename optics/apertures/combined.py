@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from math import sqrt
@@ -139,7 +139,7 @@ def hexagonal_segments(
         corners = ring * np.exp(1j * np.pi * (np.arange(7) / 3 + 1 / 6))
         for first, last in itertools.pairwise(corners):
             centres += [first + (last - first) * step / ring for step in range(ring)]
-    if not isinstance(without, (tuple, list, set, frozenset)):
+    if isinstance(without, str) or not isinstance(without, Iterable):
         raise ValueError(f"without = {shown(without)}: must hold numbers of segments, such as (0,)")
     for number in without:
         whole("without", number, 0, len(centres) - 1)

@@ -27,6 +27,7 @@ MOST_ORIENTATIONS = 1024
 PART = 0.1  # choice: of the predicted error, within which means over half of the orientations must agree
 FINEST = 1e-5  # choice: such means are not asked to agree more closely
 DIGITS = 7.0  # choice: of sums over the PSF
+AT_A_TIME = 2**17  # choice: frequencies that are summed at once, each spread over 64 cells: some hundred megabytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +112,16 @@ class MTF:
         import drjit as dr
 
         types, waves = precision("float64"), self.shares.shape[0]
-        angle = np.pi * (np.arange(n) + shift) / n
+        some, angle = max(1, AT_A_TIME // f.size), np.pi * (np.arange(n) + shift) / n
+        parts = [self._sum(f, angle[start : start + some]) for start in range(0, n, some)]
+        mean = sum(parts[1:], parts[0]) / n
+        return types.Tensor(dr.select(types.Float(np.tile(f == 0, waves)) > 0, 1, mean), (waves, f.size))
+
+    def _sum(self, f: np.ndarray, angle: np.ndarray) -> Array:
+        """Over directions, flat (wavelength, frequency)."""
+        import drjit as dr
+
+        types, waves = precision("float64"), self.shares.shape[0]
         dx = 1 / (self.fx.size * (self.fx[1] - self.fx[0]))
         turns = np.array([np.outer(f, part).ravel() * dx for part in (np.cos(angle), np.sin(angle))])
         told = (np.abs(turns) <= 0.5 * (1 + 1e-9)).all(axis=0)
@@ -119,9 +129,7 @@ class MTF:
         sums = ScatteredSum(p, q, self.shares.shape[1:], DIGITS)
         re, im = sums_at(sums, types.Float(flat(self.shares)))
         contrast = dr.sqrt(dr.maximum(re * re + im * im, 1e-300)) * types.Float(np.tile(told, waves))
-        mean = dr.block_reduce(dr.ReduceOp.Add, contrast, n) / n
-        zero = types.Float(np.tile(f == 0, waves))
-        return types.Tensor(dr.select(zero > 0, 1, mean), (waves, f.size))
+        return dr.block_reduce(dr.ReduceOp.Add, contrast, angle.size)
 
 
 def _first(tensor: Array, count: int) -> Array:

@@ -91,7 +91,7 @@ def propagate_through(
         ValueError: bad argument, named with its value and valid range; or a parameter that carries derivatives.
         AccuracyError: the tolerance cannot be met; says what can.
     """
-    if not isinstance(elements, (list, tuple)):
+    if isinstance(elements, str) or not isinstance(elements, Sequence):
         raise ValueError(f"elements = {shown(elements)}: must be a list of Pupil and FreeSpace")
     if source is not None:
         of_kind("source", source, PointSource, "PointSource(), a plane wave")

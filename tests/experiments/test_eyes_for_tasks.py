@@ -111,16 +111,6 @@ def test_rows_survive_the_file(tmp_path):
     assert [row.fitness for row in back] == pytest.approx([row.fitness for row in some], rel=1e-5)
 
 
-def test_the_published_page_says_what_its_store_says():
-    from pathlib import Path
-
-    results = Path(__file__).parents[2] / "docs/results"
-    data = results / "data/eyes_for_tasks.csv"
-    answer = data.with_suffix(".txt").read_text(encoding="utf-8").strip()
-    made = page(read_rows(Trained, data), Origin.read(data.with_suffix(".json")), answer)
-    assert made.markdown == (results / "eyes_for_tasks.md").read_text(encoding="utf-8")
-
-
 def test_lives_that_failed_count_for_nothing():
     """A training that diverged has no fitness: p is that of the others."""
     found = rows(0.0, spread=1.0)

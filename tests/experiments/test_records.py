@@ -14,8 +14,9 @@ from evolve.search.successive_halving import finished
 from evolve.store.directory import Run, RunError
 from experiments import candidates
 from experiments.candidates import Row, complete, rows_of
+from experiments.designed import Trained
 from experiments.evolved import stored
-from experiments.store import read_rows, write_rows
+from experiments.store import Origin, read_rows, write_rows
 
 RESULTS = Path(__file__).parents[2] / "docs/results"
 RECORDS = sorted((RESULTS / "records").iterdir())
@@ -101,6 +102,14 @@ def test_pages_hold_what_is_on_record(page, tmp_path, monkeypatch):
 
 def stored_rows(page):
     return RESULTS / "data" / f"{page}.csv"
+
+
+@pytest.mark.parametrize("page", ["brains_for_eyes", "eyes_for_tasks"])
+def test_pages_of_designed_trainings_say_what_their_stores_say(page):
+    data, experiment = stored_rows(page), importlib.import_module(f"experiments.{page}")
+    answer = data.with_suffix(".txt").read_text(encoding="utf-8").strip()
+    made = experiment.page(read_rows(Trained, data), Origin.read(data.with_suffix(".json")), answer)
+    assert made.markdown == (RESULTS / f"{page}.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("page", PAGES)

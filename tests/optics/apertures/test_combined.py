@@ -160,6 +160,11 @@ def test_zones_of_a_zone_plate_end_where_paths_are_half_waves_longer():
     np.testing.assert_allclose(closed.radii[:4], plate.radii[1:5])
 
 
+def test_segments_are_left_out_whatever_holds_their_numbers():
+    areas = {hexagonal_segments(1, without=held).area for held in ((0, 1), [1, 0], np.array([0, 1]), range(2))}
+    assert len(areas) == 1 < 2 * areas.pop() / hexagonal_segments(1).area
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [

@@ -7,6 +7,7 @@ from drjit.auto.ad import Float64
 
 import optics
 from optics.numerics.precision import precision
+from optics.point_spread import modulation_transfer
 from optics.point_spread.modulation_transfer import MTF
 
 LENS, FOCUS, WAVELENGTH = optics.Pupil(1e-3, thin_lens_focal_length=4e-3), 4e-3, 550e-9
@@ -50,6 +51,14 @@ def test_as_many_orientations_as_the_picture_needs():
     assert np.abs(found - fine).max() < 1e-3
     with pytest.raises(optics.AccuracyError, match="a mean over 1024 orientations errs by"):
         MTF.of(tensor, dx, np.array([1e6]), np.array([1e-6])).profile(f)
+
+
+def test_many_frequencies_are_summed_some_at_a_time(monkeypatch):
+    result = optics.psf(LENS, [WAVELENGTH, 600e-9], FOCUS + 4e-5, dx=0.5e-6, shape=(30, 71), tolerance=1e-4)
+    transfer, f = optics.mtf(result, tolerance=1), np.linspace(0, 4e5, 7)
+    at_once = transfer.profile(f)
+    monkeypatch.setattr(modulation_transfer, "AT_A_TIME", 20)
+    np.testing.assert_allclose(transfer.profile(f), at_once, atol=1e-7)
 
 
 def test_windows_need_not_be_square():
