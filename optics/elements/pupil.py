@@ -232,7 +232,15 @@ class Pupil:
     def slopes(self, wavelength: float, source: PointSource) -> Slopes:
         """Gradient of the optical path over the disk and its soft edge, by central differences: between a relief's
         jumps, where pixels are level, that of all the rest."""
-        return _slopes(self._level if self.pixels else self, wavelength, number(source.distance), source.angle)
+        # A path knows its wavelength by the indices alone: where these stay what they are, so do slopes.
+        indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
+        same = self._first_with.setdefault(indices, wavelength)
+        return _slopes(self._level if self.pixels else self, same, number(source.distance), source.angle)
+
+    @cached_property
+    def _first_with(self) -> dict[tuple[float, float, float], float]:
+        """The first wavelength that was asked for with these indices."""
+        return {}
 
     def scatter(self, wavelength: float, share: float) -> float:
         """Spatial frequency [1/m] along x and y beyond which the jumps of a relief of pixels send no more than this

@@ -14,18 +14,24 @@ from optics.numerics.grid import Grid
 __all__ = ["Tiles", "cell_integrals", "samples_per_cycle"]
 
 DEGREE = 7
-# Of the spline through three samples per cycle of the highest frequency, over tiles of any size, the error is 5e-5 of
+SHORT = 8 * DEGREE  # samples, of which the middle ones lie far from both ends
+# Of the spline through 3.1 samples per cycle of the highest frequency, over tiles of any size, the error is 3e-5 of
 # the integrals' root mean square, and it falls with the eighth power of the samples' distance. With fewer it grows by
-# ten for every 0.375; test_cell_integrals.py.
-FINE, FINE_TOLERANCE, ORDER = 3.0, 1e-4, 8
-FEWEST, PER_DECADE = 2.25, 0.375
+# ten for every 0.425; test_cell_integrals.py.
+FINE, FINE_TOLERANCE, ORDER = 3.1, 1e-4, 8
+FEWEST, PER_DECADE = 2.25, 0.425
+# Cells of whole cycles average away most of what fewer samples fold onto other frequencies: (cycles, tolerance, fewer),
+# of which each holds from the first two on. validation/cell_samples.py has the errors.
+FEWER = ((2.0, 1e-2, 0.5), (1.0, 1e-3, 0.25))
 
 
-def samples_per_cycle(tolerance: float) -> float:
-    """Of the highest frequency, so that integrals err by no more than a third of the tolerance."""
+def samples_per_cycle(tolerance: float, cycles: float = 0.0) -> float:
+    """Of the highest frequency, so that integrals over cells of so many cycles err by no more than a third of the
+    tolerance."""
     if tolerance <= FINE_TOLERANCE:
         return FINE * (FINE_TOLERANCE / tolerance) ** (1 / ORDER)
-    return max(FEWEST, FINE - PER_DECADE * math.log10(tolerance / FINE_TOLERANCE))
+    fewer = next((fewer for least, loose, fewer in FEWER if cycles >= least and tolerance >= loose), 0.0)
+    return max(FEWEST, FINE - PER_DECADE * math.log10(tolerance / FINE_TOLERANCE)) - fewer
 
 
 @dataclass(frozen=True)
@@ -58,7 +64,7 @@ def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
         held = np.diff(second, 2, axis=0) / tiles.size
     else:
         held = np.diff(primitive, axis=0)
-    found = _over_samples(held, knots, degree, grid.x)
+    found = _over_samples(held, degree)
     return np.concatenate([found, found[: tiles.count - own][::-1, ::-1]])
 
 
@@ -68,17 +74,29 @@ def _knots(x: np.ndarray, degree: int) -> np.ndarray:
     return np.concatenate([np.repeat(x[0], degree + 1), x[skipped:-skipped], np.repeat(x[-1], degree + 1)])
 
 
-def _over_samples(held: np.ndarray, knots: np.ndarray, degree: int, x: np.ndarray) -> np.ndarray:
-    """Q C⁻¹ of Q = held. C is a band: every sample lies under degree + 1 B-splines."""
+def _over_samples(held: np.ndarray, degree: int) -> np.ndarray:
+    """Q C⁻¹ of Q = held."""
     from scipy.linalg import solve_banded
 
-    there, sample = _bsplines(knots, degree, x), np.arange(len(x))[:, None]
-    above = there.indices.reshape(len(x), degree + 1) - sample
-    lower, upper = int(above.max()), -int(above.min())
-    band = np.zeros((lower + upper + 1, len(x)))
-    band[upper + above, sample] = there.data.reshape(above.shape)
-    found: np.ndarray = solve_banded((lower, upper), band, held.T, overwrite_ab=True, check_finite=False).T
+    samples = held.shape[1]
+    lower, upper, band = _collocation(min(samples, SHORT), degree)
+    if samples > SHORT:  # far from both ends all samples lie alike under their B-splines
+        inside = np.repeat(band[:, SHORT // 2 : SHORT // 2 + 1], samples - SHORT, axis=1)
+        band = np.concatenate([band[:, : SHORT // 2], inside, band[:, SHORT // 2 :]], axis=1)
+    found: np.ndarray = solve_banded((lower, upper), band, held.T, check_finite=False).T
     return found
+
+
+@lru_cache(maxsize=64)
+def _collocation(samples: int, degree: int) -> tuple[int, int, np.ndarray]:
+    """C, of samples at any pitch, as a band: every sample lies under degree + 1 B-splines. Its sides, its diagonals."""
+    x, sample = np.arange(samples, dtype=float), np.arange(samples)[:, None]
+    there = _bsplines(_knots(x, degree), degree, x)
+    above = there.indices.reshape(samples, degree + 1) - sample
+    lower, upper = int(above.max()), -int(above.min())
+    band = np.zeros((lower + upper + 1, samples))
+    band[upper + above, sample] = there.data.reshape(above.shape)
+    return lower, upper, band
 
 
 def _primitive(knots: np.ndarray, degree: int, at: np.ndarray, times: int) -> np.ndarray:

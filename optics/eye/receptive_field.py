@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
+from optics.elements.wavefront_slopes import Slopes
 from optics.eye.cell_integrals import Tiles, cell_integrals, samples_per_cycle
 from optics.methods.problem import Problem
 from optics.numerics.accuracy import AccuracyError, Plan
@@ -91,7 +93,7 @@ def visual_kernel(
     spot = spot_of(beams, retina)
     # Each wavelength on samples of its own: longer ones need fewer.
     requests = [
-        _request(beam, spot, need, spot.window(need.pitch), retina)
+        _request(beam, spot, need, spot.window(_pitch_for_cells(need.pitch, retina)), retina)
         for beam, need in zip(beams, spot.needs, strict=True)
     ]
     tiles, types = Tiles(spot.cells(retina.cell) + 2 * from_cell, retina.cell, from_cell), precision(retina.dtype)
@@ -146,6 +148,12 @@ def _image(beam: Beam, distance: float) -> tuple[float, float]:
     return distance * bent * x / axial, distance * bent * y / axial
 
 
+def _pitch_for_cells(pitch: float, retina: Retina) -> float:
+    """As wide [m] as integrals over cells allow, where `pitch` is what the PSF itself allows."""
+    each = samples_per_cycle(retina.tolerance)
+    return pitch * each / samples_per_cycle(retina.tolerance, retina.cell / (pitch * each))
+
+
 def _spread(beams: list[Beam], spot: Spot, retina: Retina) -> PSFResult:
     window = spot.window(spot.pitch)
     return spread([_request(beam, spot, need, window, retina) for beam, need in zip(beams, spot.needs, strict=True)])
@@ -193,9 +201,17 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
 
 def _shadow(beam: Beam, retina: Retina, centre: tuple[float, float]) -> float:
     """Half side [m] of the square about `centre` in which all rays end, but for half the tolerance."""
-    x, y = beam.pupil.slopes(beam.wavelength, beam.source).rays(number(retina.distance), beam.index)
+    slopes = beam.pupil.slopes(beam.wavelength, beam.source)
+    return _half_side(slopes, (number(retina.distance), beam.index), centre, 1 - retina.tolerance / 2)
+
+
+@lru_cache(maxsize=64)
+def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float, float], share: float) -> float:
+    """The same of a share of the rays; behind: distance [m] and index. Wavelengths have the same slopes where glass
+    does not disperse."""
+    x, y = slopes.rays(*behind)
     farthest = np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1]))
-    return float(np.quantile(farthest, 1 - retina.tolerance / 2, method="higher"))
+    return float(np.quantile(farthest, share, method="higher"))
 
 
 def _beyond_edge(pupil: Pupil, share: float) -> float:

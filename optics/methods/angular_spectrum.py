@@ -29,6 +29,9 @@ __all__ = [
 ]
 
 
+TOO_WIDE = 1.5  # choice: times the cheapest taper's cost, beyond which wider ones have not been seen to cost less
+
+
 class SpectrumSampling:
     """Samples of a spectrum, and of what it becomes.
 
@@ -138,12 +141,22 @@ class GridSampling(SpectrumSampling):
 
 def whole_spectrum(problem: Problem) -> list[GridSampling]:
     """Samplings by which the whole spectrum meets the problem's tolerance."""
-    return [_sampling(problem, taper, "angular_spectrum") for taper in tapers(problem)]
+    return _samplings(problem, "angular_spectrum")
 
 
 def split_spectrum(problem: Problem) -> list[GridSampling]:
     """Samplings by which the split spectrum meets the problem's tolerance."""
-    return [_sampling(problem, taper, "split_angular_spectrum") for taper in tapers(problem)]
+    return _samplings(problem, "split_angular_spectrum")
+
+
+def _samplings(problem: Problem, method: str) -> list[GridSampling]:
+    """By wider and wider tapers, as far as that pays: narrow ones need more frequencies, wide ones more room."""
+    found: list[GridSampling] = []
+    for taper in tapers(problem):
+        found.append(_sampling(problem, taper, method))
+        if found[-1].seconds > TOO_WIDE * min(each.seconds for each in found):
+            break
+    return found
 
 
 def _sampling(problem: Problem, taper: Taper, method: str) -> GridSampling:
@@ -204,19 +217,20 @@ def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling
 def _transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precision) -> Field:
     """exp(ikz (cos θ - 1)) under the spectral taper; the split method leaves the paraxial -ikz sin²θ/2 for later.
 
-    Goodman, eq. 3-74. cos θ - 1 = -q, q = sin²θ / (1 + cos θ), and with the paraxial part taken out -q²/2: no
-    difference of nearly equal numbers.
+    Goodman, eq. 3-74. cos θ - 1 = -q, and with the paraxial part taken out -q²/2. The difference q = 1 - cos θ loses
+    digits, of which the distance makes waves; a step towards q (2 - q) = sin²θ brings them back, without a division.
     """
     import drjit as dr
 
     spectrum = how.part(how.spectrum)
     fx, fy = spectrum.coordinates(types)
-    f = dr.sqrt(fx * fx + fy * fy)
-    s2 = dr.minimum(dr.square(f * opaque(types, problem.wavelength)), 1)
-    q = s2 / (1 + dr.sqrt(1 - s2))
+    f2 = fx * fx + fy * fy
+    s2 = dr.minimum(f2 * dr.square(opaque(types, problem.wavelength)), 1)
+    q = 1 - dr.sqrt(1 - s2)
+    q += (s2 - q * (2 - q)) / 2
     sag = q if how.is_whole else q * q / 2
     waves = -opaque(types, beam.distance) / opaque(types, problem.wavelength) * sag
-    return Field.from_waves(how.taper.fade(f, types), waves, spectrum, types)
+    return Field.from_waves(how.taper.fade(f2, types), waves, spectrum, types)
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:

@@ -82,7 +82,7 @@ def fraunhofer(problem: Problem) -> list[ParaxialSampling]:
 
 
 def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSampling]:
-    if problem.slopes is None:
+    if problem.pixelated is not None:
         return []
     edge = problem.soft_edge(turning)
     pitch = 1 / (turning + edge.stopband)

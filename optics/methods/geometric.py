@@ -122,7 +122,7 @@ def geometric(problem: Problem) -> list[RaySampling]:
 def pinhole(problem: Problem) -> list[PinholeSampling]:
     """One sample holds all light. Against samples of the exact PSF that is wrong by all of it, however small the PSF
     is: they are intensities at points, not means over cells. So "auto" never takes it."""
-    if problem.slopes is None:
+    if problem.pixelated is not None:
         return []
     cell = problem.window.dx**2
     return [PinholeSampling(mismatch(1 / cell, _brightness(problem)))]

@@ -117,7 +117,7 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
     f = sine / opaque(types, problem.wavelength)
     exactly = problem.tolerance < LOOSE
     spectrum = _transform(pupil, r, f, types, exactly)
-    fade = how.taper.fade(f, types)
+    fade = how.taper.fade(f * f, types)
     ring = types.Float64(2 * np.pi * edge * weights) * f * cosine / opaque(types, problem.wavelength)
     waves = -opaque(types, beam.distance) / opaque(types, problem.wavelength) * 2 * dr.square(dr.sin(theta / 2))
     grid = Grid((1, how.angles), 1.0)

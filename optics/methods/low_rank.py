@@ -18,7 +18,7 @@ from optics.numerics.cost import CALL, FOURIER_ENTRY, KERNEL_ENTRY, MATMUL_FLOPS
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
-from optics.numerics.matrices import complex_matmul
+from optics.numerics.matrices import complex_flops, complex_matmul
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["LowRankSampling", "low_rank"]
@@ -94,7 +94,7 @@ def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) 
         return None
     inner = rank * len(pupil.at)
     height, width = problem.window.shape
-    flops = 8 * (inner * inner * width + height * inner * width)
+    flops = complex_flops(inner * inner * width // 2) + complex_flops(height * inner * width)
     seconds = (
         CALL["low_rank"]
         + flops / MATMUL_FLOPS[problem.dtype]
@@ -166,27 +166,66 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
 
     which varies slowly with x; u is the place in the window, from its centre, and s = ξ/c or the sines of the samples.
     Sums over a and ξ along one axis are one: A_y W A_xᵀ, two matrix products.
+    Along x both are kept as what is even and what is odd about the middle, with half of the first one's products:
+    A_x stays what it is where window and samples are both mirrored.
     """
     window = problem.window
-    inner = _kernel(beam, problem, how, types)
-    across_x = across_y = _fourier(window.shape[1], problem, how, types)
-    if window.shape[0] != window.shape[1]:
-        across_y = _fourier(window.shape[0], problem, how, types)
-    re, im = complex_matmul(across_y, complex_matmul(inner, across_x, transposed=True))
-    return Field(re.array, im.array, window, types)
+    across_y = _fourier(sample_positions(window.shape[0], window.dx), problem, how)
+    across_x = _halves(_fourier(np.arange(window.shape[1] // 2 + 1) * window.dx, problem, how))
+    summed = [
+        complex_matmul(_tensors(across_y, types), complex_matmul(inner, _tensors(across, types), transposed=True))
+        for inner, across in zip(_kernel(beam, problem, how, types), across_x, strict=True)
+    ]
+    return _unfolded(summed, window, types)
 
 
-def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> tuple[Array, Array]:
-    """W[(b, η), (a, ξ)] = P(ξ, η) G(ξ, η; x_a, y_b) as two tensors."""
+def _halves(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(A[x, j] ± A[x, -j]) / 2 for samples j from the middle on; that in the middle is its own mirror image."""
+    size = matrix.shape[1]
+    ahead, behind = matrix[:, size // 2 :], matrix[:, : size - size // 2][:, ::-1]
+    even, odd = (ahead + behind) / 2, (ahead - behind) / 2
+    if size % 2:
+        even[:, 0] /= 2
+    return even, odd
+
+
+def _unfolded(parts: list[tuple[Array, Array]], window: Grid, types: Precision) -> Field:
+    """Over the window, of what is even and what is odd along x."""
     import drjit as dr
 
-    n, rank = len(how.pupil.at), how.rank
-    u = how.pupil.field(beam, types)
-    dr.eval(u.re, u.im)
-    column, row = Grid.square(n * rank, 1.0).coordinates(types)  # counted from the centre
-    middle = dr.opaque(types.Float64, (n * rank) // 2)
-    (a, i), (b, j) = (_split(place + middle, n, types) for place in (column, row))
-    points = types.Float64(how.half_width * chebyshev_points(rank))
+    across = window.shape[1] // 2
+    x, y = Grid(window.shape, 1.0).coordinates(types)
+    place = types.Index((y + opaque(types, window.shape[0] // 2)) * opaque(types, across + 1) + abs(x))
+    side = dr.select(x < 0, types.Float(-1), types.Float(1))
+    even, odd = ([dr.gather(types.Float, part.array, place) for part in each] for each in parts)
+    return Field(even[0] + side * odd[0], even[1] + side * odd[1], window, types)
+
+
+def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> list[tuple[Array, Array]]:
+    """W[(b, η), (a, ξ)] ± W[(b, η), -(a, ξ)], W = P(ξ, η) G(ξ, η; x_a, y_b), for (a, ξ) from the middle on: each as
+    two tensors."""
+    import drjit as dr
+
+    u, size = how.pupil.field(beam, types).evaluated(), len(how.pupil.at) * how.rank
+    shape = size, size - size // 2
+    column, row = Grid(shape, 1.0).coordinates(types)  # counted from the centre
+    column, row = column + opaque(types, shape[1] // 2), row + opaque(types, size // 2)
+    right = column + opaque(types, size // 2)
+    ahead = _entries(u, (right, row), beam, problem, how)
+    behind = _entries(u, (opaque(types, size - 1) - right, row), beam, problem, how)
+    parts = [ahead.re + behind.re, ahead.im + behind.im, ahead.re - behind.re, ahead.im - behind.im]
+    dr.eval(parts)
+    tensors = [types.Tensor(part, shape) for part in parts]
+    return [(tensors[0], tensors[1]), (tensors[2], tensors[3])]
+
+
+def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, how: LowRankSampling) -> Field:
+    """W at columns and rows, float64 indices."""
+    import drjit as dr
+
+    types, n = u.types, len(how.pupil.at)
+    (a, i), (b, j) = (_split(index, n, types) for index in at)
+    points = types.Float64(how.half_width * chebyshev_points(how.rank))
     from_centre = [dr.gather(types.Float64, points, types.Index(index)) for index in (a, b)]
     x, y = (u + opaque(types, middle) for u, middle in zip(from_centre, problem.window.centre, strict=True))
     xi, eta = how.pupil.places(i, j, beam, types)
@@ -199,12 +238,11 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
     s, t = (dr.gather(types.Float64, directions, types.Index(index)) for index in (i, j))
     fixed = from_centre[0] * s + from_centre[1] * t
     waves = (excess / (distance + dr.sqrt(rho2)) + fixed) / wavelength
-    slow = Field.from_waves(z / (wavelength * distance * distance), waves, Grid.square(n * rank, 1.0), types)
+    slow = Field.from_waves(z / (wavelength * distance * distance), waves, u.grid, types)
     near = types.Float(wavelength / (2 * math.pi * distance))
-    slow = slow * Field(near, types.Float(-1), slow.grid, types)
-    place = types.Index(j * dr.opaque(types.Float64, n) + i)
-    whole = slow * Field(dr.gather(types.Float, u.re, place), dr.gather(types.Float, u.im, place), slow.grid, types)
-    return types.Tensor(whole.re, slow.grid.shape), types.Tensor(whole.im, slow.grid.shape)
+    slow = slow * Field(near, types.Float(-1), u.grid, types)
+    place = types.Index(j * opaque(types, n) + i)
+    return slow * Field(dr.gather(types.Float, u.re, place), dr.gather(types.Float, u.im, place), u.grid, types)
 
 
 def _split(index: Array, n: int, types: Precision) -> tuple[Array, Array]:
@@ -216,12 +254,17 @@ def _split(index: Array, n: int, types: Precision) -> tuple[Array, Array]:
     return quotient, dr.fma(-quotient, by, index)
 
 
-def _fourier(n: int, problem: Problem, how: LowRankSampling, types: Precision) -> tuple[Array, Array]:
-    """A[x, (a, ξ)] = L_a(u) e^{-ik s u} as two tensors, at n samples of the window along an axis."""
-    at = sample_positions(n, problem.window.dx)
+def _fourier(at: np.ndarray, problem: Problem, how: LowRankSampling) -> np.ndarray:
+    """A[x, (a, ξ)] = L_a(u) e^{-ik s u} at places u along an axis [m], from the window's centre."""
     waves = np.outer(at, how.directions) / -problem.wavelength
-    angle = (2 * np.pi * (waves - np.rint(waves))).astype(types.dtype)
-    weight = lagrange_basis(at, how.half_width * chebyshev_points(how.rank)).T.astype(types.dtype)
-    shape = len(at), weight.shape[1] * angle.shape[1]
-    re, im = (weight[:, :, None] * part[:, None, :] for part in (np.cos(angle), np.sin(angle)))
-    return types.Tensor(padded_for_packets(re), shape), types.Tensor(padded_for_packets(im), shape)
+    angle = (2 * np.pi * (waves - np.rint(waves))).astype(problem.dtype)
+    weight = lagrange_basis(at, how.half_width * chebyshev_points(how.rank)).T.astype(problem.dtype)
+    found: np.ndarray = weight[:, :, None] * (np.cos(angle) + 1j * np.sin(angle))[:, None, :]
+    return found.reshape(len(at), -1)
+
+
+def _tensors(matrix: np.ndarray, types: Precision) -> tuple[Array, Array]:
+    return (
+        types.Tensor(padded_for_packets(matrix.real), matrix.shape),
+        types.Tensor(padded_for_packets(matrix.imag), matrix.shape),
+    )

@@ -36,14 +36,13 @@ class Problem:
 
     aperture: its shape. radius, distance [m]; wavelength [m] in the medium; window: output grid.
     phase_band: highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge.
-    turning: highest spatial frequency [1/m] in the phase of the pupil and of the path to any point of the window
-        together; for a lens in focus far less than the sum of both.
-    phase_band_inside, turning_inside: the same over the disk without its soft edge, where a relief may bend steeply.
+    phase_band_inside: the same over the disk without its soft edge, where a relief may bend steeply.
+    detail: what of it the wavefront's slopes do not tell [1/m].
     symmetric: nothing depends on the azimuth. even: nothing changes where x or y is mirrored.
     widest_band: frequencies beyond it may be dropped (infinite: whatever reaches the window counts).
     reach: given where all but a tolerance's share of the light stays within this distance of the axis [m]: what lies
         beyond may be wrong, and edge-diffracted light less exact (None: the window counts to its corners).
-    slopes: of the wavefront, by whose rays approximations judge themselves (None: these are not weighed).
+    slopes: of the wavefront.
     medium_n: index behind the pupil.
     masked: whether a mask sends light where rays do not tell, so that approximations cannot judge themselves.
     spread: of the light over the pupil, see `light_spread`.
@@ -56,14 +55,13 @@ class Problem:
     window: Grid
     phase_band: float
     phase_band_inside: float
-    turning: float
-    turning_inside: float
+    detail: float
+    slopes: Slopes
     symmetric: bool
     tolerance: float
     dtype: str = "float32"
     widest_band: float = math.inf
     reach: float | None = None
-    slopes: Slopes | None = None
     masked: bool = False
     medium_n: float = 1.0
     spread: float = ROUND
@@ -83,9 +81,28 @@ class Problem:
         return _problem(Beam(beam.pupil, source, beam.wavelength, distance), window, tolerance, dtype)
 
     @cached_property
+    def turning(self) -> float:
+        """Highest spatial frequency [1/m] in the phase of the pupil and of the path to any point of the window
+        together; for a lens in focus far less than the sum of both."""
+        return self._turning[0]
+
+    @cached_property
+    def turning_inside(self) -> float:
+        """The same over the disk without its soft edge."""
+        return self._turning[1]
+
+    @cached_property
+    def _turning(self) -> tuple[float, float]:
+        soft, inside = self.slopes.turning(self.distance, self.window, self.medium_n)
+        margin = SLOPE_MARGIN / (self.wavelength * self.medium_n)
+        return margin * soft + self.detail, margin * inside + self.detail
+
+    @cached_property
     def rays(self) -> Rays | None:
-        """Where geometrical optics sends the light."""
-        return None if self.slopes is None else Rays.of(self.slopes, self.aperture, self.distance, self.medium_n)
+        """Where geometrical optics sends the light, by which approximations judge themselves; None: pixels scatter."""
+        if self.pixelated is not None:
+            return None
+        return Rays.of(self.slopes, self.aperture, self.distance, self.medium_n)
 
     @property
     def pixelated(self) -> PixelatedAperture | None:
@@ -160,7 +177,6 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
     on_axis = beam.source.angle == (0.0, 0.0)
     detail = pupil.bandwidth(wavelength, tolerance / 10)  # choice: a tenth, of the phase [rad]
-    turning, inside = slopes.turning(distance, window, beam.index)
     return Problem(
         aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
         radius=pupil.radius,
@@ -169,13 +185,12 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
         window=window,
         phase_band=SLOPE_MARGIN * slopes.steepest / wavelength + detail,
         phase_band_inside=SLOPE_MARGIN * slopes.steepest_inside / wavelength + detail,
-        turning=SLOPE_MARGIN * turning / wavelength + detail,
-        turning_inside=SLOPE_MARGIN * inside / wavelength + detail,
+        detail=detail,
+        slopes=slopes,
         symmetric=pupil.rotationally_symmetric(wavelength) and on_axis,
         tolerance=tolerance,
         dtype=dtype,
         masked=pupil.mask is not None,
-        slopes=None if pixels else slopes,
         medium_n=beam.index,
         spread=light_spread(pupil),
         even=on_axis and window.centre == (0.0, 0.0) and pupil.mirror_symmetric(wavelength),

@@ -40,13 +40,18 @@ class Taper:
     def end(self) -> float:
         return self.band + self.width
 
-    def fade(self, f: Array, types: Precision) -> Array:
-        """1 below the band, 0 beyond its end: the error function falls to the ripple in √ln(1/ripple)."""
+    def fade(self, f2: Array, types: Precision) -> Array:
+        """1 below the band, 0 beyond its end: the error function falls to the ripple in √ln(1/ripple).
+
+        f2: f², float64.
+        """
         import drjit as dr
 
         steepness = 2 / self.width * math.sqrt(math.pi * self.width * self.blur / 2)
-        middle = opaque(types, self.band + self.width / 2)
-        return (1 - dr.erf(types.Float((f - middle) * opaque(types, steepness)))) / 2
+        middle = self.band + self.width / 2
+        # f - m = (f² - m²) / (f + m): a root of few digits does.
+        beyond = types.Float((f2 - opaque(types, middle**2)) * opaque(types, steepness / middle))
+        return (1 - dr.erf(beyond / (1 + dr.sqrt(types.Float(f2 * opaque(types, middle**-2)))))) / 2
 
 
 def tapers(problem: Problem) -> list[Taper]:

@@ -35,7 +35,7 @@ def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid) -> Field:
     """Σ_j u[j] exp(± 2πi j·k / period), as `fourier.dft2` has it, of a field on the quarter of a plane of `shape`
     samples, for the k of a grid's quarter."""
     types, (ny, nx), (my, mx) = field.types, shape, grid.shape
-    quarters = field.grid.shape
+    quarters = field.evaluated().grid.shape
     across = down = _cosines(types, mx, nx, period)
     if (ny, my) != (nx, mx):
         down = _cosines(types, my, ny, period)

@@ -53,5 +53,13 @@ class Field:
     def intensity(self) -> Array:
         return self.re * self.re + self.im * self.im
 
+    def evaluated(self) -> Field:
+        """Both parts at once: looked at one after the other, each computes what they share."""
+        import drjit as dr
+
+        dr.eval(self.re, self.im)
+        return self
+
     def numpy(self) -> np.ndarray:
+        self.evaluated()
         return (self.re.numpy() + 1j * self.im.numpy()).reshape(self.grid.shape).astype(self.types.complex_dtype)

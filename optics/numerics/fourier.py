@@ -167,6 +167,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
     types, shape_in = field.types, field.grid.shape
 
     def transform(re: Array, im: Array, to: tuple[int, int], from_: tuple[int, int], turn: int) -> tuple[Array, Array]:
+        dr.eval(re, im)  # at once: one after the other, each computes what they share
         parts = re.numpy().reshape(from_), im.numpy().reshape(from_)
         return _fft_of_parts(parts, period, to, turn, types)
 

@@ -11,7 +11,7 @@ from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.cost import DFT_CALL, FOLDED_SAMPLE, MATMUL_FLOPS
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
-from optics.numerics.matrices import complex_matmul, matmul
+from optics.numerics.matrices import complex_flops, complex_matmul, matmul
 from optics.numerics.precision import Precision, opaque
 
 __all__ = ["by_halves", "by_whole_matrices", "halves_pay", "matrix_seconds", "matrix_sum"]
@@ -42,7 +42,7 @@ def _products(shape_in: Shape, shape_out: Shape) -> int:
 
 
 def _whole_seconds(shape_in: Shape, shape_out: Shape) -> float:
-    return 8 * _products(shape_in, shape_out) / MATMUL_FLOPS["float32"]
+    return complex_flops(_products(shape_in, shape_out)) / MATMUL_FLOPS["float32"]
 
 
 def _halves_seconds(shape_in: Shape, shape_out: Shape) -> float:
@@ -89,19 +89,20 @@ def _quarter(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int)
     entries = Grid((n_out // 2 + 1, n_in // 2 + 1), 1.0)
     j, k = _counted(entries.shape, types)
     wave = Field.from_waves(1.0, j * k / opaque(types, sign * period), entries, types)
+    wave.evaluated()
     return types.Tensor(wave.re, entries.shape), types.Tensor(wave.im, entries.shape)
 
 
 def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
     """[re, im] of u[y, j] + u[y, -j] and of u[y, j] - u[y, -j], j from 0 on."""
-    types, (ny, nx) = field.types, field.grid.shape
+    types, (ny, nx) = field.types, field.evaluated().grid.shape
     shape = ny, nx // 2 + 1
     j, y = _counted(shape, types)
     middle = y * opaque(types, nx) + opaque(types, nx // 2)
     there = (j > 0) & (j < opaque(types, nx - nx // 2))
     ahead, behind = types.Index(middle + j), types.Index(middle - j)
     parts = [_read(part, ahead, behind, there) for part in (field.re, field.im)]
-    return [types.Tensor(a + b, shape) for a, b in parts], [types.Tensor(a - b, shape) for a, b in parts]
+    return _sums_and_differences(parts, shape, types)
 
 
 def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[list[Array], list[Array]]:
@@ -114,8 +115,15 @@ def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[li
     there = (j > 0) & (j < opaque(types, ny - ny // 2))
     ahead = _both_sides(across, (middle + j) * width + abs(k), k, types, there)
     behind = _both_sides(across, (middle - j) * width + abs(k), k, types)
-    pairs = list(zip(ahead, behind, strict=True))
-    return [types.Tensor(a + b, shape) for a, b in pairs], [types.Tensor(a - b, shape) for a, b in pairs]
+    return _sums_and_differences(list(zip(ahead, behind, strict=True)), shape, types)
+
+
+def _sums_and_differences(pairs: list[Parts], shape: Shape, types: Precision) -> tuple[list[Array], list[Array]]:
+    import drjit as dr
+
+    sums, differences = [a + b for a, b in pairs], [a - b for a, b in pairs]
+    dr.eval(sums, differences)
+    return [types.Tensor(each, shape) for each in sums], [types.Tensor(each, shape) for each in differences]
 
 
 def _unfolded_rows(down: list[Array], shape: Shape, types: Precision) -> Parts:

@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 from scipy.fft import next_fast_len
 
-from optics.numerics import fourier, fourier_matrices
+from optics.numerics import fourier, fourier_matrices, matrices
 from optics.numerics.field import Field
+from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 
+SINES = 60  # operations, of which sine and cosine take more
 WAYS = [fourier._fft, fourier_matrices.by_halves, fourier_matrices.by_whole_matrices]
 CASES = [((5, 6), 8, (4, 3)), ((7, 8), 12, (12, 12)), ((17, 20), 6, (5, 6)), ((9, 4), 5, (13, 11)), ((6, 6), 6, (6, 6))]
 
@@ -49,6 +51,34 @@ def test_float32_carries_six_digits():
         exact = by_definition(u, 256, (256, 256), -1)
         error = np.linalg.norm((re.numpy() + 1j * im.numpy()).reshape(256, 256) - exact) / np.linalg.norm(exact)
         assert error < 1e-6
+
+
+@pytest.mark.parametrize("transposed", [False, True])
+@pytest.mark.parametrize("across", [3, 300])
+def test_complex_products_by_four_and_by_three(across, transposed):
+    """The larger ones take three real products in the place of four."""
+    rng = np.random.default_rng(2)
+    left, right = (rng.normal(size=shape) + 1j * rng.normal(size=shape) for shape in ((300, 200), (200, across)))
+    assert (300 * right.size > matrices.THREE_PAY) == (across == 300)
+    given = right.T if transposed else right
+    types = precision("float64")
+    parts = [tuple(types.Tensor(np.ascontiguousarray(part)) for part in (u.real, u.imag)) for u in (left, given)]
+    re, im = matrices.complex_matmul(*parts, transposed=transposed)
+    np.testing.assert_allclose(re.numpy() + 1j * im.numpy(), left @ right, atol=1e-11)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_parts_of_a_field_are_computed_together(way):
+    """Real part and imaginary part share sines: looked at one after the other, each would compute them."""
+    types, grid = precision("float32"), Grid.square(256, 1.0)
+    x, y = grid.coordinates(types)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        re, im = way(Field.from_waves(1.0, dr.sqrt(x * x + y * y), grid, types), 256, (256, 256), -1)
+        dr.eval(re, im)
+        kernels = [kernel for kernel in dr.kernel_history() if kernel["type"] == dr.KernelType.JIT]
+    with_sines = [kernel for kernel in kernels if kernel["size"] == 256 * 256 and kernel["operation_count"] > SINES]
+    assert len(with_sines) == 1  # the field's; a matrix of that size goes along in it
 
 
 @pytest.mark.parametrize("way", WAYS)
