@@ -29,6 +29,7 @@ from optics.numerics.fourier import _fft
 from optics.numerics.fourier_matrices import by_whole_matrices
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import TAPS
+from optics.numerics.matrices import complex_flops
 from optics.numerics.precision import Precision, precision
 from optics.numerics.radial_profile import RadialProfile
 
@@ -63,7 +64,7 @@ def operations(types: Precision) -> Iterator[Operation]:
         f"flop of a matrix product, {types.dtype}",
         flop,
         (256, 512, 1024),
-        lambda n: 16 * n**3,
+        lambda n: int(2 * complex_flops(n**3)),
         lambda n: _dft(n, types),
     )
     if types.dtype == "float64":
@@ -96,7 +97,7 @@ def _random(n: int, types: Precision) -> Field:
 
 
 def _dft(n: int, types: Precision) -> None:
-    """Two complex products of n x n matrices, 8 n³ operations each."""
+    """Two complex products of n x n matrices."""
     dr.eval(by_whole_matrices(_random(n, types), n + 0.5, (n, n), -1))
 
 

@@ -27,6 +27,7 @@ __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 
 # Choice: light from further off a receptor's direction counts as screened by the eye's rim.
 WIDEST_TANGENT = math.tan(math.radians(50))
+BESIDE = 4  # choice: samples beyond either end of the cells, where a spline through them errs most
 MOST_CELLS = 2049  # choice: of a kernel, along an axis
 MOST_SECONDS = 3.0  # choice: per band
 
@@ -69,8 +70,8 @@ class Spot:
         return min(self.half, max(need.half_of_rays for need in self.needs))
 
     def window(self, pitch: float) -> Grid:
-        """Samples around the geometric image that hold the square."""
-        side = 2 * math.ceil(self.half / pitch) + 1
+        """Samples around the geometric image that hold the square, and some beside it."""
+        side = 2 * (math.ceil(self.half / pitch) + BESIDE) + 1
         return Grid((side, side), pitch, self.centre)
 
     def cells(self, cell: float) -> int:

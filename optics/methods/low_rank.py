@@ -94,13 +94,14 @@ def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) 
         return None
     inner = rank * len(pupil.at)
     height, width = problem.window.shape
-    flops = complex_flops(inner * inner * width // 2) + complex_flops(height * inner * width)
+    columns = width // 2 + 1
+    flops = 2 * (complex_flops(inner * inner * columns // 2) + complex_flops(height * inner * columns))
     seconds = (
         CALL["low_rank"]
         + flops / MATMUL_FLOPS[problem.dtype]
         + inner * inner * KERNEL_ENTRY
         + pupil.seconds
-        + inner * (height + width) * FOURIER_ENTRY
+        + inner * (height + columns) * FOURIER_ENTRY
     )
     return LowRankSampling(pupil, rank, half, scale, seconds)
 
@@ -220,10 +221,12 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
 
 
 def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, how: LowRankSampling) -> Field:
-    """W at columns and rows, float64 indices."""
+    """W at columns and rows, float64 indices, half as many columns as rows."""
     import drjit as dr
 
     types, n = u.types, len(how.pupil.at)
+    size = n * how.rank
+    grid = Grid((size, size - size // 2), 1.0)
     (a, i), (b, j) = (_split(index, n, types) for index in at)
     points = types.Float64(how.half_width * chebyshev_points(how.rank))
     from_centre = [dr.gather(types.Float64, points, types.Index(index)) for index in (a, b)]
@@ -238,11 +241,11 @@ def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, ho
     s, t = (dr.gather(types.Float64, directions, types.Index(index)) for index in (i, j))
     fixed = from_centre[0] * s + from_centre[1] * t
     waves = (excess / (distance + dr.sqrt(rho2)) + fixed) / wavelength
-    slow = Field.from_waves(z / (wavelength * distance * distance), waves, u.grid, types)
+    slow = Field.from_waves(z / (wavelength * distance * distance), waves, grid, types)
     near = types.Float(wavelength / (2 * math.pi * distance))
-    slow = slow * Field(near, types.Float(-1), u.grid, types)
+    slow = slow * Field(near, types.Float(-1), grid, types)
     place = types.Index(j * opaque(types, n) + i)
-    return slow * Field(dr.gather(types.Float, u.re, place), dr.gather(types.Float, u.im, place), u.grid, types)
+    return slow * Field(dr.gather(types.Float, u.re, place), dr.gather(types.Float, u.im, place), grid, types)
 
 
 def _split(index: Array, n: int, types: Precision) -> tuple[Array, Array]:

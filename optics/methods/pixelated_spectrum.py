@@ -18,7 +18,7 @@ from optics.numerics.autodiff import Array
 from optics.numerics.cost import CALL, MATMUL_FLOPS, NODE_FOURIER_ENTRY, PIXEL_NODE, SPECTRUM_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
-from optics.numerics.matrices import complex_matmul
+from optics.numerics.matrices import complex_flops, complex_matmul
 from optics.numerics.precision import Precision, precision
 
 __all__ = ["PixelSpectrum", "split_pixel_spectrum", "whole_pixel_spectrum"]
@@ -90,7 +90,7 @@ def _nodes(problem: Problem, taper: Taper) -> PixelSamples | None:
 
 def _timed(sampling: PixelSpectrum, problem: Problem) -> PixelSpectrum:
     nodes, kept = len(sampling.pupil.at), sampling.spectrum.shape[0]
-    sums = 8 * nodes * kept * (nodes + kept) / MATMUL_FLOPS[problem.dtype]
+    sums = (complex_flops(nodes * nodes * kept) + complex_flops(nodes * kept * kept)) / MATMUL_FLOPS[problem.dtype]
     points = nodes * nodes * PIXEL_NODE + kept * kept * SPECTRUM_SAMPLE + nodes * kept * NODE_FOURIER_ENTRY
     return replace(
         sampling, seconds=CALL["angular_spectrum"] + sums + points + sampling.seconds_from_spectrum(problem.window)

@@ -37,7 +37,7 @@ class Problem:
     aperture: its shape. radius, distance [m]; wavelength [m] in the medium; window: output grid.
     phase_band: highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge.
     phase_band_inside: the same over the disk without its soft edge, where a relief may bend steeply.
-    detail: what of it the wavefront's slopes do not tell [1/m].
+    detail: what of the phase the wavefront's slopes do not tell [1/m].
     symmetric: nothing depends on the azimuth. even: nothing changes where x or y is mirrored.
     widest_band: frequencies beyond it may be dropped (infinite: whatever reaches the window counts).
     reach: given where all but a tolerance's share of the light stays within this distance of the axis [m]: what lies

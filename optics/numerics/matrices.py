@@ -7,7 +7,7 @@ from optics.numerics.autodiff import Array
 __all__ = ["complex_flops", "complex_matmul", "matmul"]
 
 Parts = tuple[Array, Array]
-THREE_PAY = 1e7  # choice: multiplications, above which a third product costs more than five sums of its factors
+THREE_PAY = 1e7  # choice: multiplications, above which a fourth product costs more than three sums
 
 
 def matmul(left: Array, right: Array, transposed: bool = False) -> Array:
@@ -26,7 +26,7 @@ def complex_matmul(left: Parts, right: Parts, transposed: bool = False) -> Parts
 
 
 def complex_flops(products: int) -> float:
-    """Of so many products of complex numbers, and their sums."""
+    """Of a matrix product that multiplies so many pairs of complex numbers."""
     return (6 if products > THREE_PAY else 8) * products
 
 

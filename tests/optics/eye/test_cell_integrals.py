@@ -41,15 +41,13 @@ def integral_error(samples, size, from_cell):
 
 @pytest.mark.parametrize("from_cell", [False, True])
 @pytest.mark.parametrize("cycles", [0.1, 0.5, 0.95, 1.0, 1.5, 1.95, 2.0, 3.0])
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-6])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-5])
 def test_error_is_within_a_third_of_the_tolerance(tolerance, cycles, from_cell):
     """cycles: of the highest frequency, in a cell; samples as few as are taken for both."""
-    error = integral_error(samples_per_cycle(tolerance, cycles), cycles, from_cell)
-    # A line spread falls with the square of the distance only: beyond the samples' ends 1e-6 of it is lost.
-    assert error < max(tolerance / 3, 2e-6)
+    assert integral_error(samples_per_cycle(tolerance, cycles), cycles, from_cell) < tolerance / 3
 
 
-@pytest.mark.parametrize(("cycles", "fewer"), [(0.1, 0.25), (0.5, 0.5), (1.5, 0.5)])
+@pytest.mark.parametrize(("cycles", "fewer"), [(0.1, 0.25), (0.5, 0.5)])
 def test_samples_that_larger_cells_need_are_too_few_for_smaller_ones(cycles, fewer):
     """The rule is no luxury: with as many as larger cells get, a third of a hundredth is exceeded."""
     assert integral_error(samples_per_cycle(1e-2, cycles) - fewer, cycles, False) > 1e-2 / 3

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from optics import BSplineRelief, Grid, PointSource, Pupil, Zernike
+from optics import BSplineRelief, Grid, PixelRelief, PointSource, Pupil, Zernike
 from optics.elements.beam import Beam
 from optics.methods import low_rank as low_rank_module
 from optics.methods.low_rank import low_rank
@@ -41,13 +41,16 @@ def test_a_rank_chosen_for_far_more_error_breaks_the_promise(monkeypatch):
     assert errors(1e-3).max() > 1e-3 / 2
 
 
-def test_square_windows_share_one_matrix_and_others_do_not():
-    """The picture of an oblong window is the middle of a square one's."""
-    beam = next(eyes(1))
-    square, oblong = (Problem.of(beam, Grid(shape, 0.25e-6), 1e-4, "float64") for shape in ((65, 65), (33, 65)))
-    whole, part = (low_rank(problem)[0].intensity(beam, problem).numpy() for problem in (square, oblong))
-    middle = whole.reshape(65, 65)[16:49]
-    assert np.linalg.norm(part.reshape(33, 65) - middle) < 1e-4 * np.linalg.norm(middle)
+@pytest.mark.parametrize("relief", [None, PixelRelief(1e-6 * np.random.default_rng(1).random((5, 5)))])
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (9e-6, -4e-6)])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 8), (9, 1), (33, 65), (16, 17), (17, 16)])
+def test_windows_of_any_shape_are_the_direct_sum_s(shape, centre, relief):
+    """Halves about the middle: with an even number of samples one side has none that mirrors its last."""
+    beam = next(eyes(1)) if relief is None else Beam(Pupil(15e-6, relief), PointSource(), 550e-9, Z)
+    problem = Problem.of(beam, Grid(shape, 0.25e-6, centre), 1e-6, "float64")
+    (how,), (reference,) = low_rank(problem), nodes(problem)
+    exact = reference.intensity(beam, problem).numpy()
+    assert np.linalg.norm(how.intensity(beam, problem).numpy() - exact) < 1e-6 * np.linalg.norm(exact)
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
