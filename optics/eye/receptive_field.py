@@ -69,9 +69,9 @@ class Spot:
         """The same of its rays alone."""
         return min(self.half, max(need.half_of_rays for need in self.needs))
 
-    def window(self, pitch: float) -> Grid:
-        """Samples around the geometric image that hold the square, and some beside it."""
-        side = 2 * (math.ceil(self.half / pitch) + BESIDE) + 1
+    def window(self, pitch: float, beside: int = 0) -> Grid:
+        """Samples around the geometric image that hold the square, and so many beside it at either end."""
+        side = 2 * (math.ceil(self.half / pitch) + beside) + 1
         return Grid((side, side), pitch, self.centre)
 
     def cells(self, cell: float) -> int:
@@ -94,7 +94,7 @@ def visual_kernel(
     spot = spot_of(beams, retina)
     # Each wavelength on samples of its own: longer ones need fewer.
     requests = [
-        _request(beam, spot, need, spot.window(_pitch_for_cells(need.pitch, retina)), retina)
+        _request(beam, spot, need, spot.window(_pitch_for_cells(need.pitch, retina), BESIDE), retina)
         for beam, need in zip(beams, spot.needs, strict=True)
     ]
     tiles, types = Tiles(spot.cells(retina.cell) + 2 * from_cell, retina.cell, from_cell), precision(retina.dtype)

@@ -14,10 +14,10 @@ from tests.evolve.small_run import PHENOTYPE, small_config
 
 
 def test_animal_that_cannot_be_evaluated_is_named():
-    """A retina far behind a rough relief of a millimetre: light spreads farther than optics follows it."""
+    """A retina far behind a rough relief of two millimetres: light spreads farther than optics follows it."""
     backend.require()
     config = small_config()
-    config = replace(config, eye=replace(config.eye, relief_height=1e-3))
+    config = replace(config, eye=replace(config.eye, relief_height=2e-3))
     rough = (0.53, 0.2, 0.7, 0.22, 0.59, 0.31, 0.53, 0.39, 0.25, 0.45, 0.67, 0.59, 0.88, 0.53, 0.24, 0.56)
     blurred = replace(PHENOTYPE, fov_deg=13.8, relative_aperture=0.243, relief=rough, refractive_index=1.85)
     with pytest.raises(ConfigError, match="an animal like the middle one cannot be evaluated here: tolerance"):
