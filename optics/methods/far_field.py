@@ -104,7 +104,8 @@ def _seconds(how: FarFieldSampling, problem: Problem) -> float:
 
 def _nodes(problem: Problem, count: int) -> WindowNodes:
     """Of so many along each axis those that are needed."""
-    half_angle = math.atan2(problem.window.half_width, problem.distance)
+    # A single sample has no width of its own, and directions are counted in half angles.
+    half_angle = math.atan2(max(problem.window.half_width, problem.window.dx), problem.distance)
     if count <= FEW:
         return all_nodes(count, half_angle)
     turns = (np.arange(POINTS) + 0.5) * (math.sqrt(5) - 1) / 2

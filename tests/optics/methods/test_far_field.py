@@ -101,3 +101,13 @@ def test_few_nodes_carry_the_derivative_by_the_distance():
     near, far = (at(k) - at(-k) for k in (1, 2))
     expected = (8 * near - far) / (12 * step * beam.distance) * beam.pupil.area
     assert relative_l2(dr.grad(image).numpy(), expected) < 5e-4
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_window_of_one_sample_is_answered():
+    """It has no width, and directions are counted in half angles of the window."""
+    pupil = optics.Pupil(25e-6)
+    seen, exact = (
+        optics.psf(pupil, shape=(1, 1), method=method).psf[0, 0, 0] for method in ("far_field", "rayleigh_sommerfeld")
+    )
+    assert seen == pytest.approx(exact, rel=1e-3)

@@ -58,6 +58,7 @@ def test_unpolarised_light_errs_by_what_curvature_it_has(sine):
         ({"aperture": optics.Polygon.regular(6, 11.0)}, 5 / 24),
         ({"aperture": TWO_HOLES}, 0.9**2 + 0.05**2 / 4),
         ({"mask": optics.GaussianMask(0.2e-3)}, 0.2e-3**2 / 2 / (F * math.tan(math.asin(0.3))) ** 2),
+        ({"mask": optics.MaskMap(np.zeros((9, 9)))}, 0),
     ],
 )
 def test_spread_of_light_over_a_pupil(others, expected):
