@@ -82,7 +82,5 @@ def _open_spread(aperture: Aperture) -> float:
 
 def _spread(nodes: Nodes, weight: np.ndarray) -> float:
     xx, yy, xy = (float(weight @ part) for part in (nodes.x**2, nodes.y**2, nodes.x * nodes.y))
-    total = float(weight.sum())
-    return (
-        float(np.linalg.eigvalsh([[xx, xy], [xy, yy]])[-1]) / total if total else 0.0
-    )  # a dark mask lets nothing pass
+    total = float(weight.sum())  # 0 behind a dark mask
+    return float(np.linalg.eigvalsh([[xx, xy], [xy, yy]])[-1]) / total if total else 0.0
