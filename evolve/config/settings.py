@@ -161,7 +161,11 @@ class LearningConfig:
     n_steps: int = setting(32, Interval(2, 10**6), "steps per world between updates")
     batch_size: int = setting(1024, Interval(2, 10**7), "samples per gradient step")
     n_epochs: int = setting(10, Interval(1, 1000), "passes over the samples per update")
-    learning_rate: float = setting(3e-3, Interval(0, 1, open_low=True), "initial step size of Adam")
+    learning_rate: float = setting(
+        3e-3,
+        Interval(0, 1, open_low=True),
+        "initial step size of Adam; brains of more than 64 units take √(64 / units) of it",
+    )
     decay_after: int = setting(
         75_000, Interval(1, 10**10), "steps after which Adam's step size falls as one over the steps"
     )

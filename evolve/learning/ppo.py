@@ -26,6 +26,9 @@ from evolve.learning.training_rewards import RewardsInUnits, contact_share, term
 
 UNIT_RATE = 0.2  # of the way to the spread of the last returns, per rollout
 FLAT = 1e-6  # spread of returns that all are the same
+# Choice: units of a hidden layer up to which the step size is what is asked for
+# (docs/decisions/065-steps-of-large-brains.md).
+UNITS_AT_FULL_STEP = 64
 
 Progress = Callable[[int, int], None]  # (steps trained, steps planned)
 
@@ -60,6 +63,12 @@ class Episodes:
     first_events: np.ndarray
 
 
+def step_size(asked: float, neurons: int) -> float:
+    """Adam's, at first. What a step does to a layer's output grows with the units that it sums: large brains take smaller
+    ones, as one over the root of their units."""
+    return asked * min(1.0, math.sqrt(UNITS_AT_FULL_STEP / neurons))
+
+
 class AdaptingPPO(PPO):
     """PPO whose policy adapts to the signals it meets, and which stops at the first rollout or update that is not
     finite, instead of learning nonsense from it.
@@ -81,7 +90,7 @@ class AdaptingPPO(PPO):
             n_steps=config.n_steps,
             batch_size=config.batch_size,
             n_epochs=config.n_epochs,
-            learning_rate=config.learning_rate,
+            learning_rate=step_size(config.learning_rate, brain.neurons),
             gamma=config.gamma,
             gae_lambda=config.gae_lambda,
             vf_coef=config.value_weight,

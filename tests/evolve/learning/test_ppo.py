@@ -143,6 +143,14 @@ def test_the_learning_rate_falls_with_steps_in_whatever_pieces(pieces):
     assert rates == pytest.approx([4e-3, 4e-3, 4e-3 * 2 / 3, 2e-3])
 
 
+@pytest.mark.parametrize(("neurons", "rate"), [(16, 4e-3), (64, 4e-3), (144, 4e-3 * 2 / 3), (256, 2e-3)])
+def test_large_brains_take_smaller_steps(neurons, rate):
+    config = LearningConfig(n_envs=16, n_steps=32, batch_size=128, learning_rate=4e-3)
+    model = AdaptingPPO(BrightSpot(16), Brain(neurons), config, 0)
+    model.learn(512)
+    assert model.policy.optimizer.param_groups[0]["lr"] == pytest.approx(rate)
+
+
 class Favouring(BrightSpot):
     """Evaluation worlds that are kinder in one evaluation than in all others."""
 
