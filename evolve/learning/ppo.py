@@ -64,8 +64,8 @@ class Episodes:
 
 
 def step_size(asked: float, neurons: int) -> float:
-    """Adam's, at first. What a step does to a layer's output grows with the units that it sums: large brains take smaller
-    ones, as one over the root of their units."""
+    """Adam's, at first. What a step does to a layer's output grows with the units that it sums: large brains take
+    smaller ones, as one over the root of their units."""
     return asked * min(1.0, math.sqrt(UNITS_AT_FULL_STEP / neurons))
 
 
