@@ -27,7 +27,7 @@ __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 
 # Choice: light from further off a receptor's direction counts as screened by the eye's rim.
 WIDEST_TANGENT = math.tan(math.radians(50))
-BESIDE = 4  # choice: samples beyond either end of the cells, where a spline through them errs most
+BESIDE = 4  # choice: samples beyond either end of the light, where a spline through them errs most
 MOST_CELLS = 2049  # choice: of a kernel, along an axis
 MOST_SECONDS = 3.0  # choice: per band
 

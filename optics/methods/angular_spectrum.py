@@ -217,8 +217,7 @@ def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling
 def _transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precision) -> Field:
     """exp(ikz (cos θ - 1)) under the spectral taper; the split method leaves the paraxial -ikz sin²θ/2 for later.
 
-    Goodman, eq. 3-74. cos θ - 1 = -q, and with the paraxial part taken out -q²/2. The difference q = 1 - cos θ loses
-    digits, of which the distance makes waves; a step towards q (2 - q) = sin²θ brings them back, without a division.
+    Goodman, eq. 3-74. cos θ - 1 = -q, and with the paraxial part taken out -q²/2.
     """
     import drjit as dr
 
@@ -226,11 +225,19 @@ def _transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precis
     fx, fy = spectrum.coordinates(types)
     f2 = fx * fx + fy * fy
     s2 = dr.minimum(f2 * dr.square(opaque(types, problem.wavelength)), 1)
-    q = 1 - dr.sqrt(1 - s2)
-    q += (s2 - q * (2 - q)) / 2
+    q = versine(s2)
     sag = q if how.is_whole else q * q / 2
     waves = -opaque(types, beam.distance) / opaque(types, problem.wavelength) * sag
     return Field.from_waves(how.taper.fade(f2, types), waves, spectrum, types)
+
+
+def versine(s2: Array) -> Array:
+    """q = 1 - cos θ of sin²θ, float64. The difference loses digits, of which the distance makes waves; a step towards
+    q (2 - q) = sin²θ brings them back, without a division."""
+    import drjit as dr
+
+    q = 1 - dr.sqrt(1 - s2)
+    return q + (s2 - q * (2 - q)) / 2
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:

@@ -54,7 +54,7 @@ class Field:
         return self.re * self.re + self.im * self.im
 
     def evaluated(self) -> Field:
-        """Both parts at once: looked at one after the other, each computes what they share."""
+        """This field, its parts computed at once: looked at one after the other, each computes what they share."""
         import drjit as dr
 
         dr.eval(self.re, self.im)

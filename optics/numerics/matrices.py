@@ -46,5 +46,5 @@ def _by_four(left: Parts, right: Parts, transposed: bool) -> Parts:
 def _by_three(left: Parts, right: Parts, transposed: bool) -> Parts:
     """ac - bd and (a + b)(c + d) - ac - bd: three products in the place of four (Gauss), as exact in the norm."""
     (a, b), (c, d) = left, right
-    both, neither = matmul(a, c, transposed), matmul(b, d, transposed)
-    return both - neither, matmul(a + b, c + d, transposed) - both - neither
+    ac, bd = matmul(a, c, transposed), matmul(b, d, transposed)
+    return ac - bd, matmul(a + b, c + d, transposed) - ac - bd

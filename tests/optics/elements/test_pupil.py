@@ -56,6 +56,17 @@ def test_slopes_and_rays_of_a_prism():
     assert y.mean() == pytest.approx(0, abs=1e-9)
 
 
+def test_wavelengths_share_slopes_where_the_glass_does_not_disperse():
+    relief = BSplineRelief(np.random.default_rng(0).random((4, 4)) * 1e-5)
+    red, blue = (Pupil(30e-6, relief, n=1.5).slopes(wavelength, PointSource()) for wavelength in (650e-9, 450e-9))
+    np.testing.assert_array_equal(red.along_x, blue.along_x)
+    pupil = Pupil(30e-6, relief, n=RefractiveIndex.from_abbe(1.5, 30))
+    red, blue = (pupil.slopes(wavelength, PointSource()) for wavelength in (650e-9, 450e-9))
+    steps = [pupil.index_step(wavelength) for wavelength in (650e-9, 450e-9)]
+    assert steps[1] > 1.01 * steps[0]
+    np.testing.assert_allclose(blue.along_x, red.along_x * (steps[1] / steps[0]), rtol=1e-9)
+
+
 def test_slopes_of_a_lens_hold_out_to_the_rim_of_its_soft_edge():
     """A lens turns by thousands of waves; a slope of first order at the grid's ends would add its own to what is left
     of them in the focus, and samples with it."""

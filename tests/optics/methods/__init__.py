@@ -1,6 +1,6 @@
 """Which test fails when a module of optics/methods is broken. The oracles are closed forms that all methods meet.
 
-angular_spectrum: test_textbook.py, test_oracles_waves.py, test_even_pupils.py
+angular_spectrum: test_angular_spectrum.py, test_textbook.py, test_oracles_waves.py, test_even_pupils.py
 carrier: point_spread/test_field.py
 far_field: test_textbook.py, test_far_field.py
 far_field_nodes: test_far_field.py
@@ -17,7 +17,7 @@ richards_wolf: test_richards_wolf.py
 sampling: point_spread/test_planner.py
 scalar_theory: test_scalar_theory.py
 sine_samples: test_sine_samples.py
-spectral_taper: test_textbook.py
+spectral_taper: test_angular_spectrum.py, test_textbook.py
 textbook: test_textbook.py
 vector_sum: point_spread/test_vector_focus.py
 """
