@@ -1,0 +1,30 @@
+"""What tests draw inputs from, odd ones among them, and what a refusal is."""
+
+import math
+import os
+
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+
+SLOW = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]
+WAVELENGTHS = (300e-9, 900e-9)
+
+
+def examples(count):
+    count *= int(os.environ.get("OPTICS_EXAMPLES", "1"))
+    return settings(max_examples=count, deadline=None, derandomize=True, suppress_health_check=SLOW)
+
+
+def logarithmic(low, high):
+    return st.floats(math.log(low), math.log(high)).map(math.exp)
+
+
+def or_odd(usual):
+    """Mostly the usual, now and then what nobody should ask for."""
+    odd = st.sampled_from([0.0, -1e-6, math.nan, math.inf, -math.inf, 1e-300, 1e-16, 1e16, 1e300])
+    return st.one_of(*[usual] * 8, odd)
+
+
+def only_one_line(error):
+    assert str(error)
+    assert "\n" not in str(error)
