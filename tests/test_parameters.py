@@ -198,6 +198,7 @@ FIELDS = {
     "learning.n_steps": Case("learning.n_steps=16", life),
     "learning.batch_size": Case("learning.batch_size=32", life),
     "learning.n_epochs": Case("learning.n_epochs=3", life),
+    "learning.least_epochs": Case("learning.least_epochs=1", life, ("learning.decay_after=16",)),
     "learning.learning_rate": Case("learning.learning_rate=1e-2", life),
     "learning.decay_after": Case("learning.decay_after=50", life),
     "learning.gamma": Case("learning.gamma=0.5", life),

@@ -20,7 +20,8 @@ they are selected, is above 0. Means have 95 % confidence intervals; that of the
 Settings are the defaults of the task except for those named. "With tanh" are trainings with the earlier defaults: 64
 worlds x 64 steps, 4 epochs, a constant learning rate of 1e-3, tanh, mini-batches of stretches of 32 steps (the one of
 detection is from the last commit with them). Now it is 128 x 32, 10 epochs, 3e-3 falling as one over the steps after
-75,000 (in mazes 200,000), leaky rectifiers, stretches of 8. `docs/measurements/learning.md` lists what else was tried.
+75,000 (in mazes 200,000), leaky rectifiers, stretches of 8. Since these trainings passes fall before the rate does
+(E3). `docs/measurements/learning.md` lists what else was tried.
 A row of few steps is a training that was stopped there, not one that learnt so fast. All trainings "with tanh" except
 detection are older than the bounds on means of actions; in the maze contact then had its full price after 500,000
 steps.

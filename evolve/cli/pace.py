@@ -11,8 +11,9 @@ from itertools import cycle, islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from evolve.config.run_config import ConfigError, RunConfig
+from evolve.config.run_config import ConfigError, LearningConfig, RunConfig
 from evolve.genome.phenotype import Phenotype
+from evolve.learning.schedule import mean_passes, schedule
 from evolve.search.worker import evaluate_candidate, prepare_device
 
 __all__ = ["Pace", "measure_pace"]
@@ -25,24 +26,31 @@ class Pace:
     """What one worker achieves with one animal while all others work too.
 
     start_s: until its first world is ready
-    steps_per_s: agent steps trained per second, learning included
+    steps_per_s: agent steps trained per second at first, learning included
     play_s: one evaluation: all its episodes, side by side
     policy_bytes of its trained policy
+    pass_s: of an agent step, every pass over the samples that it is learnt from
     """
 
     start_s: float
     steps_per_s: float
     play_s: float
     policy_bytes: int
+    pass_s: float = 0.0
 
     def candidate_s(self, config: RunConfig) -> float:
         """Seconds for one candidate that trains to the end in one go."""
-        return self.stage_s(config.learning.total_steps, config.learning.eval_interval)
+        return self.stage_s(config.learning, 0, config.learning.total_steps)
 
-    def stage_s(self, steps: int, eval_interval: int) -> float:
-        """Seconds for a budget stage of so many steps, and the evaluation after it."""
-        plays = -(-steps // eval_interval) + 1
-        return self.start_s + steps / self.steps_per_s + plays * self.play_s
+    def stage_s(self, learning: LearningConfig, begin: int, end: int) -> float:
+        """Seconds for a budget stage from so many steps to so many, and the evaluation after it."""
+        plays = -(-(end - begin) // learning.eval_interval) + 1
+        return self.start_s + self.training_s(learning, begin, end) + plays * self.play_s
+
+    def training_s(self, learning: LearningConfig, begin: int, end: int) -> float:
+        """Seconds of rollouts and updates: passes become fewer."""
+        spared = learning.n_epochs - mean_passes(learning, begin, end)
+        return (end - begin) * (1 / self.steps_per_s - spared * self.pass_s)
 
 
 def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
@@ -72,13 +80,16 @@ def _slowest(paces: list[Pace]) -> Pace:
         steps_per_s=min(pace.steps_per_s for pace in paces),
         play_s=max(pace.play_s for pace in paces),
         policy_bytes=paces[0].policy_bytes,
+        pass_s=min(pace.pass_s for pace in paces),
     )
 
 
 def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
-    """A life of four rollouts: from one to the next, with an evaluation between the second and the third."""
+    """A life of four rollouts, with an evaluation between the second and the third. The first update has all passes,
+    the third, between the other two, as few as a third of them."""
     rollout = config.learning.n_envs * config.learning.n_steps
-    short = replace(config.learning, total_steps=ROLLOUTS * rollout, eval_interval=ROLLOUTS // 2 * rollout)
+    spans = {"total_steps": ROLLOUTS * rollout, "eval_interval": ROLLOUTS // 2 * rollout, "decay_after": rollout // 2}
+    short = replace(config.learning, **spans)
     # Stages of the budget would be shorter than a rollout.
     once = replace(config, learning=short, search=replace(config.search, rungs=1))
     marks: list[float] = []
@@ -91,10 +102,16 @@ def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
         )
         size = policy.stat().st_size
     first, second, third, fourth = marks
-    step_s = (second - first + fourth - third) / 2 / rollout
+    all_passes, fewer, few = (schedule(short, number * rollout)[0] for number in (1, 2, 3))
+    step_s, late_step_s = (second - first) / rollout, (fourth - third) / rollout
+    pass_s = max(step_s - late_step_s, 0.0) / (all_passes - few) if few < all_passes else 0.0
+    pass_s = min(pass_s, step_s / all_passes)
+    if pass_s == 0:
+        step_s = (step_s + late_step_s) / 2
     return Pace(
-        start_s=max(first - began - rollout * step_s, 0.0),
+        start_s=max(first - began - rollout * (step_s - all_passes * pass_s), 0.0),
         steps_per_s=1 / step_s,
-        play_s=max(third - second - rollout * step_s, 0.0),
+        play_s=max(third - second - rollout * (step_s - (all_passes - fewer) * pass_s), 0.0),
         policy_bytes=size,
+        pass_s=pass_s,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from evolve.genome.genes import CLUSTERS
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import Phenotype, develop
 from evolve.search.local_executor import cores
-from evolve.search.successive_halving import budgets, evaluations, sizes, stage_steps, trained_steps
+from evolve.search.successive_halving import budgets, evaluations, sizes, trained_steps
 from evolve.search.successive_halving import steps as total_steps
 from evolve.store.candidate import Candidate
 from evolve.store.evaluation import Evaluation
@@ -62,10 +63,10 @@ class RunPlan:
         if search.steady_state:
             rounds = -(-self.config.candidates // self.workers)
             return {name: rounds * pace.candidate_s(self.config) / 3600 for name, pace in self.paces.items()}
-        stages = list(zip(sizes(search), stage_steps(search, learning), strict=True))
+        stages = list(zip(sizes(search), pairwise((0, *budgets(search, learning))), strict=True))
         return {
             name: search.generations
-            * sum(-(-size // self.workers) * pace.stage_s(steps, learning.eval_interval) for size, steps in stages)
+            * sum(-(-size // self.workers) * pace.stage_s(learning, *span) for size, span in stages)
             / 3600
             for name, pace in self.paces.items()
         }
@@ -118,8 +119,10 @@ class RunPlan:
         ]
         for name, pace in self.paces.items():
             what = {"start": "like the first", "middle": "in the middle of all ranges"}[name]
+            whole = config.learning.total_steps
+            speed = whole / pace.training_s(config.learning, 0, whole)
             lines.append(
-                f"predicted      {_duration(self.hours[name])} if animals stay {what}: {pace.steps_per_s:,.0f} steps/s "
+                f"predicted      {_duration(self.hours[name])} if animals stay {what}: {speed:,.0f} steps/s "
                 f"per worker, {pace.candidate_s(config):,.0f} s per candidate"
             )
         if self.paces:

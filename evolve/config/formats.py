@@ -3,6 +3,8 @@
 1   no number in the file. The task "navigation" was a maze, and `learning.rays_per_eye` limited the rays in training.
 2   "navigation" is a course, "maze" the maze, and `learning.rays_per_receptor` limits the rays.
 
+Runs of both formats may lack `learning.least_epochs`: theirs did as many passes throughout.
+
 A run of a former format is opened, replayed and reported on as what it was. Its trainings cannot be carried on, because
 their light was another.
 """
@@ -40,13 +42,19 @@ def upgraded(tree: Mapping[str, Any]) -> Tree:
     """A run's settings as this version names them."""
     number = format_of(tree)
     now = {key: value for key, value in tree.items() if key != "format"}
-    if number > 1:
-        return now
-    if "task" in now:
-        now["task"] = task_then(now["task"])
     if isinstance(learning := now.get("learning"), dict):
-        now["learning"] = {key: value for key, value in learning.items() if key != "rays_per_eye"}
+        now["learning"] = _learning_then(learning, number)
+    if number == 1 and "task" in now:
+        now["task"] = task_then(now["task"])
     return now
+
+
+def _learning_then(learning: Tree, number: int) -> Tree:
+    gone = ("rays_per_eye",) if number == 1 else ()
+    then = {key: value for key, value in learning.items() if key not in gone}
+    if "n_epochs" in then:
+        then.setdefault("least_epochs", then["n_epochs"])
+    return then
 
 
 def task_then(task: Any) -> Any:

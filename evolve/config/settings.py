@@ -160,14 +160,21 @@ class LearningConfig:
     n_envs: int = setting(128, Interval(1, 65_536), "worlds simulated in parallel")
     n_steps: int = setting(32, Interval(2, 10**6), "steps per world between updates")
     batch_size: int = setting(1024, Interval(2, 10**7), "samples per gradient step")
-    n_epochs: int = setting(10, Interval(1, 1000), "passes over the samples per update")
+    n_epochs: int = setting(10, Interval(1, 1000), "passes over the samples per update, at first")
+    least_epochs: int = setting(
+        3,
+        Interval(1, 1000),
+        "fewest passes, to which they fall once the step size has halved; n_epochs or more: they stay as many",
+    )
     learning_rate: float = setting(
         3e-3,
         Interval(0, 1, open_low=True),
         "initial step size of Adam; brains of more than 64 units take √(64 / units) of it",
     )
     decay_after: int = setting(
-        75_000, Interval(1, 10**10), "steps after which Adam's step size falls as one over the steps"
+        75_000,
+        Interval(1, 10**10),
+        "steps after which learning slows down as one over the steps: Adam's step size halves, then passes get fewer",
     )
     gamma: float = setting(0.9, Interval(0, 1), "discount per step")
     gae_lambda: float = setting(

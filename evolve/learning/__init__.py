@@ -8,6 +8,7 @@ ppo               PPO, its settings' meaning, early stopping
 policy            actor and critic, stored and loaded
 eye_features      the network behind each eye
 per_eye_layers    what it is made of
+schedule          how it slows down: step size and passes
 training_rewards  rewards in the learner's units, contact at a share of its price
 rollout_buffer    frames kept once
 adam              the optimiser

@@ -22,13 +22,11 @@ from evolve.learning.adam import Adam
 from evolve.learning.checkpoint import Checkpoint
 from evolve.learning.policy import Brain, EyePolicy, TrainingDiverged, learnt, set_learnt
 from evolve.learning.rollout_buffer import FrameRolloutBuffer
+from evolve.learning.schedule import first_step_size, schedule
 from evolve.learning.training_rewards import RewardsInUnits, contact_share, terms_of
 
 UNIT_RATE = 0.2  # of the way to the spread of the last returns, per rollout
 FLAT = 1e-6  # spread of returns that all are the same
-# Choice: units of a hidden layer up to which the step size is what is asked for
-# (docs/decisions/065-steps-of-large-brains.md).
-UNITS_AT_FULL_STEP = 64
 
 Progress = Callable[[int, int], None]  # (steps trained, steps planned)
 
@@ -63,12 +61,6 @@ class Episodes:
     first_events: np.ndarray
 
 
-def step_size(asked: float, neurons: int) -> float:
-    """Adam's, at first. What a step does to a layer's output grows with the units that it sums: large brains take
-    smaller ones, as one over the root of their units."""
-    return asked * min(1.0, math.sqrt(UNITS_AT_FULL_STEP / neurons))
-
-
 class AdaptingPPO(PPO):
     """PPO whose policy adapts to the signals it meets, and which stops at the first rollout or update that is not
     finite, instead of learning nonsense from it.
@@ -81,7 +73,7 @@ class AdaptingPPO(PPO):
     policy: EyePolicy
 
     def __init__(self, worlds: VecEnv, brain: Brain, config: LearningConfig, seed: int) -> None:
-        self.contact_ramp, self.decay_after = config.contact_ramp, config.decay_after
+        self.config = config
         torch.set_num_threads(1)
         seed = int(np.random.SeedSequence(seed).generate_state(1)[0])  # SB3 takes 32 bits
         super().__init__(
@@ -90,7 +82,7 @@ class AdaptingPPO(PPO):
             n_steps=config.n_steps,
             batch_size=config.batch_size,
             n_epochs=config.n_epochs,
-            learning_rate=step_size(config.learning_rate, brain.neurons),
+            learning_rate=first_step_size(config.learning_rate, brain.neurons),
             gamma=config.gamma,
             gae_lambda=config.gae_lambda,
             vf_coef=config.value_weight,
@@ -103,15 +95,17 @@ class AdaptingPPO(PPO):
         self.set_logger(Logger(None, []))
 
     def _update_learning_rate(self, optimizers: Adam) -> None:
-        """Not by the part of a plan that is done, as SB3 does: a training goes the same way whatever is planned."""
-        optimizers.param_groups[0]["lr"] = self.learning_rate * min(1.0, self.decay_after / self.num_timesteps)
+        """And the passes of the update that follows. Not by the part of a plan that is done, as SB3 does: a training
+        goes the same way whatever is planned."""
+        self.n_epochs, share = schedule(self.config, self.num_timesteps)
+        optimizers.param_groups[0]["lr"] = self.learning_rate * share
 
     def collect_rollouts(
         self, env: VecEnv, callback: BaseCallback, rollout_buffer: RolloutBuffer, n_rollout_steps: int
     ) -> bool:
         if self.num_timesteps == 0:
             self._adapt(self._last_obs["eyes"][:, -1], self._last_obs)
-        self.env.contact_share = contact_share(self.num_timesteps, self.contact_ramp)
+        self.env.contact_share = contact_share(self.num_timesteps, self.config.contact_ramp)
         return super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps)
 
     def train(self) -> None:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 from evolve.config.numbering import generation_ids
 from evolve.config.run_config import LearningConfig, RunConfig, SearchConfig
@@ -27,7 +26,6 @@ __all__ = [
     "promoted",
     "reaching",
     "sizes",
-    "stage_steps",
     "steps",
     "trained_steps",
 ]
@@ -36,11 +34,6 @@ __all__ = [
 def budgets(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
     """Steps that a training has come to at the end of each stage, (stage,); the last is a whole training."""
     return tuple(math.ceil(learning.total_steps * search.promoted**after) for after in range(search.rungs - 1, -1, -1))
-
-
-def stage_steps(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
-    """Steps of each stage, (stage,)."""
-    return tuple(after - before for before, after in pairwise((0, *budgets(search, learning))))
 
 
 def sizes(search: SearchConfig) -> tuple[int, ...]:

@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from evolve.cli.pace import Pace, _slowest, measure_pace
-from evolve.config.run_config import ConfigError
+import evolve.cli.pace
+from evolve.cli.pace import Pace, _short_life, _slowest, measure_pace
+from evolve.config.run_config import ConfigError, LearningConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.fitness import evaluate
+from evolve.learning.schedule import schedule
 from optics.numerics import backend
 from tests.evolve.small_run import PHENOTYPE, small_config
 
@@ -38,5 +40,60 @@ def test_pace_is_measured_with_the_real_thing(tmp_path, short_episodes):
 
 
 def test_the_slowest_of_many_lives_counts():
-    lives = [Pace(start_s=1.0, steps_per_s=90.0, play_s=3.0, policy_bytes=7), Pace(2.0, 50.0, 2.0, 7)]
-    assert _slowest(lives) == Pace(start_s=2.0, steps_per_s=50.0, play_s=3.0, policy_bytes=7)
+    lives = [Pace(start_s=1.0, steps_per_s=90.0, play_s=3.0, policy_bytes=7, pass_s=0.1), Pace(2.0, 50.0, 2.0, 7, 0.2)]
+    assert _slowest(lives) == Pace(start_s=2.0, steps_per_s=50.0, play_s=3.0, policy_bytes=7, pass_s=0.1)
+
+
+class Clock:
+    """A machine on which starting takes 7 s, a step .001, a pass over it .0002, and an evaluation 3."""
+
+    now = 0.0
+
+    def perf_counter(self):
+        return self.now
+
+    def evaluate(self, animal, config, seed, policy, progress):
+        learning = config.learning
+        rollout = learning.n_envs * learning.n_steps
+        self.now += 7.0
+        for steps in range(rollout, learning.total_steps + 1, rollout):
+            self.now += 0.001 * rollout
+            progress(steps, learning.total_steps)
+            self.now += 0.0002 * schedule(learning, steps)[0] * rollout
+            if steps % learning.eval_interval == 0:
+                self.now += 3.0
+        policy.write_bytes(b"1234567")
+
+
+@pytest.mark.parametrize(("n_epochs", "least_epochs"), [(10, 3), (10, 6), (5, 1)])
+def test_what_a_pass_takes_is_told_from_the_rest(monkeypatch, n_epochs, least_epochs):
+    clock = Clock()
+    monkeypatch.setattr(evolve.cli.pace, "time", clock)
+    monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", clock.evaluate)
+    learning = LearningConfig(n_epochs=n_epochs, least_epochs=least_epochs, total_steps=20 * 4096)
+    config = replace(small_config(), learning=learning)
+    pace = _short_life(config, PHENOTYPE, 0)
+    assert (pace.start_s, pace.play_s, pace.policy_bytes) == (pytest.approx(7), pytest.approx(3), 7)
+    assert 1 / pace.steps_per_s == pytest.approx(0.001 + 0.0002 * n_epochs)
+    slowing = replace(learning, decay_after=5 * 4096)
+    passes = sum(schedule(slowing, number * 4096)[0] for number in range(1, 21))
+    assert pace.training_s(slowing, 0, 20 * 4096) == pytest.approx(4096 * (20 * 0.001 + passes * 0.0002))
+
+
+def test_a_pass_takes_no_more_than_the_whole(monkeypatch):
+    """A machine that had other work at first."""
+
+    class Busy(Clock):
+        def evaluate(self, animal, config, seed, policy, progress):
+            def later(steps, planned):
+                progress(steps, planned)
+                self.now += 1e3 * (steps == 4096)
+
+            super().evaluate(animal, config, seed, policy, later)
+
+    clock = Busy()
+    monkeypatch.setattr(evolve.cli.pace, "time", clock)
+    monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", clock.evaluate)
+    config = replace(small_config(), learning=LearningConfig())
+    pace = _short_life(config, PHENOTYPE, 0)
+    assert 0 < pace.training_s(config.learning, 0, 1_000_000) < 1_000_000 / pace.steps_per_s

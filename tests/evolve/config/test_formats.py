@@ -33,6 +33,16 @@ def test_a_format_of_the_future_is_refused():
         from_text("format = 9\n" + FORMER)
 
 
+def test_runs_that_say_nothing_of_fewer_passes_made_none_fewer():
+    config = assemble("navigation", assignments=["learning.n_epochs=7"])
+    assert config.learning.least_epochs == 3
+    silent = to_toml(config).replace("least_epochs = 3\n", "")
+    assert from_text(silent).learning.least_epochs == 7
+    assert from_toml(RECORDS / "navigation-0" / "config.toml").learning.least_epochs == 8
+    with pytest.raises(ConfigError, match="rays_per_eye"):
+        from_text(silent.replace("n_epochs = 7", "n_epochs = 7\nrays_per_eye = 32.0"))
+
+
 def test_what_somebody_asks_for_is_of_this_format(tmp_path):
     """A file without a number is a wish, not a run; another run's whole config.toml may be one, too."""
     file = tmp_path / "mine.toml"

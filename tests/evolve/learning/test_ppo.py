@@ -108,6 +108,9 @@ def test_contact_costs_a_tenth_at_first_and_its_whole_price_at_the_end_of_the_ra
     assert contact_share(steps, ramp) == pytest.approx(share)
 
 
+PACED = LearningConfig(n_epochs=10, least_epochs=6, decay_after=640)
+
+
 class Touching(BrightSpot):
     """Every action is in contact, and costs nothing else."""
 
@@ -126,21 +129,26 @@ def test_learners_pay_their_share_of_contact(ramp, cost):
     assert np.median(-model.rollout_buffer.rewards) == pytest.approx(cost, rel=1e-6)
 
 
-@pytest.mark.parametrize("pieces", [(2048,), (512, 1536), (512,) * 4])
-def test_the_learning_rate_falls_with_steps_in_whatever_pieces(pieces):
-    """It stays for 1024 steps and then falls as one over the steps: 2/3 at 1536, half at 2048."""
-    config = LearningConfig(n_envs=16, n_steps=32, batch_size=128, learning_rate=4e-3, decay_after=1024)
+@pytest.mark.parametrize("pieces", [(2560,), (512, 2048), (512,) * 5])
+def test_learning_slows_down_with_steps_in_whatever_pieces(pieces):
+    """It stays as it is for 640 steps. Passes times rate then fall as one over the steps: by passes when the rate has
+    halved, until six are left."""
+    config = replace(PACED, n_envs=16, n_steps=32, batch_size=128, learning_rate=4e-3)
     model = AdaptingPPO(BrightSpot(16), SMALL, config, 0)
-    update, rates = model.train, []
+    update, rates, batches = model.train, [], [0]
 
     def noted():
         update()
         rates.append(model.policy.optimizer.param_groups[0]["lr"])
+        batches.append(model.policy.optimizer.steps)
 
     model.train = noted
     for steps in pieces:
         model.learn(steps, reset_num_timesteps=False)
-    assert rates == pytest.approx([4e-3, 4e-3, 4e-3 * 2 / 3, 2e-3])
+    passes = np.diff(batches) // (512 // 128)
+    assert passes.tolist() == [10, 10, 9, 7, 6]
+    assert passes * rates == pytest.approx(10 * 4e-3 * np.array([1, 5 / 8, 5 / 12, 5 / 16, 1 / 4]))
+    assert max(rates) <= 4e-3
 
 
 @pytest.mark.parametrize(("neurons", "rate"), [(16, 4e-3), (64, 4e-3), (144, 4e-3 * 2 / 3), (256, 2e-3)])

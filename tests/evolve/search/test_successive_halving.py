@@ -12,7 +12,7 @@ from evolve.learning.fitness import evaluate
 from evolve.learning.training_stage import TrainingStage
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
-from evolve.search.successive_halving import budgets, evaluations, finished, promoted, sizes, stage_steps, steps
+from evolve.search.successive_halving import budgets, evaluations, finished, promoted, sizes, steps
 from evolve.store.directory import Run, RunError
 from tests.evolve.closed_form import tiny
 from tests.evolve.remote_form import in_stages
@@ -26,7 +26,6 @@ HALVING = ("search.population=7", "search.rungs=3", "learning.total_steps=16384"
 def test_budgets_and_sizes_halve():
     learning = LearningConfig(total_steps=100_000)
     assert budgets(THREE, learning) == (25_000, 50_000, 100_000)
-    assert stage_steps(THREE, learning) == (25_000, 25_000, 50_000)
     assert sizes(THREE) == (7, 4, 2)
     assert evaluations(THREE) == 5 * 13
     quarters = replace(THREE, rungs=2, promoted=0.25)
