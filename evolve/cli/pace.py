@@ -29,7 +29,7 @@ class Pace:
     steps_per_s: agent steps trained per second at first, learning included
     play_s: one evaluation: all its episodes, side by side
     policy_bytes of its trained policy
-    pass_s: of an agent step, every pass over the samples that it is learnt from
+    pass_s: what each pass over the samples takes of that, per agent step
     """
 
     start_s: float
