@@ -59,6 +59,22 @@ def test_successive_halving_costs_what_its_stages_cost(tmp_path, paced):
     assert "budget stages  6 to 25,000 steps, 2 to 100,000 steps" in "\n".join(plan.lines())
 
 
+def test_passes_that_late_stages_spare_are_in_the_hours_and_in_the_speed(tmp_path, monkeypatch):
+    """The second stage, from 4,178 steps on, makes 8 passes of 10; a whole training 10, 9 and 6."""
+    settings = ("search.population=4", "search.generations=1", "search.rungs=2", "search.promoted=0.34", "workers=4")
+    learning = ("learning.total_steps=12288", "learning.eval_interval=100000", "learning.decay_after=3277")
+    pace = replace(PACE, pass_s=5e-5)
+    monkeypatch.setattr(
+        evolve.cli.run_plan, "measure_pace", lambda config, animals, workers: dict.fromkeys(animals, pace)
+    )
+    plan = RunPlan.of(assemble("detection", assignments=[*settings, *learning]), tmp_path).measured()
+    first = 10 + 4.178 + 2 * 5
+    second = 10 + 8.110 * (1 - 2 * 0.05) + 2 * 5
+    assert plan.hours["start"] == pytest.approx((first + second) / 3600, rel=1e-3)
+    mean_spared = (0 + 1 + 4) / 3
+    assert f"{1 / (0.001 - mean_spared * 5e-5):,.0f} steps/s" in "\n".join(plan.lines())
+
+
 def test_the_exported_episode_is_the_recorded_one():
     planned = evolve.cli.run_plan
     assert planned.EPISODE_ACTIONS == EPISODE_STEPS
