@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from math import sqrt
@@ -18,7 +18,7 @@ from optics.apertures.shapes import Disk, Shape
 from optics.apertures.soft_edge import SoftEdge
 from optics.apertures.soft_outline import SoftOutline
 from optics.apertures.strips import strips
-from optics.numerics.arguments import finite, in_range, shown, whole
+from optics.numerics.arguments import finite, in_range, is_sized, shown, whole
 
 __all__ = ["Combined", "difference", "hexagonal_segments", "intersection", "union"]
 
@@ -131,7 +131,7 @@ def hexagonal_segments(
     Raises:
         ValueError: rings outside 0 to 12, gap outside [0, 1), a number that no segment has, or nothing left.
     """
-    whole("rings", rings, 0, MOST_RINGS)
+    rings = whole("rings", rings, 0, MOST_RINGS)
     in_range("gap", gap, 0, 0.999)
     turn = np.exp(1j * np.deg2rad(finite("rotation_deg", rotation_deg)))
     centres = [0j]
@@ -139,7 +139,7 @@ def hexagonal_segments(
         corners = ring * np.exp(1j * np.pi * (np.arange(7) / 3 + 1 / 6))
         for first, last in itertools.pairwise(corners):
             centres += [first + (last - first) * step / ring for step in range(ring)]
-    if isinstance(without, str) or not isinstance(without, Iterable):
+    if isinstance(without, str) or not is_sized(without):
         raise ValueError(f"without = {shown(without)}: must hold numbers of segments, such as (0,)")
     for number in without:
         whole("without", number, 0, len(centres) - 1)

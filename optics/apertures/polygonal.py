@@ -163,7 +163,7 @@ def _checked(value: Any) -> np.ndarray:
     without_derivative("vertices", value)
     try:
         vertices = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"vertices = {shown(value)}: must be numbers of shape (n, 2)") from None
     if vertices.ndim != 2 or vertices.shape[1] != 2 or len(vertices) < 3:
         raise ValueError(f"vertices has shape {vertices.shape}: must be (n, 2) with n at least 3")

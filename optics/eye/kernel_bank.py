@@ -155,7 +155,7 @@ def _distances(z: Any) -> np.ndarray:
     without_derivative("z", z)
     try:
         distances = np.atleast_1d(np.asarray(z, dtype=np.float64))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"z = {shown(z)}: must be a distance [m], or an array of them") from None
     if distances.size == 0 or np.isnan(distances).any():
         raise ValueError("z is empty or holds NaN: must be distances greater than 0, in m, or infinite")

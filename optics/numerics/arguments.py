@@ -13,6 +13,7 @@ __all__ = [
     "did_you_mean",
     "finite",
     "in_range",
+    "is_sized",
     "of_kind",
     "one_of",
     "point_2d",
@@ -200,6 +201,15 @@ def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
     return radiance
 
 
+def is_sized(value: Any) -> bool:
+    """Whether `value` has a length: NumPy's arrays without an axis claim one."""
+    try:
+        len(value)
+    except TypeError:
+        return False
+    return True
+
+
 def whole(name: str, value: Any, low: int, high: int) -> int:
     """`value` as int; ValueError unless it is whole and in [low, high]."""
     without_derivative(name, value)
@@ -226,5 +236,5 @@ def _number(name: str, value: Any, carried: bool = False) -> float:
         if isinstance(value, (str, bytes)):
             raise TypeError
         return number(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} = {shown(value)}: must be a number") from None

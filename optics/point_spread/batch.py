@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence, Sized
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +12,15 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import Plan
-from optics.numerics.arguments import in_range, of_kind, positive, shown, vacuum_wavelength, without_derivative
+from optics.numerics.arguments import (
+    in_range,
+    is_sized,
+    of_kind,
+    positive,
+    shown,
+    vacuum_wavelength,
+    without_derivative,
+)
 from optics.numerics.autodiff import Array, Scalar, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, padded_for_packets, precision
@@ -70,7 +78,7 @@ def psf_batch(
         AccuracyError: see `optics.psf`.
     """
     for name, values in (("pupils", pupils), ("wavelengths", wavelengths), ("source_distances", source_distances)):
-        if not isinstance(values, Sized) or len(values) == 0:
+        if not is_sized(values) or len(values) == 0:
             raise ValueError(f"{name} = {shown(values)}: must be a sequence of at least one")
     without_derivative("wavelengths", wavelengths)
     window = Grid(shape, dx)

@@ -204,7 +204,7 @@ def encircled_energy(
     if not isinstance(result, PSFResult):
         return a_mixture(result).encircled_energy(radii, centre, with_error)
     wanted = np.atleast_1d(reals("radii", radii))
-    if wanted.ndim > 1:
+    if wanted.ndim > 1 or not wanted.size:
         raise ValueError(f"radii has shape {wanted.shape}: must be a number or a row of them [m]")
     middle = result.centre if centre is None else point_2d("centre", centre)
     x, y = result.x - middle[0], result.y - middle[1]

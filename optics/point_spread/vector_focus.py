@@ -90,7 +90,7 @@ def _polarised(polarization: Any) -> tuple[np.ndarray, tuple[float, float, float
     without_derivative("polarization", polarization)
     try:
         given = np.asarray((1, 0, 0, 0) if polarization is None else polarization, dtype=complex)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         given = np.zeros(0)
     known = given.shape in ((2,), (4,)) and bool(np.isfinite(given).all())
     if known and given.shape == (2,) and np.abs(given).any():

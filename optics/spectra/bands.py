@@ -99,7 +99,7 @@ def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
     """What a function said of wavelengths."""
     try:
         values = np.broadcast_to(np.asarray(found, np.float64), shape)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"radiance: must be a number for each of {shape[0]} wavelengths, not {shown(found)}") from None
     if not np.isfinite(values).all():
         raise ValueError("radiance: must be finite at every wavelength that receptors see")

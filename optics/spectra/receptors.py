@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import one_of, shown, without_derivative
+from optics.numerics.arguments import is_sized, one_of, shown, without_derivative
 from optics.spectra.pigment import Pigment
 from optics.spectra.spectrum import LIMITS_NM, Spectrum, cone_fundamentals, daylight
 
@@ -84,7 +84,7 @@ class Receptors:
 
 def _types(types: Any) -> tuple[Pigment | Spectrum, ...]:
     without_derivative("receptors", types)
-    if isinstance(types, (Pigment, Spectrum)) or np.ndim(types) == 0:
+    if isinstance(types, str) or not is_sized(types):
         types = (types,)
     if not len(types):
         raise ValueError("receptors: there is no type; an eye needs at least one")
@@ -98,7 +98,7 @@ def _types(types: Any) -> tuple[Pigment | Spectrum, ...]:
 def _pigment(lambda_max_nm: Any) -> Pigment:
     try:
         return Pigment(float(lambda_max_nm))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(
             f"receptors hold {shown(lambda_max_nm)}: must be wavelengths of peaks in [330, 700] nm, Pigments or Spectra"
         ) from None
@@ -108,7 +108,7 @@ def _mosaic(mosaic: Any, types: int) -> tuple[tuple[int, ...], ...]:
     try:
         tile = np.array(mosaic)
         whole = tile.ndim == 2 and tile.size > 0 and bool(np.all(tile == tile.astype(int)))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         whole = False
     if not whole or tile.min() < 0 or tile.max() >= types:
         raise ValueError(f"mosaic: must be rows, all as long, of indices of types from 0 to {types - 1}")

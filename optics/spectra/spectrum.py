@@ -69,7 +69,7 @@ def _row(name: str, numbers: Sequence[float]) -> tuple[float, ...]:
     without_derivative(name, numbers)
     try:
         row = np.asarray(numbers, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         row = np.empty(0)
     if row.ndim != 1 or not row.size or not np.isfinite(row).all():
         raise ValueError(f"{name}: must be a row of finite numbers, at least one")

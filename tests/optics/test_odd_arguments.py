@@ -1,0 +1,218 @@
+"""Every argument of the public face, given what it is not: an answer, or one line of our own. Nothing else."""
+
+import math
+import traceback
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import optics
+from tests.optics.any_numbers import only_one_line
+
+OURS = str(Path(optics.__file__).parent)
+ODD = {
+    "none": None,
+    "word": "auto",
+    "bytes": b"x",
+    "nan": math.nan,
+    "infinite": math.inf,
+    "negative": -1,
+    "zero": 0,
+    "minute": 1e-30,
+    "huge": 10**400,
+    "true": True,
+    "complex": 1j,
+    "empty": [],
+    "ragged": [[1, 2], [3]],
+    "no number in it": [None],
+    "three numbers": (1, 2, 3),
+    "array without axes": np.array(1.0),
+    "empty array": np.zeros(0),
+    "square": np.zeros((2, 2)),
+    "NumPy's number": np.float32(2),
+    "dictionary": {},
+    "object": object(),
+    "function": abs,
+}
+
+LENS = optics.Pupil(20e-6, thin_lens_focal_length=240e-6)
+WIDE = optics.Pupil(100e-6, thin_lens_focal_length=240e-6)
+PICTURE = {
+    "sensor_distance": 240e-6,
+    "dx": 0.5e-6,
+    "shape": (9, 9),
+    "tolerance": 1e-2,
+    "method": "auto",
+    "dtype": "float32",
+}
+SOURCE = {"source_distance": math.inf, "source_angle": (0.0, 0.0), "centre": (0.0, 0.0)}
+
+# Valid calls. They are so small that hundreds of variants take seconds.
+SHAPES = {
+    "Annulus": {"inner": 0.3},
+    "Disk": {"radius": 0.3, "centre": (0.0, 0.1)},
+    "Oblong": {"width": 0.3, "height": 0.2, "centre": (0.0, 0.0), "rotation_deg": 0.0},
+    "Polygon": {"vertices": np.array([[0, 0], [0.5, 0], [0, 0.5]])},
+    "Rings": {"radii": [0.1, 0.2, 0.3, 0.4]},
+    "Slit": {"width": 0.3, "height": 0.3},
+    "Spider": {"vanes": 3, "width": 0.1, "rotation_deg": 0.0},
+    "hexagonal_segments": {"rings": 1, "gap": 0.01, "rotation_deg": 0.0, "without": (0,)},
+}
+ELEMENTS = {
+    "BSplineRelief": {"control_points": np.zeros((4, 4))},
+    "FacetLens": {
+        "diameter": 25e-6,
+        "radius_front": 30e-6,
+        "radius_back": -math.inf,
+        "thickness": 0.0,
+        "n": 1.45,
+        "medium_n": 1.34,
+    },
+    "FreeSpace": {"distance": 1e-3, "medium_n": 1.0},
+    "GaussianMask": {"waist": 1e-5},
+    "HeightMap": {"samples": np.zeros((4, 4))},
+    "HumanEye": {"aperture_radius": 1e-3, "wavefront": "standard_observer"},
+    "MaskMap": {"samples": np.ones((4, 4)), "reach": 1e-4},
+    "PixelRelief": {"samples": np.zeros((4, 4))},
+    "PointSource": {"distance": 1.0, "angle": (0.0, 0.0)},
+    "Pupil": {
+        "aperture_radius": 2e-5,
+        "height": None,
+        "n": 1.5,
+        "medium_n": 1.0,
+        "object_n": None,
+        "thin_lens_focal_length": 240e-6,
+        "aperture": optics.Circle(),
+        "wavefront": None,
+        "mask": None,
+    },
+    "WavefrontMap": {"samples": np.zeros((4, 4)), "radius": 1.0},
+    "Zernike": {"coefficients_um": [0, 0, 0, 0.1], "radius": 1e-3},
+    "medium": {"name": "water"},
+}
+SPECTRA = {
+    "Cornu": {"a": 1.5, "b_um": 0.01, "c_um": 0.1},
+    "PhotonBudget": {"illuminance": 1e4, "integration_time": 0.02, "quantum_efficiency": 0.5},
+    "Pigment": {"lambda_max_nm": 530.0, "chromophore": "A1"},
+    "Receptors": {"types": (530.0,), "mosaic": None, "range_nm": None},
+    "RefractiveIndex": {"a": 1.5, "b": 0.0, "c": 0.0, "d": 0.0},
+    "Sellmeier": {"strengths": (1.0,), "poles_um2": (0.01,)},
+    "Spectrum": {"wavelengths_nm": (400.0, 700.0), "values": (1.0, 1.0)},
+    "illuminant": {"name": "D65"},
+    "receptors_of": {"receptors": "rgb"},
+    "reflectance": {"name": "foliage"},
+}
+EYES = {
+    "AppositionEye": {
+        "ommatidium": optics.Ommatidium(optics.FacetLens(25e-6, 30e-6), optics.Waveguide(2e-6)),
+        "rings": 1,
+        "interommatidial_deg": 2.0,
+    },
+    "Eye": {
+        "pupil": LENS,
+        "resolution": (3, 3),
+        "fov_deg": 45.0,
+        "sensor_width": 200e-6,
+        "bands": 4,
+        "noise_sigma": 0.01,
+        "tolerance": 0.01,
+        "receptors": "rgb",
+        "full_aperture": None,
+        "eccentricity_deg": (0.0, 0.0),
+        "microvilli": None,
+        "photon_budget": None,
+    },
+    "Microvilli": {"azimuth_deg": 0.0, "dichroic_ratio": 10.0},
+    "Waveguide": {"diameter": 2e-6, "n_core": 1.363, "n_clad": 1.34, "length": None, "absorption": 6e3},
+    "hexagonal_directions": {"rings": 1, "interommatidial_deg": 2.0},
+    "mean_human_mtf": {"cycles_per_degree": [1.0, 2.0], "pupil_diameter": 3e-3},
+    "snyder_acceptance": {"diameter": 2e-5, "focal_length": 5e-5, "rhabdom": 2e-6, "wavelength": 500e-9},
+}
+PICTURES = {
+    "plan": dict(pupil=LENS, wavelength=550e-9, **PICTURE, **SOURCE),
+    "psf": dict(pupil=LENS, wavelengths=[550e-9], field=False, **PICTURE, **SOURCE),
+    "psf_batch": dict(pupils=[LENS], wavelengths=[550e-9], source_distances=[math.inf], **PICTURE),
+    "vector_focus": {
+        "pupil": WIDE,
+        "wavelength": 550e-9,
+        "sensor_distance": 240e-6,
+        "polarization": None,
+        "source_angle": (0.0, 0.0),
+        "apodization": "flat",
+        "dx": 0.3e-6,
+        "shape": (5, 5),
+    },
+}
+SPOT = optics.psf(LENS, sensor_distance=240e-6, dx=0.5e-6, shape=(33, 33))
+MEASURES = {
+    "encircled_energy": {"result": SPOT, "radii": 1e-6, "centre": None},
+    "image_quality": {"result": SPOT, "nyquist": 1e5, "throughput": 1.0, "noise_sigma": 0.01, "tolerance": 0.02},
+    "mtf": {"result": SPOT, "arriving": None, "tolerance": 0.02},
+    "strehl_ratio": {"result": SPOT},
+}
+FIELDS = {
+    "propagate": {
+        "u": np.ones((8, 8)),
+        "dx": 1e-6,
+        "wavelength": 550e-9,
+        "distance": 1e-4,
+        "out_dx": 1e-6,
+        "out_shape": (8, 8),
+        "out_centre": (0.0, 0.0),
+        "medium_n": 1.0,
+        "tolerance": 1e-2,
+        "method": "auto",
+        "dtype": "float32",
+    },
+    "propagate_through": {
+        "elements": [LENS, optics.FreeSpace(1e-3)],
+        "u": None,
+        "wavelength": 550e-9,
+        "source": optics.PointSource(),
+        "out_dx": 1e-6,
+        "out_shape": (9, 9),
+        "tolerance": 1e-2,
+        "dtype": "float32",
+    },
+}
+CALLS = SHAPES | ELEMENTS | SPECTRA | EYES | PICTURES | MEASURES | FIELDS
+
+
+def complaint(call, arguments):
+    """What is wrong with how a call ends; None if it answers, or refuses in one line of our own."""
+    try:
+        call(**arguments)
+    except ValueError as error:
+        only_one_line(error)
+        raised_in = traceback.extract_tb(error.__traceback__)[-1].filename
+        return None if raised_in.startswith(OURS) else f"{error} ({raised_in})"
+    except Exception as error:
+        return repr(error)
+    return None
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_any_argument(name):
+    call, valid = getattr(optics, name), CALLS[name]
+    call(**valid)
+    for argument in valid:
+        complaints = {what: complaint(call, valid | {argument: odd}) for what, odd in ODD.items()}
+        assert not any(complaints.values()), f"{argument}: {complaints}"
+
+
+def test_nothing_of_the_face_is_forgotten():
+    """What is left out is made by optics itself, or takes what is tried here."""
+    made = {"AccuracyError", "BackendError", "MTF", "Mode", "PSFBatch", "PSFResult", "Plan", "PropagationResult"}
+    made |= {"ExitPupil", "SpectralBands", "StackResult", "VectorFocus", "WhitePSF", "Relief", "Circle", "Combined"}
+    like_others = {
+        "difference",
+        "intersection",
+        "union",
+        "Grid",
+        "Ommatidium",
+        "white_psf",
+        "read_exit_pupil",
+        "require",
+    }
+    assert CALLS.keys() | made | like_others == set(optics.__all__)
