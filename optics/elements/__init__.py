@@ -12,4 +12,5 @@ exit_pupil        read_exit_pupil: lenses of other programs
 refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
 wavefront_slopes  where the rays of a wavefront go
 beam              light of one wavelength on its way to a plane
+ray_field         what rays make of polarised light
 """

@@ -16,8 +16,8 @@ far_field            by one transform onto directions for each of a few nodes of
 far_field_nodes      which nodes, and what each counts in every direction
 fresnel              approximate: Fresnel and Fraunhofer, and how wrong they are
 geometric            approximate: density of rays; the pinhole
-richards_wolf        the vector focus of symmetric pupils
-vector_sum           the vector focus of any pupil
+smythe               vector fields, of what the others propagate
+vector_sum           vector fields about a focus, as a sum of plane waves
 scalar_theory        how wrong scalar theory is, at most
 rays                 where geometrical optics sends the light
 pupil_sampling       where matrix products sample the pupil

@@ -1,11 +1,12 @@
-"""The vector focus of any light: Debye's sum of plane waves, one from each point of a pupil.
+"""The vector focus of any light, roughly: Debye's sum of plane waves, one from each point of a pupil.
 
-The ray from ξ to the image's place c, at a distance D, brings a plane wave whose field is turned with it:
+The light from ξ, which reaches the image's place c after a distance D, is there taken for a plane wave:
 
-    E(c + x) = k/2π ∫ P(ξ) e^{ik(L + D)} g(ξ) e(ξ) e^{ik s·x} dξ,   s = (c - ξ)/D,   g = z/D²,
+    E(c + x) = -ik/2π ∫ P(ξ) e^{ik(L + D)} g(ξ) e(ξ) e^{ik s·x} dξ,   s = (c - ξ)/D,   g = z/D²,
 
-L the path through the pupil, e the field before it, turned by the shortest way into the ray's direction. With e = 1
-this is Rayleigh-Sommerfeld's integral about c; where all is the same around the axis it is Richards and Wolf's.
+L the path through the pupil, e the field that rays have behind it (`ray_field`). With e = 1 this is Rayleigh-
+Sommerfeld's integral about c, but for ik(|x|² - (s·x)²)/2D in the exponent. Where all is the same around the axis it is
+Richards and Wolf's (1959).
 """
 
 from __future__ import annotations
@@ -16,13 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.methods.rayleigh_sommerfeld import cached_nodes
+from optics.elements.ray_field import Vector, before_pupil, rays_behind, turned
+from optics.methods.rayleigh_sommerfeld import cached_nodes, node_count
 from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
-from optics.numerics.precision import precision
+from optics.numerics.precision import padded_for_packets, precision
 from optics.numerics.scattered_sum import ScatteredSum
 
-__all__ = ["VectorSum", "turned"]
+__all__ = ["VectorSum"]
 
 DIGITS = 8.0  # choice
 
@@ -38,58 +40,60 @@ class VectorSum:
 
     def components(self) -> np.ndarray:
         """Ex, Ey, Ez of light that is polarised along x before the pupil, the same of y, and scalar theory's field:
-        (7, y, x), complex, over the root of the pupil's area."""
+        (7, y, x), complex, over the root of the pupil's area and less the carrier e^{ikz}."""
         x, y, amplitude = self._pupil()
-        ray = self._rays(x, y)
-        per_sample = self.beam.index / self.beam.wavelength * self.window.dx
-        sums = ScatteredSum(ray[0] * per_sample, ray[1] * per_sample, self.window.shape, DIGITS)
-        before = self._before()
-        fields = [turned(turned(np.eye(3)[axis][:, None], AXIS, before), before, ray) for axis in (0, 1)]
-        parts = np.concatenate([*fields, np.ones((1, len(x)))]).astype(complex)
-        return sums.of(parts * amplitude) / math.sqrt(self.beam.pupil.area)
-
-    def _rays(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Unit vectors (x, y, z), (3, point)."""
         (cx, cy), z = self.window.centre, number(self.beam.distance)
+        d = z if self.aplanatic else np.sqrt((cx - x) ** 2 + (cy - y) ** 2 + z * z)
+        per_sample = self.beam.index / self.beam.wavelength * self.window.dx
+        sums = ScatteredSum((cx - x) / d * per_sample, (cy - y) / d * per_sample, self.window.shape, DIGITS)
+        rays = self._rays(x, y)
+        parts = []
+        for axis in (0, 1):
+            along, before = before_pupil(self.beam.source, axis)
+            ex, ey, ez = turned(before, along, rays)
+            # As Maxwell's equations have it of the other two: along its own ray that is the turned field's.
+            parts += [ex, ey, ez if self.aplanatic else -(ex * (cx - x) + ey * (cy - y)) / z]
+        return sums.of(np.array([*parts, np.ones(len(x))]) * amplitude) / math.sqrt(self.beam.pupil.area)
+
+    @property
+    def nodes(self) -> int:
+        """How many points of the pupil it takes."""
+        return node_count(self.beam.pupil.aperture, self._cycles, DIGITS)
+
+    def _rays(self, x: np.ndarray, y: np.ndarray) -> Vector:
+        z = number(self.beam.distance)
         if self.aplanatic:
-            return np.stack([-x / z, -y / z, np.sqrt(1 - (x * x + y * y) / z**2)])
-        there = np.stack([cx - x, cy - y, np.full(len(x), z)])
-        return np.asarray(there / np.sqrt((there**2).sum(axis=0)))
+            return -x / z, -y / z, np.sqrt(1 - (x * x + y * y) / z**2)
+        types = precision("float64")
+        at_x, at_y = (types.Float64(padded_for_packets(at)) for at in (x, y))
+        along_x, along_y, axial = (part.numpy() for part in rays_behind(self.beam, at_x, at_y, types))
+        return along_x, along_y, axial
 
-    def _before(self) -> np.ndarray:
-        """The light's direction before the pupil, (3, 1)."""
-        along = np.array([*(math.tan(angle) for angle in self.beam.source.angle), 1.0])
-        return np.asarray(along / np.linalg.norm(along))[:, None]
-
-    def _pupil(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points x, y [m], and k/2π P g e^{ik(L + D)} dξ."""
-        beam, pupil, types = self.beam, self.beam.pupil, precision("float64")
-        k, z, radius = 2 * math.pi * beam.index / beam.wavelength, number(beam.distance), pupil.radius
+    @property
+    def _cycles(self) -> float:
+        """That phases turn through along the pupil's radius."""
+        beam, pupil, z = self.beam, self.beam.pupil, number(self.beam.distance)
         turning = pupil.slopes(beam.wavelength, beam.source).turning(z, self.window, beam.index)[1]
         if self.aplanatic:
             turning = beam.index * self.window.own_half_diagonal / z
-        detail = 0.0 if pupil.mask is None else pupil.mask.bandwidth(1e-6, radius) * radius
+        detail = 0.0 if pupil.mask is None else pupil.mask.bandwidth(1e-6, pupil.radius) * pupil.radius
         # Directions and obliquity turn nothing, but are no polynomials: their poles lie at height z.
-        poles = DIGITS * math.log(10) / (2 * math.pi) * radius / z
-        nodes = cached_nodes(pupil.aperture, radius * turning / beam.wavelength + detail + poles, DIGITS)
+        poles = DIGITS * math.log(10) / (2 * math.pi) * pupil.radius / z
+        return pupil.radius * turning / beam.wavelength + detail + poles
+
+    def _pupil(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points x, y [m], and -ik/2π P g e^{ik(L + D - z)} dξ."""
+        beam, pupil, types = self.beam, self.beam.pupil, precision("float64")
+        k, z, radius = 2 * math.pi * beam.index / beam.wavelength, number(beam.distance), pupil.radius
+        nodes = cached_nodes(pupil.aperture, self._cycles, DIGITS)
         x, y = nodes.x * radius, nodes.y * radius
-        weight = nodes.weight * radius**2 * k / (2 * math.pi)
+        weight = -1j * nodes.weight * radius**2 * k / (2 * math.pi)
         if self.aplanatic:
             return x, y, weight / z * (1 - (x * x + y * y) / z**2) ** -0.25
         at = types.Float64(x), types.Float64(y)
         passed = pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types).numpy() * np.ones(len(x))
-        (cx, cy), end = self.window.centre, math.hypot(*self.window.centre, z)
-        d2 = (cx - x) ** 2 + (cy - y) ** 2 + z * z
-        excess = (x * x + y * y - 2 * (x * cx + y * cy)) / (np.sqrt(d2) + end)
-        phase = 2 * np.pi * beam.waves(*at, types).numpy() + k * excess
+        cx, cy = self.window.centre
+        across = (cx - x) ** 2 + (cy - y) ** 2
+        d2 = across + z * z
+        phase = 2 * np.pi * beam.waves(*at, types).numpy() + k * across / (np.sqrt(d2) + z)
         return x, y, weight * passed * z / d2 * np.exp(1j * phase)
-
-
-AXIS = np.array([0.0, 0.0, 1.0])[:, None]
-
-
-def turned(field: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Vectors (3, …) turned as the shortest way turns one unit vector into another; they are at right angles to it."""
-    between = before + after
-    share = (field * after).sum(axis=0) / (1 + (before * after).sum(axis=0))
-    return np.asarray(field - share * between)

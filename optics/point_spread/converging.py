@@ -3,34 +3,43 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.elements.pupil import Pupil
-from optics.elements.source import PointSource
-from optics.methods.richards_wolf import Light, focal_integrals
+from optics.elements.ray_field import RayField
+from optics.methods.problem import Problem
+from optics.methods.sampling import WithField
+from optics.methods.smythe import SCALAR, smythe
 from optics.methods.vector_sum import VectorSum
+from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
-from optics.numerics.precision import precision
+from optics.point_spread.pictures import pictures
+from optics.point_spread.request import Request
+from optics.point_spread.spot_check import spot_check
 
 __all__ = ["Converging", "VectorFocus"]
 
-DEBYE = 1.5  # choice: test_microvilli.py
-PATH_SAMPLES = 513  # choice: along a radius, at which the path is looked at
+PLANE_WAVES = "plane_waves"
+MOST_NODES = 300_000  # choice, by memory: of a sum of plane waves, each of which is spread over 81 cells
+CHECK_SECONDS = 0.02  # choice: what a sum of plane waves counts for; a check takes a share of it
+SINGLE = 1e-4  # choice: tolerance from which on float32 will do
 
 
 @dataclass(frozen=True, eq=False)
 class Converging:
-    """Light behind a pupil. jones: of its parts that do not interfere, (part, 2). stokes: of it all, over the first."""
+    """Light behind a pupil. jones: of its parts that do not interfere, (part, 2). stokes: of it all, over the first.
+    tolerance: relative L2 error of the intensity over a window."""
 
     beam: Beam
     aplanatic: bool
     jones: np.ndarray
     stokes: tuple[float, float, float, float]
+    tolerance: float
 
     @property
     def image(self) -> tuple[float, float]:
@@ -42,51 +51,75 @@ class Converging:
         return number(beam.distance) * bent * x / axial, number(beam.distance) * bent * y / axial
 
     @property
-    def sine(self) -> float:
-        """Of the steepest ray."""
-        radius, z = self.beam.pupil.radius, number(self.beam.distance)
-        return radius / z if self.aplanatic else radius / math.hypot(radius, z)
-
-    @property
     def cutoff(self) -> float:
-        """Frequency [1/m] beyond which the intensity has none."""
-        return 2 * self.sine * self.beam.index / self.beam.wavelength
+        """Frequency [1/m] beyond which the intensity has none: light from opposite rims interferes, whose directions
+        differ most on the axis."""
+        radius, z = self.beam.pupil.radius, number(self.beam.distance)
+        sine = radius / z if self.aplanatic else radius / math.hypot(radius, z)
+        return 2 * sine * self.beam.index / self.beam.wavelength
 
     def onto(self, window: Grid) -> VectorFocus:
-        """Its field there; the window lies about the image, or about the axis if that is where it is."""
-        beam, pupil = self.beam, self.beam.pupil
-        along_axis = beam.source.angle == (0.0, 0.0) and len(pupil.aperture.rings) == 1
-        if along_axis and pupil.rotationally_symmetric(beam.wavelength):
-            found = _symmetric(self, window)
-        else:
-            found = VectorSum(beam, window, self.aplanatic).components()
+        """Its field there; the window lies about the image.
+
+        Raises:
+            AccuracyError: no method meets the tolerance within the limits on memory and time.
+        """
+        found, plan = self._aplanatic(window) if self.aplanatic else self._flat(window)
         parts = np.tensordot(self.jones, found[:6].reshape(2, 3, *window.shape), axes=1)
         intensity, pure = (np.abs(parts) ** 2).sum(axis=0), parts[0] if len(parts) == 1 else None
         scalar = np.abs(found[6]) ** 2
-        return VectorFocus(intensity, scalar, window.dx, pure, parts, window.centre, self.stokes, self)
+        return VectorFocus(intensity, scalar, window.dx, pure, parts, window.centre, self.stokes, plan, self)
 
-    @property
-    def debye_error(self) -> float:
-        """Relative error of what falls on a receptor that plane waves make, in place of waves that converge, roughly.
+    def _aplanatic(self, window: Grid) -> tuple[np.ndarray, Plan]:
+        """A sum of plane waves is what such a lens is defined by."""
+        rule = VectorSum(self.beam, window, True)
+        if (nodes := rule.nodes) > MOST_NODES:
+            raise AccuracyError(
+                f"the window reaches {window.own_half_diagonal:.3g} m from the image: needs a smaller one"
+            )
+        z, wavelength = number(self.beam.distance), self.beam.wavelength / self.beam.index
+        error = (wavelength * z / (2 * self.beam.pupil.radius**2)) ** 2
+        why = "an aplanatic lens is one; (1/2N)² for a Fresnel number N"
+        return rule.components(), Plan(PLANE_WAVES, (nodes, 1), "float64", error, why)
 
-        Over a distance x from the image, amplitudes 1/D and directions differ by x sin θ/z from those at the image.
-        Light comes from as far as rays miss it, and a wavelength over sin θ.
-        """
-        beam, z = self.beam, number(self.beam.distance)
-        beside = 0.0
-        if not self.aplanatic:
-            slopes = beam.pupil.slopes(beam.wavelength, beam.source)
-            beside = z * slopes.turning(z, Grid((1, 1), 1e-9, self.image), beam.index)[1] / beam.index
-        return DEBYE * (beam.wavelength / beam.index + beside * self.sine) / z
+    def _flat(self, window: Grid) -> tuple[np.ndarray, Plan]:
+        return self._plane_waves(window) or self._exact(window)
+
+    def _plane_waves(self, window: Grid) -> tuple[np.ndarray, Plan] | None:
+        """None where they err by more than the tolerance, or nothing tells by how much."""
+        rule = VectorSum(self.beam, window)
+        if window.own_half_diagonal > number(self.beam.distance) or (nodes := rule.nodes) > MOST_NODES:
+            return None
+        found = rule.components()
+        problem = Problem.of(self.beam, window, self.tolerance, "float64")
+        error = spot_check(self.beam, problem, np.abs(found[6].ravel()) ** 2, CHECK_SECONDS)
+        if error is None or error > self.tolerance:
+            return None
+        return found, Plan(PLANE_WAVES, (nodes, 1), "float64", error, "a check against the direct sum finds them right")
+
+    def _exact(self, window: Grid) -> tuple[np.ndarray, Plan]:
+        """By Smythe's integral, all fields by the method that does for the scalar one."""
+        mask = RayField(self.beam, 0, SCALAR)
+        dtype = "float32" if self.tolerance >= SINGLE else "float64"
+        beam = replace(self.beam, pupil=mask.pupil)
+        made = pictures([Request(beam, Problem.of(beam, window, self.tolerance, dtype), keeps_field=True)])[0]
+        sampling, root = cast(WithField, made.sampling), math.sqrt(self.beam.pupil.area)
+
+        def propagated(beam: Beam) -> np.ndarray:
+            return sampling.field(beam, made.problem).numpy() / root
+
+        found = np.concatenate([smythe(self.beam, window, propagated), propagated(beam)[None]])
+        return found, replace(made.plan, why=f"Smythe's integral; {made.plan.why}")
 
 
 @dataclass(frozen=True, eq=False)
 class VectorFocus:
     """intensity: |Ex|², |Ey|², |Ez|² over the pupil's area, (3, y, x) [1/m²]; what a molecule sees whose dipole lies
-    along x, y or z. scalar: what scalar theory says, (y, x). field: Ex, Ey, Ez, (3, y, x); None unless the light is
-    fully polarised. parts: fields that do not interfere and together are the light, (part, 3, y, x): one, or two.
-    centre: (x, y) [m] of the middle sample. polarization: of the light before the pupil, Stokes' parameters over the
-    first. towards: by which it can be looked at again; None for a field from elsewhere.
+    along x, y or z. scalar: what scalar theory says, (y, x). field: Ex, Ey, Ez, (3, y, x), less the carrier e^{ikz};
+    None unless the light is fully polarised. parts: fields that do not interfere and together are the light,
+    (part, 3, y, x): one, or two. centre: (x, y) [m] of the middle sample. polarization: of the light before the pupil,
+    Stokes' parameters over the first. plan: how it was computed, and its predicted error, relative L2 of the intensity
+    over the window. towards: by which it can be looked at again; None for a field from elsewhere.
     """
 
     intensity: np.ndarray
@@ -96,11 +129,15 @@ class VectorFocus:
     parts: np.ndarray
     centre: tuple[float, float]
     polarization: tuple[float, float, float, float]
+    plan: Plan
     towards: Converging | None = None
 
     def __repr__(self) -> str:
         height, width = self.scalar.shape
-        return f"<VectorFocus {height} x {width} samples {self.dx:.3g} m apart, scalar error {self.scalar_error:.1e}>"
+        return (
+            f"<VectorFocus {height} x {width} samples {self.dx:.3g} m apart, "
+            f"predicted error {self.plan.predicted_error:.1e}, scalar error {self.scalar_error:.1e}>"
+        )
 
     @cached_property
     def psf(self) -> np.ndarray:
@@ -118,47 +155,3 @@ class VectorFocus:
     def scalar_error(self) -> float:
         """Relative L2 error that scalar theory makes over the window."""
         return float(np.linalg.norm(self.scalar - self.psf) / np.linalg.norm(self.psf))
-
-
-def _symmetric(towards: Converging, window: Grid) -> np.ndarray:
-    """See `VectorSum.components`, by Richards and Wolf's integrals."""
-    pupil, wavelength, z = towards.beam.pupil, towards.beam.wavelength, number(towards.beam.distance)
-    ends, light = _aplanatic(pupil, z) if towards.aplanatic else _flat(pupil, wavelength, z)
-    x, y = window.x[None, :], window.y[:, None]
-    radii, back = np.unique(np.round(np.hypot(x, y) / window.dx, 9), return_inverse=True)
-    wavenumber = 2 * math.pi * pupil.index_behind(wavelength) / wavelength
-    found = focal_integrals(radii * window.dx, wavenumber, z, ends, light)
-    along, axial, twice, scalar = found[:, back.reshape(window.shape)] / math.sqrt(pupil.area)
-    phi = np.arctan2(y, x)
-    by_x = along + twice * np.cos(2 * phi), twice * np.sin(2 * phi), -2j * axial * np.cos(phi)
-    by_y = twice * np.sin(2 * phi), along - twice * np.cos(2 * phi), -2j * axial * np.sin(phi)
-    return np.array([*by_x, *by_y, scalar])
-
-
-def _flat(pupil: Pupil, wavelength: float, z: float) -> tuple[tuple[float, float], Light]:
-    """r = z tan θ; W is what the path through the pupil and on to the axis has more than the axial one."""
-    types = precision("float64")
-    inner, outer = (share * pupil.radius for share in pupil.aperture.rings[0])
-    r = np.linspace(inner, outer, PATH_SAMPLES)
-
-    def waves(r: np.ndarray) -> np.ndarray:
-        path = pupil.path(types.Float64(r), types.Float64(0 * r), wavelength, PointSource(), types).numpy()
-        found: np.ndarray = (path + pupil.index_behind(wavelength) * r * r / (np.sqrt(r * r + z * z) + z)) / wavelength
-        return found
-
-    def passed(r: np.ndarray) -> np.ndarray:
-        found: np.ndarray = pupil.amplitude(types.Float64(r / pupil.radius), types.Float64(0 * r), types).numpy()
-        return found
-
-    def at(theta: np.ndarray) -> np.ndarray:
-        found: np.ndarray = passed(z * np.tan(theta)) * np.exp(2j * np.pi * waves(z * np.tan(theta))) / np.cos(theta)
-        return found
-
-    turns = float(np.abs(np.diff(waves(r))).max()) * (PATH_SAMPLES - 1)
-    return (math.atan2(inner, z), math.atan2(outer, z)), Light(at, turns)
-
-
-def _aplanatic(pupil: Pupil, z: float) -> tuple[tuple[float, float], Light]:
-    """r = z sin θ, all rays in phase."""
-    inner, outer = (share * pupil.radius for share in pupil.aperture.rings[0])
-    return (math.asin(inner / z), math.asin(outer / z)), Light(lambda theta: np.sqrt(np.cos(theta)))

@@ -24,13 +24,11 @@ MOST_AGAIN = 1025  # choice: samples along a side of a window that is looked at 
 
 @dataclass(frozen=True, eq=False)
 class DiskSum:
-    """light: over samples that can be added up. share: of each that counts, (y, x). radius [m] of the disk.
-    model_error: relative, of the light itself."""
+    """light: over samples that can be added up. share: of each that counts, (y, x). radius [m] of the disk."""
 
     light: VectorFocus
     share: np.ndarray
     radius: float
-    model_error: float
 
     @classmethod
     def over(cls, light: VectorFocus, radius: float, centre: tuple[float, float] | None = None) -> DiskSum:
@@ -60,13 +58,19 @@ class DiskSum:
         share = (distance <= radius).astype(np.float64)
         near = np.abs(distance - radius) < kernel.reach / unit
         share[near] = disk_profile(kernel, radius * unit, distance[near] * unit)
-        return cls(seen, share, radius, towards.debye_error)
+        return cls(seen, share, radius)
 
     def of(self, picture: np.ndarray) -> tuple[float, float]:
         """Integral over the disk of an intensity (y, x) [1/m²] that is the light's, or a part of it; and its error."""
         found = float((picture * self.share).sum()) * self.light.dx**2
         bright = min(math.pi * self.radius**2 * float(self.light.psf.max()), 1.0)
-        return found, self.model_error * found + SUM_ERROR * RIPPLE * bright
+        return found, self.light_error + SUM_ERROR * RIPPLE * bright
+
+    @property
+    def light_error(self) -> float:
+        """Of any such integral at most, by Cauchy and Schwarz, from what the light errs by over its window."""
+        norms = float(np.linalg.norm(self.light.psf) * np.linalg.norm(self.share))
+        return self.light.plan.predicted_error * norms * self.light.dx**2
 
 
 def _room(light: VectorFocus, middle: tuple[float, float]) -> float:

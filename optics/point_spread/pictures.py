@@ -27,11 +27,14 @@ LAST_TOLERANCE = 1e-2  # choice: of that, once nothing is tried after it
 
 
 class PSFPicture(NamedTuple):
-    """A PSF, flat; its plan; the field whose square it is, carrier included, where that was wanted."""
+    """A PSF, flat; its plan; the field whose square it is, carrier included, where that was wanted; and by which
+    samples of which problem it was made."""
 
     image: Array
     plan: Plan
-    field: Field | None = None
+    field: Field | None
+    sampling: Sampling
+    problem: Problem
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,8 @@ class _Attempt:
 
     def stated(self, error: float) -> PSFPicture:
         """The picture, and the plan with the error that is now known."""
-        return PSFPicture(self.image, replace(self.plan, predicted_error=error), self.field)
+        plan = replace(self.plan, predicted_error=error)
+        return PSFPicture(self.image, plan, self.field, self.sampling, self.request.problem)
 
     def repeated(self, error: float, tolerance: float, last: bool) -> _Attempt | None:
         """What to try after the check saw an error above the tolerance: an exact method, or else a smaller tolerance,

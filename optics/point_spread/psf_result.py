@@ -247,7 +247,7 @@ def spread(requests: Sequence[Request]) -> PSFResult:
     """
     import drjit as dr
 
-    flat, plans, fields = zip(*pictures(requests, alike=len(requests) >= MANY), strict=True)
+    flat, plans, fields, *_ = zip(*pictures(requests, alike=len(requests) >= MANY), strict=True)
     beam, window, types = requests[0].beam, requests[0].problem.window, precision(requests[0].problem.dtype)
     tensor = types.Tensor(flat[0] if len(flat) == 1 else dr.concat(flat), (len(flat), *window.shape))
     wavelengths = np.array([request.beam.wavelength for request in requests])

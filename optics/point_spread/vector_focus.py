@@ -12,14 +12,15 @@ from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import of_kind, one_of, positive, shown, vacuum_wavelength, without_derivative
+from optics.numerics.arguments import in_range, of_kind, one_of, positive, shown, vacuum_wavelength, without_derivative
+from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.point_spread.converging import Converging, VectorFocus
 
 __all__ = ["vector_focus"]
 
-FEWEST_ZONES = 20.0  # choice: Fresnel number from which rays meet as in the Debye integral, to 1/(2 number) far out
+FEWEST_ZONES = 20.0  # choice: Fresnel number of an aplanatic lens from which on rays meet in a point
 ROUNDING = 1e-9
 
 
@@ -33,21 +34,25 @@ def vector_focus(
     apodization: str = "flat",
     dx: float = 0.05e-6,
     shape: tuple[int, int] = (65, 65),
+    tolerance: float = 1e-3,
 ) -> VectorFocus:
     """Electric field behind a pupil of any shape about the image of a point far away.
 
-    The Debye integral of plane waves, one for each ray: right to about 1/(2 Fresnel number). Along the axis of a circle
-    or ring it is Richards and Wolf's (1959), elsewhere a sum over the pupil's points.
+    Rays give the field in the pupil's plane, perpendicular to each, and Smythe's integral (1947) what Maxwell's
+    equations make of it. Where that meets the tolerance, a sum of plane waves does, one for each point of the pupil
+    (Debye's integral): about foci of high Fresnel number, where it is much faster.
 
     sensor_distance: [m]; None: the lens' focus. polarization: of the light before the pupil, Jones' vector (x, y) or
         Stokes' parameters (S0, S1, S2, S3) with S1 = |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey), S3 = 2 Im(Ex* Ey); None:
         unpolarised. In light aslant x and y are turned with it. source_angle: (x, y) [rad], as of `optics.psf`; the
         window then lies about the image. apodization: "flat", even light over a flat pupil; "aplanatic", as behind a
-        corrected objective and on its axis: the pupil is then seen from the focus under the sine ξ/z.
+        corrected objective and on its axis: the pupil is then seen from the focus under the sine ξ/z, and the light is
+        plane waves (Richards and Wolf 1959). tolerance: relative L2 error of the intensity over the window.
 
     Raises:
         ValueError: a bad argument, a relief of pixels, or a derivative.
-        AccuracyError: a Fresnel number below 20, where rays do not meet in a point.
+        AccuracyError: no method meets the tolerance within the limits on memory and time; an aplanatic lens with a
+            Fresnel number below 20, whose rays do not meet in a point.
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
     lambda_, source = vacuum_wavelength(wavelength), PointSource(math.inf, source_angle)
@@ -56,14 +61,12 @@ def vector_focus(
     _check_plain(pupil, lambda_)
     if pupil.pixels:
         raise ValueError("height is a PixelRelief: must be smooth, for each point to have one ray")
-    index = pupil.index_behind(lambda_)
-    zones = pupil.radius**2 * index / (lambda_ * z)
-    if zones < FEWEST_ZONES:
-        raise AccuracyError(f"Fresnel number {zones:.3g}: must be at least {FEWEST_ZONES:g} for rays to meet; use psf")
+    in_range("tolerance", tolerance, 1e-12, 0.5)
+    beam = Beam(pupil, source, lambda_, z)
     if apodization == "aplanatic":
-        _check_aplanatic(pupil, z, source.angle)
+        _check_aplanatic(beam)
     amplitudes, shares = _polarised(polarization)
-    towards = Converging(Beam(pupil, source, lambda_, z), apodization == "aplanatic", amplitudes, shares)
+    towards = Converging(beam, apodization == "aplanatic", amplitudes, shares, tolerance)
     return towards.onto(Grid(shape, dx, towards.image))
 
 
@@ -76,9 +79,13 @@ def _check_plain(pupil: Pupil, wavelength: float) -> None:
         without_derivative("pupil", part)
 
 
-def _check_aplanatic(pupil: Pupil, z: float, angle: tuple[float, float]) -> None:
-    bare = pupil.height is None and pupil.wavefront is None and pupil.mask is None and angle == (0.0, 0.0)
-    if not bare or pupil.thin_lens_focal_length is None or pupil.radius >= z:
+def _check_aplanatic(beam: Beam) -> None:
+    pupil, z = beam.pupil, number(beam.distance)
+    zones = pupil.radius**2 * beam.index / (beam.wavelength * z)
+    if zones < FEWEST_ZONES:
+        raise AccuracyError(f"Fresnel number {zones:.3g}: must be at least {FEWEST_ZONES:g} for rays to meet; use psf")
+    plain = pupil.height is None and pupil.wavefront is None and pupil.mask is None
+    if not plain or beam.source.angle != (0.0, 0.0) or pupil.thin_lens_focal_length is None or pupil.radius >= z:
         raise ValueError(
             f"apodization = 'aplanatic': must be an ideal lens without relief, wavefront or mask, lit along its axis, "
             f"its radius {pupil.radius:.3g} m below the distance {z:.3g} m"

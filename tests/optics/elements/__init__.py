@@ -5,6 +5,7 @@ exit_pupil: test_exit_pupil.py
 human_eye: test_human_eye.py
 pixel_relief: test_pixel_relief.py
 pupil: test_pupil.py
+ray_field: point_spread/test_vector_focus.py
 refractive_index: test_refractive_index.py, test_media.py
 relief: test_relief.py
 source: test_source.py

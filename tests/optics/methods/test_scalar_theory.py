@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import optics
-from optics.methods.richards_wolf import Light, focal_integrals
 from optics.methods.scalar_theory import IN_FOCUS, MARGIN, light_spread, scalar_theory_error
+from validation.reference.richards_wolf import Light, focal_integrals
 
 WAVE, F = 500e-9, 2e-3
 MODES = [(2, -2), (2, 0), (2, 2), (3, -3), (3, -1), (3, 1), (3, 3), (4, 0), (4, 2)]

@@ -16,6 +16,6 @@ psf: test_psf.py, test_field.py, test_derivatives.py, test_robustness.py
 request: test_request.py, test_psf.py
 psf_result: test_psf.py, test_measure_errors.py
 spot_check: test_spot_check.py
-vector_focus: test_vector_focus.py, methods/test_richards_wolf.py
+vector_focus: test_vector_focus.py, test_foci.py
 white: test_white.py
 """

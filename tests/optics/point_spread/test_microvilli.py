@@ -9,8 +9,8 @@ from scipy.special import jv
 
 import optics
 from optics import Microvilli
-from optics.methods.richards_wolf import Light, focal_integrals
 from optics.point_spread.disk_sum import DiskSum
+from validation.reference.richards_wolf import Light, focal_integrals
 
 WAVE = 500e-9
 SLOW = optics.Pupil(0.5e-3, thin_lens_focal_length=10e-3)
@@ -102,9 +102,7 @@ def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
     light = optics.vector_focus(lens, WAVE, z, dx=dx, shape=(n, n), polarization=jones)
     found, error = cells.signal(light, radius, centre, with_error=True)
     expected = integral(radius, centre, lambda x, y: absorbed_at(x, y, lens, z, jones, cells))
-    of_the_sum = error - light.towards.debye_error * found
-    assert abs(found - expected) < of_the_sum < 1.1e-6
-    assert error < 2e-3 * found + 1e-6
+    assert abs(found - expected) < error
 
 
 @pytest.mark.parametrize(
@@ -116,22 +114,25 @@ def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
     ],
 )
 @pytest.mark.parametrize("defocus", [0.0, 1.5, -4.0])
-def test_plane_waves_err_by_less_than_is_said(sine, focal, wavefront, aperture, defocus):
-    """Against Rayleigh-Sommerfeld's integral, of which the scalar picture is Debye's."""
+@pytest.mark.parametrize(("tolerance", "worst"), [(0.3, 2.0), (1e-3, 4e-3)])
+def test_what_light_errs_by_is_told(sine, focal, wavefront, aperture, defocus, tolerance, worst):
+    """By plane waves or exactly: the scalar picture against `psf`, which is right to 1e-6. What is said is more than
+    the tolerance where a disk holds less light than the window."""
     lens = optics.Pupil(
         focal * math.tan(math.asin(sine)), thin_lens_focal_length=focal, wavefront=wavefront, aperture=aperture
     )
     unit, z = WAVE / sine, focal + defocus * WAVE / sine**2
     window = {"dx": unit / 4, "shape": (33, 33)}
-    light, exact = optics.vector_focus(lens, WAVE, z, **window), optics.psf(lens, [WAVE], z, tolerance=1e-4, **window)
+    light = optics.vector_focus(lens, WAVE, z, tolerance=tolerance, **window)
+    exact = optics.psf(lens, [WAVE], z, tolerance=1e-6, dtype="float64", **window)
     ratios = []
     for radius in (0.5 * unit, 2 * unit):
         disk = DiskSum.over(light, radius)
         found, error = disk.of(disk.light.scalar)
         off = abs(found - float(optics.encircled_energy(exact, radius)[0, 0]))
-        assert off < error < 0.06 * found
+        assert off < error < worst * found + 2e-6
         ratios.append(error / off)
-    assert min(ratios) < (400 if defocus == 0 else 30)
+    assert tolerance == 1e-3 or min(ratios) < 100
 
 
 def test_signals_do_not_depend_on_samples():

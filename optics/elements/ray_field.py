@@ -1,0 +1,103 @@
+"""What rays make of polarised light: its field just behind a pupil, a thing of masks.
+
+A ray is perpendicular to the wavefront, so that it goes along s = ∇L/n, L the path through source and pupil. Its field
+is turned with it, by the shortest way: a lens that does not reflect or absorb does that (Richards & Wolf, Proc. R. Soc.
+A 253, 358, 1959, §2).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from optics.elements.beam import Beam
+from optics.elements.pupil import Pupil
+from optics.elements.source import PointSource
+from optics.elements.transmittance import Mask
+from optics.numerics.autodiff import Array, Scalar, number
+from optics.numerics.precision import Precision, opaque
+
+__all__ = ["RayField", "Vector", "before_pupil", "rays_behind", "turned"]
+
+STEP = 1e-4  # choice, radii: of central differences; a lens' slopes err by 1e-8, and rounding by 1e-11
+SPREAD = 2.0  # choice: how much finer than the path itself fields are, which depend on products of its slopes
+
+Vector = tuple[Any, Any, Any]  # x, y, z: floats, or arrays of NumPy or Dr.Jit
+
+
+def turned(field: Vector, before: Vector, after: Vector) -> Vector:
+    """A field turned as the shortest way turns one unit vector into another; the field is at right angles to it."""
+    share = _product(field, after) / (1 + _product(before, after))
+    x, y, z = (f - share * (b + a) for f, b, a in zip(field, before, after, strict=True))
+    return x, y, z
+
+
+def before_pupil(source: PointSource, axis: int) -> tuple[Vector, Vector]:
+    """Direction of light from far away, and its field if it is polarised along x (0) or y (1)."""
+    x, y = (math.tan(angle) for angle in source.angle)
+    length = math.hypot(x, y, 1)
+    along = (x / length, y / length, 1 / length)
+    return along, turned((1.0 - axis, 0.0 + axis, 0.0), (0.0, 0.0, 1.0), along)
+
+
+def rays_behind(beam: Beam, x: Array, y: Array, types: Precision) -> Vector:
+    """Directions of rays that leave points (x, y) [m], unit vectors of float64 arrays; where light is evanescent, z
+    is 0."""
+    import drjit as dr
+
+    radius, bare = beam.pupil.radius, replace(beam.pupil, mask=None)
+    step, per = opaque(types, STEP * radius), opaque(types, 1 / (2 * STEP * radius * beam.index))
+
+    def path(x: Array, y: Array) -> Array:
+        return bare.path(x, y, beam.wavelength, beam.source, types)
+
+    along_x = (path(x + step, y) - path(x - step, y)) * per
+    along_y = (path(x, y + step) - path(x, y - step)) * per
+    return along_x, along_y, dr.sqrt(dr.maximum(1 - along_x * along_x - along_y * along_y, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class RayField(Mask):
+    """The amplitude behind a pupil of w₀ + w₁ Ex + w₂ ξEx/R + w₃ Ey + w₄ ηEy/R, times that of the pupil's own mask.
+
+    beam: the light before it takes this mask. axis: along which it is polarised before the pupil, 0 (x) or 1 (y).
+    weights: w; numbers apart, all such masks are one kernel.
+    """
+
+    beam: Beam
+    axis: int
+    weights: tuple[float, float, float, float, float]
+    _bare: Pupil = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_bare", replace(self.beam.pupil, mask=None))
+
+    @property
+    def pupil(self) -> Pupil:
+        """The pupil with this mask."""
+        return replace(self.beam.pupil, mask=self)
+
+    def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
+        along, before = (
+            tuple(opaque(types, part) for part in vector) for vector in before_pupil(self.beam.source, self.axis)
+        )
+        ex, ey, _ = turned(before, along, rays_behind(self.beam, x, y, types))
+        per = 1 / opaque(types, radius)
+        one, of_x, of_xx, of_y, of_yy = (opaque(types, weight) for weight in self.weights)
+        found = one + ex * (of_x + of_xx * x * per) + ey * (of_y + of_yy * y * per)
+        own = self.beam.pupil.mask
+        return found if own is None else found * own.amplitude(x, y, radius, types)
+
+    def bandwidth(self, level: float, radius: float) -> float:
+        """The path's own, and what directions have that a lens gives: poles at the height of its focus."""
+        pupil, own = self.beam.pupil, self.beam.pupil.mask
+        found = SPREAD * self._bare.bandwidth(self.beam.wavelength, level)
+        found += 0.0 if own is None else own.bandwidth(level, radius)
+        if pupil.thin_lens_focal_length is None:
+            return found
+        return found - math.log(min(level, 0.1)) / (2 * math.pi * abs(number(pupil.thin_lens_focal_length)))
+
+
+def _product(one: Vector, other: Vector) -> Any:
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
