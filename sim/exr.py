@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.arguments import items, reals, shown
 from sim.scene.color import preview
 
 LAYOUT_VERSION = "1.0"
@@ -57,22 +58,33 @@ class View:
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        where = f"View {self.name!r}"
+        where = f"View {shown(self.name)}"
         if not isinstance(self.name, str) or not self.name or not self.name.isprintable():
             raise ValueError(f"{where}: its name must be printable text, and not empty")
         if self.radiance is None and self.receptors is None:
             raise ValueError(f"{where}: has neither radiance nor receptors")
         for label, image in (("radiance", self.radiance), ("receptors", self.receptors)):
-            if image is not None and (image.ndim != 3 or 0 in image.shape):
-                raise ValueError(f"{where}: {label} has shape {image.shape}: must be (band, y, x)")
-        if np.ndim(self.wavelengths_nm) != 1 or not np.all(np.isfinite(self.wavelengths_nm)):
-            raise ValueError(f"{where}: wavelengths_nm = {self.wavelengths_nm!s:.60}: must be finite numbers (band,)")
+            if image is not None and (len(_shape(image)) != 3 or 0 in image.shape):
+                raise ValueError(f"{where}: {label} {_kind(image)}: must be an array (band, y, x)")
+        wavelengths = reals(f"{where}: wavelengths_nm", self.wavelengths_nm)
+        if wavelengths.ndim != 1 or not np.all(np.isfinite(wavelengths)):
+            raise ValueError(f"{where}: wavelengths_nm = {shown(self.wavelengths_nm)}: must be finite numbers (band,)")
         if self.radiance is not None:
             names = {_channel(nm) for nm in self.wavelengths_nm}
             if len(self.radiance) != len(self.wavelengths_nm) or len(names) != len(self.radiance):
                 raise ValueError(f"{where}: needs one distinct wavelength per band of {self.radiance.shape}")
-            if self.rgb is not None and self.rgb.shape != (*self.radiance.shape[1:], 3):
-                raise ValueError(f"{where}: rgb has shape {self.rgb.shape}: must be (y, x, 3) like the radiance")
+            if self.rgb is not None and _shape(self.rgb) != (*self.radiance.shape[1:], 3):
+                raise ValueError(f"{where}: rgb {_kind(self.rgb)}: must be an array (y, x, 3) like the radiance")
+
+
+def _shape(image: Any) -> tuple[int, ...]:
+    """Of an array; () for what is none."""
+    return image.shape if isinstance(image, np.ndarray) else ()
+
+
+def _kind(image: Any) -> str:
+    """What an image has or is, for messages."""
+    return f"has shape {image.shape}" if isinstance(image, np.ndarray) else f"is {shown(image)}"
 
 
 def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
@@ -84,6 +96,7 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
     """
     import OpenEXR
 
+    views = items("views", views, View, "View('left', radiance=...)")
     names = [view.name for view in views]
     if not views or len(set(names)) != len(names):
         raise ValueError(f"write_exr: views = {names}: must be at least one, and no name twice")

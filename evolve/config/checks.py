@@ -7,11 +7,22 @@ from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
+
 from evolve.genome.genes import Gene, GeneConfig
 from evolve.genome.interval import Interval
-from optics.numerics.arguments import close_match
+from optics.numerics.arguments import close_match, shown
 
-__all__ = ["AUTO", "ConfigError", "check_gene_use", "check_gene_value", "check_value", "check_values", "suggestion"]
+__all__ = [
+    "AUTO",
+    "ConfigError",
+    "check_gene_use",
+    "check_gene_value",
+    "check_value",
+    "check_values",
+    "quoted",
+    "suggestion",
+]
 
 SHOWN = 200  # letters of a value that a message quotes
 MOST_LISTED = 36  # of known words: all genes and tasks, and not all settings
@@ -52,7 +63,8 @@ def check_values(settings: Any, names: Iterable[str] | None = None, prefix: str 
         ConfigError: see above.
     """
     for name in [one.name for one in fields(settings)] if names is None else names:
-        check_value(type(settings), name, getattr(settings, name), f"{prefix}{name}")
+        value = check_value(type(settings), name, getattr(settings, name), f"{prefix}{name}")
+        object.__setattr__(settings, name, value)  # Python's number for NumPy's
 
 
 def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
@@ -88,10 +100,10 @@ def check_gene_use(gene: Gene, use: GeneConfig) -> None:
         )
 
 
-def suggestion(word: str, known: Iterable[str]) -> str:
+def suggestion(word: Any, known: Iterable[str]) -> str:
     """ "did you mean X?" where a known word, or the last part of one, is near; else the list of them, the first
     MOST_LISTED of it."""
-    known = list(known)
+    known, word = list(known), str(word)
     by_last = {name.rpartition(".")[2]: name for name in known}
     last = close_match(word.rpartition(".")[2], by_last, cutoff=0.75)
     close = close_match(word, known) or (by_last[last] if last else None)
@@ -104,8 +116,9 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> Any:
     """`value`, if it is of this kind (a whole number may stand for a number) and in `valid`."""
     names = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
-    shown = str(value).lower() if isinstance(value, bool) else _quoted(value)
+    shown = str(value).lower() if isinstance(value, bool) else quoted(value)
     allowed = names[kind] if valid is None else f"{names[kind]} in {valid}"
+    value = value.item() if isinstance(value, np.generic) else value
     try:
         if kind is float and type(value) is int:
             value = float(value)
@@ -118,9 +131,10 @@ def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> A
     return value
 
 
-def _quoted(value: Any) -> str:
+def quoted(value: Any) -> str:
+    """As a message shows it, on one line."""
     try:
-        whole = repr(value)
+        whole = repr(value) if isinstance(value, str) else shown(value)
     except ValueError:  # more digits than Python writes
         return "a number of thousands of digits"
     return whole if len(whole) <= SHOWN else f"{whole[:SHOWN]}..."

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from evolve.config.checks import ConfigError, check_gene_use, check_values
+from evolve.config.checks import ConfigError, check_gene_use, check_values, quoted
 from evolve.config.own_task import OwnTask, is_own
 from evolve.config.settings import (
     SECTIONS,
@@ -70,7 +70,9 @@ class RunConfig:
 
     def __post_init__(self) -> None:
         check_values(self, ("seed", "workers"))
-        for section in SECTIONS:
+        for section, kind in SECTIONS.items():
+            if not isinstance(getattr(self, section), kind):
+                raise ConfigError(f"{section} = {quoted(getattr(self, section))}: must be a {kind.__name__}", section)
             check_values(getattr(self, section), prefix=f"{section}.")
         self._check_task()
         if self.eye.receptors not in (known := (*RECEPTORS, INHERITED)):
@@ -103,9 +105,10 @@ class RunConfig:
 
     def _check_task(self) -> None:
         own = is_own(self.task)
-        if not own and self.task not in TASKS:
+        if not own and (not isinstance(self.task, str) or self.task not in TASKS):
             raise ConfigError(
-                f"task = {self.task!r}: must be one of {', '.join(TASKS)}, or FILE.py:CLASS, one of your own", "task"
+                f"task = {quoted(self.task)}: must be one of {', '.join(TASKS)}, or FILE.py:CLASS, one of your own",
+                "task",
             )
         if (re.fullmatch("[0-9a-f]{64}", self.task_sha256) is None) if own else self.task_sha256:
             needs = "the SHA-256 of the file, 64 digits" if own else "empty, as no file belongs to this task"

@@ -10,7 +10,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from evolve.config.checks import ConfigError, suggestion
+from evolve.config.checks import ConfigError, quoted, suggestion
 from evolve.config.provenance import Source
 from evolve.config.run_config import TASKS
 
@@ -53,19 +53,19 @@ def preset_sources(name: str | None, scale: str | None) -> list[Source]:
     """
     if name is None:
         return []
-    if name not in preset_names():
-        raise ConfigError(f"unknown preset {name!r}; {suggestion(name, preset_names())}")
+    if not isinstance(name, str) or name not in preset_names():
+        raise ConfigError(f"unknown preset {quoted(name)}; {suggestion(name, preset_names())}")
     text = (resources.files("evolve") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
     tree = tomllib.loads(text)
     scales = tree.pop("scales", {})
     settings = Source(f"preset {name}", tree, text)
     if not scales:
         if scale is not None:
-            raise ConfigError(f"scale {scale!r}: preset {name} comes in one scale only")
+            raise ConfigError(f"scale {quoted(scale)}: preset {name} comes in one scale only")
         return [settings]
     chosen = scale or SCALES[0]
-    if chosen not in scales:
-        raise ConfigError(f"unknown scale {chosen!r} of preset {name}; {suggestion(chosen, scales)}")
+    if not isinstance(chosen, str) or chosen not in scales:
+        raise ConfigError(f"unknown scale {quoted(chosen)} of preset {name}; {suggestion(chosen, scales)}")
     return [settings, Source(f"preset {name} on {chosen} scale", scales[chosen])]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from evolve.cli.start_from import starts_from
 from evolve.config.assemble import assemble
+from evolve.config.checks import ConfigError, quoted
 from evolve.interactive.carry_on import Callback, carry_on
 from evolve.interactive.opened_run import OpenedRun
 from evolve.search.search import Search
@@ -51,6 +53,7 @@ def run(
         RunError: the directory holds something already, or cannot be written.
         BackendError: Dr.Jit has no LLVM that it can use.
     """
+    _check(settings, config, start_from)
     starts = starts_from(start_from) if start_from else None
     assignments = [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
     chosen = assemble(task, preset, None if config is None else Path(config), assignments, starts, scale)
@@ -66,6 +69,17 @@ def run(
     with begun.lock():
         carry_on(begun, callbacks, progress)
     return begun
+
+
+def _check(settings: Any, config: Any, start_from: Any) -> None:
+    """ConfigError for what is no settings, no file and no animal."""
+    for name, value, kinds, right in (
+        ("settings", settings, Mapping, "names and values, {'search.generations': 2}"),
+        ("config", config, (str, os.PathLike), "a file's path"),
+        ("start_from", start_from, str, "'RUN:ID'"),
+    ):
+        if value is not None and not isinstance(value, kinds):
+            raise ConfigError(f"{name} = {quoted(value)}: must be {right}")
 
 
 def _toml(value: Any) -> str:

@@ -14,6 +14,7 @@ __all__ = [
     "finite",
     "in_range",
     "is_sized",
+    "items",
     "of_kind",
     "one_of",
     "point_2d",
@@ -208,6 +209,17 @@ def is_sized(value: Any) -> bool:
     except TypeError:
         return False
     return True
+
+
+def items(name: str, values: Any, kind: type, example: str) -> tuple[Any, ...]:
+    """`values` as a tuple; ValueError, with an example, unless they can be counted up and all are of the kind."""
+    try:
+        found = tuple(values)
+    except TypeError:
+        raise ValueError(f"{name} = {shown(values)}: must be several, such as ({example},)") from None
+    for one in found:
+        of_kind(name, one, kind, example)
+    return found
 
 
 def whole(name: str, value: Any, low: int, high: int) -> int:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import numpy as np
 
+from optics.numerics.arguments import shown
 from optics.spectra.spectrum import Spectrum
 from sim.envs.auxiliary import checked
 from sim.envs.follow_camera import check_render_mode
@@ -89,7 +90,7 @@ def make_vec_env(
         return TaskVecEnv(task, n_envs, seed, memory, render_mode, episode_steps)
     eyes = Eyes() if eyes is None else eyes
     if not isinstance(eyes, Eyes):
-        raise ValueError(f"eyes = {eyes!r}: must be sim.Eyes or None, the default ones")
+        raise ValueError(f"eyes = {shown(eyes)}: must be sim.Eyes or None, the default ones")
     asked = _fidelity_of(rays_per_receptor, fidelity, eyes)
     _require_whole("world_seed", world_seed, 0)
     _check(n_envs, seed, memory, mode, render_mode)
@@ -198,9 +199,9 @@ def _fidelity_of(rays_per_receptor: float | str | Fidelity, fidelity: Fidelity |
     if fidelity is None:
         return asked
     if not isinstance(fidelity, Fidelity):
-        raise ValueError(f"fidelity = {fidelity!r}: must be a sim.Fidelity or None, see rays_per_receptor")
+        raise ValueError(f"fidelity = {shown(fidelity)}: must be a sim.Fidelity or None, see rays_per_receptor")
     if asked is not None:
-        raise ValueError(f"rays_per_receptor = {rays_per_receptor!r}: must be left out where a fidelity is given")
+        raise ValueError(f"rays_per_receptor = {shown(rays_per_receptor)}: must be left out where a fidelity is given")
     return fidelity
 
 
@@ -216,4 +217,4 @@ def _check(n_envs: int, seed: int | None, memory: int, mode: str, render_mode: s
 
 def _require_whole(name: str, number: Any, least: int) -> None:
     if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
-        raise ValueError(f"{name} = {number!r}: must be a whole number, at least {least}")
+        raise ValueError(f"{name} = {shown(number)}: must be a whole number, at least {least}")

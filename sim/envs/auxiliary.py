@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from gymnasium import spaces
 
-from optics.numerics.arguments import did_you_mean
+from optics.numerics.arguments import did_you_mean, items
 from sim.robots.eye_kinds import AUXILIARY
 from sim.robots.model_renderer import ModelRenderer
 from sim.robots.optic_flow import flow_between
@@ -74,7 +74,7 @@ def checked(names: Iterable[str], where: str) -> tuple[str, ...]:
     """
     if isinstance(names, str):
         raise ValueError(f"{where} = {names!r}: must be several names, such as ({names!r},)")
-    asked = tuple(names)
+    asked = items(where, names, str, repr(AUXILIARY[0]))
     for name in asked:
         if name not in AUXILIARY:
             hint = did_you_mean(name, AUXILIARY) or f": must be of {', '.join(map(repr, AUXILIARY))}"

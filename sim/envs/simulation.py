@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
+from optics.numerics.arguments import shown
 from sim.envs.observation import STANDING
 from sim.physics.physics import Agents, Motion, Physics
 from sim.tasks.random_streams import Streams
@@ -242,8 +244,8 @@ def check_least_return(least_return: float | None, mode: str) -> None:
     """
     if least_return is None:
         return
-    if isinstance(least_return, str | bool) or not least_return < 0:
-        raise ValueError(f"least_return = {least_return!r}: must be below 0, or None")
+    if isinstance(least_return, bool) or not isinstance(least_return, Real) or not least_return < 0:
+        raise ValueError(f"least_return = {shown(least_return)}: must be below 0, or None")
     if mode != "training":
         raise ValueError(f"least_return = {least_return!r}: must be left out in mode {mode!r}, only training ends so")
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from optics.numerics.arguments import shown
 from optics.spectra.bands import FINEST
 from optics.spectra.photon_budget import PhotonBudget
 from optics.spectra.receptors import receptors_of
@@ -69,7 +70,7 @@ class Eyes:
             except (TypeError, ValueError, OverflowError):
                 fits = False
             if not fits:
-                raise ValueError(f"Eyes: {name} = {value!r}: must be {range_}")
+                raise ValueError(f"Eyes: {name} = {shown(value)}: must be {range_}")
 
         def counts(value: Any) -> bool:
             return 1 <= value == int(value) <= MOST
@@ -91,7 +92,9 @@ class Eyes:
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
         check("optics", _is_pupil, "an optics.Pupil or None, the perfect lens")
         if not isinstance(self.photon_budget, PhotonBudget | None):
-            raise ValueError(f"Eyes: photon_budget = {self.photon_budget!r}: must be an optics.PhotonBudget or None")
+            raise ValueError(
+                f"Eyes: photon_budget = {shown(self.photon_budget)}: must be an optics.PhotonBudget or None"
+            )
         if self.waveguide is not None:
             self._check_waveguide()
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from numbers import Real
 
-from optics.numerics.arguments import whole
+from optics.numerics.arguments import shown, whole
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.tracing.lighting import ALL, DIRECT, LEVELS
@@ -59,14 +59,15 @@ class Fidelity:
     def __post_init__(self) -> None:
         rays = self.rays_per_receptor
         if not (isinstance(rays, Real) and 0 < rays <= MOST_RAYS):
-            raise ValueError(f"rays_per_receptor = {rays!s:.40}: must be positive and at most {MOST_RAYS:g}, or 'auto'")
+            most = f"{MOST_RAYS:g}"
+            raise ValueError(f"rays_per_receptor = {shown(rays)}: must be positive and at most {most}, or 'auto'")
         whole("bands", self.bands, 1, MOST_BANDS)
         if self.light not in LEVELS:
-            raise ValueError(f"light = {self.light!r}: must be one of {', '.join(map(repr, LEVELS))}")
+            raise ValueError(f"light = {shown(self.light)}: must be one of {', '.join(map(repr, LEVELS))}")
         if self.light == ALL and self.samples != AREAS:
             raise ValueError("light = 'all': must go with samples = 'areas'; rays follow two reflections at most")
         if self.samples not in SAMPLES:
-            raise ValueError(f"samples = {self.samples!r}: must be one of {', '.join(map(repr, SAMPLES))}")
+            raise ValueError(f"samples = {shown(self.samples)}: must be one of {', '.join(map(repr, SAMPLES))}")
 
     @property
     def predicted_error(self) -> float | None:
@@ -103,5 +104,5 @@ def fidelity_asked(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity | Non
     if not isinstance(rays_per_receptor, str):
         return Fidelity(rays_per_receptor, eyes.bands)
     if rays_per_receptor != "auto":
-        raise ValueError(f"rays_per_receptor = {rays_per_receptor!r}: must be positive, or 'auto'")
+        raise ValueError(f"rays_per_receptor = {shown(rays_per_receptor)}: must be positive, or 'auto'")
     return None

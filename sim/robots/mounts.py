@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import did_you_mean
+from optics.numerics.arguments import did_you_mean, finite, items, of_kind, reals, shown, whole
 
+EXAMPLE = "sim.Mount('head')"
+MOST_EYES = 10_000  # choice: of a fan, more than any animal has
 KINDS = ("site", "camera", "body")  # what a name is looked for among, in this order
 # Axes (ahead, left, up) in the frame of what an eye is on, as rows: x ahead and z up, but for MuJoCo's cameras, which
 # look along -z with x to the right.
@@ -43,14 +45,13 @@ class Mount:
 
     def __post_init__(self) -> None:
         for name in ("azimuth_deg", "elevation_deg", "roll_deg"):
-            if not np.isfinite(getattr(self, name)):
-                raise ValueError(f"Mount: {name} = {getattr(self, name)!r}: must be finite")
-        offset = np.asarray(self.offset, float)
+            object.__setattr__(self, name, finite(f"Mount: {name}", getattr(self, name)))
+        offset = reals("Mount: offset", self.offset)
         if offset.shape != (3,) or not np.isfinite(offset).all():
-            raise ValueError(f"Mount: offset = {self.offset!r}: must be three lengths (ahead, left, up) [m]")
+            raise ValueError(f"Mount: offset = {shown(self.offset)}: must be three lengths (ahead, left, up) [m]")
         object.__setattr__(self, "offset", tuple(map(float, offset)))
         if self.kind is not None and self.kind not in KINDS:
-            raise ValueError(f"Mount: kind = {self.kind!r}: must be one of {', '.join(map(repr, KINDS))}, or None")
+            raise ValueError(f"Mount: kind = {shown(self.kind)}: must be one of {', '.join(map(repr, KINDS))}, or None")
 
     def mirrored(self) -> Mount:
         """The eye on the other side of the body: left and right exchanged."""
@@ -86,7 +87,7 @@ class Mount:
 
 def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
     """Each of them and its mirror image: left, right, left, right ..."""
-    return tuple(one for mount in mounts for one in (mount, mount.mirrored()))
+    return tuple(one for mount in items("mounts", mounts, Mount, EXAMPLE) for one in (mount, mount.mirrored()))
 
 
 def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
@@ -105,9 +106,9 @@ def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: fl
     Raises:
         ValueError: less than one eye.
     """
-    if n_eyes < 1:
-        raise ValueError(f"n_eyes = {n_eyes!r}: must be at least 1")
-    half = placement_range_deg / 2
+    of_kind("mount", mount, Mount, EXAMPLE)
+    n_eyes = whole("n_eyes", n_eyes, 1, MOST_EYES)
+    half, elevation_deg = finite("placement_range_deg", placement_range_deg) / 2, finite("elevation_deg", elevation_deg)
     azimuths = np.linspace(half, -half, n_eyes) if n_eyes > 1 else np.zeros(1)
     return tuple(_turned(mount, float(azimuth), elevation_deg) for azimuth in azimuths)
 

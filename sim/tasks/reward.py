@@ -28,6 +28,8 @@ from functools import cached_property
 
 import numpy as np
 
+from optics.numerics.arguments import one_of
+
 TERMS = ("progress", "goal", "adversary", "contact")
 
 
@@ -57,8 +59,7 @@ def check_mode(mode: str) -> None:
     Raises:
         ValueError: not one of MODES.
     """
-    if mode not in MODES:
-        raise ValueError(f"mode = {mode!r}: must be one of {', '.join(map(repr, MODES))}")
+    one_of("mode", mode, MODES)
 
 
 def reward_terms(

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from optics.numerics.arguments import of_kind
 from sim.worlds.layout import CELL, cell_centers
 
 Cell = tuple[int, int]  # row, column
@@ -39,6 +40,7 @@ class Course:
     episode_steps: int | None = None
 
     def __post_init__(self) -> None:
+        of_kind("course: drawing", self.drawing, str, "'#####\\n#S..#\\n#####'")
         lines = self.drawing.split()
         if len({len(line) for line in lines}) != 1 or (signs := set(self.drawing) - set("#.Ss \n")):
             what = "all lines must be as long" if len({len(line) for line in lines}) != 1 else f"signs {sorted(signs)}"

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import scipy.ndimage
 
-from optics.numerics.arguments import did_you_mean
+from optics.numerics.arguments import did_you_mean, shown
 from sim.worlds.catalog import COURSES
 from sim.worlds.course import GOAL_COLUMNS, Course
 from sim.worlds.layout import CELL, Layout, Starts, add_floor
@@ -64,9 +64,11 @@ def course_named(course: str | Course) -> Course:
     """
     if isinstance(course, Course):
         return course
-    if course not in DRAWN:
+    if not isinstance(course, str) or course not in DRAWN:
         hint = did_you_mean(course, COURSES) if isinstance(course, str) else ""
-        raise ValueError(f"course = {course!r}: must be sim.Course or one of {', '.join(map(repr, COURSES))}{hint}")
+        raise ValueError(
+            f"course = {shown(course)}: must be sim.Course or one of {', '.join(map(repr, COURSES))}{hint}"
+        )
     return DRAWN[course]
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import did_you_mean
+from optics.numerics.arguments import did_you_mean, of_kind, shown, whole
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.scene.spectra import resolve
@@ -22,6 +22,8 @@ from sim.worlds.catalog import TASKS
 from sim.worlds.course import Course
 from sim.worlds.layout import WALL_CONAFFINITY, Layout, Starts
 
+MOST_SEED = 2**63  # choice: more than anybody counts to
+MOST_MAZES = 100_000  # choice: more than memory holds
 _FIELDS = {"detection": detection.add_layout, "foraging": foraging.add_layout, "tracking": detection.add_layout}
 
 TIMESTEP = 0.02  # [s], as published
@@ -93,14 +95,18 @@ def build_world(
         ValueError: an unknown task or course, a negative seed, mazes or a course for another task, or spectra of what
             is not there.
     """
-    if task not in TASKS:
-        raise ValueError(f"unknown task {task!r}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")
-    if seed < 0:
-        raise ValueError(f"build_world: seed = {seed}: must be at least 0")
-    if mazes < 1 or (mazes > 1 and task != "maze"):
-        raise ValueError(f"build_world: mazes = {mazes}: must be 1, or more for 'maze'")
+    if not isinstance(task, str) or task not in TASKS:
+        raise ValueError(f"unknown task {shown(task)}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")
+    seed = whole("build_world: seed", seed, 0, MOST_SEED)
+    if task != "maze" and mazes != 1:
+        raise ValueError(f"build_world: mazes = {shown(mazes)}: must be 1, or more for 'maze'")
+    mazes = whole("build_world: mazes", mazes, 1, MOST_MAZES)
+    if eyes is not None:
+        of_kind("build_world: eyes", eyes, Eyes, "sim.Eyes(n_eyes=2)")
+    if spectra is not None:
+        of_kind("build_world: spectra", spectra, Mapping, "{'wall': 'foliage'}")
     if course != "short" and task != "navigation":
-        raise ValueError(f"build_world: course: must be left out for {task!r}, only 'navigation' has one")
+        raise ValueError(f"build_world: course: must be left out for {shown(task)}, only 'navigation' has one")
     spec = _empty_world()
     layout = _layout(spec, task, np.random.default_rng(seed), mazes, course)
     _add_agent(spec, layout.starts.position[0], eyes)

@@ -199,6 +199,6 @@ def test_results_are_printed_in_a_line():
     waves = f"<PSFResult {len(white.waves.wavelengths)} wavelengths, 9 x 11 samples 2e-06 m apart, predicted error "
     assert repr(white.waves).startswith(waves)
     assert repr(white).startswith(f"<WhitePSF of 3 types from {waves}")
-    assert repr(focus).startswith("<VectorFocus 9 x 11 samples 2e-06 m apart, scalar error ")
+    assert repr(focus).startswith("<VectorFocus 9 x 11 samples 2e-06 m apart, predicted error ")
     assert repr(white.mtf(tolerance=0.3)).startswith("<MTF of 3 wavelengths or types, to ")
     assert max(map(len, map(repr, (white, focus)))) < 240

@@ -61,7 +61,7 @@ def test_our_agents_ring_is_one():
         offset, frame = mount.local("body")
         np.testing.assert_allclose(offset, eye_positions(np.array([azimuth]))[0], atol=1e-12)
         np.testing.assert_allclose(frame, eye_rotations(np.array([azimuth]))[0], atol=1e-12)
-    with pytest.raises(ValueError, match="n_eyes = 0: must be at least 1"):
+    with pytest.raises(ValueError, match="n_eyes = 0: must be a whole number in"):
         sim.ring("head", 0, 90, 0.2)
 
 

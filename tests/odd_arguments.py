@@ -1,0 +1,58 @@
+"""What no argument should be, and what is wrong with how a call ends that gets it."""
+
+import math
+import traceback
+from pathlib import Path
+
+import numpy as np
+
+OURS = tuple(str(Path(__file__).parents[1] / package) for package in ("optics", "sim", "evolve"))
+ODD = {
+    "none": None,
+    "word": "auto",
+    "bytes": b"x",
+    "nan": math.nan,
+    "infinite": math.inf,
+    "negative": -1,
+    "zero": 0,
+    "minute": 1e-30,
+    "huge": 10**400,
+    "true": True,
+    "complex": 1j,
+    "empty": [],
+    "ragged": [[1, 2], [3]],
+    "no number in it": [None],
+    "three numbers": (1, 2, 3),
+    "array without axes": np.array(1.0),
+    "empty array": np.zeros(0),
+    "square": np.zeros((2, 2)),
+    "NumPy's number": np.float32(2),
+    "dictionary": {},
+    "object": object(),
+    "function": abs,
+}
+
+
+def complaint(call, arguments):
+    """None if it answers, or refuses in one line of our own."""
+    try:
+        call(**arguments)
+    except (ValueError, OSError) as error:
+        raised_in = traceback.extract_tb(error.__traceback__)[-1].filename
+        if not str(error) or "\n" in str(error):
+            return f"not one line: {error}"
+        return None if raised_in.startswith(OURS) or isinstance(error, OSError) else f"{error} ({raised_in})"
+    except Exception as error:
+        return repr(error)
+    return None
+
+
+def complaints(call, valid):
+    """Of every argument in turn, given everything that it is not; the call itself must do."""
+    call(**valid)
+    found = {}
+    for argument in valid:
+        for what, odd in ODD.items():
+            if (said := complaint(call, valid | {argument: odd})) is not None:
+                found[argument, what] = said
+    return found

@@ -1,0 +1,55 @@
+"""Arguments of `sim` given what they are not: an answer, or one line of our own. See the optics' test."""
+
+import numpy as np
+import pytest
+
+import sim
+from tests.odd_arguments import complaints
+
+MOUNT = sim.Mount("head", 30.0)
+VIEW = {"name": "left", "wavelengths_nm": np.array([450.0]), "radiance": np.ones((1, 2, 2), np.float32)}
+CALLS = {
+    "Eyes": {
+        "n_eyes": 2,
+        "resolution": (3, 3),
+        "fov_deg": 45.0,
+        "placement_range_deg": 60.0,
+        "optics": None,
+        "sensor_width": 200e-6,
+        "noise_sigma": 0.01,
+        "bands": 4,
+        "receptors": "rgb",
+        "photon_budget": None,
+        "waveguide": None,
+    },
+    "Fidelity": {"rays_per_receptor": 8, "bands": 4, "tolerance": None, "light": "direct", "samples": "rays"},
+    "Mount": {
+        "on": "head",
+        "azimuth_deg": 0.0,
+        "elevation_deg": 0.0,
+        "roll_deg": 0.0,
+        "offset": (0.0, 0.0, 0.0),
+        "kind": None,
+    },
+    "View": VIEW | {"receptors": None, "rgb": None},
+    "both_sides": {"mounts": [MOUNT]},
+    "build_world": {"task": "navigation", "seed": 0, "mazes": 1, "course": "short", "eyes": None, "spectra": None},
+    "fan": {"mount": MOUNT, "n_eyes": 2, "placement_range_deg": 40.0, "elevation_deg": 0.0},
+    "ring": {"on": "head", "n_eyes": 2, "placement_range_deg": 40.0, "radius": 0.1},
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_any_argument(name):
+    assert complaints(getattr(sim, name), CALLS[name]) == {}
+
+
+def test_views_to_write(tmp_path):
+    assert complaints(lambda views: sim.write_exr(tmp_path / "a.exr", views), {"views": [sim.View(**VIEW)]}) == {}
+
+
+def test_environments():
+    """What is refused before anything is built."""
+    valid = {"mode": "training", "least_return": -50.0, "auxiliary": (), "spectra": None, "mazes": 1, "n_envs": 1}
+    fixed = {"task": "detection", "eyes": sim.Eyes(1, (1, 1)), "rays_per_receptor": 1.0}
+    assert complaints(lambda **asked: sim.make_vec_env(**fixed, **asked).close(), valid) == {}
