@@ -78,13 +78,13 @@ class View:
 
 
 def _shape(image: Any) -> tuple[int, ...]:
-    """Of an array; () for what is none."""
-    return image.shape if isinstance(image, np.ndarray) else ()
+    """Of an array of any library; () for what is none."""
+    return tuple(getattr(image, "shape", ()))
 
 
 def _kind(image: Any) -> str:
     """What an image has or is, for messages."""
-    return f"has shape {image.shape}" if isinstance(image, np.ndarray) else f"is {shown(image)}"
+    return f"has shape {_shape(image)}" if hasattr(image, "shape") else f"is {shown(image)}"
 
 
 def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:

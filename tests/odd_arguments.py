@@ -38,10 +38,12 @@ def complaint(call, arguments):
     try:
         call(**arguments)
     except (ValueError, OSError) as error:
-        raised_in = traceback.extract_tb(error.__traceback__)[-1].filename
+        last = traceback.extract_tb(error.__traceback__)[-1]
         if not str(error) or "\n" in str(error):
             return f"not one line: {error}"
-        return None if raised_in.startswith(OURS) or isinstance(error, OSError) else f"{error} ({raised_in})"
+        # What compiled code raises has no line of its own: it seems to come from the line that called it.
+        ours = last.filename.startswith(OURS) and last.line.startswith("raise ")
+        return None if ours or isinstance(error, OSError) else f"{error} ({last.filename}:{last.lineno})"
     except Exception as error:
         return repr(error)
     return None

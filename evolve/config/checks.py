@@ -48,7 +48,7 @@ def check_value(cls: type, name: str, value: Any, key: str) -> Any:
     """
     definition = next(f for f in fields(cls) if f.name == name)
     if definition.type == "float | str":
-        if value == AUTO:
+        if isinstance(value, str) and value == AUTO:
             return value
         if isinstance(value, str):
             raise ConfigError(f"{key} = {value!r}: must be a number or {AUTO!r}", key)

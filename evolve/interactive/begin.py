@@ -53,7 +53,7 @@ def run(
         RunError: the directory holds something already, or cannot be written.
         BackendError: Dr.Jit has no LLVM that it can use.
     """
-    _check(settings, config, start_from)
+    _check(task=task, scale=scale, settings=settings, config=config, start_from=start_from)
     starts = starts_from(start_from) if start_from else None
     assignments = [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
     chosen = assemble(task, preset, None if config is None else Path(config), assignments, starts, scale)
@@ -71,17 +71,26 @@ def run(
     return begun
 
 
-def _check(settings: Any, config: Any, start_from: Any) -> None:
-    """ConfigError for what is no settings, no file and no animal."""
-    for name, value, kinds, right in (
-        ("settings", settings, Mapping, "names and values, {'search.generations': 2}"),
-        ("config", config, (str, os.PathLike), "a file's path"),
-        ("start_from", start_from, str, "'RUN:ID'"),
-    ):
+RIGHT: Mapping[str, tuple[Any, str]] = {
+    "task": (str, "a task's name, or 'FILE.py:CLASS'"),
+    "scale": (str, "'laptop' or 'paper'"),
+    "settings": (Mapping, "names and values, {'search.generations': 2}"),
+    "config": ((str, os.PathLike), "a file's path"),
+    "start_from": (str, "'RUN:ID'"),
+}
+
+
+def _check(**given: Any) -> None:
+    """ConfigError for what is none of its kind."""
+    for name, value in given.items():
+        kinds, right = RIGHT[name]
         if value is not None and not isinstance(value, kinds):
             raise ConfigError(f"{name} = {quoted(value)}: must be {right}")
 
 
 def _toml(value: Any) -> str:
     """A setting as `--set` takes it: JSON writes numbers, texts, true and false as TOML does; NumPy's are those."""
-    return json.dumps(value.item() if isinstance(value, np.generic) else value)
+    try:
+        return json.dumps(value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value)
+    except TypeError:
+        raise ConfigError(f"settings hold {quoted(value)}: must be numbers, texts, true or false") from None

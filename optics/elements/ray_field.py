@@ -18,11 +18,14 @@ from optics.elements.transmittance import Mask
 from optics.numerics.autodiff import Array, Scalar, number
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["RayField", "Vector", "before_pupil", "rays_behind", "turned"]
+__all__ = ["SCALAR", "RayField", "Vector", "Weights", "before_pupil", "rays_behind", "turned"]
 
 STEP = 1e-4  # choice, radii: of central differences; a lens' slopes err by 1e-8, and rounding by 1e-11
 SPREAD = 2.0  # choice: how much finer than the path itself fields are, which depend on products of its slopes
 
+SCALAR = (1.0, 0.0, 0.0, 0.0, 0.0)  # weights of a `RayField` that is the mask of the pupil alone
+
+Weights = tuple[float, float, float, float, float]
 Vector = tuple[Any, Any, Any]  # x, y, z: floats, or arrays of NumPy or Dr.Jit
 
 
@@ -67,7 +70,7 @@ class RayField(Mask):
 
     beam: Beam
     axis: int
-    weights: tuple[float, float, float, float, float]
+    weights: Weights
     _bare: Pupil = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -26,6 +26,7 @@ __all__ = ["LowRankSampling", "low_rank"]
 # Choice: ranks to try.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
 RANK_RIPPLE = 0.4  # choice: error of the rest at the pupil's rim, of the tolerance; test_low_rank.py
+STEEPEST = 8.0  # choice, radii over distance: nearer, ranks that are tried on the rim tell too little
 TRIED = 41  # choice: places along a line through the window
 MOST_BYTES = 288_000_000  # choice, by memory: of the matrix between pupil and window; it takes twice that
 
@@ -74,6 +75,8 @@ class LowRankSampling:
 def low_rank(problem: Problem) -> list[LowRankSampling]:
     """As few pupil samples as the turns of pupil and path together allow, and the rank that the slow rest needs: with
     samples in sines, or where these crowd, on a grid of places; pixels have nodes of their own."""
+    if problem.radius > STEEPEST * problem.distance:
+        return []
     half = max(problem.window.own_half_width, problem.window.dx)
     if problem.pixelated is None:
         sines = sine_samples(problem)

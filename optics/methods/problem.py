@@ -75,7 +75,7 @@ class Problem:
             ValueError: the distance is not positive, tolerance not in [1e-12, 0.5], or there is no such dtype.
         """
         distance = positive("sensor_distance", beam.distance, carried=True)
-        in_range("tolerance", tolerance, 1e-12, 0.5)
+        tolerance = in_range("tolerance", tolerance, 1e-12, 0.5)
         precision(dtype)
         source = PointSource(number(beam.source.distance), beam.source.angle)
         return _problem(Beam(beam.pupil, source, beam.wavelength, distance), window, tolerance, dtype)

@@ -20,10 +20,9 @@ from optics.elements.ray_field import RayField
 from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
 
-__all__ = ["SCALAR", "smythe"]
+__all__ = ["ALONG_X", "smythe"]
 
 # Of 1, Ex, ξEx/R, Ey, ηEy/R: see `RayField`.
-SCALAR = (1.0, 0.0, 0.0, 0.0, 0.0)
 ALONG_X, ALONG_Y = (0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0, 0.0)
 MOMENT = (0.0, 0.0, 1.0, 0.0, 1.0)
 

@@ -5,8 +5,8 @@ The light from ξ, which reaches the image's place c after a distance D, is ther
     E(c + x) = -ik/2π ∫ P(ξ) e^{ik(L + D)} g(ξ) e(ξ) e^{ik s·x} dξ,   s = (c - ξ)/D,   g = z/D²,
 
 L the path through the pupil, e the field that rays have behind it (`ray_field`). With e = 1 this is Rayleigh-
-Sommerfeld's integral about c, but for ik(|x|² - (s·x)²)/2D in the exponent. Where all is the same around the axis it is
-Richards and Wolf's (1959).
+Sommerfeld's integral about c, but for ik(|x|² - (s·x)²)/2D in the exponent, which is taken to be that of the pupil's
+middle everywhere. Where all is the same around the axis it is Richards and Wolf's (1959).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.elements.ray_field import Vector, before_pupil, rays_behind, turned
+from optics.elements.ray_field import SCALAR, RayField, Vector, before_pupil, rays_behind, turned
 from optics.methods.rayleigh_sommerfeld import cached_nodes, node_count
 from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
@@ -53,7 +53,16 @@ class VectorSum:
             ex, ey, ez = turned(before, along, rays)
             # As Maxwell's equations have it of the other two: along its own ray that is the turned field's.
             parts += [ex, ey, ez if self.aplanatic else -(ex * (cx - x) + ey * (cy - y)) / z]
-        return sums.of(np.array([*parts, np.ones(len(x))]) * amplitude) / math.sqrt(self.beam.pupil.area)
+        found = sums.of(np.array([*parts, np.ones(len(x))]) * amplitude) / math.sqrt(self.beam.pupil.area)
+        return found if self.aplanatic else found * self._bend()
+
+    def _bend(self) -> np.ndarray:
+        """What the path from the pupil's middle to a sample has beyond a plane wave's, as a phase, (y, x)."""
+        (cx, cy), z = self.window.centre, number(self.beam.distance)
+        x, y, d = self.window.x[None, :], self.window.y[:, None], math.hypot(cx, cy, z)
+        longer = np.sqrt(x * x + y * y + z * z) - d - (cx * (x - cx) + cy * (y - cy)) / d
+        bend: np.ndarray = np.exp(2j * np.pi * self.beam.index / self.beam.wavelength * longer)
+        return bend
 
     @property
     def nodes(self) -> int:
@@ -76,7 +85,7 @@ class VectorSum:
         turning = pupil.slopes(beam.wavelength, beam.source).turning(z, self.window, beam.index)[1]
         if self.aplanatic:
             turning = beam.index * self.window.own_half_diagonal / z
-        detail = 0.0 if pupil.mask is None else pupil.mask.bandwidth(1e-6, pupil.radius) * pupil.radius
+        detail = RayField(beam, 0, SCALAR).bandwidth(1e-6, pupil.radius) * pupil.radius
         # Directions and obliquity turn nothing, but are no polynomials: their poles lie at height z.
         poles = DIGITS * math.log(10) / (2 * math.pi) * pupil.radius / z
         return pupil.radius * turning / beam.wavelength + detail + poles

@@ -49,7 +49,7 @@ class Plan:
     scalar_error: what scalar theory itself errs by, at most, where rays as steep as these meet, in light of any
         polarisation, which no method here makes less: see `optics.vector_focus`. It is meant for windows that hold the
         brightest place of the light. Where all is dark nothing is promised.
-    seconds: predicted time of a warm call on two cores.
+    seconds: predicted time of a warm call on two cores; 0 where nobody predicts it.
     options: every method that was weighed.
     """
 
@@ -71,7 +71,7 @@ class Plan:
             "dtype": self.dtype,
             "predicted error": f"{self.predicted_error:.1e}",
             **({"scalar theory": f"errs by up to {self.scalar_error:.2g}"} if self.scalar_error >= STEEP else {}),
-            "predicted time": f"{self.seconds:.2g} s",
+            **({"predicted time": f"{self.seconds:.2g} s"} if self.seconds else {}),
             "why": self.why,
         }
         head = [f"{name:<17}{value}" for name, value in rows.items()]

@@ -10,6 +10,7 @@ from optics.numerics.autodiff import is_differentiable, number
 
 __all__ = [
     "close_match",
+    "complexes",
     "did_you_mean",
     "finite",
     "in_range",
@@ -185,6 +186,18 @@ def reals(name: str, values: Any) -> np.ndarray:
     return given.astype(np.float64)
 
 
+def complexes(name: str, values: Any) -> np.ndarray:
+    """`values` as an array of any shape; ValueError unless they are numbers, real or complex, without derivatives."""
+    without_derivative(name, values)
+    try:
+        given = np.asarray(values)
+    except (TypeError, ValueError):
+        given = np.asarray(None)
+    if given.dtype.kind not in "biufc":
+        raise ValueError(f"{name}: must be numbers, not {shown(values)}")
+    return given
+
+
 def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
     """(band, Y, X) float32; ValueError unless it has `bands` bands and at least the shape `least`."""
     radiance = reals("radiance", value).astype(np.float32)
@@ -217,8 +230,8 @@ def items(name: str, values: Any, kind: type, example: str) -> tuple[Any, ...]:
         found = tuple(values)
     except TypeError:
         raise ValueError(f"{name} = {shown(values)}: must be several, such as ({example},)") from None
-    for one in found:
-        of_kind(name, one, kind, example)
+    for place, one in enumerate(found):
+        of_kind(f"{name}[{place}]", one, kind, example)
     return found
 
 
@@ -226,7 +239,7 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
     """`value` as int; ValueError unless it is whole and in [low, high]."""
     without_derivative(name, value)
     try:
-        fits = int(value) == value and low <= value <= high
+        fits = int(value) == value and low <= int(value) <= high
     except (TypeError, ValueError, OverflowError):
         fits = False
     if not fits:

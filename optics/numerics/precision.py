@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.arguments import shown
 from optics.numerics.autodiff import Array, Scalar, is_differentiable
 from optics.numerics.device import Device, make_ready
 
@@ -37,8 +38,8 @@ def precision(dtype: str = "float32") -> Precision:
         ValueError: any other dtype.
         BackendError: no LLVM, or no GPU, that Dr.Jit can use.
     """
-    if dtype not in ("float32", "float64"):
-        raise ValueError(f"dtype = {dtype!r}: must be 'float32' or 'float64'")
+    if not isinstance(dtype, str) or dtype not in ("float32", "float64"):
+        raise ValueError(f"dtype = {shown(dtype)}: must be 'float32' or 'float64'")
     return _precision(dtype, make_ready())
 
 

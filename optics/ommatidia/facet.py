@@ -46,7 +46,7 @@ class FacetLens:
             value = without_derivative(name, getattr(self, name))
             if not (isinstance(value, float) and math.isinf(value)):
                 positive(f"abs({name})", abs(finite(name, value)))
-        if self.thickness != 0:
+        if finite("thickness", self.thickness) != 0:
             positive("thickness", self.thickness)
         for name in ("n", "object_n", "medium_n"):
             index_of(name, getattr(self, name))

@@ -84,7 +84,9 @@ def psf_batch(
     window = Grid(shape, dx)
     in_range("tolerance", tolerance, 1e-12, 0.5)
     members = list(_members(pupils, wavelengths, sensor_distance, source_distances))
-    by_one_plan = population_pictures(members, window, tolerance) if (method, dtype) == ("auto", "float32") else ()
+    precision(dtype)
+    plain = isinstance(method, str) and (method, dtype) == ("auto", "float32")
+    by_one_plan = population_pictures(members, window, tolerance) if plain else ()
     known = {index: (image, plan) for index, image, plan in by_one_plan}
     rest = [index for index in range(len(members)) if index not in known]
     requests = []

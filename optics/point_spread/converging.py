@@ -10,23 +10,25 @@ from typing import cast
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.elements.ray_field import RayField
+from optics.elements.ray_field import SCALAR, RayField, Weights
 from optics.methods.problem import Problem
 from optics.methods.sampling import WithField
-from optics.methods.smythe import SCALAR, smythe
+from optics.methods.smythe import ALONG_X, smythe
 from optics.methods.vector_sum import VectorSum
 from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
-from optics.point_spread.pictures import pictures
+from optics.point_spread.pictures import PSFPicture, pictures
 from optics.point_spread.request import Request
 from optics.point_spread.spot_check import spot_check
 
 __all__ = ["Converging", "VectorFocus"]
 
 PLANE_WAVES = "plane_waves"
-MOST_NODES = 300_000  # choice, by memory: of a sum of plane waves, each of which is spread over 81 cells
-CHECK_SECONDS = 0.02  # choice: what a sum of plane waves counts for; a check takes a share of it
+MOST_NODES = 400_000  # choice, by memory: of a sum of plane waves, each of which is spread over 81 cells
+SUM_ERROR = 1e-8  # of such a sum
+CHECK_SECONDS = 0.5  # choice: what a picture counts for; a check takes a third of it at most
+MOST_SECONDS, FIELDS = 60.0, 7  # choice, and what it is shared by
 SINGLE = 1e-4  # choice: tolerance from which on float32 will do
 
 
@@ -74,13 +76,12 @@ class Converging:
         """A sum of plane waves is what such a lens is defined by."""
         rule = VectorSum(self.beam, window, True)
         if (nodes := rule.nodes) > MOST_NODES:
-            raise AccuracyError(
-                f"the window reaches {window.own_half_diagonal:.3g} m from the image: needs a smaller one"
-            )
-        z, wavelength = number(self.beam.distance), self.beam.wavelength / self.beam.index
-        error = (wavelength * z / (2 * self.beam.pupil.radius**2)) ** 2
-        why = "an aplanatic lens is one; (1/2N)² for a Fresnel number N"
-        return rule.components(), Plan(PLANE_WAVES, (nodes, 1), "float64", error, why)
+            far = f"{window.own_half_diagonal:.3g} m from the image"
+            raise AccuracyError(f"the window reaches {far}: must be smaller for an aplanatic lens")
+        if self.tolerance < SUM_ERROR:
+            raise AccuracyError(f"tolerance = {self.tolerance:g}: must be at least {SUM_ERROR:g} for an aplanatic lens")
+        why = "which an aplanatic lens is defined by"
+        return rule.components(), Plan(PLANE_WAVES, (nodes, 1), "float64", SUM_ERROR, why)
 
     def _flat(self, window: Grid) -> tuple[np.ndarray, Plan]:
         return self._plane_waves(window) or self._exact(window)
@@ -91,25 +92,59 @@ class Converging:
         if window.own_half_diagonal > number(self.beam.distance) or (nodes := rule.nodes) > MOST_NODES:
             return None
         found = rule.components()
-        problem = Problem.of(self.beam, window, self.tolerance, "float64")
-        error = spot_check(self.beam, problem, np.abs(found[6].ravel()) ** 2, CHECK_SECONDS)
-        if error is None or error > self.tolerance:
+        problem = Problem.of(self._behind(SCALAR), window, self.tolerance, "float64")
+        error = self._errors(problem, {SCALAR: found[6], ALONG_X: found[0]})
+        if error is None or (error := error + self._crossed(found[6], window)) > self.tolerance:
             return None
-        return found, Plan(PLANE_WAVES, (nodes, 1), "float64", error, "a check against the direct sum finds them right")
+        return found, Plan(PLANE_WAVES, (nodes, 1), "float64", error, "right by a check against the direct sum")
+
+    def _crossed(self, scalar: np.ndarray, window: Grid) -> float:
+        """What components of light from both planes of polarisation err by, which no check of one plane sees: plane
+        waves have paths that bend alike all over the pupil, and the share s² of fields that rays turn interferes."""
+        z, bright = number(self.beam.distance), np.abs(scalar) ** 2
+        off = np.add.outer((window.y - self.image[1]) ** 2, (window.x - self.image[0]) ** 2)
+        reach = self.beam.pupil.radius + math.hypot(*self.image)
+        squared = reach**2 / (reach**2 + z**2)
+        bend = math.pi * self.beam.index / self.beam.wavelength * squared / z
+        return bend * math.sqrt(float((bright * off**2).sum() / bright.sum())) * squared / 2
 
     def _exact(self, window: Grid) -> tuple[np.ndarray, Plan]:
         """By Smythe's integral, all fields by the method that does for the scalar one."""
-        mask = RayField(self.beam, 0, SCALAR)
-        dtype = "float32" if self.tolerance >= SINGLE else "float64"
-        beam = replace(self.beam, pupil=mask.pupil)
-        made = pictures([Request(beam, Problem.of(beam, window, self.tolerance, dtype), keeps_field=True)])[0]
+        made = self._scalar(window, "float32" if self.tolerance >= SINGLE else "float64")
         sampling, root = cast(WithField, made.sampling), math.sqrt(self.beam.pupil.area)
 
         def propagated(beam: Beam) -> np.ndarray:
             return sampling.field(beam, made.problem).numpy() / root
 
-        found = np.concatenate([smythe(self.beam, window, propagated), propagated(beam)[None]])
-        return found, replace(made.plan, why=f"Smythe's integral; {made.plan.why}")
+        found = np.concatenate([smythe(self.beam, window, propagated), propagated(self._behind(SCALAR))[None]])
+        checked = self._errors(made.problem, {ALONG_X: found[0]})
+        error = max(made.plan.predicted_error, checked or 0.0)
+        if error > self.tolerance:
+            raise AccuracyError(f"tolerance = {self.tolerance:g}: a check finds Ex to err by {error:.1g}; widen it")
+        why, seconds = f"Smythe's integral; {made.plan.why}", FIELDS * made.plan.seconds
+        return found, replace(made.plan, predicted_error=error, why=why, seconds=seconds, scalar_error=0.0)
+
+    def _scalar(self, window: Grid, dtype: str) -> PSFPicture:
+        """The scalar field, planned and checked; in float64 if float32 will not do."""
+        beam = self._behind(SCALAR)
+        problem = Problem.of(beam, window, self.tolerance, dtype)
+        try:
+            return pictures([Request(beam, problem, most_seconds=MOST_SECONDS / FIELDS, keeps_field=True)])[0]
+        except AccuracyError:
+            if dtype == "float64":
+                raise
+            return self._scalar(window, "float64")
+
+    def _behind(self, weights: Weights) -> Beam:
+        return replace(self.beam, pupil=RayField(self.beam, 0, weights).pupil)
+
+    def _errors(self, problem: Problem, fields: dict[Weights, np.ndarray]) -> float | None:
+        """The largest, relative, that the direct sum finds in fields (y, x) behind such masks; None: it is too dear."""
+        errors = [
+            spot_check(self._behind(weights), problem, np.abs(field.ravel()) ** 2, CHECK_SECONDS)
+            for weights, field in fields.items()
+        ]
+        return None if None in errors else max(error for error in errors if error is not None)
 
 
 @dataclass(frozen=True, eq=False)

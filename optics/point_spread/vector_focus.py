@@ -22,6 +22,7 @@ __all__ = ["vector_focus"]
 
 FEWEST_ZONES = 20.0  # choice: Fresnel number of an aplanatic lens from which on rays meet in a point
 ROUNDING = 1e-9
+STEEPEST = 0.98  # choice: sine of rays behind the pupil, near 1 of which fields change abruptly
 
 
 def vector_focus(
@@ -61,10 +62,9 @@ def vector_focus(
     _check_plain(pupil, lambda_)
     if pupil.pixels:
         raise ValueError("height is a PixelRelief: must be smooth, for each point to have one ray")
-    in_range("tolerance", tolerance, 1e-12, 0.5)
+    tolerance = in_range("tolerance", tolerance, 1e-12, 0.5)
     beam = Beam(pupil, source, lambda_, z)
-    if apodization == "aplanatic":
-        _check_aplanatic(beam)
+    _check_aplanatic(beam) if apodization == "aplanatic" else _check_rays(beam)
     amplitudes, shares = _polarised(polarization)
     towards = Converging(beam, apodization == "aplanatic", amplitudes, shares, tolerance)
     return towards.onto(Grid(shape, dx, towards.image))
@@ -77,6 +77,16 @@ def _check_plain(pupil: Pupil, wavelength: float) -> None:
     path = pupil.path(at * pupil.radius, middle, wavelength, PointSource(), types)
     for part in (pupil.aperture_radius, path, pupil.amplitude(at, middle, types)):
         without_derivative("pupil", part)
+
+
+def _check_rays(beam: Beam) -> None:
+    """AccuracyError if rays go no further than the pupil: an evanescent wave has no direction."""
+    steepest = beam.pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.index
+    if steepest > STEEPEST:
+        raise AccuracyError(
+            f"rays leave the pupil under a sine of {steepest:.3g}: must be at most {STEEPEST:g}, "
+            "beyond which light has no direction"
+        )
 
 
 def _check_aplanatic(beam: Beam) -> None:

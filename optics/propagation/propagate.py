@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
-from optics.numerics.arguments import finite, in_range, vacuum_wavelength, without_derivative
+from optics.numerics.arguments import complexes, finite, in_range, shown, vacuum_wavelength, without_derivative
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum, predicted_seconds
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, precision
@@ -86,12 +86,12 @@ def propagate(
         ValueError: bad argument, named with its value and valid range.
         AccuracyError: the tolerance cannot be met; says what can.
     """
-    if method not in ("auto", *PROPAGATION_METHODS):
-        raise ValueError(f"method = {method!r}: must be 'auto' or one of {', '.join(PROPAGATION_METHODS)}")
+    if not isinstance(method, str) or method not in ("auto", *PROPAGATION_METHODS):
+        raise ValueError(f"method = {shown(method)}: must be 'auto' or one of {', '.join(PROPAGATION_METHODS)}")
     for name, value in (("u", u), ("distance", distance), ("medium_n", medium_n)):
         without_derivative(name, value)
     given = _field(u)
-    window = Grid(out_shape or given.shape[-2:], dx if out_dx is None else out_dx, out_centre)
+    window = Grid(given.shape[-2:] if out_shape is None else out_shape, dx if out_dx is None else out_dx, out_centre)
     lit = _lit(given)
     source = Grid(lit.shape[-2:], dx)
     sources = lit.reshape(-1, *source.shape)
@@ -118,7 +118,7 @@ def propagate(
 
 
 def _field(u: np.ndarray) -> np.ndarray:
-    field = np.asarray(u)
+    field = complexes("u", u)
     if field.ndim < 2 or 0 in field.shape:
         raise ValueError(f"u has shape {field.shape}: must be (…, y, x), not empty")
     if not np.isfinite(field).all():

@@ -13,7 +13,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.refractive_index import Dispersion
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
-from optics.numerics.arguments import in_range, of_kind, positive, shown, vacuum_wavelength, without_derivative
+from optics.numerics.arguments import complexes, in_range, of_kind, positive, shown, vacuum_wavelength
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.propagation.planes import PlaneField, PupilSampling, StepSettings, Stop
@@ -134,7 +134,7 @@ def _start(
         if out_dx is None or out_shape is None:
             raise ValueError("out_dx, out_shape: must be given where u is not")
         return None, Grid(out_shape, out_dx), 1.0
-    samples = np.asarray(without_derivative("u", u))
+    samples = complexes("u", u)
     if samples.ndim != 2 or samples.size == 0 or not np.isfinite(samples).all():
         raise ValueError(f"u has shape {samples.shape}: must be (y, x), not empty, and finite everywhere")
     if dx is None:

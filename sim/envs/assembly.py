@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import numpy as np
 
-from optics.numerics.arguments import shown
+from optics.numerics.arguments import shown, whole
 from optics.spectra.spectrum import Spectrum
 from sim.envs.auxiliary import checked
 from sim.envs.follow_camera import check_render_mode
@@ -32,6 +32,8 @@ from sim.worlds.world import build_world
 
 if TYPE_CHECKING:
     from sim.envs.parallel_env import EncounterEnv
+
+MOST = 1_000_000  # choice: of worlds and of frames, more than memory holds
 
 
 def make_vec_env(
@@ -207,8 +209,9 @@ def _fidelity_of(rays_per_receptor: float | str | Fidelity, fidelity: Fidelity |
 
 def _check(n_envs: int, seed: int | None, memory: int, mode: str, render_mode: str | None) -> None:
     """Refuse bad arguments before anything expensive is done."""
-    _require_whole("n_envs", n_envs, 1)
-    _require_whole("memory", memory, 1)
+    for name, number in (("n_envs", n_envs), ("memory", memory)):
+        _require_whole(name, number, 1)
+        whole(name, number, 1, MOST)
     if seed is not None:
         _require_whole("seed", seed, 0)
     check_mode(mode)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from numbers import Real
 
-from optics.numerics.arguments import shown, whole
+from optics.numerics.arguments import one_of, shown, whole
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.tracing.lighting import ALL, DIRECT, LEVELS
@@ -62,12 +62,10 @@ class Fidelity:
             most = f"{MOST_RAYS:g}"
             raise ValueError(f"rays_per_receptor = {shown(rays)}: must be positive and at most {most}, or 'auto'")
         whole("bands", self.bands, 1, MOST_BANDS)
-        if self.light not in LEVELS:
-            raise ValueError(f"light = {shown(self.light)}: must be one of {', '.join(map(repr, LEVELS))}")
+        one_of("light", self.light, LEVELS)
+        one_of("samples", self.samples, SAMPLES)
         if self.light == ALL and self.samples != AREAS:
             raise ValueError("light = 'all': must go with samples = 'areas'; rays follow two reflections at most")
-        if self.samples not in SAMPLES:
-            raise ValueError(f"samples = {shown(self.samples)}: must be one of {', '.join(map(repr, SAMPLES))}")
 
     @property
     def predicted_error(self) -> float | None:

@@ -50,7 +50,7 @@ class Mount:
         if offset.shape != (3,) or not np.isfinite(offset).all():
             raise ValueError(f"Mount: offset = {shown(self.offset)}: must be three lengths (ahead, left, up) [m]")
         object.__setattr__(self, "offset", tuple(map(float, offset)))
-        if self.kind is not None and self.kind not in KINDS:
+        if self.kind is not None and not (isinstance(self.kind, str) and self.kind in KINDS):
             raise ValueError(f"Mount: kind = {shown(self.kind)}: must be one of {', '.join(map(repr, KINDS))}, or None")
 
     def mirrored(self) -> Mount:
@@ -96,7 +96,7 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
     Raises:
         ValueError: less than one eye.
     """
-    return fan(Mount(on, offset=(radius, 0.0, 0.0)), n_eyes, placement_range_deg)
+    return fan(Mount(on, offset=(finite("radius", radius), 0.0, 0.0)), n_eyes, placement_range_deg)
 
 
 def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: float = 0.0) -> tuple[Mount, ...]:

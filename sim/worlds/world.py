@@ -22,7 +22,7 @@ from sim.worlds.catalog import TASKS
 from sim.worlds.course import Course
 from sim.worlds.layout import WALL_CONAFFINITY, Layout, Starts
 
-MOST_SEED = 2**63  # choice: more than anybody counts to
+MOST_SEED = 2**128  # choice: what NumPy draws for a seed
 MOST_MAZES = 100_000  # choice: more than memory holds
 _FIELDS = {"detection": detection.add_layout, "foraging": foraging.add_layout, "tracking": detection.add_layout}
 
@@ -98,14 +98,14 @@ def build_world(
     if not isinstance(task, str) or task not in TASKS:
         raise ValueError(f"unknown task {shown(task)}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")
     seed = whole("build_world: seed", seed, 0, MOST_SEED)
-    if task != "maze" and mazes != 1:
-        raise ValueError(f"build_world: mazes = {shown(mazes)}: must be 1, or more for 'maze'")
     mazes = whole("build_world: mazes", mazes, 1, MOST_MAZES)
+    if task != "maze" and mazes != 1:
+        raise ValueError(f"build_world: mazes = {mazes}: must be 1, or more for 'maze'")
     if eyes is not None:
         of_kind("build_world: eyes", eyes, Eyes, "sim.Eyes(n_eyes=2)")
     if spectra is not None:
         of_kind("build_world: spectra", spectra, Mapping, "{'wall': 'foliage'}")
-    if course != "short" and task != "navigation":
+    if task != "navigation" and not (isinstance(course, str) and course == "short"):
         raise ValueError(f"build_world: course: must be left out for {shown(task)}, only 'navigation' has one")
     spec = _empty_world()
     layout = _layout(spec, task, np.random.default_rng(seed), mazes, course)

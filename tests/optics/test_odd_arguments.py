@@ -114,6 +114,7 @@ PICTURES = {
         "apodization": "flat",
         "dx": 0.3e-6,
         "shape": (5, 5),
+        "tolerance": 0.1,
     },
 }
 SPOT = optics.psf(LENS, sensor_distance=240e-6, dx=0.5e-6, shape=(33, 33))

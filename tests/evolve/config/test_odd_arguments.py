@@ -44,6 +44,12 @@ def _quietly(call, asked, usual):
             raise
 
 
+@pytest.mark.parametrize("value", [np.arange(3), object(), 1j, None, [1, 2]])
+def test_values_of_settings(value, tmp_path):
+    with pytest.raises(evolve.ConfigError, match=r"search.generations = |settings hold "):
+        evolve.run("detection", "quick", {"search.generations": value}, out=tmp_path / "run")
+
+
 def test_numpys_numbers_are_pythons():
     learning = evolve.LearningConfig(total_steps=np.int64(8192), gamma=np.float64(0.5))
     config = evolve.RunConfig("detection", seed=np.int64(3), learning=learning)

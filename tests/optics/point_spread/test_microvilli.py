@@ -99,10 +99,12 @@ def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
     cells = Microvilli(float(rng.uniform(0, 180)), float(rng.choice([1, 3, 10, math.inf])))
     jones, dx = rng.normal(size=2) + 1j * rng.normal(size=2), float(rng.uniform(0.05, 0.7)) * unit
     n = 2 * math.ceil((math.hypot(*centre) + radius) / dx) + 1
-    light = optics.vector_focus(lens, WAVE, z, dx=dx, shape=(n, n), polarization=jones)
+    plane_waves = {"polarization": jones, "tolerance": 0.3}  # as in the integrals
+    light = optics.vector_focus(lens, WAVE, z, dx=dx, shape=(n, n), **plane_waves)
+    assert light.plan.method == "plane_waves"
     found, error = cells.signal(light, radius, centre, with_error=True)
     expected = integral(radius, centre, lambda x, y: absorbed_at(x, y, lens, z, jones, cells))
-    assert abs(found - expected) < error
+    assert abs(found - expected) < min(error, 1.1e-6)
 
 
 @pytest.mark.parametrize(
@@ -132,7 +134,8 @@ def test_what_light_errs_by_is_told(sine, focal, wavefront, aperture, defocus, t
         off = abs(found - float(optics.encircled_energy(exact, radius)[0, 0]))
         assert off < error < worst * found + 2e-6
         ratios.append(error / off)
-    assert tolerance == 1e-3 or min(ratios) < 100
+    # In focus nearly all that is said is for single components, which a sum does not err by.
+    assert tolerance == 1e-3 or defocus == 0 or min(ratios) < 100
 
 
 def test_signals_do_not_depend_on_samples():

@@ -42,7 +42,8 @@ def test_far_away_a_lens_in_focus_is_richards_and_wolfs(sine):
         pupil = optics.Pupil(radius, thin_lens_focal_length=z)
         for tolerance in (1e-1, 1e-9):
             found = optics.vector_focus(pupil, WAVE, polarization=jones, tolerance=tolerance, **window)
-            expected = -1j * by_directions(found.grid, z, sine, jones, FLAT) * z / (math.sqrt(math.pi) * radius)
+            bend = np.exp(2j * math.pi / WAVE * (np.sqrt(found.grid.x**2 + found.grid.y[:, None] ** 2 + z * z) - z))
+            expected = -1j * by_directions(found.grid, z, sine, jones, FLAT) * z / (math.sqrt(math.pi) * radius) * bend
             off[z, found.plan.method] = np.abs(found.field - expected).max() / np.abs(expected).max()
     assert [method for _, method in off] == ["plane_waves", "rayleigh_sommerfeld"] * 2
     assert off[0.2e-3, "plane_waves"] < 1e-8
@@ -117,14 +118,14 @@ def turn(field, before, after):
 
 
 @pytest.mark.parametrize("defocus", [0.0, -2e-6, 15e-6])
-@pytest.mark.parametrize("relief", [0.0, 2e-6])
+@pytest.mark.parametrize("relief", [0.0, 1e-6])
 def test_predicted_errors_hold_for_each_component(defocus, relief):
     """Of lenses with reliefs of some waves, in focus and far from it; plane waves are taken where they will do."""
-    rng, f = np.random.default_rng(5), 200e-6
+    rng, f = np.random.default_rng(5), 100e-6
     height = rng.random((4, 4)) * relief if relief else None
-    pupil = optics.Pupil(50e-6, height, thin_lens_focal_length=f, aperture=HEXAGON)
-    view = {"sensor_distance": f + defocus, "polarization": (1, 0.3), "dx": 0.4e-6, "shape": (33, 33)}
-    exact = optics.vector_focus(pupil, WAVE, tolerance=1e-7, **view)
+    pupil = optics.Pupil(25e-6, height, thin_lens_focal_length=f, aperture=HEXAGON)
+    view = {"sensor_distance": f + defocus, "polarization": (1, 0.3), "dx": 0.4e-6, "shape": (17, 17)}
+    exact = optics.vector_focus(pupil, WAVE, tolerance=1e-5, **view)
     for tolerance in (0.3, 1e-3):
         found = optics.vector_focus(pupil, WAVE, tolerance=tolerance, **view)
         error = found.plan.predicted_error
@@ -133,6 +134,33 @@ def test_predicted_errors_hold_for_each_component(defocus, relief):
         assert off.max() < error
         assert np.linalg.norm(found.psf - exact.psf) < error * np.linalg.norm(exact.psf)
     assert found.plan.method != "plane_waves" or defocus <= 0
+
+
+def test_plane_waves_have_the_fields_phase():
+    """The path to the window's corners is five radians longer than to its middle."""
+    pupil = optics.Pupil(50e-6, thin_lens_focal_length=1e-3)
+    rough, exact = (
+        optics.vector_focus(pupil, WAVE, polarization=(1, 1j), dx=1e-6, shape=(41, 41), tolerance=tolerance)
+        for tolerance in (1e-2, 1e-6)
+    )
+    assert (rough.plan.method, exact.plan.method) == ("plane_waves", "rayleigh_sommerfeld")
+    assert np.linalg.norm(rough.field - exact.field) < 1e-2 * np.linalg.norm(exact.field)
+
+
+def test_evanescent_rays_are_refused():
+    """Aslant by half a radian, those of a lens as wide as it is far are to leave under a sine of 1.17."""
+    with pytest.raises(optics.AccuracyError, match=r"sine of 1\.17: must be at most 0\.98"):
+        optics.vector_focus(optics.Pupil(20e-6, thin_lens_focal_length=20e-6), source_angle=(0.5, 0.0))
+
+
+def test_single_components_behind_thin_rings():
+    """What a plane wave's bent path does to them is of first order, where it is of second to their sum."""
+    pupil = optics.Pupil(300e-6, thin_lens_focal_length=400e-6, aperture=optics.Annulus(0.98))
+    view = {"polarization": (1, 0.5j), "dx": 0.1e-6, "shape": (9, 9)}
+    rough, exact = (optics.vector_focus(pupil, WAVE, tolerance=tolerance, **view) for tolerance in (1e-2, 1e-8))
+    off = np.linalg.norm(rough.intensity - exact.intensity, axis=(1, 2)) / np.linalg.norm(exact.psf)
+    assert rough.plan.method == "plane_waves"
+    assert 1e-6 < off.max() < rough.plan.predicted_error
 
 
 def test_flat_rays_aslant_keep_their_polarisation():
@@ -168,7 +196,7 @@ def test_turning_pupil_and_polarisation_turns_the_picture():
 
 
 def test_no_light_is_lost_among_components():
-    found = optics.vector_focus(lens(0.7, aperture=HEXAGON), WAVE, dx=0.1e-6, shape=(201, 201))
+    found = optics.vector_focus(lens(0.7, aperture=HEXAGON), WAVE, dx=0.1e-6, shape=(201, 201), tolerance=0.1)
     assert found.psf.sum() == pytest.approx(found.scalar.sum(), rel=2e-3)
     assert found.intensity[2].sum() > 0.1 * found.psf.sum()
 
