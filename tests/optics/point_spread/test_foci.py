@@ -116,7 +116,7 @@ def test_rings_have_more_light_along_the_axis():
             "Fresnel number .* at least 20",
         ),
         ({"dx": 1.0}, "widen the tolerance|needs"),
-        ({"dx": 1.0, "pupil": lens(0.7, aplanatic=True), "apodization": "aplanatic"}, "must be smaller for an aplanatic lens"),
+        ({"dx": 1.0, "pupil": lens(0.7, aplanatic=True), "apodization": "aplanatic"}, "smaller for an aplanatic"),
         ({"tolerance": 0.0}, "tolerance = 0"),
         ({"pupil": optics.Pupil(1e-3), "apodization": "aplanatic"}, "must be an ideal lens without relief"),
         ({"sensor_distance": -1}, "sensor_distance = -1"),
