@@ -1,4 +1,4 @@
-"""What no argument should be, and what is wrong with how a call ends that gets it."""
+"""Odd values to try as arguments, and what is wrong with how a call answers them."""
 
 import math
 import traceback

@@ -26,7 +26,7 @@ __all__ = ["LowRankSampling", "low_rank"]
 # Choice: ranks to try.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
 RANK_RIPPLE = 0.4  # choice: error of the rest at the pupil's rim, of the tolerance; test_low_rank.py
-STEEPEST = 8.0  # choice, radii over distance: nearer, ranks that are tried on the rim tell too little
+STEEPEST = 8.0  # choice, radii over distance: nearer, the rim on which ranks are tried tells too little
 TRIED = 41  # choice: places along a line through the window
 MOST_BYTES = 288_000_000  # choice, by memory: of the matrix between pupil and window; it takes twice that
 

@@ -17,6 +17,7 @@ from optics.methods.smythe import ALONG_X, smythe
 from optics.methods.vector_sum import VectorSum
 from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import number
+from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.point_spread.pictures import PSFPicture, pictures
 from optics.point_spread.request import Request
@@ -66,7 +67,7 @@ class Converging:
         Raises:
             AccuracyError: no method meets the tolerance within the limits on memory and time.
         """
-        found, plan = self._aplanatic(window) if self.aplanatic else self._flat(window)
+        found, plan = self._aplanatic(window) if self.aplanatic else self._plane_waves(window) or self._exact(window)
         parts = np.tensordot(self.jones, found[:6].reshape(2, 3, *window.shape), axes=1)
         intensity, pure = (np.abs(parts) ** 2).sum(axis=0), parts[0] if len(parts) == 1 else None
         scalar = np.abs(found[6]) ** 2
@@ -82,9 +83,6 @@ class Converging:
             raise AccuracyError(f"tolerance = {self.tolerance:g}: must be at least {SUM_ERROR:g} for an aplanatic lens")
         why = "which an aplanatic lens is defined by"
         return rule.components(), Plan(PLANE_WAVES, (nodes, 1), "float64", SUM_ERROR, why)
-
-    def _flat(self, window: Grid) -> tuple[np.ndarray, Plan]:
-        return self._plane_waves(window) or self._exact(window)
 
     def _plane_waves(self, window: Grid) -> tuple[np.ndarray, Plan] | None:
         """None where they err by more than the tolerance, or nothing tells by how much."""
@@ -116,7 +114,8 @@ class Converging:
         def propagated(beam: Beam) -> np.ndarray:
             return sampling.field(beam, made.problem).numpy() / root
 
-        found = np.concatenate([smythe(self.beam, window, propagated), propagated(self._behind(SCALAR))[None]])
+        scalar = cast(Field, made.field).numpy()
+        found = np.concatenate([smythe(self.beam, window, propagated), scalar[None]])
         checked = self._errors(made.problem, {ALONG_X: found[0]})
         error = max(made.plan.predicted_error, checked or 0.0)
         if error > self.tolerance:

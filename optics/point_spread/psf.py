@@ -60,7 +60,7 @@ def psf(
         raise ValueError("wavelengths is empty: must hold at least one wavelength [m]")
     if lambdas.ndim > 1:
         raise ValueError(f"wavelengths has shape {lambdas.shape}: must be one wavelength [m], or a row of them")
-    if not isinstance(field, bool):
+    if not isinstance(field, (bool, np.bool_)):
         raise ValueError(f"field = {shown(field)}: must be True or False")
     if field and method not in ("auto", "exact", *FIELDS):
         raise ValueError(

@@ -40,8 +40,8 @@ def vector_focus(
     """Electric field behind a pupil of any shape about the image of a point far away.
 
     Rays give the field in the pupil's plane, perpendicular to each, and Smythe's integral (1947) what Maxwell's
-    equations make of it. Where that meets the tolerance, a sum of plane waves does, one for each point of the pupil
-    (Debye's integral): about foci of high Fresnel number, where it is much faster.
+    equations make of it. A sum of plane waves, one for each point of the pupil (Debye's integral), is much faster, and
+    is taken where it meets the tolerance: about foci of high Fresnel number.
 
     sensor_distance: [m]; None: the lens' focus. polarization: of the light before the pupil, Jones' vector (x, y) or
         Stokes' parameters (S0, S1, S2, S3) with S1 = |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey), S3 = 2 Im(Ex* Ey); None:
