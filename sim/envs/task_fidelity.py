@@ -11,8 +11,8 @@ import numpy as np
 
 import optics
 from sim.envs.task_worlds import TaskWorlds
+from sim.eyes.allowed_error import allowed_error
 from sim.render.fidelity import Fidelity
-from sim.robots.edge_rays import allowed_error
 from sim.robots.encounter import Frozen, among, cast
 from sim.robots.eye_kinds import EYES, kinds_of, several
 from sim.robots.model_fidelity import choose_model_fidelity

@@ -7,4 +7,5 @@ receptive_fields  directions drawn from all receptive fields at once
 field_areas       areas, and what of all receptive fields lies in each
 receptor_sums     from rays to receptors
 depth_layers      one PSF for each of a few distances
+allowed_error     what may be wrong of a signal
 """

@@ -14,9 +14,9 @@ import numpy as np
 
 from sim.eyes.receptive_fields import ReceptiveFields
 
-# Chosen: of all receptors' light, what may come from beyond either side of the lattice; it is then looked for within.
-# Behind a lens in focus, a quarter as wide as the retina, that is .012 for 1 x 4 receptors and .004 for 15 x 15: these
-# have no rim, and one would change their errors by less than a tenth.
+# Chosen: of all receptors' light, what may come from beyond either side of the lattice, at most; it is then looked for
+# within. Behind a lens in focus, a quarter as wide as the retina, that is .012 for 1 x 4 receptors and .004 for
+# 15 x 15: these have no rim, and one would change their errors by less than a tenth.
 BEYOND = 0.015
 
 
@@ -30,13 +30,15 @@ class FieldAreas:
     edges: tuple[np.ndarray, np.ndarray]
 
     @classmethod
-    def of(cls, fields: ReceptiveFields, parts: tuple[int, int]) -> FieldAreas:
-        """Each receptor's square in so many rows and columns, and as many more around them as its light comes from."""
+    def of(cls, fields: ReceptiveFields, parts: tuple[int, int], beyond: float = BEYOND) -> FieldAreas:
+        """Each receptor's square in so many rows and columns, and as many more around them as its light comes from, but
+        for such a share beyond either side."""
         found = []
         for axis, (n, per_receptor) in enumerate(zip(fields.resolution, parts, strict=True)):
             field = fields.field.sum(axis=2 - axis)
             profile = np.mean(field / field.sum(axis=-1, keepdims=True), axis=0)
-            lower, upper = (_rim(one, n, per_receptor, fields.cells) for one in (profile, profile[::-1]))
+            ends = profile, profile[::-1]
+            lower, upper = (_rim(end, (n, per_receptor), fields.cells, beyond) for end in ends)
             found.append(np.arange(-lower, n * per_receptor + upper + 1) / per_receptor - n / 2)
         return cls((found[0], found[1]))
 
@@ -68,16 +70,18 @@ class FieldAreas:
         return found
 
 
-def _rim(profile: np.ndarray, n: int, per_receptor: int, cells: int) -> int:
-    """How many rectangles lie before the first receptor's: so few that less than BEYOND of the light of n receptors in
-    a line comes from before; profile: of a receptor's field along that line."""
+def _rim(profile: np.ndarray, line: tuple[int, int], cells: int, beyond: float) -> int:
+    """How many rectangles lie before the first receptor's: so few that no more than this share of the light of a line
+    of receptors comes from before; profile: of a receptor's field along that line, line: its receptors, and rectangles
+    of each."""
+    n, per_receptor = line
     # Of a field that begins so many cells before the line's first receptor, what is before that, per receptor.
     before = np.concatenate([[0.0], np.cumsum(profile)])
     start = (len(profile) - cells) / 2
     rims = np.arange(per_receptor * len(profile)) / per_receptor
     ends = start - cells * (np.arange(n)[:, None] + rims)
     lost = np.interp(ends, np.arange(len(before)), before).mean(axis=0)
-    return int(np.argmax(lost <= BEYOND))
+    return int(np.argmax(lost <= beyond))
 
 
 def _shares(edges: np.ndarray, centre: float, size: int, cells: int) -> np.ndarray:

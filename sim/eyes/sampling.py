@@ -13,8 +13,9 @@ import numpy as np
 import scipy.sparse
 
 import optics
+from sim.eyes.allowed_error import allowed_error
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
-from sim.eyes.field_areas import FieldAreas
+from sim.eyes.field_areas import BEYOND, FieldAreas
 from sim.eyes.receptive_fields import (
     Draw,
     NoRaysError,
@@ -114,11 +115,13 @@ class BoxSampling:
 @dataclass(frozen=True)
 class FieldSampling:
     """Directions drawn from the mixture of all receptive fields; as many as asked for, or as it takes until every
-    receptor has one."""
+    receptor has one. tolerance: error allowed to a signal, see `sim.eyes.allowed_error`; of areas' lattice it is what
+    light of white beyond it may be worth."""
 
     eye: optics.Eye
     fields: ReceptiveFields
     depth: DepthLayers = ONE_PSF
+    tolerance: float | None = None
 
     def sensor(self, rays_per_receptor: float) -> ReceptiveFieldSensor:
         """The sensor with so many rays per receptor, on average."""
@@ -158,7 +161,8 @@ class FieldSampling:
         return Trial(plane, _unused(plane), lattice.weights(self.fields, receptors), _extent(self.eye, lattice.size))
 
     def _lattice(self, per_receptor: float, in_rows: bool) -> FieldAreas:
-        return FieldAreas.of(self.fields, parts_of(max(1, round(per_receptor)), in_rows))
+        beyond = min(allowed_error(self.eye, self.tolerance) / self.eye.throughput, BEYOND)
+        return FieldAreas.of(self.fields, parts_of(max(1, round(per_receptor)), in_rows), beyond)
 
     def _sensor(self, rays: int) -> ReceptiveFieldSensor:
         draw = self.fields.draw(rays)

@@ -86,7 +86,7 @@ class BatchedRenderer:
         self._static = scene.static
         with variant(self._static.variant):
             white = lighting.white_radiance(self._static.scene, self.bands.wavelengths)
-        self.fidelity, sampling = fidelity, scene.sampling(fidelity.depth)
+        self.fidelity, sampling = fidelity, scene.sampling(fidelity.depth, fidelity.tolerance)
         self.tracer: Tracer | AreaTracer
         self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.of)(fidelity.light)
         self._check_memory(n_envs)

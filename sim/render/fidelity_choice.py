@@ -10,6 +10,7 @@ import math
 import warnings
 from dataclasses import replace
 
+from sim.eyes.allowed_error import allowed_error
 from sim.eyes.eyes import Eyes
 from sim.render import fidelity_stages as stages
 from sim.render.fidelity import Fidelity, fidelity_asked
@@ -43,7 +44,7 @@ def choose_fidelity(
     """
     if bands not in ("auto", "own"):
         raise ValueError(f"bands = {bands!r}: must be 'auto' or 'own'")
-    allowed = stages.allowed_error(eyes, eyes.eye(), tolerance)
+    allowed = allowed_error(eyes.eye(), tolerance)
     if bands == "own":
         return chosen_fidelity(PreparedScene(world, eyes, tracer), allowed)
     n_bands, level = stages.bands(eyes.eye(), SHARE_OF_BANDS * allowed)
@@ -63,9 +64,9 @@ def fidelity_for(scene: PreparedScene, rays_per_receptor: float | str) -> Fideli
 def chosen_fidelity(scene: PreparedScene, tolerance: float | None = None) -> Fidelity:
     """What `choose_fidelity` gives for a scene that has been prepared, with the bands that it has."""
     eyes, eye, trials = scene.eyes, scene.eye, FidelityTrials(scene)
-    allowed = stages.allowed_error(eyes, eye, tolerance)
+    allowed = allowed_error(eye, tolerance)
     depth, depth_level = stages.depth(trials, eye, SHARE_OF_DEPTH * allowed)
-    sampling = scene.sampling(depth)
+    sampling = scene.sampling(depth, allowed)
     light_level = stages.light(trials, sampling, SHARE_OF_LIGHT * allowed)
     spent = SHARE_OF_BANDS**2 + (SHARE_OF_DEPTH**2 if eye.pupil else 0)
     for_light = min((light_level.predicted_error or 0) / allowed, SHARE_OF_LIGHT) ** 2

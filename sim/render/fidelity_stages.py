@@ -9,7 +9,6 @@ import numpy as np
 
 import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
-from sim.eyes.eyes import Eyes
 from sim.eyes.sampling import EyeSampling
 from sim.render.band_error import band_error, measured
 from sim.render.fidelity import Level
@@ -17,24 +16,11 @@ from sim.render.fidelity_trials import FidelityTrials
 from sim.tracing.lighting import BOUNCE, DIRECT
 from sim.worlds.world import World
 
-# Errors beside noise add up as squares: half of it makes √(1 + 1/4) = 1.12 of it.
-SHARE_OF_NOISE = 0.5
-# Chosen: errors of less than this share of white's signal never cost rays, however little noise there is.
-LEAST_TOLERANCE = 5e-3
 # Chosen: times an error that a few random views have; what agents live through has another
 # (tests/sim/render/test_fidelity.py holds that against the noise).
 CAUTION = 1.2
 LAYERS = (1, 3, 5, 9)  # nodes of each are among those of the next
 NEAREST = 0.005  # chosen: quantile of the distances that counts as the nearest
-
-
-def allowed_error(eyes: Eyes, eye: optics.Eye, tolerance: float | None) -> float:
-    allowed = max(SHARE_OF_NOISE * eyes.noise_sigma, LEAST_TOLERANCE * eye.throughput)
-    if tolerance is None:
-        return float(allowed)
-    if not 0 < tolerance < math.inf:
-        raise ValueError(f"tolerance = {tolerance!r}: must be positive")
-    return tolerance
 
 
 def bands(eye: optics.Eye, allowed: float) -> tuple[int, Level]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 import optics
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import Eyes
-from sim.eyes.sampling import EyeSampling, Trial, eye_sampling
+from sim.eyes.sampling import EyeSampling, FieldSampling, Trial, eye_sampling
 from sim.eyes.sensor import Sensor
 from sim.render.band_error import with_band_averaged_lights
 from sim.tracing.areas.area_tracer import AreaTracer
@@ -59,12 +61,15 @@ class PreparedScene:
         """What is upright has closed forms along columns of any height; spheres' outlines want rows, too."""
         return len(self.static.spheres) > 0
 
-    def sampling(self, depth: DepthLayers) -> EyeSampling:
+    def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> EyeSampling:
         """How the eye is sampled with these depth layers; its PSFs are computed once, when first asked for.
+
+        tolerance: error allowed to a signal, see `sim.eyes.allowed_error`
 
         Raises:
             optics.AccuracyError: a pupil whose light spreads too far to be computed.
         """
         if depth not in self._samplings:
             self._samplings[depth] = eye_sampling(self.eye, depth)
-        return self._samplings[depth]
+        found = self._samplings[depth]
+        return replace(found, tolerance=tolerance) if isinstance(found, FieldSampling) else found

@@ -20,6 +20,7 @@ NUMBERS_OF_AREAS = (1, 2, 4, 6, 9, 12, 16, 20, 25, 30)
 # What an area costs, in rays (docs/measurements/rendering.md); where fewer will do, they are taken. Behind a pupil its
 # light is spread by the kernel, which rays pay for, too.
 PERFECT_LENS_AREA, PUPIL_AREA = 3, 1.6
+IN_BOUNCED_LIGHT = 0.7  # times that: following light on costs rays more than tables cost areas
 HARDLY_MORE = 1.1  # times an error that cannot be lessened: not worth several times the samples
 
 
@@ -52,7 +53,8 @@ def fewest_samples(
     numbers: tuple[float, ...] = PERFECT_LENS_RAYS if perfect else PUPIL_RAYS
 
     def cost(number: float) -> float:
-        return (PERFECT_LENS_AREA if perfect else PUPIL_AREA) * trials.areas_seen(sampling, number)
+        one = (PERFECT_LENS_AREA if perfect else PUPIL_AREA) * (IN_BOUNCED_LIGHT if light.level == BOUNCE else 1)
+        return one * trials.areas_seen(sampling, number)
 
     def rays(most: float = math.inf) -> Samples:
         return Samples(RAYS, light, *_fewest(errors, tuple(n for n in numbers if n <= most), allowed, RAYS))

@@ -16,10 +16,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-import optics
 from optics.numerics.autodiff import Array
 from sim.eyes.sampling import BoxSampling, beyond_rim_of
-from sim.render.fidelity_stages import LEAST_TOLERANCE, SHARE_OF_NOISE
 from sim.robots.model_wavefront import ModelWavefront
 from sim.robots.poses import Poses
 from sim.scene.device_arrays import as_whole_numbers
@@ -121,17 +119,3 @@ def edges_pay(resolution: tuple[int, int], rays: float) -> bool:
     """Whether the first rays, those beyond the rim among them, are half as many as so many everywhere, or fewer: more
     save nothing, where a few receptors want all."""
     return 2 * FIRST * beyond_rim_of(resolution).size <= rays * resolution[0] * resolution[1]
-
-
-def allowed_error(eye: optics.Eye, tolerance: float | None) -> float:
-    """Of a signal (root mean square), where None is asked for: half of the receptors' noise, but no less than
-    LEAST_TOLERANCE of what white is worth behind the eye's pupil.
-
-    Raises:
-        ValueError: a tolerance that is not positive.
-    """
-    if tolerance is None:
-        return max(SHARE_OF_NOISE * eye.noise_sigma, LEAST_TOLERANCE * float(eye.throughput))
-    if not 0 < tolerance < np.inf:
-        raise ValueError(f"tolerance = {tolerance!r}: must be positive")
-    return tolerance

@@ -18,10 +18,11 @@ import numpy as np
 
 import optics
 from optics.spectra.spectrum import Spectrum
+from sim.eyes.allowed_error import allowed_error
 from sim.render.fidelity import EDGES, RAYS, Fidelity, Level
 from sim.render.fidelity_choice import FidelityWarning
 from sim.robots.appearances import Varied
-from sim.robots.edge_rays import allowed_error, edges_pay
+from sim.robots.edge_rays import edges_pay
 from sim.robots.model_renderer import ModelRenderer
 from sim.robots.mounts import Mount
 from sim.robots.poses import Poses

@@ -11,12 +11,13 @@ import numpy as np
 import optics
 from optics.numerics.arguments import of_kind, whole
 from optics.spectra.spectrum import Spectrum
+from sim.eyes.allowed_error import allowed_error
 from sim.eyes.sampling import BoxSampling, directions_of, eye_sampling
 from sim.render.fidelity import AREAS, EDGES, Fidelity
 from sim.render.memory_budget import Demand, check_memory
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.robots.appearances import Varied
-from sim.robots.edge_rays import FIRST, EdgeRays, allowed_error
+from sim.robots.edge_rays import FIRST, EdgeRays
 from sim.robots.eye_kinds import mounts_of
 from sim.robots.inside import depth_inside
 from sim.robots.model_scene import ModelScene

@@ -5,17 +5,18 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sim.eyes import field_areas
+import optics
+from sim.eyes.allowed_error import allowed_error
 from sim.eyes.field_areas import BEYOND, FieldAreas
 from sim.eyes.receptive_fields import ReceptiveFields, cells_per_receptor
 from sim.eyes.sampling import FieldSampling
-from tests.sim.eyes.test_sensor import convolved, dense, eye, focused, plane_of, prism, scene
+from tests.sim.eyes.test_sensor import L, convolved, dense, eye, focused, plane_of, prism, scene
 
 FINE = 8  # points along an area's side, on which its mean is found
 
 
-def sampling_of(e):
-    return FieldSampling(e, ReceptiveFields.of(e, cells_per_receptor(e.resolution)))
+def sampling_of(e, tolerance=None):
+    return FieldSampling(e, ReceptiveFields.of(e, cells_per_receptor(e.resolution)), tolerance=tolerance)
 
 
 def from_means(e, sensor):
@@ -29,9 +30,9 @@ def from_means(e, sensor):
     return e.throughput * np.einsum("cb,byx->cyx", e.spectral_bands.weights, receptors)
 
 
-def error(e, per_receptor):
+def error(e, per_receptor, tolerance=None):
     expected = convolved(e, cells_per_receptor(e.resolution))
-    found = from_means(e, sampling_of(e).areas(per_receptor))
+    found = from_means(e, sampling_of(e, tolerance).areas(per_receptor))
     return np.sqrt(np.mean((found - expected) ** 2)) / expected.mean()
 
 
@@ -43,15 +44,29 @@ def test_agrees_with_the_convolution(pupil, most):
 
 
 @pytest.mark.parametrize("pupil", [focused(), prism()], ids=["focused", "prism"])
-def test_errors_fall_with_smaller_areas(monkeypatch, pupil):
+def test_errors_fall_with_smaller_areas(pupil):
     """As the square of their sides, and better where that makes them fit the fields: by 3 at least for half the side.
     Then nothing may be left beyond the lattice; the convolution's own cells, a quarter as wide as receptors, err by
     .0015 at most."""
-    monkeypatch.setattr(field_areas, "BEYOND", 5e-4)
     e = eye(pupil=pupil)
-    errors = [error(e, n) for n in (1, 4, 16)]
+    errors = [error(e, n, 5e-4 * e.throughput) for n in (1, 4, 16)]
     assert errors[1] < errors[0] / 3
     assert errors[2] < 0.0015
+
+
+@pytest.mark.parametrize("a", [0.9, 0.55, 0.3])
+def test_the_lattice_reaches_as_far_as_the_noise_asks(a):
+    """Behind a hole one area per receptor errs by no more than is allowed, although the rim's receptors get most of
+    their light from beside the retina. As far as pupils reached whatever the noise, those wider than half of the retina
+    erred by more."""
+    e = dataclasses.replace(eye((15, 15), optics.Pupil(aperture_radius=a * L / 2)), noise_sigma=0.003)
+    expected, allowed = convolved(e, cells_per_receptor(e.resolution)), allowed_error(e, None)
+
+    def rms(tolerance):
+        return np.sqrt(np.mean((from_means(e, sampling_of(e, tolerance).areas(1)) - expected) ** 2))
+
+    assert rms(None) < allowed
+    assert (rms(BEYOND * e.throughput) > allowed) == (a > 0.5)
 
 
 def turned(self, fields, receptors, right=FieldAreas.weights):
