@@ -8,6 +8,7 @@ focus, one rectangle per receptor does: sharp fields are the rectangles themselv
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,16 +31,18 @@ class FieldAreas:
     edges: tuple[np.ndarray, np.ndarray]
 
     @classmethod
-    def of(cls, fields: ReceptiveFields, parts: tuple[int, int], beyond: float = BEYOND) -> FieldAreas:
+    def of(cls, fields: ReceptiveFields, parts: tuple[float, float], beyond: float = BEYOND) -> FieldAreas:
         """Each receptor's square in so many rows and columns, and as many more around them as its light comes from, but
-        for such a share beyond either side."""
+        for such a share beyond either side. Less than one row: of several receptors, and together as high as all or
+        higher."""
         found = []
         for axis, (n, per_receptor) in enumerate(zip(fields.resolution, parts, strict=True)):
             field = fields.field.sum(axis=2 - axis)
             profile = np.mean(field / field.sum(axis=-1, keepdims=True), axis=0)
             ends = profile, profile[::-1]
             lower, upper = (_rim(end, (n, per_receptor), fields.cells, beyond) for end in ends)
-            found.append(np.arange(-lower, n * per_receptor + upper + 1) / per_receptor - n / 2)
+            within = _within(n, per_receptor)
+            found.append((np.arange(-lower, within + upper + 1) - within / 2) / per_receptor)
         return cls((found[0], found[1]))
 
     @property
@@ -70,7 +73,12 @@ class FieldAreas:
         return found
 
 
-def _rim(profile: np.ndarray, line: tuple[int, int], cells: int, beyond: float) -> int:
+def _within(n: int, per_receptor: float) -> int:
+    """Rectangles that n receptors in a line take."""
+    return math.ceil(n * per_receptor - 1e-9)
+
+
+def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float) -> int:
     """How many rectangles lie before the first receptor's: so few that no more than this share of the light of a line
     of receptors comes from before; profile: of a receptor's field along that line, line: its receptors, and rectangles
     of each."""
@@ -78,7 +86,8 @@ def _rim(profile: np.ndarray, line: tuple[int, int], cells: int, beyond: float) 
     # Of a field that begins so many cells before the line's first receptor, what is before that, per receptor.
     before = np.concatenate([[0.0], np.cumsum(profile)])
     start = (len(profile) - cells) / 2
-    rims = np.arange(per_receptor * len(profile)) / per_receptor
+    overhang = (_within(n, per_receptor) / per_receptor - n) / 2
+    rims = np.arange(max(per_receptor, 1) * len(profile)) / per_receptor + overhang
     ends = start - cells * (np.arange(n)[:, None] + rims)
     lost = np.interp(ends, np.arange(len(before)), before).mean(axis=0)
     return int(np.argmax(lost <= beyond))

@@ -146,8 +146,8 @@ class FieldSampling:
         return max(1, round(rays_per_receptor * np.prod(self.eye.resolution)))
 
     def areas(self, per_receptor: float, *, in_rows: bool = True) -> ReceptiveFieldSensor:
-        """The sensor whose samples are rectangles: as many of each receptor's square as `BoxSampling.areas` has, and
-        of what more its receptors see."""
+        """The sensor whose samples are rectangles: as many of each receptor's square as `BoxSampling.areas` has, or
+        less than one, and of what more its receptors see."""
         lattice = self._lattice(per_receptor, in_rows)
         plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
         weights = self._in_rows(lambda receptors: lattice.weights(self.fields, receptors))
@@ -162,7 +162,7 @@ class FieldSampling:
 
     def _lattice(self, per_receptor: float, in_rows: bool) -> FieldAreas:
         beyond = min(allowed_error(self.eye, self.tolerance) / self.eye.throughput, BEYOND)
-        return FieldAreas.of(self.fields, parts_of(max(1, round(per_receptor)), in_rows), beyond)
+        return FieldAreas.of(self.fields, _parts_or_share(per_receptor, in_rows), beyond)
 
     def _sensor(self, rays: int) -> ReceptiveFieldSensor:
         draw = self.fields.draw(rays)
@@ -185,6 +185,13 @@ def parts_of(count: int, in_rows: bool) -> tuple[int, int]:
     """Rows and columns of a receptor that is cut into so many parts."""
     rows = max(n for n in range(1, math.isqrt(count) + 1) if count % n == 0) if in_rows else 1
     return rows, count // rows
+
+
+def _parts_or_share(per_receptor: float, in_rows: bool) -> tuple[float, float]:
+    """The same of a whole number of parts; less than one: of the rows and columns that receptors share."""
+    if per_receptor >= 1:
+        return parts_of(round(per_receptor), in_rows)
+    return (math.sqrt(per_receptor), math.sqrt(per_receptor)) if in_rows else (1.0, per_receptor)
 
 
 def _unused(plane: np.ndarray) -> np.ndarray:

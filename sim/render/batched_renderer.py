@@ -95,8 +95,9 @@ class BatchedRenderer:
             self.sensor = scene.area_sensor(sampling, fidelity.rays_per_receptor)
         else:
             self.sensor = sampling.sensor(fidelity.rays_per_receptor)
-        if self.eye.pupil is None or fidelity.samples == AREAS:  # a whole number of its own for every receptor
-            self.fidelity = replace(fidelity, rays_per_receptor=float(max(1, round(fidelity.rays_per_receptor))))
+        asked = fidelity.rays_per_receptor
+        if self.eye.pupil is None or (fidelity.samples == AREAS and asked > 1):  # of its own for every receptor: whole
+            self.fidelity = replace(fidelity, rays_per_receptor=float(max(1, round(asked))))
         mixing = self.eye.throughput * self.bands.weights
         self.brightest = float((mixing @ white).max())
         self._receptor_sums = self.sensor.receptor_sums(mixing, self.tracer.basis)

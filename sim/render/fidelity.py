@@ -31,7 +31,7 @@ class Level:
 class Fidelity:
     """How finely a world is rendered for given eyes; printed, it is a table.
 
-    rays_per_receptor: on average; behind a pupil it may be below 1, since all receptors share all rays
+    rays_per_receptor: on average; behind a pupil it may be below 1, since all receptors share all rays and areas
     bands: spectral bands
     depth: distances for which the eye has a PSF
     light: what of it is followed: "direct"; "bounce", which adds light that is reflected twice; or, with areas, "all"

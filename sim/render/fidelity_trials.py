@@ -120,13 +120,13 @@ class FidelityTrials:
             return False
         return True
 
-    def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[int], float]:
+    def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
         """The same with so many areas per receptor; the truth's own noise is part of it."""
         true = self._truth(sampling)
         populations = self._populations(sampling)
         truths = [self._signals(true, sampling.depth, light, p.views, TRUE_RAYS) for p in populations]
 
-        def error(areas: int) -> float:
+        def error(areas: float) -> float:
             trial = self._scene.area_trial(sampling, areas, self._receptors)
             found = (
                 (p, self._signals(trial, sampling.depth, light, p.views.take(len(t)), TRUE_RAYS) - t)

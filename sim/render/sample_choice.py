@@ -16,7 +16,9 @@ from sim.tracing.lighting import ALL, BOUNCE
 # Numbers of rays that are tried: steps of about √2, so that hardly more are traced than are needed.
 PERFECT_LENS_RAYS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 PUPIL_RAYS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
-NUMBERS_OF_AREAS = (1, 2, 4, 6, 9, 12, 16, 20, 25, 30)
+FEW_RAYS = 1  # for each receptor: fewer hardly cost less
+PERFECT_LENS_AREAS = (1, 2, 4, 6, 9, 12, 16, 20, 25, 30)
+PUPIL_AREAS = (1 / 9, 1 / 4, 4 / 9, *PERFECT_LENS_AREAS)  # blur wider than receptors: areas three, two, 1.5 wide
 # What an area costs, in rays (docs/measurements/rendering.md); where fewer will do, they are taken. Behind a pupil its
 # light is spread by the kernel, which rays pay for, too.
 PERFECT_LENS_AREA, PUPIL_AREA = 3, 1.6
@@ -51,6 +53,7 @@ def fewest_samples(
     errors = trials.errors(sampling, light.level)
     perfect = isinstance(sampling, BoxSampling)
     numbers: tuple[float, ...] = PERFECT_LENS_RAYS if perfect else PUPIL_RAYS
+    of_areas: tuple[float, ...] = PERFECT_LENS_AREAS if perfect else PUPIL_AREAS
 
     def cost(number: float) -> float:
         one = (PERFECT_LENS_AREA if perfect else PUPIL_AREA) * (IN_BOUNCED_LIGHT if light.level == BOUNCE else 1)
@@ -59,9 +62,9 @@ def fewest_samples(
     def rays(most: float = math.inf) -> Samples:
         return Samples(RAYS, light, *_fewest(errors, tuple(n for n in numbers if n <= most), allowed, RAYS))
 
-    if (few := rays(cost(1))).enough:
+    if (few := rays(max(FEW_RAYS, cost(of_areas[0])))).enough:
         return few
-    areas = _areas(trials, sampling, light, allowed, without_light)
+    areas = _areas(trials, sampling, light, of_areas, (allowed, without_light))
     if areas is None:
         return rays()
     if not areas.enough:
@@ -71,16 +74,20 @@ def fewest_samples(
 
 
 def _areas(
-    trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: float, without_light: float
+    trials: FidelityTrials,
+    sampling: EyeSampling,
+    light: Level,
+    numbers: tuple[float, ...],
+    allowed: tuple[float, float],
 ) -> Samples | None:
-    """None where they cannot see the world."""
+    """None where they cannot see the world; allowed: errors, the other where no light is left out."""
     if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):
         return None
-    errors = trials.area_errors(sampling, light.level)
+    errors, most = trials.area_errors(sampling, light.level), allowed[0]
     if light.level == BOUNCE:
-        more, allowed = trials.reflected_more_often(sampling), without_light
+        more, most = trials.reflected_more_often(sampling), allowed[1]
         light = Level("light", ALL, None, f"light that is reflected more than twice is worth {more:.1e}; in tables")
-    return Samples(AREAS, light, *_fewest(lambda n: errors(int(n)), NUMBERS_OF_AREAS, allowed, AREAS))
+    return Samples(AREAS, light, *_fewest(errors, numbers, most, AREAS))
 
 
 def _fewest(
@@ -104,5 +111,5 @@ def _fewest(
     enough = predicted <= allowed
     number = numbers[at] if enough else next(n for n, e in tried.items() if e <= HARDLY_MORE * min(tried.values()))
     found = "fewest of" if enough else "not enough, but hardly worse than any of"
-    why = f"{found} {numbers[0]:g} ... {numbers[-1]:g} for {allowed:.1e}, {len(tried)} tried"
-    return number, Level(kind, f"{number:g} per receptor", tried[number], why), enough
+    why = f"{found} {numbers[0]:.3g} ... {numbers[-1]:.3g} for {allowed:.1e}, {len(tried)} tried"
+    return number, Level(kind, f"{number:.3g} per receptor", tried[number], why), enough
