@@ -69,6 +69,33 @@ def test_the_lattice_reaches_as_far_as_the_noise_asks(a):
     assert (rms(BEYOND * e.throughput) > allowed) == (a > 0.5)
 
 
+@pytest.mark.parametrize("a", [0.55, 0.3])
+def test_areas_of_several_receptors_err_as_the_square_of_their_sides(a):
+    """Holes blur them more widely than they are. Areas of four receptors and of one: sides twice as long."""
+    e = eye((15, 15), optics.Pupil(aperture_radius=a * L / 2))
+    of_four, of_one = (error(e, n, 5e-4 * e.throughput) for n in (1 / 4, 1))
+    assert 3 < of_four / of_one < 5
+
+
+def test_areas_of_several_receptors_cover_all_in_the_middle():
+    """Fifteen receptors take ten columns of 1.5 or, with half a one beyond either side, eight of two."""
+    fields = sampling_of(eye((15, 15), focused())).fields
+    for per_receptor, columns in ((4 / 9, 10), (1 / 4, 8)):
+        lattice = FieldAreas.of(fields, (1, per_receptor**0.5))
+        assert len(lattice.edges[1]) == columns + 1
+        assert lattice.size == pytest.approx((per_receptor**-0.5, 1))
+        assert sum(lattice.edges[1]) == pytest.approx(0)
+
+
+def test_columns_of_any_height_leave_rows_alone():
+    """Where nothing but columns matters, receptors of one row share an area and those of several do not."""
+    e = eye((4, 8), optics.Pupil(aperture_radius=0.1 * L))
+    tall, square = (sampling_of(e).areas(1 / 4, in_rows=in_rows) for in_rows in (False, True))
+    pitch = e.receptor_pitch / e.sensor_distance
+    assert tall.extent == pytest.approx((4 * pitch, pitch))
+    assert square.extent == pytest.approx((2 * pitch, 2 * pitch))
+
+
 def turned(self, fields, receptors, right=FieldAreas.weights):
     return right(self, dataclasses.replace(fields, field=fields.field[:, ::-1, ::-1]), receptors)
 
