@@ -7,4 +7,5 @@ field_areas: test_field_areas.py, tracing/test_areas_behind_pupils.py
 receptive_fields: test_sensor.py, tracing/test_lighting.py
 receptor_sums: test_sensor.py
 depth_layers: test_depth_layers.py
+allowed_error: test_allowed_error.py
 """
