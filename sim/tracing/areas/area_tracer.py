@@ -23,7 +23,7 @@ from sim.tracing.areas.columns import RIM, Columns, Piece
 from sim.tracing.areas.illumination import Illumination, Moment
 from sim.tracing.areas.light_table import LightTable, sum_of
 from sim.tracing.areas.patch import Area, Patch
-from sim.tracing.areas.sphere_areas import Slice, SphereTexture, SphereView
+from sim.tracing.areas.sphere_areas import Slice, SphereTexture, SphereView, Strip
 from sim.tracing.areas.stripes import Stripes, Texture
 from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.spheres import Spheres
@@ -183,30 +183,51 @@ class AreaTracer:
     def _sphere(self, area: Area, k: int, pieces: tuple[Piece, Piece], now: Moment, depth: DepthLayers) -> list[Array]:
         """Shares of the area in which it hides either wall and the floor, and light that comes from it, per component,
         times its share; without what is hidden by nearer spheres."""
-        texture, radius = self._sphere_textures[k], self._radii[k]
-        around = self._reflected.on_body(k, now.bodies[k], now.inputs) if self._reflected else None
-        view = SphereView(area, now.bodies[k], radius)
+        view = SphereView(area, now.bodies[k], self._radii[k])
 
-        def add(index: Array, hidden: list[Array], total: list[Array]) -> tuple[Array, ...]:
-            slice_ = view.slice(index)
-            bare = self._not_hidden(area, k, slice_, now)
-            behind = [self._columns.behind(area, piece, slice_.part) for piece in pieces]
+        def add(number: Array, hidden: list[Array], total: list[Array]) -> tuple[Array, ...]:
+            strip = view.strip(number)
+            behind = [self._columns.behind(area, piece, strip.part) for piece in pieces]
             found = behind[0].beside, behind[1].beside, behind[0].below + behind[1].below
-            column, sides = sphere_areas.columns_of(texture, slice_.patch, radius)
-            reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs)
-            light = self._illumination.irradiance(slice_.patch, now, k)
-            if around:
-                arriving = [sum_of(fours, slice_.patch.normal) for fours in around]
-                light = _sum(light, self._illumination.past_bodies(slice_.patch, arriving, now, k))
-            layers = _in_layers(depth, slice_.vergence(area), light)
-            sent_on = zip(reflectance * depth.count, layers, strict=True)
-            total = [dr.fma(slice_.share * bare, r * e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
+            bare, *sent_on = self._strip(area, k, (view, strip), now, depth)
             hidden = [dr.fma(own, bare, sum_) for own, sum_ in zip(found, hidden, strict=True)]
-            return index + 1, hidden, total
+            return number + 1, hidden, _sum(sent_on, total)
 
         start = mi.UInt32(0), [mi.Float(0)] * 3, [mi.Float(0) for _ in range(depth.count * len(self.basis))]
-        _, hidden, total = dr.while_loop(start, lambda index, *_: index < view.count, add, label="slices")
+        _, hidden, total = dr.while_loop(start, lambda number, *_: number < view.sides, add, label="strips")
         return [*hidden, *total]
+
+    def _strip(
+        self, area: Area, k: int, seen: tuple[SphereView, Strip], now: Moment, depth: DepthLayers
+    ) -> list[Array]:
+        """Share of a strip of a sphere before which no other stands, and light that comes from it, per component, times
+        its share of the area. What share of each light reaches it and what other bodies change of reflected light is
+        found once; slices have their own slopes and textures, and are hidden one by one."""
+        (view, strip), texture = seen, self._sphere_textures[k]
+        lit = self._illumination.lit(strip.patch, now, k)
+        around, change = [], [mi.Float(0)] * len(self.basis)
+        if self._reflected:
+            around = self._reflected.on_body(k, now.bodies[k], now.inputs)
+            free = [sum_of(fours, strip.patch.normal) for fours in around]
+            left = self._illumination.past_bodies(strip.patch, free, now, k)
+            change = [a - b for a, b in zip(left, free, strict=True)]
+
+        def add(number: Array, total: list[Array]) -> tuple[Array, list[Array]]:
+            slice_ = view.slice(strip, number)
+            bare = self._not_hidden(area, k, slice_, now)
+            column, sides = sphere_areas.columns_of(texture, slice_.patch, self._radii[k])
+            reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs)
+            light = self._illumination.arriving(slice_.patch.normal, lit)
+            if around:
+                light = _sum(light, _sum(change, [sum_of(fours, slice_.patch.normal) for fours in around]))
+            layers = _in_layers(depth, slice_.vergence(area), light)
+            sent_on = [bare / mi.Float(view.sides)]
+            sent_on += [slice_.share * bare * r * e for r, e in zip(reflectance * depth.count, layers, strict=True)]
+            return number + 1, _sum(sent_on, total)
+
+        start = mi.UInt32(0), [mi.Float(0)] * (1 + depth.count * len(self.basis))
+        _, total = dr.while_loop(start, lambda number, _: number < view.sides, add, label="slices")
+        return total
 
     def _not_hidden(self, area: Area, k: int, slice_: Slice, now: Moment) -> Array:
         """Share of a slice before which no other sphere stands; as if others hid it at random, where several do."""

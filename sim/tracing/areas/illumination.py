@@ -55,15 +55,22 @@ class Illumination:
     def irradiance(self, patch: Patch, now: Moment, itself: int = ITSELF_NONE) -> list[Array]:
         """Per component: sum over the lights of level · cos θ · share that is lit; itself: the body that the patch is
         part of."""
+        return self.arriving(patch.normal, self.lit(patch, now, itself))
+
+    def lit(self, patch: Patch, now: Moment, itself: int = ITSELF_NONE) -> list[Array]:
+        """Share of a patch that each light reaches."""
 
         def past(k: Array, lit: list[Array]) -> list[Array]:
             left = lit_past_sphere(patch, self._directions, of(k, now.bodies), of(k, self._radii))
             return [dr.select(k == itself, share, share * other) for share, other in zip(lit, left, strict=True)]
 
-        lit = self._for_bodies(past, self._shadows.lit(patch, self._directions, now.inputs))
+        return self._for_bodies(past, self._shadows.lit(patch, self._directions, now.inputs))
+
+    def arriving(self, normal: Array, lit: list[Array]) -> list[Array]:
+        """Per component: sum over the lights of level · cos θ · these shares."""
         total = [mi.Float(0) for _ in range(self._levels.shape[1])]
         for direction, level, share in zip(self._directions, self._levels, lit, strict=True):
-            arrives = share * dr.maximum(dr.dot(patch.normal, mi.Vector3f(*direction)), 0)
+            arrives = share * dr.maximum(dr.dot(normal, mi.Vector3f(*direction)), 0)
             total = [dr.fma(arrives, float(factor), sum_) for factor, sum_ in zip(level, total, strict=True)]
         return total
 

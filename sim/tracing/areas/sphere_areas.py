@@ -38,8 +38,8 @@ class SphereTexture:
 
 
 @dataclass(frozen=True)
-class Slice:
-    """A sphere as an area sees it.
+class Strip:
+    """Of what an area sees of a sphere.
 
     share: of the area that it fills · part: which that is, nearly
     seen, along, across: direction of its middle, and its sides on the area's plane · patch: what is seen there
@@ -52,6 +52,17 @@ class Slice:
     across: Array
     patch: Patch
 
+
+@dataclass(frozen=True)
+class Slice:
+    """Of a strip. share: of the area that it fills · seen, along, across: as of a strip · patch: what is seen there"""
+
+    share: Array
+    seen: Array
+    along: Array
+    across: Array
+    patch: Patch
+
     def vergence(self, area: Area) -> Array:
         """1/z along the eye's axis [1/m]."""
         found: Array = dr.norm(self.seen) * dr.rcp(dr.norm(self.patch.point - area.origin))
@@ -59,9 +70,9 @@ class Slice:
 
 
 class SphereView:
-    """What an area sees of a sphere, in slices: strips across what it fills, cut to as many parts each.
+    """What an area sees of a sphere: strips across what it fills, cut to as many slices each.
 
-    count: of slices
+    sides: how many
     """
 
     def __init__(self, area: Area, centre: Array, radius: float) -> None:
@@ -79,25 +90,30 @@ class SphereView:
         self._upright = upright = slope(right) <= slope(up)
         self._along, self._across = dr.select(upright, up, right), dr.select(upright, right, up)
         self._outline = _outline(way, radius, ahead, self._along, self._across)
-        self._sides = sides = dr.select(dr.norm(area.right) > WIDE, mi.UInt32(SIDES_OF_WIDE), mi.UInt32(SIDES))
-        self.count = sides * sides
+        self.sides = dr.select(dr.norm(area.right) > WIDE, mi.UInt32(SIDES_OF_WIDE), mi.UInt32(SIDES))
 
-    def slice(self, index: Array) -> Slice:
+    def strip(self, number: Array) -> Strip:
         """One of them."""
-        n, per = mi.Float(self._sides), dr.rcp(mi.Float(self._sides))
-        outline, number = self._outline, dr.floor((mi.Float(index) + 0.5) * per)
-        one, other = outline.edge(number * per), outline.edge((number + 1) * per)
+        outline, per = self._outline, dr.rcp(mi.Float(self.sides))
+        one, other = outline.edge(mi.Float(number) * per), outline.edge((mi.Float(number) + 1) * per)
         place, width = (one.place + other.place) / 2, other.place - one.place
         cut = _chord(self._way, self._tangent, self._ahead + self._across * place, self._along)
         chord = outline.mean_chord(one, other)
         length, middle = (dr.select(outline.closed, mean, open_) for mean, open_ in zip(chord, cut, strict=True))
-        middle = middle + length * ((mi.Float(index) - number * n + 0.5) * per - 0.5)
-        length = length * per
         seen = self._ahead + self._across * place + self._along * middle
         sides = self._along * length, self._across * width
-        patch = _patch(self._way, self._tangent, seen, *sides, self._area.origin, self._centre)
         upright = Rectangle(place, middle, width, length), Rectangle(middle, place, length, width)
-        return Slice(length * width, dr.select(self._upright, *upright), seen, *sides, patch)
+        return Strip(length * width, dr.select(self._upright, *upright), seen, *sides, self._patch(seen, *sides))
+
+    def slice(self, strip: Strip, number: Array) -> Slice:
+        """One of a strip's."""
+        per = dr.rcp(mi.Float(self.sides))
+        seen = strip.seen + strip.along * ((mi.Float(number) + 0.5) * per - 0.5)
+        sides = strip.along * per, strip.across
+        return Slice(strip.share * per, seen, *sides, self._patch(seen, *sides))
+
+    def _patch(self, seen: Array, along: Array, across: Array) -> Patch:
+        return _patch(self._way, self._tangent, seen, along, across, self._area.origin, self._centre)
 
 
 @dataclass(frozen=True)

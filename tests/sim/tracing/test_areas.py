@@ -108,14 +108,14 @@ def no_filter(monkeypatch):
 
 def all_or_nothing(monkeypatch):
     """A sphere fills the area or does not, as its middle says."""
-    right = sphere_areas.SphereView.slice
+    right = sphere_areas.SphereView.strip
 
-    def slice_(self, index):
-        found = right(self, index)
+    def strip(self, number):
+        found = right(self, number)
         on = dr.dot(self._way, self._ahead) ** 2 > dr.squared_norm(self._ahead) * self._tangent
-        return dataclasses.replace(found, share=dr.select(on, dr.rcp(mi.Float(self.count)), 0))
+        return dataclasses.replace(found, share=dr.select(on, dr.rcp(mi.Float(self.sides)), 0))
 
-    monkeypatch.setattr(sphere_areas.SphereView, "slice", slice_)
+    monkeypatch.setattr(sphere_areas.SphereView, "strip", strip)
 
 
 def objects_are_transparent(monkeypatch):
