@@ -5,6 +5,7 @@ branches       what is left out where no area needs it
 illumination   the light that falls on a patch
 patch          Area, and the Patch of a surface that is seen in it
 lit_bodies     and on bodies that move
+body_light     what of it arrives where they are seen
 half_planes    shares that straight lines cut off
 borders        between columns of areas
 columns        walls, floor and sky behind an area

@@ -18,10 +18,11 @@ from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.scene.device_arrays import floats
 from sim.tracing import lighting
 from sim.tracing.areas import sphere_areas
+from sim.tracing.areas.body_light import BodyLight
 from sim.tracing.areas.branches import only_where
 from sim.tracing.areas.columns import RIM, Columns, Piece
 from sim.tracing.areas.illumination import Illumination, Moment
-from sim.tracing.areas.light_table import LightTable, sum_of
+from sim.tracing.areas.light_table import LightTable
 from sim.tracing.areas.patch import Area, Patch
 from sim.tracing.areas.sphere_areas import Slice, SphereTexture, SphereView, Strip
 from sim.tracing.areas.stripes import Stripes, Texture
@@ -184,12 +185,13 @@ class AreaTracer:
         """Shares of the area in which it hides either wall and the floor, and light that comes from it, per component,
         times its share; without what is hidden by nearer spheres."""
         view = SphereView(area, now.bodies[k], self._radii[k])
+        light = BodyLight.of(self._illumination, self._reflected, k, view.whole().patch, now)
 
         def add(number: Array, hidden: list[Array], total: list[Array]) -> tuple[Array, ...]:
             strip = view.strip(number)
             behind = [self._columns.behind(area, piece, strip.part) for piece in pieces]
             found = behind[0].beside, behind[1].beside, behind[0].below + behind[1].below
-            bare, *sent_on = self._strip(area, k, (view, strip), now, depth)
+            bare, *sent_on = self._strip(area, k, view, strip, (light, now, depth))
             hidden = [dr.fma(own, bare, sum_) for own, sum_ in zip(found, hidden, strict=True)]
             return number + 1, hidden, _sum(sent_on, total)
 
@@ -198,29 +200,18 @@ class AreaTracer:
         return [*hidden, *total]
 
     def _strip(
-        self, area: Area, k: int, seen: tuple[SphereView, Strip], now: Moment, depth: DepthLayers
+        self, area: Area, k: int, view: SphereView, strip: Strip, how: tuple[BodyLight, Moment, DepthLayers]
     ) -> list[Array]:
         """Share of a strip of a sphere before which no other stands, and light that comes from it, per component, times
-        its share of the area. What share of each light reaches it and what other bodies change of reflected light is
-        found once; slices have their own slopes and textures, and are hidden one by one."""
-        (view, strip), texture = seen, self._sphere_textures[k]
-        lit = self._illumination.lit(strip.patch, now, k)
-        around, change = [], [mi.Float(0)] * len(self.basis)
-        if self._reflected:
-            around = self._reflected.on_body(k, now.bodies[k], now.inputs)
-            free = [sum_of(fours, strip.patch.normal) for fours in around]
-            left = self._illumination.past_bodies(strip.patch, free, now, k)
-            change = [a - b for a, b in zip(left, free, strict=True)]
+        its share of the area."""
+        (light, now, depth), texture = how, self._sphere_textures[k]
 
         def add(number: Array, total: list[Array]) -> tuple[Array, list[Array]]:
             slice_ = view.slice(strip, number)
             bare = self._not_hidden(area, k, slice_, now)
             column, sides = sphere_areas.columns_of(texture, slice_.patch, self._radii[k])
             reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs)
-            light = self._illumination.arriving(slice_.patch.normal, lit)
-            if around:
-                light = _sum(light, _sum(change, [sum_of(fours, slice_.patch.normal) for fours in around]))
-            layers = _in_layers(depth, slice_.vergence(area), light)
+            layers = _in_layers(depth, slice_.vergence(area), light.on(slice_.patch.normal))
             sent_on = [bare / mi.Float(view.sides)]
             sent_on += [slice_.share * bare * r * e for r, e in zip(reflectance * depth.count, layers, strict=True)]
             return number + 1, _sum(sent_on, total)

@@ -92,10 +92,19 @@ class SphereView:
         self._outline = _outline(way, radius, ahead, self._along, self._across)
         self.sides = dr.select(dr.norm(area.right) > WIDE, mi.UInt32(SIDES_OF_WIDE), mi.UInt32(SIDES))
 
+    def whole(self) -> Strip:
+        """All that is seen, as if it were one."""
+        return self._between(mi.Float(0), mi.Float(1))
+
     def strip(self, number: Array) -> Strip:
         """One of them."""
-        outline, per = self._outline, dr.rcp(mi.Float(self.sides))
-        one, other = outline.edge(mi.Float(number) * per), outline.edge((mi.Float(number) + 1) * per)
+        per = dr.rcp(mi.Float(self.sides))
+        return self._between(mi.Float(number) * per, (mi.Float(number) + 1) * per)
+
+    def _between(self, low: Array, high: Array) -> Strip:
+        """With such shares of what is seen before its sides."""
+        outline = self._outline
+        one, other = outline.edge(low), outline.edge(high)
         place, width = (one.place + other.place) / 2, other.place - one.place
         cut = _chord(self._way, self._tangent, self._ahead + self._across * place, self._along)
         chord = outline.mean_chord(one, other)

@@ -19,6 +19,7 @@ areas.columns: test_areas.py
 areas.half_planes: test_area_integrals.py, test_areas.py
 areas.illumination: test_illumination.py, test_areas.py
 areas.lit_bodies: test_lit_bodies.py, test_light_table.py
+areas.body_light: test_body_light.py, test_areas.py
 areas.borders: render/test_area_wavefront.py
 areas.patch: test_areas.py
 areas.shadows: test_areas.py

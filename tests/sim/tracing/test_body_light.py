@@ -1,0 +1,99 @@
+"""Light on what is seen of a body, against light that is found for every slope by itself."""
+
+import dataclasses
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from sim.scene.variant import variant
+from sim.tracing.areas.body_light import BodyLight
+from sim.tracing.areas.illumination import Illumination, Moment
+from sim.tracing.areas.light_table import sum_of
+from sim.tracing.areas.patch import Patch
+from tests.sim.tracing.test_lit_bodies import WORLDS, bodies_of, scene  # noqa: F401
+
+SIZE = 0.05  # of a patch [m]
+SIDES = ((1.0, 0.0, 0.0), (0.0, -0.6, 0.8), (-0.8, 0.0, -0.6))
+
+
+def moment(tracer, centres):
+    bodies = [mi.Point3f(c.T.astype(np.float32)) for c in np.moveaxis(centres, 1, 0)]
+    place = dr.arange(mi.UInt32, tracer.places * WORLDS) % tracer.places
+    spread = [mi.Point3f(np.repeat(c, tracer.places, axis=0).T.astype(np.float32)) for c in np.moveaxis(centres, 1, 0)]
+    lit = tracer.lit(place, spread, tracer.inputs)
+    return Moment(bodies, tracer.inputs, dr.arange(mi.UInt32, WORLDS), lit)
+
+
+def patch_of(tracer, now, side):
+    """Of the first body, where it slopes like this."""
+    normal = mi.Normal3f(*map(float, side))
+    along = dr.normalize(dr.cross(normal, mi.Vector3f(0.1, 0.2, 1)))
+    return Patch(now.bodies[0] + normal * tracer._radii[0], normal, along * SIZE, dr.cross(normal, along) * SIZE)
+
+
+def by_itself(tracer, patch, now):
+    """Per component and world: straight from the lights, and what walls, floor and other bodies send on."""
+    straight = tracer._illumination.irradiance(patch, now, 0)
+    free = [sum_of(fours, patch.normal) for fours in tracer._reflected.on_body(0, now.bodies[0], now.inputs)]
+    reflected = tracer._illumination.past_bodies(patch, free, now, 0)
+    return np.array([np.array(a + b) for a, b in zip(straight, reflected, strict=True)])
+
+
+def on(light, patch):
+    return np.array([np.array(component) for component in light.on(patch.normal)])
+
+
+def light_at(tracer, now, side):
+    patch = patch_of(tracer, now, side)
+    return BodyLight.of(tracer._illumination, tracer._reflected, 0, patch, now), patch
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_on_its_own_slope_it_is_what_is_found_by_itself(scene, side):  # noqa: F811
+    with variant():
+        tracer = scene.areas("all")
+        now = moment(tracer, bodies_of(scene))
+        light, patch = light_at(tracer, now, side)
+        expected = by_itself(tracer, patch, now)
+        np.testing.assert_allclose(on(light, patch), expected, rtol=1e-5, atol=1e-6)
+        # What other bodies shade and send on is in it, and is worth noticing.
+        unchanged = dataclasses.replace(light, change=[mi.Float(0)] * len(light.change))
+        assert np.abs(on(unchanged, patch) - expected).max() > 0.01 * expected.max()
+
+
+def test_slopes_nearby_have_their_own_light(scene):  # noqa: F811
+    """Twelve degrees off, as at the rim of what an eye of 15 x 15 sees of a body in one receptor: to 1 % of the
+    brightest in the mean (root of squares), where light of the middle's slope errs by five times as much."""
+    turned = np.array([np.cos(np.radians(12)), np.sin(np.radians(12)), 0.0])
+    with variant():
+        tracer = scene.areas("all")
+        now = moment(tracer, bodies_of(scene))
+        light, middle = light_at(tracer, now, SIDES[0])
+        patch = patch_of(tracer, now, turned)
+        expected = by_itself(tracer, patch, now)
+        error, wrong = (np.sqrt(np.mean((found - expected) ** 2)) for found in (on(light, patch), on(light, middle)))
+    assert error < 0.01 * expected.max()
+    assert wrong > 5 * error
+
+
+def test_light_that_is_not_followed_is_not_there(scene):  # noqa: F811
+    with variant():
+        tracer, all_ = scene.areas("direct"), scene.areas("all")
+        now = moment(all_, bodies_of(scene))
+        light, patch = light_at(tracer, now, SIDES[1])
+        straight = tracer._illumination.irradiance(patch, now, 0)
+        np.testing.assert_array_equal(on(light, patch), [np.array(component) for component in straight])
+
+
+def test_shadows_of_other_bodies_are_noticed(scene, monkeypatch):  # noqa: F811
+    with variant():
+        tracer = scene.areas("all")
+        now = moment(tracer, bodies_of(scene))
+        light, patch = light_at(tracer, now, SIDES[0])
+        expected = by_itself(tracer, patch, now)
+        monkeypatch.setattr(Illumination, "lit", lambda self, *_: [mi.Float(1)] * len(self._directions))
+        unshaded, _ = light_at(tracer, now, SIDES[0])
+        assert np.abs(on(unshaded, patch) - expected).max() > 0.2 * expected.max()
+        np.testing.assert_allclose(on(light, patch), expected, rtol=1e-5, atol=1e-6)
