@@ -33,8 +33,8 @@ class FieldAreas:
     @classmethod
     def of(cls, fields: ReceptiveFields, parts: tuple[float, float], beyond: float = BEYOND) -> FieldAreas:
         """Each receptor's square in so many rows and columns, and as many more around them as its light comes from, but
-        for such a share beyond either side. Less than one row: of several receptors, and together as high as all or
-        higher."""
+        for such a share beyond either side. Half a row is one that two receptors share; those at the ends may reach
+        beyond the last receptors."""
         found = []
         for axis, (n, per_receptor) in enumerate(zip(fields.resolution, parts, strict=True)):
             field = fields.field.sum(axis=2 - axis)

@@ -73,6 +73,14 @@ class ReceptiveFields:
         power: np.ndarray = self.field.sum(axis=(1, 2))
         return power
 
+    @property
+    def widths(self) -> tuple[float, float]:
+        """Of the narrowest plane's field, height and width [receptor pitches]: as wide as one would be that takes the
+        same from everywhere and is as concentrated, (sum p)² / sum p² of its profile; 1 for a receptor's square."""
+        profiles = (self.field.sum(axis=axis) for axis in (2, 1))
+        height, width = (((p.sum(axis=1) ** 2) / (p**2).sum(axis=1)).min() / self.cells for p in profiles)
+        return float(height), float(width)
+
     def draw(self, n: int) -> Draw:
         """n low-discrepancy draws from the mixture: inverts the marginal over rows, then each row's cumulative."""
         density, points = self.density, low_discrepancy(n)

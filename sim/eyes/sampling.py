@@ -115,8 +115,8 @@ class BoxSampling:
 @dataclass(frozen=True)
 class FieldSampling:
     """Directions drawn from the mixture of all receptive fields; as many as asked for, or as it takes until every
-    receptor has one. tolerance: error allowed to a signal, see `sim.eyes.allowed_error`; of areas' lattice it is what
-    light of white beyond it may be worth."""
+    receptor has one. tolerance: error allowed to a signal, see `sim.eyes.allowed_error`; white beyond the lattice of
+    areas is worth no more, on either side."""
 
     eye: optics.Eye
     fields: ReceptiveFields
@@ -154,6 +154,12 @@ class FieldSampling:
         extent = _extent(self.eye, lattice.size)
         return ReceptiveFieldSensor(plane, _unused(plane), weights, self.eye.resolution, self.depth, extent)
 
+    def may_share(self, per_receptor: float, *, in_rows: bool = True) -> bool:
+        """Whether areas of several receptors, so many for each, are no wider than half of what one receptor sees: else
+        neighbours that differ would see the same."""
+        sides = (1 / n for n in _parts_or_share(per_receptor, in_rows))
+        return all(side <= max(1, width / 2) for side, width in zip(sides, self.fields.widths, strict=True))
+
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
         """What that sensor has for these receptors."""
         lattice = self._lattice(per_receptor, in_rows)
@@ -188,7 +194,7 @@ def parts_of(count: int, in_rows: bool) -> tuple[int, int]:
 
 
 def _parts_or_share(per_receptor: float, in_rows: bool) -> tuple[float, float]:
-    """The same of a whole number of parts; less than one: of the rows and columns that receptors share."""
+    """Rows and columns of a receptor, in all a whole number; less than one is its share of larger areas."""
     if per_receptor >= 1:
         return parts_of(round(per_receptor), in_rows)
     return (math.sqrt(per_receptor), math.sqrt(per_receptor)) if in_rows else (1.0, per_receptor)

@@ -89,15 +89,16 @@ class BatchedRenderer:
         self.fidelity, sampling = fidelity, scene.sampling(fidelity.depth, fidelity.tolerance)
         self.tracer: Tracer | AreaTracer
         self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.of)(fidelity.light)
-        self._check_memory(n_envs)
+        self._check_memory(n_envs, fidelity.rays_per_receptor)
         self.sensor: Sensor
         if fidelity.samples == AREAS:
             self.sensor = scene.area_sensor(sampling, fidelity.rays_per_receptor)
         else:
             self.sensor = sampling.sensor(fidelity.rays_per_receptor)
         asked = fidelity.rays_per_receptor
-        if self.eye.pupil is None or (fidelity.samples == AREAS and asked > 1):  # of its own for every receptor: whole
+        if self.eye.pupil is None or (fidelity.samples == AREAS and asked >= 1):  # of its own for every receptor: whole
             self.fidelity = replace(fidelity, rays_per_receptor=float(max(1, round(asked))))
+        self._check_memory(n_envs, self._samples_per_receptor)
         mixing = self.eye.throughput * self.bands.weights
         self.brightest = float((mixing @ white).max())
         self._receptor_sums = self.sensor.receptor_sums(mixing, self.tracer.basis)
@@ -106,17 +107,22 @@ class BatchedRenderer:
     def resized(self, n_envs: int) -> BatchedRenderer:
         """The same eyes and scene for another number of worlds; the scene is shared, not loaded again."""
         other = copy.copy(self)
-        other._check_memory(n_envs)
+        other._check_memory(n_envs, other._samples_per_receptor)
         other._set_width(n_envs)
         return other
 
-    def _check_memory(self, n_envs: int) -> None:
+    @property
+    def _samples_per_receptor(self) -> float:
+        """Behind a pupil with areas around the receptors', too."""
+        return len(self.sensor.directions) / float(np.prod(self.eyes.resolution))
+
+    def _check_memory(self, n_envs: int, samples_per_receptor: float) -> None:
         whole("n_envs", n_envs, 1, MOST_ENVS)
-        fidelity, layers = self.fidelity, self.fidelity.depth.count
+        layers = self.fidelity.depth.count
         planes, weights = layers * len(self.tracer.basis), layers * len(self.bands.wavelengths)
         memory_budget.check_memory(
             memory_budget.Demand(
-                fidelity.rays_per_receptor,
+                samples_per_receptor,
                 n_envs,
                 self.eyes.n_eyes,
                 self.eyes.resolution,

@@ -31,12 +31,13 @@ class Level:
 class Fidelity:
     """How finely a world is rendered for given eyes; printed, it is a table.
 
-    rays_per_receptor: on average; behind a pupil it may be below 1, since all receptors share all rays and areas
+    rays_per_receptor: on average; behind a pupil it may be below 1, since receptors share rays and may share areas
     bands: spectral bands
     depth: distances for which the eye has a PSF
     light: what of it is followed: "direct"; "bounce", which adds light that is reflected twice; or, with areas, "all"
     samples: what eyes look along: "rays", or "areas", which cut each receptor's square into rays_per_receptor
-        rectangles and find the mean of each in closed form, behind a pupil of some around the receptors', too; upright
+        rectangles and find the mean of each in closed form, behind a pupil of some around the receptors', too, and of
+        larger ones where that is less than 1; upright
         worlds only; or "edges": a few rays per receptor, and rays_per_receptor where these differ; models of one's own
         through perfect lenses only
     tolerance: error allowed to a receptor's signal (root mean square); None where nothing was chosen. At edges, rays
@@ -44,8 +45,8 @@ class Fidelity:
     levels: what was chosen for each stage, and why
 
     Raises:
-        ValueError: bands or rays_per_receptor that are no numbers or out of range, unknown light or samples, and rays
-            that would follow all light.
+        ValueError: bands, rays_per_receptor or a tolerance that are no numbers or out of range, unknown light or
+            samples, and rays that would follow all light.
     """
 
     rays_per_receptor: float
@@ -62,6 +63,8 @@ class Fidelity:
             most = f"{MOST_RAYS:g}"
             raise ValueError(f"rays_per_receptor = {shown(rays)}: must be positive and at most {most}, or 'auto'")
         whole("bands", self.bands, 1, MOST_BANDS)
+        if self.tolerance is not None and not (isinstance(self.tolerance, Real) and 0 < self.tolerance < math.inf):
+            raise ValueError(f"tolerance = {shown(self.tolerance)}: must be positive, or None")
         one_of("light", self.light, LEVELS)
         one_of("samples", self.samples, SAMPLES)
         if self.light == ALL and self.samples != AREAS:

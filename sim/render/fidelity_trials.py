@@ -136,8 +136,12 @@ class FidelityTrials:
 
         return error
 
+    def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
+        """Whether receptors may share areas, so many for each: not where they would become copies of each other."""
+        return self._scene.may_share(sampling, per_receptor)
+
     def areas_seen(self, sampling: EyeSampling, per_receptor: float) -> float:
-        """How many are seen per receptor where each one's square is cut into so many: behind a pupil, some around."""
+        """How many are seen per receptor where each one has so many: behind a pupil, some around."""
         n = len(self._scene.area_trial(sampling, per_receptor, self._receptors[:1]).directions)
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 

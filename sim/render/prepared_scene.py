@@ -49,12 +49,16 @@ class PreparedScene:
         return self.tracers.areas(light)
 
     def area_sensor(self, sampling: EyeSampling, per_receptor: float) -> Sensor:
-        """What areas are seen along: so many parts of each receptor's square."""
+        """What areas are seen along: so many for each receptor."""
         return sampling.areas(per_receptor, in_rows=self._in_rows)
 
     def area_trial(self, sampling: EyeSampling, per_receptor: float, receptors: np.ndarray) -> Trial:
         """What that sensor has for these receptors."""
         return sampling.area_trial(per_receptor, receptors, in_rows=self._in_rows)
+
+    def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
+        """Whether areas may be larger than receptors' squares, so many for each."""
+        return isinstance(sampling, FieldSampling) and sampling.may_share(per_receptor, in_rows=self._in_rows)
 
     @property
     def _in_rows(self) -> bool:

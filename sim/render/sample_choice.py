@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 from sim.eyes.receptive_fields import NoRaysError
 from sim.eyes.sampling import BoxSampling, EyeSampling
@@ -16,13 +17,13 @@ from sim.tracing.lighting import ALL, BOUNCE
 # Numbers of rays that are tried: steps of about √2, so that hardly more are traced than are needed.
 PERFECT_LENS_RAYS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 PUPIL_RAYS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
-FEW_RAYS = 1  # for each receptor: fewer hardly cost less
-PERFECT_LENS_AREAS = (1, 2, 4, 6, 9, 12, 16, 20, 25, 30)
-PUPIL_AREAS = (1 / 9, 1 / 4, 4 / 9, *PERFECT_LENS_AREAS)  # blur wider than receptors: areas three, two, 1.5 wide
+FEW_RAYS = 1  # for each receptor, behind a pupil: where so few do, areas are not tried
+NUMBERS_OF_AREAS = (1, 2, 4, 6, 9, 12, 16, 20, 25, 30)
+SHARED_AREAS = (4 / 9, 1 / 4, 1 / 9)  # of several receptors: 1.5, two and three of them wide
 # What an area costs, in rays (docs/measurements/rendering.md); where fewer will do, they are taken. Behind a pupil its
 # light is spread by the kernel, which rays pay for, too.
 PERFECT_LENS_AREA, PUPIL_AREA = 3, 1.6
-IN_BOUNCED_LIGHT = 0.7  # times that: following light on costs rays more than tables cost areas
+PUPIL_AREA_IN_ALL_LIGHT = 1.3  # in rays with a bounce
 HARDLY_MORE = 1.1  # times an error that cannot be lessened: not worth several times the samples
 
 
@@ -50,21 +51,21 @@ def fewest_samples(
 
     light: what rays would follow of it · without_light: allowed, where no light is left out
     """
-    errors = trials.errors(sampling, light.level)
+    errors = cache(trials.errors(sampling, light.level))
     perfect = isinstance(sampling, BoxSampling)
     numbers: tuple[float, ...] = PERFECT_LENS_RAYS if perfect else PUPIL_RAYS
-    of_areas: tuple[float, ...] = PERFECT_LENS_AREAS if perfect else PUPIL_AREAS
+    shared = tuple(number for number in SHARED_AREAS if trials.may_share(sampling, number))
+    of_pupil = PUPIL_AREA_IN_ALL_LIGHT if light.level == BOUNCE else PUPIL_AREA
 
     def cost(number: float) -> float:
-        one = (PERFECT_LENS_AREA if perfect else PUPIL_AREA) * (IN_BOUNCED_LIGHT if light.level == BOUNCE else 1)
-        return one * trials.areas_seen(sampling, number)
+        return (PERFECT_LENS_AREA if perfect else of_pupil) * trials.areas_seen(sampling, number)
 
     def rays(most: float = math.inf) -> Samples:
         return Samples(RAYS, light, *_fewest(errors, tuple(n for n in numbers if n <= most), allowed, RAYS))
 
-    if (few := rays(max(FEW_RAYS, cost(of_areas[0])))).enough:
+    if (few := rays(max(FEW_RAYS, cost(min(shared, default=1))))).enough:
         return few
-    areas = _areas(trials, sampling, light, of_areas, (allowed, without_light))
+    areas = _areas(trials, sampling, light, shared, (allowed, without_light))
     if areas is None:
         return rays()
     if not areas.enough:
@@ -77,17 +78,24 @@ def _areas(
     trials: FidelityTrials,
     sampling: EyeSampling,
     light: Level,
-    numbers: tuple[float, ...],
+    shared: tuple[float, ...],
     allowed: tuple[float, float],
 ) -> Samples | None:
-    """None where they cannot see the world; allowed: errors, the other where no light is left out."""
+    """None where they cannot see the world. shared: numbers below one, to be tried where one is enough
+    allowed: errors, the other where no light is left out"""
     if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):
         return None
     errors, most = trials.area_errors(sampling, light.level), allowed[0]
     if light.level == BOUNCE:
         more, most = trials.reflected_more_often(sampling), allowed[1]
         light = Level("light", ALL, None, f"light that is reflected more than twice is worth {more:.1e}; in tables")
-    return Samples(AREAS, light, *_fewest(errors, numbers, most, AREAS))
+    found = _fewest(errors, NUMBERS_OF_AREAS, most, AREAS)
+    for number in shared if found[2] and found[0] == 1 else ():
+        fewer = _fewest(errors, (number,), most, AREAS)
+        if not fewer[2]:
+            break
+        found = fewer
+    return Samples(AREAS, light, *found)
 
 
 def _fewest(
@@ -111,5 +119,6 @@ def _fewest(
     enough = predicted <= allowed
     number = numbers[at] if enough else next(n for n, e in tried.items() if e <= HARDLY_MORE * min(tried.values()))
     found = "fewest of" if enough else "not enough, but hardly worse than any of"
-    why = f"{found} {numbers[0]:.3g} ... {numbers[-1]:.3g} for {allowed:.1e}, {len(tried)} tried"
+    span = f"{numbers[0]:.3g} ... {numbers[-1]:.3g}" if len(numbers) > 1 else "those that receptors share"
+    why = f"{found} {span} for {allowed:.1e}, {len(tried)} tried"
     return number, Level(kind, f"{number:.3g} per receptor", tried[number], why), enough

@@ -52,13 +52,12 @@ class Illumination:
         self.tables = self._shadows.tables
         self.bodies = LitBodies(self._shadows, self._directions, self._radii)
 
-    def irradiance(self, patch: Patch, now: Moment, itself: int = ITSELF_NONE) -> list[Array]:
-        """Per component: sum over the lights of level · cos θ · share that is lit; itself: the body that the patch is
-        part of."""
-        return self.arriving(patch.normal, self.lit(patch, now, itself))
+    def irradiance(self, patch: Patch, now: Moment) -> list[Array]:
+        """Per component: sum over the lights of level · cos θ · share that is lit."""
+        return self.arriving(patch.normal, self.lit(patch, now))
 
     def lit(self, patch: Patch, now: Moment, itself: int = ITSELF_NONE) -> list[Array]:
-        """Share of a patch that each light reaches."""
+        """Share of a patch that each light reaches; itself: the body that the patch is part of."""
 
         def past(k: Array, lit: list[Array]) -> list[Array]:
             left = lit_past_sphere(patch, self._directions, of(k, now.bodies), of(k, self._radii))

@@ -77,8 +77,20 @@ def test_areas_of_several_receptors_err_as_the_square_of_their_sides(a):
     assert 3 < of_four / of_one < 5
 
 
+def test_areas_are_shared_where_fields_are_twice_as_wide():
+    """A hole's field is about as wide as the hole, of 15 receptors; a lens's in focus as a receptor."""
+    for pupil, width in ((optics.Pupil(0.3 * L / 2), 4.5), (optics.Pupil(0.9 * L / 2), 13.5), (focused(), 1.0)):
+        sampling = sampling_of(eye((15, 15), pupil))
+        assert sampling.fields.widths == pytest.approx((width, width), rel=0.25)
+        shared = [sampling.may_share(n) for n in (4 / 9, 1 / 4, 1 / 9)]
+        assert shared == [width > 3, width > 4, width > 6]
+    columns = sampling_of(eye((15, 15), optics.Pupil(0.3 * L / 2)))
+    assert [columns.may_share(n, in_rows=False) for n in (1 / 2, 1 / 4)] == [True, False]
+
+
 def test_areas_of_several_receptors_cover_all_in_the_middle():
-    """Fifteen receptors take ten columns of 1.5 or, with half a one beyond either side, eight of two."""
+    """Fifteen receptors take ten columns of 1.5, or eight of two, of which the outer ones reach half a receptor
+    further."""
     fields = sampling_of(eye((15, 15), focused())).fields
     for per_receptor, columns in ((4 / 9, 10), (1 / 4, 8)):
         lattice = FieldAreas.of(fields, (1, per_receptor**0.5))

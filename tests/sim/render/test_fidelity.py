@@ -144,7 +144,7 @@ def test_behind_a_pupil_an_area_costs_less_than_three_rays():
     assert (fidelity.samples, fidelity.light, fidelity.rays_per_receptor) == ("areas", "direct", 1)
 
 
-@pytest.mark.parametrize(("a", "most"), [(0.9, 1 / 4), (0.4, 1)])
+@pytest.mark.parametrize(("a", "most"), [(0.9, 1 / 4), (0.3, 4 / 9)])
 def test_receptors_share_areas_behind_a_hole(a, most):
     """Its blur is wider than they are; four rays with a bounce and six were chosen here, and erred by more. All as well
     as promised, with what the renderer then says of itself."""
@@ -162,6 +162,33 @@ def test_receptors_share_areas_behind_a_hole(a, most):
     truth = signals(world, eyes, state, sim.Fidelity(1, eyes.bands, light="bounce"), 128)
     for error in (by_areas - truth, (by_areas - truth)[seen]):
         assert np.sqrt(np.mean(error**2)) < fidelity.tolerance
+
+
+@pytest.mark.parametrize(("resolution", "a", "sigma"), [((15, 15), 0.4, 0.003), ((1, 4), 0.25, 0.01)])
+def test_receptors_behind_a_lens_in_focus_keep_their_own(resolution, a, sigma):
+    """One area each does for the first eye, and what fewer err by says nothing of more. Four receptors that shared two
+    would see the same in pairs."""
+    eyes = sim.Eyes(n_eyes=2, resolution=resolution, noise_sigma=sigma, placement_range_deg=45.0)
+    fidelity = sim.choose_fidelity(sim.build_world("detection"), behind_lens(eyes, a), bands="own")
+    assert fidelity.rays_per_receptor >= 1
+    assert fidelity.samples == "rays" or fidelity.rays_per_receptor == 1
+
+
+def test_a_tolerance_reaches_the_areas_around_the_receptors():
+    world, eyes = sim.build_world("detection"), sim.Eyes(n_eyes=1, resolution=(9, 9), bands=3)
+    eyes = replace(eyes, optics=optics.Pupil(0.6 * eyes.sensor_width / 2))
+
+    def areas(tolerance):
+        fidelity = sim.Fidelity(1, 3, tolerance=tolerance, samples="areas")
+        return len(sim.BatchedRenderer(world, eyes, 1, fidelity).sensor.directions)
+
+    assert areas(1e-5) > areas(None) == areas(0.005) > 81
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, float("inf"), "fine"])
+def test_no_tolerance_is_refused(wrong):
+    with pytest.raises(ValueError, match=r"tolerance = .*must be positive, or None"):
+        sim.Fidelity(1, 3, tolerance=wrong)
 
 
 def test_what_cannot_be_kept_is_said():

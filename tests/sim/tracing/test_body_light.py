@@ -35,7 +35,7 @@ def patch_of(tracer, now, side):
 
 def by_itself(tracer, patch, now):
     """Per component and world: straight from the lights, and what walls, floor and other bodies send on."""
-    straight = tracer._illumination.irradiance(patch, now, 0)
+    straight = tracer._illumination.arriving(patch.normal, tracer._illumination.lit(patch, now, 0))
     free = [sum_of(fours, patch.normal) for fours in tracer._reflected.on_body(0, now.bodies[0], now.inputs)]
     reflected = tracer._illumination.past_bodies(patch, free, now, 0)
     return np.array([np.array(a + b) for a, b in zip(straight, reflected, strict=True)])
@@ -83,7 +83,7 @@ def test_light_that_is_not_followed_is_not_there(scene):  # noqa: F811
         tracer, all_ = scene.areas("direct"), scene.areas("all")
         now = moment(all_, bodies_of(scene))
         light, patch = light_at(tracer, now, SIDES[1])
-        straight = tracer._illumination.irradiance(patch, now, 0)
+        straight = tracer._illumination.arriving(patch.normal, tracer._illumination.lit(patch, now, 0))
         np.testing.assert_array_equal(on(light, patch), [np.array(component) for component in straight])
 
 
