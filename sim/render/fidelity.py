@@ -36,10 +36,9 @@ class Fidelity:
     depth: distances for which the eye has a PSF
     light: what of it is followed: "direct"; "bounce", which adds light that is reflected twice; or, with areas, "all"
     samples: what eyes look along: "rays", or "areas", which cut each receptor's square into rays_per_receptor
-        rectangles and find the mean of each in closed form, behind a pupil of some around the receptors', too, and of
-        larger ones where that is less than 1; upright
-        worlds only; or "edges": a few rays per receptor, and rays_per_receptor where these differ; models of one's own
-        through perfect lenses only
+        rectangles and find the mean of each in closed form, behind a pupil of some around the receptors', too, and
+        below 1 of larger ones; upright worlds only; or "edges": a few rays per receptor, and rays_per_receptor where
+        these differ; models of one's own through perfect lenses only
     tolerance: error allowed to a receptor's signal (root mean square); None where nothing was chosen. At edges, rays
         whose signals are within it of each other do not differ
     levels: what was chosen for each stage, and why

@@ -23,7 +23,7 @@ SHARED_AREAS = (4 / 9, 1 / 4, 1 / 9)  # of several receptors: 1.5, two and three
 # What an area costs, in rays (docs/measurements/rendering.md); where fewer will do, they are taken. Behind a pupil its
 # light is spread by the kernel, which rays pay for, too.
 PERFECT_LENS_AREA, PUPIL_AREA = 3, 1.6
-PUPIL_AREA_IN_ALL_LIGHT = 1.3  # in rays with a bounce
+PUPIL_AREA_IN_ALL_LIGHT = 2  # in rays with a bounce
 HARDLY_MORE = 1.1  # times an error that cannot be lessened: not worth several times the samples
 
 
@@ -81,8 +81,11 @@ def _areas(
     shared: tuple[float, ...],
     allowed: tuple[float, float],
 ) -> Samples | None:
-    """None where they cannot see the world. shared: numbers below one, to be tried where one is enough
-    allowed: errors, the other where no light is left out"""
+    """None where they cannot see the world.
+
+    shared: numbers below one, falling, to be tried where one is enough
+    allowed: errors; the second holds where no light is left out
+    """
     if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):
         return None
     errors, most = trials.area_errors(sampling, light.level), allowed[0]
@@ -91,10 +94,10 @@ def _areas(
         light = Level("light", ALL, None, f"light that is reflected more than twice is worth {more:.1e}; in tables")
     found = _fewest(errors, NUMBERS_OF_AREAS, most, AREAS)
     for number in shared if found[2] and found[0] == 1 else ():
-        fewer = _fewest(errors, (number,), most, AREAS)
-        if not fewer[2]:
+        if (predicted := CAUTION * errors(number)) > most:
             break
-        found = fewer
+        why = f"receptors share them: one for each is more than enough for {most:.1e}"
+        found = number, Level(AREAS, f"{number:.3g} per receptor", predicted, why), True
     return Samples(AREAS, light, *found)
 
 
@@ -119,6 +122,5 @@ def _fewest(
     enough = predicted <= allowed
     number = numbers[at] if enough else next(n for n, e in tried.items() if e <= HARDLY_MORE * min(tried.values()))
     found = "fewest of" if enough else "not enough, but hardly worse than any of"
-    span = f"{numbers[0]:.3g} ... {numbers[-1]:.3g}" if len(numbers) > 1 else "those that receptors share"
-    why = f"{found} {span} for {allowed:.1e}, {len(tried)} tried"
-    return number, Level(kind, f"{number:.3g} per receptor", tried[number], why), enough
+    why = f"{found} {numbers[0]:g} ... {numbers[-1]:g} for {allowed:.1e}, {len(tried)} tried"
+    return number, Level(kind, f"{number:g} per receptor", tried[number], why), enough

@@ -1,11 +1,9 @@
-"""Light on what an area sees of a body: what is the same for all of that is found once, what depends on slopes slice by
-slice."""
+"""Light on what an area sees of a body: shadows, and what other bodies change, are found once for all of it; the rest
+depends on how it slopes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import drjit as dr
 
 from optics.numerics.autodiff import Array
 from sim.tracing.areas.illumination import Illumination, Moment
@@ -29,7 +27,7 @@ class BodyLight:
     def of(
         cls, illumination: Illumination, reflected: LightTable | None, body: int, patch: Patch, now: Moment
     ) -> BodyLight:
-        """Light on a patch of a body, by its number."""
+        """Light on a patch that stands for what is seen of a body; body: its number."""
         lit = illumination.lit(patch, now, body)
         if reflected is None:
             return cls(illumination, lit, [], [])
@@ -43,8 +41,5 @@ class BodyLight:
         light = self.illumination.arriving(normal, self.lit)
         if not self.around:
             return light
-        reflected = (
-            dr.maximum(sum_of(fours, normal) + change, 0)
-            for fours, change in zip(self.around, self.change, strict=True)
-        )
-        return [straight + more for straight, more in zip(light, reflected, strict=True)]
+        parts = zip(light, self.around, self.change, strict=True)
+        return [straight + sum_of(fours, normal) + change for straight, fours, change in parts]

@@ -56,9 +56,9 @@ def test_errors_fall_with_smaller_areas(pupil):
 
 @pytest.mark.parametrize("a", [0.9, 0.55, 0.3])
 def test_the_lattice_reaches_as_far_as_the_noise_asks(a):
-    """Behind a hole one area per receptor errs by no more than is allowed, although the rim's receptors get most of
-    their light from beside the retina. As far as pupils reached whatever the noise, those wider than half of the retina
-    erred by more."""
+    """Behind a hole one area per receptor errs by no more than is allowed, although the rim's receptors get much of
+    their light from beside the retina. A lattice that reaches as far whatever the noise errs by more where holes are
+    wider than half of the retina."""
     e = dataclasses.replace(eye((15, 15), optics.Pupil(aperture_radius=a * L / 2)), noise_sigma=0.003)
     expected, allowed = convolved(e, cells_per_receptor(e.resolution)), allowed_error(e, None)
 

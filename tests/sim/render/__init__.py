@@ -8,12 +8,12 @@ reference_renderer: test_reference_renderer.py
 fidelity: test_fidelity.py, eyes/test_depth_layers.py
 fidelity_choice: test_fidelity.py, eyes/test_depth_layers.py
 fidelity_stages: test_fidelity.py, eyes/test_depth_layers.py
-sample_choice: test_fidelity.py
+sample_choice: test_sample_choice.py, test_fidelity.py
 random_views: test_fidelity.py
 fidelity_trials: test_fidelity.py, eyes/test_depth_layers.py
 prepared_scene: test_batched_renderer.py, test_fidelity.py
 band_error: test_band_error.py
-memory_budget: test_memory_budget.py
+memory_budget: test_memory_budget.py, test_sample_choice.py
 frozen_kernels: test_frozen_kernels.py, test_batched_renderer.py
 receptor_noise: test_receptor_noise.py
 noisy_signals: test_noisy_signals.py

@@ -44,11 +44,18 @@ def test_shares_of_spheres():
         most = int(dr.max(view.sides)[0])
         found = sum(dr.select(i < view.sides, view.strip(mi.UInt32(i)).share, 0) for i in range(most)).numpy()
         assert set(view.sides.numpy()) == {3, 4}
+        whole, strips = view.whole(), [view.strip(mi.UInt32(i)) for i in range(3)]
     error = found - expected.mean(axis=(1, 2))
     assert within.sum() > 10
     assert np.abs(error[within]).max() < 1e-3
     assert np.abs(error).max() < 0.03
     assert np.sqrt(np.mean(error**2)) < 0.003
+    # The whole that light is found for is as large, and lies in the middle; any one of its strips does not.
+    assert np.abs(whole.share.numpy()[within] - found[within]).max() < 1e-3
+    places = np.einsum("nhw,ahw->an", expected, ab)[:, within] / expected.sum(axis=(1, 2))[within]
+    for strip, in_the_middle in ((whole, True), (strips[0], False), (strips[2], False)):
+        off = np.abs(np.array([strip.part.a, strip.part.b])[:, within] - places).max()
+        assert (off < 0.01) == in_the_middle
 
 
 def test_shares_above_lines():

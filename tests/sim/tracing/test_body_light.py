@@ -7,15 +7,23 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from sim.render.prepared_scene import PreparedScene
 from sim.scene.variant import variant
 from sim.tracing.areas.body_light import BodyLight
 from sim.tracing.areas.illumination import Illumination, Moment
 from sim.tracing.areas.light_table import sum_of
 from sim.tracing.areas.patch import Patch
-from tests.sim.tracing.test_lit_bodies import WORLDS, bodies_of, scene  # noqa: F401
+from sim.worlds.world import build_world
+from tests.sim.tracing.area_views import COARSE
+from tests.sim.tracing.crowded_rooms import WORLDS, bodies_of
 
 SIZE = 0.05  # of a patch [m]
 SIDES = ((1.0, 0.0, 0.0), (0.0, -0.6, 0.8), (-0.8, 0.0, -0.6))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return PreparedScene(build_world("detection"), COARSE)
 
 
 def moment(tracer, centres):
@@ -51,7 +59,7 @@ def light_at(tracer, now, side):
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_on_its_own_slope_it_is_what_is_found_by_itself(scene, side):  # noqa: F811
+def test_on_its_own_slope_it_is_what_is_found_by_itself(scene, side):
     with variant():
         tracer = scene.areas("all")
         now = moment(tracer, bodies_of(scene))
@@ -63,7 +71,7 @@ def test_on_its_own_slope_it_is_what_is_found_by_itself(scene, side):  # noqa: F
         assert np.abs(on(unchanged, patch) - expected).max() > 0.01 * expected.max()
 
 
-def test_slopes_nearby_have_their_own_light(scene):  # noqa: F811
+def test_slopes_nearby_have_their_own_light(scene):
     """Twelve degrees off, as at the rim of what an eye of 15 x 15 sees of a body in one receptor: to 1 % of the
     brightest in the mean (root of squares), where light of the middle's slope errs by five times as much."""
     turned = np.array([np.cos(np.radians(12)), np.sin(np.radians(12)), 0.0])
@@ -78,7 +86,7 @@ def test_slopes_nearby_have_their_own_light(scene):  # noqa: F811
     assert wrong > 5 * error
 
 
-def test_light_that_is_not_followed_is_not_there(scene):  # noqa: F811
+def test_light_that_is_not_followed_is_not_there(scene):
     with variant():
         tracer, all_ = scene.areas("direct"), scene.areas("all")
         now = moment(all_, bodies_of(scene))
@@ -87,7 +95,7 @@ def test_light_that_is_not_followed_is_not_there(scene):  # noqa: F811
         np.testing.assert_array_equal(on(light, patch), [np.array(component) for component in straight])
 
 
-def test_shadows_of_other_bodies_are_noticed(scene, monkeypatch):  # noqa: F811
+def test_shadows_of_other_bodies_are_noticed(scene, monkeypatch):
     with variant():
         tracer = scene.areas("all")
         now = moment(tracer, bodies_of(scene))

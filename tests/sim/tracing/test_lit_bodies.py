@@ -10,32 +10,14 @@ from sim.scene.variant import variant
 from sim.tracing.areas import lit_bodies
 from sim.worlds.world import build_world
 from tests.sim.tracing.area_views import COARSE
+from tests.sim.tracing.crowded_rooms import WORLDS, bodies_of
 
 POINTS = 4096  # of a disk; a share's own error is then .005, twice that at most
-WORLDS = 24
-HALF_ROOM = np.array([11.0, 9.0])  # detection's, between its walls [m]
 
 
 @pytest.fixture(scope="module")
 def scene():
     return PreparedScene(build_world("detection"), COARSE)
-
-
-def bodies_of(scene):
-    """Centres (world, body, 3), the agent's last: beside walls, and some way apart, so that lights are often shut off
-    by both."""
-    radii, rng, found = scene.static.bodies.radii, np.random.default_rng(4), []
-    heights = [*[0.5] * (len(radii) - 1), 0.2]
-    room = HALF_ROOM - 0.55
-    while len(found) < WORLDS:
-        middle = rng.uniform(-1, 1, 2) * room
-        axis = rng.integers(2)
-        middle[axis] = rng.choice([-1, 1]) * room[axis]
-        places = np.clip(middle + rng.uniform(-2, 2, (len(radii), 2)), -room, room)
-        apart = np.linalg.norm(places[:, None] - places, axis=-1) - radii[:, None] - radii
-        if apart[~np.eye(len(radii), dtype=bool)].min() > 0.05:
-            found.append(np.column_stack([places, heights]))
-    return np.array(found)
 
 
 def table(scene, centres):
