@@ -25,7 +25,7 @@ UNIT = 1e-6  # the optimiser works in µm
 def gathered(points: np.ndarray, spot: float) -> tuple[float, np.ndarray]:
     """-log of the light within a Gaussian spot, and its gradient over the control points [per µm]."""
     import drjit as dr
-    from drjit.auto.ad import Float64, TensorXf64
+    from drjit.llvm.ad import Float64, TensorXf64
 
     heights = TensorXf64(points.reshape(4, 4) * UNIT)
     dr.enable_grad(heights)

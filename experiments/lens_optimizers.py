@@ -63,7 +63,7 @@ def lens(genome: Any) -> optics.Pupil:
     if isinstance(genome, np.ndarray):
         return optics.Pupil(RADIUS, optics.BSplineRelief(RELIEF_HEIGHT * genome[:16].reshape(4, 4)), n=1 + genome[16])
     import drjit as dr
-    from drjit.auto.ad import Float64, TensorXf64, UInt32
+    from drjit.llvm.ad import Float64, TensorXf64, UInt32
 
     heights = TensorXf64(RELIEF_HEIGHT * dr.gather(Float64, genome, dr.arange(UInt32, 16)), (4, 4))
     return optics.Pupil(RADIUS, optics.BSplineRelief(heights), n=1 + dr.gather(Float64, genome, UInt32(16)))
@@ -72,7 +72,7 @@ def lens(genome: Any) -> optics.Pupil:
 def loss(genome: Any, spot: float | None) -> Any:
     """-log of the Strehl ratio near the axis (spot None) or of the light in a Gaussian spot on it."""
     import drjit as dr
-    from drjit.auto.ad import Float64
+    from drjit.llvm.ad import Float64
 
     dx, side = (0.5e-6, 33) if spot is None else (spot / 4, _side(spot))
     result = optics.psf(lens(genome), [WAVELENGTH], RETINA, dx=dx, shape=(side, side), tolerance=TOLERANCE)
@@ -92,7 +92,7 @@ def _side(spot: float) -> int:
 def gradient(genome: Floats, spot: float | None) -> tuple[float, Floats]:
     """Loss and its derivative by every gene."""
     import drjit as dr
-    from drjit.auto.ad import Float64
+    from drjit.llvm.ad import Float64
 
     tracked = Float64(genome)
     dr.enable_grad(tracked)

@@ -16,6 +16,8 @@ from optics.elements.pupil import Pupil
 from optics.elements.relief import BSplineRelief, HeightMap
 from optics.numerics.arguments import of_kind
 from optics.numerics.autodiff import Array, Scalar
+from optics.numerics.backend import BackendError
+from optics.numerics.device import VARIABLE, make_ready
 from optics.numerics.precision import precision
 from optics.point_spread.psf import psf as drjit_psf
 
@@ -35,25 +37,39 @@ def psf(
     Raises:
         ValueError: see `optics.psf`.
         AccuracyError: see `optics.psf`.
+        BackendError: RHABDOM_DEVICE asks for a GPU, and torch cannot use it.
     """
     import drjit as dr
 
     of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)")
+    place = _place()
     if view.get("field"):
         raise ValueError("field: is `optics.psf`'s alone; this is the intensity")
-    precision(view.get("dtype", "float32"))  # proves the backend before Dr.Jit is asked for anything
+    precision(view.get("dtype", "float32"))  # refuses other types
 
     @dr.wrap(source="torch", target="drjit")
     def spread(heights: Array, radius: Scalar, n: Scalar) -> Array:
         relief = BSplineRelief(heights) if heights.shape == (4, 4) else HeightMap(heights)
         return drjit_psf(Pupil(radius, relief, n=n, **(pupil or {})), **view).tensor
 
-    tensor: torch.Tensor = spread(heights.double(), _double(radius), _double(n))
-    return tensor
+    tensor: torch.Tensor = spread(*(_moved(value, place) for value in (heights, radius, n)))
+    return tensor.to(heights.device)
 
 
-def _double(value: Any) -> Any:
-    return value.double() if isinstance(value, torch.Tensor) else value
+def _place() -> str:
+    """Where optics computes, as torch calls it.
+
+    Raises:
+        BackendError: on a GPU that this torch cannot use.
+    """
+    place = make_ready()
+    if place == "cuda" and not torch.cuda.is_available():
+        raise BackendError(f"{VARIABLE} asks for a GPU, and this torch has none: must be cpu, or torch built for CUDA")
+    return place
+
+
+def _moved(value: Any, place: str) -> Any:
+    return value.double().to(place) if isinstance(value, torch.Tensor) else value
 
 
 class PointSpread(torch.nn.Module):

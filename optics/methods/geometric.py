@@ -14,6 +14,7 @@ from optics.methods.rayleigh_sommerfeld import cached_nodes, node_count
 from optics.methods.rays import brightness, mismatch
 from optics.numerics.autodiff import Array, is_differentiable, number
 from optics.numerics.cost import CALL, RAY
+from optics.numerics.device import VARIABLE, device
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["PinholeSampling", "RaySampling", "geometric", "pinhole"]
@@ -39,7 +40,12 @@ class RaySampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Power per area over the window for unit intensity at the pupil, a flat Dr.Jit array."""
+        """Power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
+
+        Raises:
+            ValueError: derivatives are asked for on a GPU. Rules of Dr.Jit's that take the reciprocal of a float64 err
+                by 1e-6 there, and by 1e-2 in directions, which are differences of paths.
+        """
         import drjit as dr
 
         types = precision(problem.dtype)
@@ -49,6 +55,10 @@ class RaySampling:
         if beam.pupil.mask is not None:
             weight *= dr.square(beam.pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types))
         x, y, propagates = _landings(beam, x, y, types)
+        if device() == "cuda" and dr.grad_enabled(x, y):
+            raise ValueError(
+                f"method = 'geometric': has no derivatives on a GPU; ask for a wave method, or {VARIABLE}=cpu"
+            )
         return _splat(x, y, dr.select(propagates, weight, 0), problem, types)
 
     def plane(self, problem: Problem) -> float:
@@ -139,7 +149,8 @@ def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, 
     py = (beam.waves(x, y + step, types) - beam.waves(x, y - step, types)) * scale
     squared = px * px + py * py
     propagates = squared < 1 - 1e-9
-    tangent = opaque(types, beam.distance) * dr.rsqrt(dr.select(propagates, 1 - squared, 1))
+    # dr.rsqrt errs by 1e-6 on a GPU, also in float64.
+    tangent = opaque(types, beam.distance) / dr.sqrt(dr.select(propagates, 1 - squared, 1))
     return x + tangent * px, y + tangent * py, propagates
 
 

@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.backend import BackendError
+from optics.numerics.device import VARIABLE, device
+
 __all__ = ["Array", "Scalar", "is_differentiable", "number", "plain", "to_user"]
 
 # Dr.Jit makes its types when it is first asked for a backend, so that no checker can see them: these names say what an
@@ -25,6 +28,7 @@ def number(value: Any) -> float:
     Raises:
         TypeError: of a type that is no number's.
         ValueError: an array of more than one element.
+        BackendError: an array of another device than the one that is asked for.
     """
     if type(value) is float:
         return value  # asked for thousands of times in planning
@@ -34,12 +38,25 @@ def number(value: Any) -> float:
 
 
 def plain(value: Any) -> np.ndarray:
-    """value as a NumPy array, without derivative."""
+    """value as a NumPy array, without derivative.
+
+    Raises:
+        BackendError: a Dr.Jit array of another device than the one that is asked for.
+    """
     if is_differentiable(value):
         import drjit as dr
 
+        _on_the_device(value)
         return np.array(dr.detach(value).numpy(), dtype=np.float64)
     return np.asarray(value, dtype=np.float64)
+
+
+def _on_the_device(value: Array) -> None:
+    given, wanted = type(value).__module__, "drjit.llvm" if device() == "cpu" else "drjit.cuda"
+    if given.startswith(("drjit.llvm", "drjit.cuda")) and not given.startswith(wanted):
+        raise BackendError(
+            f"{given}.{type(value).__name__}: must be of {wanted}.ad, since {VARIABLE} asks for {device()}"
+        )
 
 
 def to_user(tensor: Array) -> np.ndarray | Array:

@@ -50,7 +50,8 @@ LIBRARY_PATTERNS = (
 
 
 class BackendError(RuntimeError):
-    """Dr.Jit has no LLVM library it can use here; the message is one line with the remedy."""
+    """Dr.Jit cannot compute as asked: no LLVM library that it can use, no GPU, or an array of another device. The
+    message is one line with the remedy."""
 
 
 @dataclass(frozen=True)

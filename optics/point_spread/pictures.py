@@ -64,7 +64,8 @@ class _Attempt:
             return cls(request, plan, sampling, sampling.intensity(beam, problem) / area)
         whole = cast(WithField, sampling).field(beam, problem)
         waves = opaque(types, beam.distance) * opaque(types, 1 / problem.wavelength)
-        field = whole * Field.from_waves(dr.rsqrt(area), waves, whole.grid, types)
+        # dr.rsqrt errs by 1e-6 on a GPU, also in float64.
+        field = whole * Field.from_waves(1 / dr.sqrt(area), waves, whole.grid, types)
         return cls(request, plan, sampling, field.intensity, field)
 
     @property

@@ -145,7 +145,11 @@ class ModelTracer:
         hit = self._scene.movers.nearest(
             ray, dr.select(si.is_valid(), si.t, dr.inf), rows.movers, rows.first_mover, inputs
         )
-        standing = dr.select(si.is_valid(), movers + si.shape_index, movers + still) if still else mi.UInt32(movers)
+        standing = mi.UInt32(movers)
+        if still:
+            shape: Array = dr.reinterpret_array(mi.UInt32, si.shape)
+            number = dr.gather(mi.UInt32, inputs["standing"], shape, si.is_valid())
+            standing = movers + dr.select(si.is_valid(), number, still)
         return dr.select(hit.which < movers, hit.which, standing)
 
     def _irradiance(

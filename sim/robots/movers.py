@@ -20,7 +20,7 @@ from sim.robots.poses import Poses
 from sim.robots.primitives import PRIMITIVES, Primitive
 from sim.scene import shapes, surfaces
 from sim.scene.device_arrays import three, whole_numbers
-from sim.scene.variant import MitsubaObject
+from sim.scene.variant import MitsubaObject, computed, on_gpu
 
 _TYPES = mujoco.mjtGeom
 KINDS = {
@@ -165,12 +165,18 @@ class Movers:
         none = farthest, mi.UInt32(len(self)), mi.Vector3f(0, 0, 1), mi.Point2f(0)
         if not len(self):
             return Hit(*none)
+        if self._in_kernels_of_their_own:
+            computed(ray, farthest, rows, first)
+            return Hit(*self._nearest(ray, farthest, rows, first + 1, inputs))
         near = _may_meet(ray, rows, first)
         found = dr.if_stmt((), near, lambda: self._nearest(ray, farthest, rows, first + 1, inputs), lambda: none)
         return Hit(*found)
 
     def block(self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Array:
         """Whether any lies on a ray, nearer than `farthest`."""
+        if self._in_kernels_of_their_own:
+            computed(ray, farthest, rows, first)
+            return self._block(ray, farthest, rows, first + 1, inputs)
         near = _may_meet(ray, rows, first) & (farthest > 0)
         return dr.if_stmt((), near, lambda: self._block(ray, farthest, rows, first + 1, inputs), lambda: mi.Bool(False))
 
@@ -190,6 +196,7 @@ class Movers:
         uv = mi.Point2f(0)
         normal = self._normals(ray(dr.select(which < len(self), t, 0)), which, rows, first, inputs)
         for m, scene in enumerate(self.meshes):
+            computed(t, which, normal, uv)
             k = self.n_primitives + m
             frame, _ = _frame(rows, first, mi.UInt32(k))
             si = scene.ray_intersect(_local_ray(ray, frame), mi.RayFlags.All, True, self._is_there(k, frame))
@@ -197,6 +204,8 @@ class Movers:
             t, which = dr.select(nearer, si.t, t), dr.select(nearer, k, which)
             normal = dr.select(nearer, frame.given(mi.Vector3f(si.n)), normal)
             uv = dr.select(nearer, si.uv, uv)
+        if self._in_kernels_of_their_own:
+            computed(t, which, normal, uv)
         return t, which, normal, uv
 
     def _block(self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Array:
@@ -208,12 +217,20 @@ class Movers:
 
             _, blocked = _loop(i, inputs, step, blocked)
         for m, scene in enumerate(self.meshes):
+            computed(blocked)
             k = self.n_primitives + m
             frame, _ = _frame(rows, first, mi.UInt32(k))
             local = _local_ray(ray, frame)
             local.maxt = farthest
             blocked |= scene.ray_test(local, ~blocked & self._is_there(k, frame))
+        if self._in_kernels_of_their_own:
+            computed(blocked)
         return blocked
+
+    @property
+    def _in_kernels_of_their_own(self) -> bool:
+        """Whether each mesh is met in a kernel by itself, see `computed`: there, no branch can hold it."""
+        return bool(self.meshes) and on_gpu()
 
     def _is_there(self, k: int, frame: _Frame) -> Array | bool:
         """Whether a world has mover k: what Embree and OptiX make of rays from nowhere is not defined."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 
 from optics.numerics import backend
@@ -27,6 +28,18 @@ def default_variant() -> str:
         optics.BackendError: there is no such device.
     """
     return ON_GPU if device() == "cuda" else DEFAULT_VARIANT
+
+
+def on_gpu() -> bool:
+    """Whether Mitsuba's variant in force computes on a GPU."""
+    return (mi.variant() or "").startswith("cuda")
+
+
+def computed(*values: Any) -> None:
+    """Have a GPU compute these now: OptiX meets one scene per kernel, and leaves others out with a line on stderr. On
+    the processor all go into one kernel."""
+    if on_gpu():
+        dr.eval(values)
 
 
 @contextmanager

@@ -3,9 +3,9 @@
 import drjit as dr
 import numpy as np
 import pytest
-from drjit.auto.ad import Float64, TensorXf64
 
 import optics
+from tests.optics.device_types import Float64, TensorXf64
 
 PUPIL = optics.Pupil(10e-6, thin_lens_focal_length=100e-6)
 WIDE = optics.Pupil(1e-3, thin_lens_focal_length=1e-3)

@@ -120,7 +120,8 @@ def test_bad_input_names_itself(make, message):
 
 def test_derivatives_are_refused():
     import drjit as dr
-    from drjit.llvm.ad import Float64
+
+    from tests.optics.device_types import Float64
 
     value = Float64(0.1)
     dr.enable_grad(value)

@@ -5,10 +5,10 @@ import math
 import drjit as dr
 import numpy as np
 import pytest
-from drjit.auto.ad import Float64, TensorXf64
 
 import optics
 from optics import GaussianMask, MaskMap, Pupil, Rings
+from tests.optics.device_types import Float64, TensorXf64
 from validation.reference import relative_l2
 
 R, F, WAVE = 60e-6, 1e-3, 550e-9

@@ -5,11 +5,11 @@ import math
 import drjit as dr
 import numpy as np
 import pytest
-from drjit.auto.ad import Float64, TensorXf64
 
 import optics
 from optics import Pupil, Slit, WavefrontMap, Zernike
 from optics.elements.wavefront import mode
+from tests.optics.device_types import Float64, TensorXf64, UInt32
 
 R, F, WAVE = 60e-6, 1e-3, 550e-9
 MODES = [(n, m) for n in range(9) for m in range(-n, n + 1, 2)]
@@ -170,7 +170,7 @@ def asking(numbers):
 def brightness(wavefront):
     """Of one sample beside the axis."""
     result = optics.psf(eye(wavefront), [WAVE], F, dx=2e-6, shape=(3, 3), tolerance=1e-5, dtype="float64")
-    return dr.gather(Float64, dr.ravel(result.tensor), dr.llvm.UInt(5))
+    return dr.gather(Float64, dr.ravel(result.tensor), UInt32(5))
 
 
 def slope(function, at, step=1e-4):

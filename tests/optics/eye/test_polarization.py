@@ -6,11 +6,11 @@ from dataclasses import replace
 import drjit as dr
 import numpy as np
 import pytest
-from drjit.auto.ad import Float64
 
 import optics
 from optics import Eye, Microvilli
 from optics.eye.polarization import polarised_error
+from tests.optics.device_types import Float64
 
 WAVE, F = 500e-9, 4e-3
 PERFECT = Eye(resolution=(3, 4), bands=2, noise_sigma=0.0)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import optics
 from optics.numerics import device
 from optics.numerics.backend import BackendError
 from optics.numerics.precision import precision
@@ -63,6 +64,15 @@ venv = sim.make_vec_env("detection", eyes=sim.Eyes(n_eyes=2, resolution=(5, 5), 
                         rays_per_receptor=16)
 found = venv.reset()["eyes"]
 """
+
+
+def test_arrays_of_another_device_are_refused(monkeypatch):
+    """`drjit.auto` makes them on a GPU wherever there is one. The other way round fails alike: no GPU is needed."""
+    radius = precision("float64").Float64(30e-6)
+    monkeypatch.setenv(device.VARIABLE, "cuda")
+    monkeypatch.setattr(device, "has_gpu", lambda: True)
+    with pytest.raises(BackendError, match=r"drjit.llvm.ad.Float64: must be of drjit.cuda.ad, since RHABDOM_DEVICE"):
+        optics.Pupil(radius)
 
 
 @pytest.mark.skipif(not device.has_gpu(), reason="no NVIDIA GPU here")

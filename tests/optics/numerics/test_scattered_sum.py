@@ -3,10 +3,10 @@
 import drjit as dr
 import numpy as np
 import pytest
-from drjit.auto.ad import Float64
 
 from optics.numerics.interpolation import chebyshev_basis, chebyshev_points
 from optics.numerics.scattered_sum import ScatteredSum, sums_at
+from tests.optics.device_types import Float64
 
 
 @pytest.mark.parametrize("shape", [(31, 34), (64, 20), (1, 5)])

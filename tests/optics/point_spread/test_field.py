@@ -6,10 +6,10 @@ import math
 import drjit as dr
 import numpy as np
 import pytest
-from drjit.auto.ad import Float64
 
 import optics
 from optics import Annulus, BSplineRelief, PixelRelief, Pupil
+from tests.optics.device_types import Float64
 
 R, Z, WAVE = 30e-6, 250e-6, 550e-9
 RELIEF = np.random.default_rng(1).random((4, 4)) * 2e-6

@@ -6,9 +6,9 @@ from dataclasses import replace
 import drjit as dr
 import numpy as np
 import pytest
-from drjit.auto.ad import Float64
 
 import optics
+from tests.optics.device_types import Float64
 from validation import reference
 from validation.cases import draw_case
 

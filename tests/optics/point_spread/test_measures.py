@@ -160,7 +160,8 @@ def test_the_cutoff_is_the_mediums():
 def test_contrasts_know_how_much_light_a_mask_leaves_at_the_rim():
     """The derivative by the mask's width, against differences: what is evanescent goes with the light at the rim."""
     import drjit as dr
-    from drjit.llvm.ad import Float64
+
+    from tests.optics.device_types import Float64
 
     def total(waist):
         pupil = optics.Pupil(15e-6, thin_lens_focal_length=110e-6, mask=optics.GaussianMask(waist))

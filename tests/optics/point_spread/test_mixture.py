@@ -3,9 +3,9 @@
 import drjit as dr
 import numpy as np
 import pytest
-from drjit.auto.ad import TensorXf64
 
 from optics.point_spread.mixture import mixed
+from tests.optics.device_types import TensorXf64
 
 RNG = np.random.default_rng(0)
 WEIGHTS = np.array([[0.2, 0.9, -0.1], [0.5, 0.0, 0.5]])

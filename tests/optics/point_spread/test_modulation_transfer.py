@@ -3,12 +3,12 @@
 import drjit as dr
 import numpy as np
 import pytest
-from drjit.auto.ad import Float64
 
 import optics
 from optics.numerics.precision import precision
 from optics.point_spread import modulation_transfer
 from optics.point_spread.modulation_transfer import MTF
+from tests.optics.device_types import Float64
 
 LENS, FOCUS, WAVELENGTH = optics.Pupil(1e-3, thin_lens_focal_length=4e-3), 4e-3, 550e-9
 

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from drjit.auto.ad import Float64
 
 import optics
 from optics import Grid
 from optics.point_spread.population import _sine, _spread, _Stack, population_pictures
 from optics.point_spread.population_members import Member
+from tests.optics.device_types import Float64
 from validation.reference import relative_l2
 
 Z, LAMBDA = 240e-6, 550e-9

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from drjit.auto.ad import Float64
 
 import optics
 from optics import Grid
 from optics.elements.wavefront import mode
 from optics.point_spread.population import population_pictures
 from optics.point_spread.population_members import HIGHEST_ORDER, Member, powers
+from tests.optics.device_types import Float64
 from validation.reference import relative_l2
 
 Z, LAMBDA = 240e-6, 550e-9

@@ -3,10 +3,10 @@
 import drjit as dr
 import numpy as np
 import pytest
-from drjit.auto.ad import Float64
 
 import optics
 from optics import AccuracyError, Pupil, Spectrum, Zernike
+from tests.optics.device_types import Float64
 from validation import reference
 
 R, F = 60e-6, 6e-3

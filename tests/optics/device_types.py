@@ -1,0 +1,6 @@
+"""Dr.Jit's types in float64, of the device that is asked for: `drjit.auto` takes a GPU wherever there is one."""
+
+from optics.numerics.precision import precision
+
+_TYPES = precision("float64")
+Float64, TensorXf64, UInt32 = _TYPES.Float64, _TYPES.Tensor64, _TYPES.Index

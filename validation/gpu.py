@@ -1,0 +1,249 @@
+"""The processor and a GPU: the same pictures, gradients, looks and steps on both, and what they take.
+
+    python -m validation.gpu [--only NAME ...]
+
+Each device computes in a process of its own. Prints wall time per call, medians after calls that compile and warm up,
+and the largest difference between both devices' numbers, as a share of the largest number.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.device import VARIABLE, has_gpu
+
+WARM_UP, LEAST_CALLS, BUDGET = 3, 5, 1.0  # calls, calls, seconds
+GREEN, FOCUS = 550e-9, 240e-6
+WORLDS = (64, 1024)
+
+
+@dataclass(frozen=True)
+class Case:
+    """make: prepares a call, whose numbers both devices shall agree in."""
+
+    name: str
+    make: Callable[[], Callable[[], Any]]
+
+
+def relief(radius: float, seed: int) -> Any:
+    """Control points near a lens that focuses at FOCUS."""
+    import optics
+
+    exact = optics.BSplineRelief.paraboloid(0.0, 2 / FOCUS, radius).control_points
+    return exact + 1e-6 * np.random.default_rng(seed).random((4, 4))
+
+
+def one_picture(side: int, radius: float, dtype: str) -> Callable[[], Callable[[], Any]]:
+    """A PSF of a pupil with glass near a lens."""
+
+    def make() -> Callable[[], Any]:
+        import optics
+
+        pupil = optics.Pupil(radius, optics.BSplineRelief(relief(radius, 0)))
+        asked = {"dx": 0.25e-6, "shape": (side, side), "dtype": dtype}
+        return lambda: optics.psf(pupil, [GREEN], FOCUS, **asked).psf
+
+    return make
+
+
+def many_pictures(count: int) -> Callable[[], Callable[[], Any]]:
+    """PSFs of a population."""
+
+    def make() -> Callable[[], Any]:
+        import optics
+
+        radii = np.random.default_rng(0).uniform(15e-6, 40e-6, count)
+        pupils = [optics.Pupil(r, optics.BSplineRelief(relief(r, seed))) for seed, r in enumerate(radii)]
+        return lambda: optics.psf_batch(pupils, [GREEN], FOCUS, dx=0.25e-6, shape=(65, 65), tolerance=0.01).psf
+
+    return make
+
+
+def gradient() -> Callable[[], Any]:
+    """Of the light on the axis, over sixteen heights of a relief."""
+    import drjit as dr
+
+    import optics
+    from optics.numerics.precision import precision
+
+    types = precision("float64")
+    start = relief(30e-6, 0)
+
+    def call() -> Any:
+        heights = types.Tensor(start)
+        dr.enable_grad(heights)
+        pupil = optics.Pupil(30e-6, optics.BSplineRelief(heights))
+        result = optics.psf(pupil, [GREEN], FOCUS, dx=0.5e-6, shape=(65, 65), dtype="float64")
+        dr.backward(-dr.log(dr.gather(types.Float, types.Float(result.tensor.array), 32 * 65 + 32)))
+        return dr.grad(heights).numpy()
+
+    return call
+
+
+def whole_plane(side: int) -> Callable[[], Callable[[], Any]]:
+    """A field carried from plane to plane by the angular spectrum."""
+
+    def make() -> Callable[[], Any]:
+        import optics
+
+        dx = 0.5e-6
+        x = (np.arange(side) - side // 2) * dx
+        field = np.exp(-(x**2 + x[:, None] ** 2) / (side * dx / 12) ** 2).astype(complex)
+        return lambda: optics.propagate(field, dx=dx, wavelength=GREEN, distance=1e-3, out_shape=(side, side)).u
+
+    return make
+
+
+def kernel() -> Callable[[], Any]:
+    """What a receptor sees, four bands."""
+    from sim import Eyes
+    from sim.eyes.receptive_fields import cells_for
+
+    eye = behind_lens(Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45)).eye()
+    return lambda: eye.kernel(cells_for(eye))
+
+
+def behind_lens(eyes: Any) -> Any:
+    """The same eyes behind a pupil a quarter as wide as the retina, with a lens in focus."""
+    import optics
+
+    return replace(eyes, optics=optics.Pupil(eyes.sensor_width / 8, thin_lens_focal_length=eyes.eye().sensor_distance))
+
+
+def looks(worlds: int, lens: bool, samples: str) -> Callable[[], Callable[[], Any]]:
+    """Signals of two eyes of 15 x 15 receptors in every world, without noise."""
+
+    def make() -> Callable[[], Any]:
+        import sim
+        from sim.envs.simulation import Simulation
+
+        plain = sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_deg=60)
+        eyes = behind_lens(plain) if lens else plain
+        world = sim.build_world("detection")
+        light = "direct" if samples == "rays" else "all"
+        fidelity = sim.Fidelity(4.0 if samples == "rays" else 1.0, eyes.bands, light=light, samples=samples)
+        renderer = sim.BatchedRenderer(world, eyes, worlds, fidelity)
+        state = Simulation(world, worlds, 0, "training", 1).reset()
+        return lambda: renderer.signals(state)
+
+    return make
+
+
+def steps(worlds: int) -> Callable[[], Callable[[], Any]]:
+    """A step of all worlds: physics on the processor, looks on the device, noise."""
+
+    def make() -> Callable[[], Any]:
+        import sim
+
+        eyes = sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_deg=60)
+        venv = sim.make_vec_env("detection", eyes=eyes, n_envs=worlds, seed=0)
+        venv.reset()
+        random = np.random.default_rng(0)
+        return lambda: venv.step(random.uniform(-1, 1, (worlds, 2)).astype(np.float32))[1]
+
+    return make
+
+
+CASES = (
+    Case("PSF, 65 x 65 samples", one_picture(65, 30e-6, "float32")),
+    Case("PSF, 513 x 513", one_picture(513, 100e-6, "float32")),
+    Case("the same in float64", one_picture(513, 100e-6, "float64")),
+    *(Case(f"{n} PSFs of a population", many_pictures(n)) for n in (32, 512)),
+    Case("gradient of a PSF, 16 heights", lambda: gradient()),
+    *(Case(f"plane to plane, {n} x {n}", whole_plane(n)) for n in (512, 2048)),
+    Case("kernel of a receptor", lambda: kernel()),
+    *(Case(f"looks, perfect lens, areas, {n} worlds", looks(n, False, "areas")) for n in WORLDS),
+    *(Case(f"looks, behind a lens, areas, {n} worlds", looks(n, True, "areas")) for n in WORLDS),
+    *(Case(f"looks, perfect lens, rays, {n} worlds", looks(n, False, "rays")) for n in WORLDS),
+    *(Case(f"steps, {n} worlds", steps(n)) for n in WORLDS),
+)
+
+
+def measured(case: Case) -> dict[str, Any]:
+    """Seconds of the first call and of later ones, and what the last warm-up found."""
+    call = case.make()
+    begun = time.perf_counter()
+    values = np.asarray(call())
+    first = time.perf_counter() - begun
+    for _ in range(WARM_UP - 1):
+        call()
+    spent: list[float] = []
+    while len(spent) < LEAST_CALLS or sum(spent) < BUDGET:
+        begun = time.perf_counter()
+        np.asarray(call())
+        spent.append(time.perf_counter() - begun)
+    return {"first": first, "seconds": statistics.median(spent), "values": values}
+
+
+def child(place: str, names: list[str], out: Path) -> None:
+    """Measures on this process's device; a case that fails is told in one line."""
+    numbers, arrays = {}, {}
+    for case in CASES:
+        if names and not any(name in case.name for name in names):
+            continue
+        try:
+            found = measured(case)
+        except Exception as error:  # whatever a device cannot do is a result, too
+            numbers[case.name] = {"failed": f"{type(error).__name__}: {str(error).splitlines()[0][:300]}"}
+            continue
+        arrays[case.name] = found.pop("values")
+        numbers[case.name] = found
+        print(place, case.name, found, file=sys.stderr, flush=True)
+    np.savez(out / f"{place}.npz", **arrays)
+    (out / f"{place}.json").write_text(json.dumps(numbers))
+
+
+def row(name: str, cpu: dict[str, Any], gpu: dict[str, Any], difference: float | None) -> str:
+    if "failed" in gpu or "failed" in cpu:
+        return f"| {name} | {cpu.get('failed', 'works')} | {gpu.get('failed', 'works')} | | |"
+    ratio = cpu["seconds"] / gpu["seconds"]
+    return (
+        f"| {name} | {1e3 * cpu['seconds']:.3g} | {1e3 * gpu['seconds']:.3g} | {ratio:.2g} |"
+        f" {gpu['first']:.2g} | {difference:.1e} |"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="*", default=[], help="parts of cases' names")
+    parser.add_argument("--child", help=argparse.SUPPRESS)
+    parser.add_argument("--out", type=Path, help=argparse.SUPPRESS)
+    asked = parser.parse_args()
+    if asked.child:
+        child(asked.child, asked.only, asked.out)
+        return
+    if not has_gpu():
+        sys.exit("Dr.Jit finds no NVIDIA GPU here")
+    with tempfile.TemporaryDirectory() as folder:
+        found = {}
+        for place in ("cpu", "cuda"):
+            command = [sys.executable, "-m", "validation.gpu", "--child", place, "--out", folder, "--only", *asked.only]
+            subprocess.run(command, check=True, env={**os.environ, VARIABLE: place})
+            found[place] = json.loads((Path(folder) / f"{place}.json").read_text())
+        arrays = {place: np.load(Path(folder) / f"{place}.npz") for place in found}
+        print(
+            "| | processor [ms] | GPU [ms] | ratio | first call [s] | largest difference |\n|---|---|---|---|---|---|"
+        )
+        for name, cpu in found["cpu"].items():
+            gpu, difference = found["cuda"][name], None
+            if name in arrays["cpu"] and name in arrays["cuda"]:
+                a, b = (arrays[place][name] for place in ("cpu", "cuda"))
+                difference = float(np.abs(a - b).max() / np.abs(a).max())
+            print(row(name, cpu, gpu, difference))
+
+
+if __name__ == "__main__":
+    main()
