@@ -6,6 +6,7 @@ python -m experiments.brains_and_acuity [--runs TASK=DIR ...] [--answer TEXT] [-
 from __future__ import annotations
 
 import math
+import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -25,7 +26,9 @@ NAME = "brains_and_acuity"
 COLORS = {"navigation": "#D55E00", "detection": "#0072B2", "tracking": "#009E73"}
 PUBLISHED = {"navigation": 0.69, "detection": 0.74, "tracking": 0.59}
 CLASSES = 4  # of acuity
-TICKS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.2, 0.3, 0.5, 0.7, 1)
+TICKS = (1.0, 2.0, 3.0, 5.0, 7.0)  # of a decade
+FEW = (1.0, 3.0)  # where there are many decades
+MANY = 30.0  # from the lowest to the highest number
 Size = Callable[[Row], float]
 FACTORS: dict[str, Size] = {
     "acuity": lambda row: row.cpd,
@@ -173,8 +176,10 @@ def _key() -> list[Any]:
 
 
 def label(axis: Any, ends: tuple[float, float]) -> None:
-    """Plain numbers on an axis that spans few decades."""
-    ticks = [tick for tick in TICKS if ends[0] <= tick <= ends[1]]
+    """Plain numbers on a logarithmic axis."""
+    of_decade = TICKS if ends[1] < MANY * ends[0] else FEW
+    decades = range(math.floor(math.log10(ends[0])), math.ceil(math.log10(ends[1])))
+    ticks = [tick for n in decades for k in of_decade if ends[0] <= (tick := k * 10.0**n) <= ends[1]]
     axis.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
     axis.set_tick_params(which="minor", labelleft=False, labelbottom=False)
 
