@@ -6,7 +6,6 @@ python -m experiments.brains_and_acuity [--runs TASK=DIR ...] [--answer TEXT] [-
 from __future__ import annotations
 
 import math
-import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path

@@ -9,24 +9,33 @@ from argparse import Namespace
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 from evolve.config.assemble import assemble
-from evolve.config.run_config import RunConfig
+from evolve.config.run_config import EyeConfig, RunConfig
 from evolve.genome.phenotype import NEURONS_PER_FEATURE, Phenotype
 from evolve.search.job import Job
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.worker import evaluate_candidate, prepare_device
 from evolve.store.atomic_files import write_whole
 from evolve.store.evaluation import Evaluation
+from experiments.glass import paraboloid
 from experiments.page import Page, parser, told
 from experiments.store import Origin, read_rows, write_rows
 
 __all__ = ["Design", "Experiment", "Trained", "crossed", "main", "train_all"]
 
 
+INDEX = 1.9  # of glass: high, so that reliefs of the greatest height reach far
+
+
 @dataclass(frozen=True)
 class Design:
-    """An animal behind perfect lenses, what it is to learn and in which light, and the seed of its life."""
+    """An animal, what it is to learn and in which light, and the seed of its life.
+
+    relative_aperture: of pupils with a paraboloid of glass in them; 0: perfect lenses
+    glass_power: of that glass, 1 in focus (see experiments.glass)
+    """
 
     task: str
     n_eyes: int
@@ -38,6 +47,8 @@ class Design:
     fov_deg: float = 45.0
     memory_frames: int = 5
     neurons: int = 64
+    relative_aperture: float = 0.0
+    glass_power: float = 0.0
 
     @property
     def animal(self) -> Phenotype:
@@ -46,17 +57,21 @@ class Design:
             placement_range_deg=self.placement_range_deg,
             fov_deg=self.fov_deg,
             resolution=(self.height, self.width),
-            relative_aperture=None,
-            relief=None,
-            refractive_index=None,
             memory_frames=self.memory_frames,
             neurons=self.neurons,
             encoder=math.ceil(self.neurons / NEURONS_PER_FEATURE),
+            **self._optics(),
         )
+
+    def _optics(self) -> dict[str, Any]:
+        if not self.relative_aperture:
+            return {"relative_aperture": None, "relief": None, "refractive_index": None}
+        relief = paraboloid(self.glass_power, self.relative_aperture, self.fov_deg, INDEX, EyeConfig())
+        return {"relative_aperture": self.relative_aperture, "relief": relief, "refractive_index": INDEX}
 
     def config(self, settings: Sequence[str]) -> RunConfig:
         """Of a run of which it could be a candidate."""
-        own = ("eye.optics=false", f"eye.noise_sigma={self.noise_sigma}")
+        own = (f"eye.optics={str(self.relative_aperture > 0).lower()}", f"eye.noise_sigma={self.noise_sigma}")
         return assemble(self.task, assignments=(*own, *settings))
 
 

@@ -14,7 +14,7 @@ from evolve.genome.anatomy import retina_width
 from evolve.genome.phenotype import Phenotype
 from evolve.report.eye_figures import relief_heights
 
-__all__ = ["power", "relief_of"]
+__all__ = ["paraboloid", "power", "relief_of"]
 
 
 def power(animal: Phenotype, config: EyeConfig) -> float:
@@ -32,6 +32,25 @@ def power(animal: Phenotype, config: EyeConfig) -> float:
     way = (animal.refractive_index - 1) * config.relief_height * fall + 0.0  # no -0
     width = retina_width(animal.resolution[1], config)
     return 4 * way / (animal.relative_aperture**2 * width * math.tan(math.radians(animal.fov_deg) / 2))
+
+
+def paraboloid(
+    power: float, relative_aperture: float, fov_deg: float, index: float, eye: EyeConfig
+) -> tuple[float, ...]:
+    """Sixteen heights in [0, 1] of glass of this power, thinnest where it is 0.
+
+    Raises:
+        ValueError: it would be thicker than reliefs can be.
+    """
+    radius = relative_aperture * eye.sensor_width / 2
+    focus = eye.sensor_width / (2 * math.tan(math.radians(fov_deg) / 2))
+    points = optics.BSplineRelief.paraboloid(0.0, power / ((index - 1) * focus), radius).control_points
+    heights = (np.array(points) - np.min(points)) / eye.relief_height
+    if heights.max() > 1:
+        raise ValueError(
+            f"glass of power {power:g} behind a = {relative_aperture:g} is {heights.max():.2f} of the height"
+        )
+    return tuple(heights.ravel().tolist())
 
 
 def relief_of(heights: NDArray[np.float64]) -> optics.BSplineRelief | NDArray[np.float64]:

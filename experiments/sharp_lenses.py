@@ -1,0 +1,183 @@
+"""Sharp lenses: how near to focus must glass be, for animals that tell a goal from its doubles?
+
+python -m experiments.sharp_lenses [--compute] [--workers N] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from evolve.analysis.statistics import white_strehl
+from evolve.config.run_config import EyeConfig
+from experiments import designed
+from experiments.best_pupil import contrast_of, measures
+from experiments.designed import Design, Trained
+from experiments.means import Interval
+from experiments.page import Figure, Page, markdown_table, new_figure, save
+from experiments.store import Origin
+
+__all__ = ["Lens", "designs", "lens_of", "page", "worth"]
+
+NAME = "sharp_lenses"
+SIGMA = 0.003
+APERTURES = (0.3, 0.45)  # about where evolving pupils end while they are holes, and when they are lenses
+POWERS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3)
+SEEDS = range(4)
+SETTINGS = ("learning.total_steps=130000", "learning.eval_interval=65000")  # as the preset `lens` trains
+SHARP = 0.3  # Strehl ratio
+NEARLY = 0.1  # contrast that a lens is short of the best one's, at most, to be nearly as good
+COLORS = {0.3: "#D55E00", 0.45: "#0072B2"}
+RESAMPLES = 10_000
+
+
+@dataclass(frozen=True)
+class Lens:
+    """strehl: in white daylight · contrast: above the noise, see experiments.best_pupil."""
+
+    strehl: float
+    contrast: float
+
+
+def designs() -> list[Design]:
+    """All trainings, one life of every animal first: two eyes of 15 x 15, as the preset `lens` has them."""
+    return [
+        Design("detection", 2, 15, 15, 45.0, SIGMA, seed, relative_aperture=a, glass_power=power)
+        for seed in SEEDS
+        for a in APERTURES
+        for power in POWERS
+    ]
+
+
+@cache
+def lens_of(aperture: float, power: float) -> Lens:
+    """What glass of this power does in such a pupil."""
+    design = Design("detection", 2, 15, 15, 45.0, SIGMA, 0, relative_aperture=aperture, glass_power=power)
+    eye = design.animal.eyes(EyeConfig(noise_sigma=SIGMA)).eye()
+    return Lens(white_strehl(eye, eye.psf()), measures(contrast_of(eye), float(eye.throughput), SIGMA)[1])
+
+
+def _lives(rows: Sequence[Trained], aperture: float, power: float) -> list[Trained]:
+    return [r for r in rows if not r.failed and (r.relative_aperture, r.glass_power) == (aperture, power)]
+
+
+def _powers(rows: Sequence[Trained], aperture: float) -> list[float]:
+    return sorted({row.glass_power for row in rows if row.relative_aperture == aperture and not row.failed})
+
+
+def worth(rows: Sequence[Trained], aperture: float, seed: int = 0) -> Interval | None:
+    """Mean fitness behind sharp lenses, less that behind lenses that are not, but have nearly the contrast of the best,
+    with a bootstrap over lives; None where there are none of either."""
+    lenses = {power: lens_of(aperture, power) for power in _powers(rows, aperture)}
+    best = max((lens.contrast for lens in lenses.values()), default=math.nan)
+    good = {power: lens for power, lens in lenses.items() if lens.contrast >= (1 - NEARLY) * best}
+    kinds = [
+        np.array(
+            [
+                row.fitness
+                for p, lens in good.items()
+                if (lens.strehl > SHARP) is sharp
+                for row in _lives(rows, aperture, p)
+            ]
+        )
+        for sharp in (True, False)
+    ]
+    if not all(kind.size for kind in kinds):
+        return None
+    chance = np.random.default_rng(seed)
+    drawn = [kind[chance.integers(kind.size, size=(RESAMPLES, kind.size))].mean(axis=1) for kind in kinds]
+    low, high = np.quantile(drawn[0] - drawn[1], [0.025, 0.975])
+    return Interval(float(kinds[0].mean() - kinds[1].mean()), float(low), float(high))
+
+
+def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
+    """The page of stored rows."""
+    lives = [len(_lives(rows, a, p)) for a in APERTURES for p in _powers(rows, a)]
+    return Page(
+        name=NAME,
+        command=f"python -m experiments.{NAME} --compute",
+        values={
+            "answer": answer,
+            "lenses": _table(rows),
+            "worth": _worths(rows),
+            "sigma": f"{SIGMA:g}",
+            "sharp": f"{SHARP:g}",
+            "nearly": f"{NEARLY:.0%}",
+            "steps": f"{max(row.steps for row in rows):,}",
+            "lives": f"{min(lives)}" if min(lives) == max(lives) else f"{min(lives)} or {max(lives)}",
+            "resamples": f"{RESAMPLES:,}",
+        },
+        figures=[Figure(NAME, lambda path: draw(rows, path))],
+        origin=origin,
+    )
+
+
+def _table(rows: Sequence[Trained]) -> str:
+    """A row per lens."""
+    lines = []
+    for aperture in APERTURES:
+        for power in _powers(rows, aperture):
+            lens, mine = lens_of(aperture, power), _lives(rows, aperture, power)
+            fitness = [row.fitness for row in mine]
+            lines.append(
+                [
+                    *(f"{aperture:g}", f"{power:g}", f"{lens.strehl:.3f}", f"{lens.contrast:.2f}"),
+                    f"{np.mean(fitness):.0f} [{min(fitness):.0f}, {max(fitness):.0f}]",
+                    f"{np.mean([row.success_rate for row in mine]):.2f}",
+                ]
+            )
+    header = ["a", "power of the glass", "Strehl ratio", "contrast above the noise", "fitness", "goal first"]
+    return markdown_table(header, lines)
+
+
+def _worths(rows: Sequence[Trained]) -> str:
+    """A row per pupil."""
+    lines = [[f"{a:g}", str(worth(rows, a) or "-")] for a in APERTURES]
+    return markdown_table(["a", "fitness of sharp lenses, less that of nearly sharp ones"], lines)
+
+
+def draw(rows: Sequence[Trained], path: Path) -> None:
+    """Fitness and Strehl ratio over the power of the glass, a panel per pupil."""
+    figure, axes = new_figure(9.0, 4.2, columns=len(APERTURES), sharey=True)
+    for place, aperture in zip(axes[0], APERTURES, strict=True):
+        powers, color = _powers(rows, aperture), COLORS[aperture]
+        for power in powers:
+            mine = [row.fitness for row in _lives(rows, aperture, power)]
+            place.plot([power] * len(mine), mine, "o", color=color, ms=4, alpha=0.5, mec="none")
+        means = [float(np.mean([row.fitness for row in _lives(rows, aperture, p)])) for p in powers]
+        place.plot(powers, means, color=color, lw=1.5, label="fitness: lives and their mean")
+        sharpness = place.twinx()
+        sharpness.plot(powers, [lens_of(aperture, p).strehl for p in powers], color="#777777", ls="--", lw=1)
+        sharpness.set(ylim=(0, 1.05), ylabel="Strehl ratio" if aperture == APERTURES[-1] else "")
+        sharpness.spines["top"].set_visible(False)
+        place.plot([], [], color="#777777", ls="--", lw=1, label="Strehl ratio")
+        place.set(title=f"a = {aperture:g}", xlabel="power of the glass, 1 in focus")
+    axes[0, 0].set_ylabel("fitness")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
+    figure.suptitle(_message(rows))
+    save(figure, path)
+
+
+def _message(rows: Sequence[Trained]) -> str:
+    found = [worth(rows, a) for a in APERTURES]
+    if any(one is None for one in found):
+        return "What the power of glass is worth"
+    if all(one.low <= 0 <= one.high for one in found if one):
+        return "Glass pays long before it is sharp, and sharpness by itself does not"
+    return "Sharp lenses are worth more than nearly sharp ones"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train what is missing if asked; make the page from the store."""
+    return designed.main(designed.Experiment(NAME, __doc__ or "", designs, SETTINGS, page), arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
