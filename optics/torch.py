@@ -60,7 +60,7 @@ def _place() -> str:
     """Where optics computes, as torch calls it.
 
     Raises:
-        BackendError: on a GPU that this torch cannot use.
+        BackendError: Dr.Jit cannot compute there, or this torch cannot.
     """
     place = make_ready()
     if place == "cuda" and not torch.cuda.is_available():

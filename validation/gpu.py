@@ -28,6 +28,7 @@ from optics.numerics.device import VARIABLE, has_gpu
 WARM_UP, LEAST_CALLS, BUDGET = 3, 5, 1.0  # calls, calls, seconds
 GREEN, FOCUS = 550e-9, 240e-6
 WORLDS = (64, 1024)
+PLACES = ("cpu", "cuda")
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,7 @@ def steps(worlds: int) -> Callable[[], Callable[[], Any]]:
         venv = sim.make_vec_env("detection", eyes=eyes, n_envs=worlds, seed=0)
         venv.reset()
         random = np.random.default_rng(0)
-        return lambda: venv.step(random.uniform(-1, 1, (worlds, 2)).astype(np.float32))[1]
+        return lambda: venv.step(random.uniform(-1, 1, (worlds, 2)).astype(np.float32))[0]["eyes"]
 
     return make
 
@@ -162,9 +163,9 @@ CASES = (
     Case("PSF, 513 x 513", one_picture(513, 100e-6, "float32")),
     Case("the same in float64", one_picture(513, 100e-6, "float64")),
     *(Case(f"{n} PSFs of a population", many_pictures(n)) for n in (32, 512)),
-    Case("gradient of a PSF, 16 heights", lambda: gradient()),
+    Case("gradient of a PSF, 16 heights", gradient),
     *(Case(f"plane to plane, {n} x {n}", whole_plane(n)) for n in (512, 2048)),
-    Case("kernel of a receptor", lambda: kernel()),
+    Case("kernel of a receptor", kernel),
     *(Case(f"looks, perfect lens, areas, {n} worlds", looks(n, False, "areas")) for n in WORLDS),
     *(Case(f"looks, behind a lens, areas, {n} worlds", looks(n, True, "areas")) for n in WORLDS),
     *(Case(f"looks, perfect lens, rays, {n} worlds", looks(n, False, "rays")) for n in WORLDS),
@@ -173,7 +174,7 @@ CASES = (
 
 
 def measured(case: Case) -> dict[str, Any]:
-    """Seconds of the first call and of later ones, and what the last warm-up found."""
+    """Seconds of the first call and of later ones, and what the first found."""
     call = case.make()
     begun = time.perf_counter()
     values = np.asarray(call())
@@ -191,13 +192,11 @@ def measured(case: Case) -> dict[str, Any]:
 def child(place: str, names: list[str], out: Path) -> None:
     """Measures on this process's device; a case that fails is told in one line."""
     numbers, arrays = {}, {}
-    for case in CASES:
-        if names and not any(name in case.name for name in names):
-            continue
+    for case in chosen(names):
         try:
             found = measured(case)
         except Exception as error:  # whatever a device cannot do is a result, too
-            numbers[case.name] = {"failed": f"{type(error).__name__}: {str(error).splitlines()[0][:300]}"}
+            numbers[case.name] = {"failed": f"{type(error).__name__}: {(str(error).splitlines() or [''])[0][:300]}"}
             continue
         arrays[case.name] = found.pop("values")
         numbers[case.name] = found
@@ -206,10 +205,18 @@ def child(place: str, names: list[str], out: Path) -> None:
     (out / f"{place}.json").write_text(json.dumps(numbers))
 
 
-def row(name: str, cpu: dict[str, Any], gpu: dict[str, Any], difference: float | None) -> str:
+def chosen(names: list[str]) -> list[Case]:
+    """Cases that have one of these in their names; all without any."""
+    return [case for case in CASES if not names or any(name in case.name for name in names)]
+
+
+def row(name: str, found: dict[str, dict[str, Any]], arrays: dict[str, Any]) -> str:
+    """Of a table; what a device cannot do stands in the place of its time."""
+    cpu, gpu = (found[place][name] for place in PLACES)
     if "failed" in gpu or "failed" in cpu:
         return f"| {name} | {cpu.get('failed', 'works')} | {gpu.get('failed', 'works')} | | |"
-    ratio = cpu["seconds"] / gpu["seconds"]
+    a, b = (arrays[place][name] for place in PLACES)
+    difference, ratio = np.abs(a - b).max() / np.abs(a).max(), cpu["seconds"] / gpu["seconds"]
     return (
         f"| {name} | {1e3 * cpu['seconds']:.3g} | {1e3 * gpu['seconds']:.3g} | {ratio:.2g} |"
         f" {gpu['first']:.2g} | {difference:.1e} |"
@@ -218,31 +225,28 @@ def row(name: str, cpu: dict[str, Any], gpu: dict[str, Any], difference: float |
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", nargs="*", default=[], help="parts of cases' names")
+    parser.add_argument("--only", nargs="*", default=[], metavar="TEXT", help="cases with one of these in their names")
     parser.add_argument("--child", help=argparse.SUPPRESS)
     parser.add_argument("--out", type=Path, help=argparse.SUPPRESS)
     asked = parser.parse_args()
     if asked.child:
         child(asked.child, asked.only, asked.out)
         return
+    if not chosen(asked.only):
+        sys.exit(f"no case has {' or '.join(asked.only)} in its name: {', '.join(case.name for case in CASES)}")
     if not has_gpu():
         sys.exit("Dr.Jit finds no NVIDIA GPU here")
     with tempfile.TemporaryDirectory() as folder:
         found = {}
-        for place in ("cpu", "cuda"):
+        for place in PLACES:
             command = [sys.executable, "-m", "validation.gpu", "--child", place, "--out", folder, "--only", *asked.only]
             subprocess.run(command, check=True, env={**os.environ, VARIABLE: place})
             found[place] = json.loads((Path(folder) / f"{place}.json").read_text())
         arrays = {place: np.load(Path(folder) / f"{place}.npz") for place in found}
-        print(
-            "| | processor [ms] | GPU [ms] | ratio | first call [s] | largest difference |\n|---|---|---|---|---|---|"
-        )
-        for name, cpu in found["cpu"].items():
-            gpu, difference = found["cuda"][name], None
-            if name in arrays["cpu"] and name in arrays["cuda"]:
-                a, b = (arrays[place][name] for place in ("cpu", "cuda"))
-                difference = float(np.abs(a - b).max() / np.abs(a).max())
-            print(row(name, cpu, gpu, difference))
+        print("| | processor [ms] | GPU [ms] | ratio | first call on the GPU [s] | largest difference |")
+        print("|---|---|---|---|---|---|")
+        for case in chosen(asked.only):
+            print(row(case.name, found, arrays))
 
 
 if __name__ == "__main__":

@@ -28,6 +28,10 @@ FRINGES = 0.75
 SPLAT_CELLS = 3.3  # area of a splat, as its inverse mean square: (∫β²)⁻² of the quadratic B-spline β
 
 
+class NoDerivativesError(ValueError):
+    """A method has no derivatives where it computes."""
+
+
 @dataclass(frozen=True)
 class RaySampling:
     """Edge-fitted rays, and the error of the intensity that rays instead of waves make."""
@@ -43,8 +47,8 @@ class RaySampling:
         """Power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
 
         Raises:
-            ValueError: derivatives are asked for on a GPU. Rules of Dr.Jit's that take the reciprocal of a float64 err
-                by 1e-6 there, and by 1e-2 in directions, which are differences of paths.
+            NoDerivativesError: they are asked for on a GPU. Rules of Dr.Jit's that take the reciprocal of a float64
+                err by 1e-6 there, and by 1e-2 in directions, which are differences of paths.
         """
         import drjit as dr
 
@@ -56,8 +60,8 @@ class RaySampling:
             weight *= dr.square(beam.pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types))
         x, y, propagates = _landings(beam, x, y, types)
         if device() == "cuda" and dr.grad_enabled(x, y):
-            raise ValueError(
-                f"method = 'geometric': has no derivatives on a GPU; ask for a wave method, or {VARIABLE}=cpu"
+            raise NoDerivativesError(
+                f"method = 'geometric': has no derivatives on a GPU; ask for 'exact', or for {VARIABLE}=cpu"
             )
         return _splat(x, y, dr.select(propagates, weight, 0), problem, types)
 

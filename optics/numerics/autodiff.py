@@ -52,10 +52,12 @@ def plain(value: Any) -> np.ndarray:
 
 
 def _on_the_device(value: Array) -> None:
-    given, wanted = type(value).__module__, "drjit.llvm" if device() == "cpu" else "drjit.cuda"
+    given, place = type(value).__module__, device()
+    wanted, where = ("drjit.llvm", "the processor") if place == "cpu" else ("drjit.cuda", "a GPU")
     if given.startswith(("drjit.llvm", "drjit.cuda")) and not given.startswith(wanted):
         raise BackendError(
-            f"{given}.{type(value).__name__}: must be of {wanted}.ad, since {VARIABLE} asks for {device()}"
+            f"an array of {given}.{type(value).__name__}: must be of {wanted}.ad, where optics computes on {where} "
+            f"({VARIABLE} says on which)"
         )
 
 

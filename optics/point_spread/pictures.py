@@ -9,6 +9,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from optics.methods.geometric import NoDerivativesError
 from optics.methods.problem import Problem
 from optics.methods.sampling import Sampling, WithField
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
@@ -52,7 +53,8 @@ class _Attempt:
 
     @classmethod
     def at(cls, request: Request, planned: tuple[Plan, Sampling]) -> _Attempt:
-        """The picture as planned. Dr.Jit has then recorded it, and computes it when it is first looked at."""
+        """The picture as planned, or exact where what was picked has no derivatives. Dr.Jit has then recorded it, and
+        computes it when it is first looked at."""
         import drjit as dr
 
         plan, sampling = planned
@@ -61,7 +63,13 @@ class _Attempt:
         radius = opaque(types, beam.radius)
         area = types.Float(beam.pupil.aperture.area * radius * radius)
         if not request.keeps_field:
-            return cls(request, plan, sampling, sampling.intensity(beam, problem) / area)
+            try:
+                return cls(request, plan, sampling, sampling.intensity(beam, problem) / area)
+            except NoDerivativesError:
+                if request.method != "auto":
+                    raise
+            request = replace(request, method="exact")
+            return cls.at(request, request.planned())
         whole = cast(WithField, sampling).field(beam, problem)
         waves = opaque(types, beam.distance) * opaque(types, 1 / problem.wavelength)
         # dr.rsqrt errs by 1e-6 on a GPU, also in float64.

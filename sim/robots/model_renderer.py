@@ -156,7 +156,7 @@ class ModelRenderer:
     def ids(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
         """Which geom each receptor's centre looks at, (env, eye, height, width) int32; -1 where there is nothing."""
         found = self._begin(poses, "which").wait().astype(int)
-        geoms = np.concatenate([self._scene.movers.geoms, self._scene.told_apart.geoms, [-1]])
+        geoms = np.concatenate([self._scene.movers.geoms, self._scene.told_apart[1]])
         return geoms[found].astype(np.int32).reshape(self.n_envs, len(self.mounts), *self.eye.resolution)
 
     def flow(self, poses: Poses | Sequence[mujoco.MjData], later: Poses | Sequence[mujoco.MjData]) -> np.ndarray:

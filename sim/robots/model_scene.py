@@ -8,16 +8,13 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-import drjit as dr
 import mitsuba as mi
 import mujoco
 import numpy as np
 
-from optics.numerics.autodiff import Array
 from optics.spectra.spectrum import Spectrum
 from sim.robots.appearances import Appearance, Varied, appearances_of, varied_geoms
 from sim.robots.model_lights import Lights, model_lights
@@ -27,22 +24,13 @@ from sim.robots.poses import Poses
 from sim.scene import bsdfs, inventory, lights, shapes, sky, surfaces
 from sim.scene.merged_parts import PlacedPart, merged
 from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
+from sim.scene.rays import names_of
 from sim.scene.spectra import Spectra, of_geom, resolve
 from sim.scene.variant import Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
 from sim.tracing.lighting import DIRECT
 
 _HERE = Path(__file__).parents[1]
-
-
-@dataclass(frozen=True)
-class ToldApart:
-    """scene: Mitsuba's · geoms: of its shapes, (shape,) · numbers: of these shapes, by Mitsuba's ids, which is all
-    that rays on a GPU say of what they meet"""
-
-    scene: MitsubaObject
-    geoms: np.ndarray
-    numbers: np.ndarray
 
 
 class ModelScene:
@@ -124,17 +112,17 @@ class ModelScene:
         return mi.load_dict({"type": "scene", **built}, optimize=False)
 
     @cached_property
-    def told_apart(self) -> ToldApart:
-        """What stands still, each geom by itself."""
+    def told_apart(self) -> tuple[MitsubaObject, np.ndarray]:
+        """What stands still, each geom by itself, and the geoms of its shapes by Mitsuba's ids; -1 where there is none.
+        Ids are all that rays on a GPU say of what they meet."""
         with in_variant(self.variant):
             built = {name: shapes.build(part, pose, name, bsdf, None) for name, part, pose, bsdf in self._still_parts()}
             scene = mi.load_dict({"type": "scene", **built}, optimize=False)
-            known = scene.shapes()
-            pointers: Array = dr.reinterpret_array(mi.UInt32, mi.ShapePtr(known))
-            ids = pointers.numpy()
-        numbers = np.zeros(ids.max(initial=0) + 1, np.uint32)
-        numbers[ids] = np.arange(len(known))
-        return ToldApart(scene, np.array([int(shape.id().split("_")[1]) for shape in known], int), numbers)
+            known = names_of(scene)
+        geoms = np.full(max(known, default=0) + 1, -1)
+        for shape, name in known.items():
+            geoms[shape] = int(name.split("_")[1])
+        return scene, geoms
 
     def refuse_differences(self, poses: Poses) -> None:
         """Sizes, colours and materials that differ from the model's where they cannot.

@@ -16,7 +16,7 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from sim.robots.model_scene import ModelScene
 from sim.scene.device_arrays import whole_numbers
-from sim.scene.variant import MitsubaObject
+from sim.scene.variant import MitsubaObject, computed
 from sim.tracing import lighting
 
 
@@ -112,6 +112,8 @@ class ModelTracer:
         active = mi.Bool(True) if active is None else active
         ray.wavelengths = self._bands[0]
         si = still.ray_intersect(ray, active) if self._any_still else _nothing()
+        if movers.apart:
+            computed(si)  # once: every kernel that reads of it would trace it anew
         far = dr.select(active, si.t, 0)
         hit = movers.nearest(ray, far, rows.movers, rows.first_mover, inputs)
         on_mover = active & (hit.which < len(movers))
@@ -138,19 +140,14 @@ class ModelTracer:
         return self._scene.movers.nearest(ray, far, rows.movers, rows.first_mover, inputs).t
 
     def which(self, told_apart: MitsubaObject, ray: Array, rows: Rows, inputs: dict[str, Array]) -> Array:
-        """What each ray meets: a mover by its number, after all movers the shapes of what stands still by theirs, and
-        nothing at last."""
-        movers, still = len(self._scene.movers), len(told_apart.shapes())
-        si = told_apart.ray_intersect_preliminary(ray) if still else _nothing()
-        hit = self._scene.movers.nearest(
-            ray, dr.select(si.is_valid(), si.t, dr.inf), rows.movers, rows.first_mover, inputs
-        )
-        standing = mi.UInt32(movers)
-        if still:
-            shape: Array = dr.reinterpret_array(mi.UInt32, si.shape)
-            number = dr.gather(mi.UInt32, inputs["standing"], shape, si.is_valid())
-            standing = movers + dr.select(si.is_valid(), number, still)
-        return dr.select(hit.which < movers, hit.which, standing)
+        """What each ray meets: a mover by its number; what stands still by its id in Mitsuba, after all movers, and
+        nothing as the id 0."""
+        movers, any_still = len(self._scene.movers), len(told_apart.shapes()) > 0
+        si = told_apart.ray_intersect_preliminary(ray) if any_still else _nothing()
+        far = dr.select(si.is_valid(), si.t, dr.inf)
+        hit = self._scene.movers.nearest(ray, far, rows.movers, rows.first_mover, inputs)
+        shape: Array = dr.reinterpret_array(mi.UInt32, si.shape) if any_still else mi.UInt32(0)
+        return dr.select(hit.which < movers, hit.which, movers + dr.select(si.is_valid(), shape, 0))
 
     def _irradiance(
         self,

@@ -79,9 +79,7 @@ class ModelWavefront:
         scene = self._scene
         with in_variant(scene.variant), garbage_kept():
             buffers = {name: mi.Float(buffer.reshape(-1)) for name, buffer in self._buffers.items()}
-            still = scene.scene
-            if kernel is self.which:
-                still, look = scene.told_apart.scene, look | {"standing": whole_numbers(scene.told_apart.numbers)}
+            still = scene.told_apart[0] if kernel is self.which else scene.scene
             found = kernel(still, scene.movers.meshes, buffers, look)
         return lambda: _read(found)
 

@@ -1,6 +1,7 @@
 """All that moves in a world, met by rays inside the renderer's kernel: primitives in closed form, meshes by Mitsuba.
 
-Each mesh is a scene of its own, in the geom's frame, and rays are taken there: nothing is rebuilt when it moves.
+Each mesh is a scene of its own, in the geom's frame, and rays are taken there: nothing is rebuilt when it moves. On a
+GPU each has a kernel of its own.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ KINDS = {
 # Of four floats for each mover: a sphere around its origin; then an axis of its frame in the world and one of its
 # sizes, three times.
 ROWS = 4
-MESHES = 32  # scenes in one kernel, at most
+MESHES = 32  # at most; on the processor all are scenes in one kernel
 # How far each kind reaches from its origin [m], by half sizes (..., 3).
 _REACH: dict[mujoco.mjtGeom, Callable[[np.ndarray], np.ndarray]] = {
     _TYPES.mjGEOM_SPHERE: lambda size: size[..., 0],
@@ -108,6 +109,11 @@ class Movers:
         return len(self.geoms)
 
     @property
+    def apart(self) -> bool:
+        """Whether each mesh is met in a kernel by itself, which no branch can hold: see `computed`."""
+        return bool(self.meshes) and on_gpu()
+
+    @property
     def n_rows(self) -> int:
         """Of four floats each, in one world."""
         return 1 + ROWS * len(self)
@@ -165,7 +171,7 @@ class Movers:
         none = farthest, mi.UInt32(len(self)), mi.Vector3f(0, 0, 1), mi.Point2f(0)
         if not len(self):
             return Hit(*none)
-        if self._in_kernels_of_their_own:
+        if self.apart:
             computed(ray, farthest, rows, first)
             return Hit(*self._nearest(ray, farthest, rows, first + 1, inputs))
         near = _may_meet(ray, rows, first)
@@ -174,7 +180,7 @@ class Movers:
 
     def block(self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Array:
         """Whether any lies on a ray, nearer than `farthest`."""
-        if self._in_kernels_of_their_own:
+        if self.apart:
             computed(ray, farthest, rows, first)
             return self._block(ray, farthest, rows, first + 1, inputs)
         near = _may_meet(ray, rows, first) & (farthest > 0)
@@ -204,7 +210,7 @@ class Movers:
             t, which = dr.select(nearer, si.t, t), dr.select(nearer, k, which)
             normal = dr.select(nearer, frame.given(mi.Vector3f(si.n)), normal)
             uv = dr.select(nearer, si.uv, uv)
-        if self._in_kernels_of_their_own:
+        if self.apart:
             computed(t, which, normal, uv)
         return t, which, normal, uv
 
@@ -223,14 +229,9 @@ class Movers:
             local = _local_ray(ray, frame)
             local.maxt = farthest
             blocked |= scene.ray_test(local, ~blocked & self._is_there(k, frame))
-        if self._in_kernels_of_their_own:
+        if self.apart:
             computed(blocked)
         return blocked
-
-    @property
-    def _in_kernels_of_their_own(self) -> bool:
-        """Whether each mesh is met in a kernel by itself, see `computed`: there, no branch can hold it."""
-        return bool(self.meshes) and on_gpu()
 
     def _is_there(self, k: int, frame: _Frame) -> Array | bool:
         """Whether a world has mover k: what Embree and OptiX make of rays from nowhere is not defined."""

@@ -7,6 +7,7 @@ import torch
 import optics
 import optics.torch
 from optics import AccuracyError, BSplineRelief, Pupil
+from optics.numerics import device
 
 VIEW = {"sensor_distance": 150e-6, "dx": 1e-6, "shape": (21, 17)}
 EXACTLY = {"dtype": "float64", "tolerance": 1e-7}
@@ -78,3 +79,11 @@ def test_errors_pass_through():
         optics.torch.psf(torch.zeros(4, 4), radius=1e-5, field=True, **VIEW)
     with pytest.raises(AccuracyError, match="float32 carries"):
         optics.torch.psf(torch.zeros(4, 4), radius=1e-5, tolerance=1e-8, **VIEW)
+
+
+def test_a_gpu_that_torch_cannot_use_is_refused(monkeypatch):
+    monkeypatch.setenv(device.VARIABLE, "cuda")
+    monkeypatch.setattr(device, "has_gpu", lambda: True)
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(optics.BackendError, match="RHABDOM_DEVICE asks for a GPU, and this torch has none"):
+        optics.torch.psf(torch.zeros(4, 4), radius=30e-6, sensor_distance=240e-6)

@@ -7,6 +7,8 @@ import pytest
 
 import optics
 from optics import BSplineRelief, Polygon, Pupil
+from optics.methods import geometric
+from tests.optics.device_types import Float64
 from tests.optics.methods.approximations import predicted_and_actual, random_case
 from validation.reference import order_of_convergence, relative_l2
 
@@ -87,6 +89,23 @@ def test_auto_takes_rays_only_within_the_tolerance():
     hexagon = Pupil(2e-3, aperture=optics.Polygon.regular(6))
     with pytest.raises(optics.AccuracyError):  # no method can, and none is taken that errs by more
         optics.plan(hexagon, WAVELENGTH, 2e-3, **wide, tolerance=1e-2)
+
+
+def test_rays_have_no_derivatives_on_a_gpu(monkeypatch):
+    """As if this were one: who asks for rays is told so, and "auto" takes waves."""
+    import drjit as dr
+
+    monkeypatch.setattr(geometric, "device", lambda: "cuda")
+    radius = Float64(2e-3)
+    dr.enable_grad(radius)
+    asked = {"wavelengths": [WAVELENGTH], "sensor_distance": 2e-3, "dx": 40e-6, "shape": (9, 9), "tolerance": 0.5}
+    with pytest.raises(ValueError, match="has no derivatives on a GPU; ask for 'exact'"):
+        optics.psf(Pupil(radius), **asked, method="geometric")
+    found = optics.psf(Pupil(radius), **asked)
+    assert found.plan.method == "hankel"
+    dr.backward(dr.sum(found.tensor.array))
+    assert radius.grad[0] != 0
+    assert optics.psf(Pupil(2e-3), **asked).plan.method == "geometric"
 
 
 class TestPinhole:

@@ -68,10 +68,11 @@ found = venv.reset()["eyes"]
 
 def test_arrays_of_another_device_are_refused(monkeypatch):
     """`drjit.auto` makes them on a GPU wherever there is one. The other way round fails alike: no GPU is needed."""
+    monkeypatch.setenv(device.VARIABLE, "cpu")
     radius = precision("float64").Float64(30e-6)
     monkeypatch.setenv(device.VARIABLE, "cuda")
     monkeypatch.setattr(device, "has_gpu", lambda: True)
-    with pytest.raises(BackendError, match=r"drjit.llvm.ad.Float64: must be of drjit.cuda.ad, since RHABDOM_DEVICE"):
+    with pytest.raises(BackendError, match=r"drjit.llvm.ad.Float64: must be of drjit.cuda.ad, where .* a GPU"):
         optics.Pupil(radius)
 
 

@@ -83,7 +83,7 @@ def test_every_entry_counts(env):
     """A state with one entry of another moment leads elsewhere: nothing in it is for show."""
     played(env, 3, 6)
     early = env.get_state()
-    played(env, Pushed.episode_steps + 1, 7)  # some begin anew, by chance
+    played(env, Pushed.episode_steps + 1, 7)  # every world begins anew, where chance has drawn it
     state = env.get_state()
     first = played(env, 15, 8)
     for name in set(state) - {"felt", "action"}:

@@ -1,5 +1,6 @@
 """Rays that meet movers, against MuJoCo's own ray caster."""
 
+import drjit as dr
 import mujoco
 import numpy as np
 import pytest
@@ -7,6 +8,7 @@ import pytest
 import sim
 from optics import Eye
 from sim.robots import movers, primitives
+from sim.scene import variant
 
 SHAPES = {
     "sphere": '<geom type="sphere" size=".3"/>',
@@ -84,6 +86,26 @@ def test_all_kinds_together():
     datas = [posed(model, seed, 0.8) for seed in range(WORLDS)]
     found, expected = depths(model, datas)
     assert agreement(found, expected) > 0.998
+
+
+def test_on_a_gpu_each_mesh_has_a_kernel_of_its_own(monkeypatch):
+    """OptiX meets one scene per kernel. As if this were a GPU: the same depths, and a kernel more for every mesh."""
+    kernels, expected = {}, {}
+    for gpu in (False, True):
+        for place in (movers, variant):
+            monkeypatch.setattr(place, "on_gpu", lambda gpu=gpu: gpu)
+        for meshes in (1, 2, 3):
+            model = model_of(SHAPES["box"], *[SHAPES["mesh"]] * meshes)
+            renderer = sim.ModelRenderer(model, EYE, [sim.Mount("eye")], 1, sim.Fidelity(1, bands=1))
+            with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+                dr.kernel_history_clear()
+                found = renderer.depth([posed(model, 0)])
+                kernels[gpu, meshes] = sum(each["type"] == dr.KernelType.JIT for each in dr.kernel_history())
+            np.testing.assert_array_equal(found, expected.setdefault(meshes, found))
+    assert kernels[False, 1] == kernels[False, 2] == kernels[False, 3]
+    assert kernels[True, 2] == kernels[True, 1] + 1
+    assert kernels[True, 3] == kernels[True, 1] + 2
+    assert kernels[True, 1] >= kernels[False, 1] + 2  # what stands still and primitives, the mesh, what is made of it
 
 
 @pytest.mark.parametrize("name", ["ellipsoid", "capsule", "cylinder", "box"])
