@@ -33,7 +33,7 @@ SEEDS = range(4)
 SETTINGS = ("learning.total_steps=130000", "learning.eval_interval=65000")  # as the preset `lens` trains
 SHARP = 0.3  # Strehl ratio
 NEARLY = 0.1  # contrast that a lens is short of the best one's, at most, to be nearly as good
-COLORS = {0.3: "#D55E00", 0.45: "#0072B2"}
+COLOR = "#0072B2"
 RESAMPLES = 10_000
 
 
@@ -146,7 +146,7 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
     """Fitness and Strehl ratio over the power of the glass, a panel per pupil."""
     figure, axes = new_figure(9.0, 4.2, columns=len(APERTURES), sharey=True)
     for place, aperture in zip(axes[0], APERTURES, strict=True):
-        powers, color = _powers(rows, aperture), COLORS[aperture]
+        powers, color = _powers(rows, aperture), COLOR
         for power in powers:
             mine = [row.fitness for row in _lives(rows, aperture, power)]
             place.plot([power] * len(mine), mine, "o", color=color, ms=4, alpha=0.5, mec="none")
@@ -170,7 +170,7 @@ def _message(rows: Sequence[Trained]) -> str:
     if any(one is None for one in found):
         return "What the power of glass is worth"
     if all(one.low <= 0 <= one.high for one in found if one):
-        return "Glass pays long before it is sharp, and sharpness by itself does not"
+        return "Glass pays long before it is sharp, and what sharpness adds is lost in the lives' chance"
     return "Sharp lenses are worth more than nearly sharp ones"
 
 

@@ -58,7 +58,7 @@ def test_what_sharpness_is_worth():
         assert found.low > 18
         assert nothing.low < 0 < nothing.high
     assert "worth more" in _message(paid)
-    assert "sharpness by itself does not" in _message(unpaid)
+    assert "what sharpness adds is lost" in _message(unpaid)
 
 
 def test_lenses_far_from_focus_do_not_count():
