@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import sim
 from experiments import designed
 from experiments.designed import Design, Trained, crossed
-from experiments.means import Interval
+from experiments.means import Interval, interval_of, resampled_difference
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.portraits import draw_head
 from experiments.store import Origin
@@ -71,15 +71,15 @@ def crossing(rows: Sequence[Trained], chance: np.random.Generator) -> Crossing:
     if min(one.size for both in fitness.values() for one in both) < FEWEST_LIVES:
         raise ValueError(f"a crossing takes {FEWEST_LIVES} lives of each kind of eyes in each task, or more")
     spread = {task: float(np.concatenate(both).std(ddof=1)) for task, both in fitness.items()}
-    drawn = {task: _resampled(*both, chance) for task, both in fitness.items()}
+    drawn = {task: resampled_difference(both[1], both[0], RESAMPLES, chance) for task, both in fitness.items()}
     means = {task: float(camera.mean() - compound.mean()) for task, (compound, camera) in fitness.items()}
-    differences = {task: _interval(means[task], drawn[task]) for task in TASKS}
+    differences = {task: interval_of(means[task], drawn[task]) for task in TASKS}
     apart = {task: (means[task] / spread[task], drawn[task] / spread[task]) for task in TASKS}
     (there, many_there), (here, many_here) = apart["detection"], apart["navigation"]
     permuted = {task: _permuted(*both, chance) / spread[task] for task, both in fitness.items()}
     null = permuted["detection"] - permuted["navigation"]
     p = (1 + int((np.abs(null) >= abs(there - here)).sum())) / (1 + null.size)
-    return Crossing(differences, _interval(there - here, many_there - many_here), p)
+    return Crossing(differences, interval_of(there - here, many_there - many_here), p)
 
 
 def _of(rows: Sequence[Trained], task: str, eyes: tuple[int, int]) -> Floats:
@@ -88,21 +88,10 @@ def _of(rows: Sequence[Trained], task: str, eyes: tuple[int, int]) -> Floats:
     return np.array([row.fitness for row in mine])
 
 
-def _resampled(compound: Floats, camera: Floats, chance: np.random.Generator) -> Floats:
-    """Differences of means over seeds drawn with replacement."""
-    drawn = [one[chance.integers(one.size, size=(RESAMPLES, one.size))].mean(axis=1) for one in (compound, camera)]
-    return np.asarray(drawn[1] - drawn[0])
-
-
 def _permuted(compound: Floats, camera: Floats, chance: np.random.Generator) -> Floats:
     """The same over animals that have been dealt their eyes at random."""
     mixed = chance.permuted(np.tile(np.concatenate([compound, camera]), (RESAMPLES, 1)), axis=1)
     return np.asarray(mixed[:, compound.size :].mean(axis=1) - mixed[:, : compound.size].mean(axis=1))
-
-
-def _interval(mean: float, drawn: Floats) -> Interval:
-    low, high = np.quantile(drawn, [0.025, 0.975])
-    return Interval(mean, float(low), float(high))
 
 
 def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:

@@ -13,6 +13,7 @@ from evolve.config.run_config import EyeConfig
 from evolve.genome.anatomy import retina_width
 from evolve.genome.phenotype import Phenotype
 from evolve.report.eye_figures import relief_heights
+from optics.eye.geometry import focal_length
 
 __all__ = ["paraboloid", "power", "relief_of"]
 
@@ -43,8 +44,8 @@ def paraboloid(
         ValueError: it would be thicker than reliefs can be.
     """
     radius = relative_aperture * eye.sensor_width / 2
-    focus = eye.sensor_width / (2 * math.tan(math.radians(fov_deg) / 2))
-    points = optics.BSplineRelief.paraboloid(0.0, power / ((index - 1) * focus), radius).control_points
+    curvature = power / ((index - 1) * focal_length(eye.sensor_width, fov_deg))
+    points = optics.BSplineRelief.paraboloid(0.0, curvature, radius).control_points
     heights = (np.array(points) - np.min(points)) / eye.relief_height
     if heights.max() > 1:
         raise ValueError(

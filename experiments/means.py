@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.candidates import Row
 
-__all__ = ["LAST", "Interval", "last_mean", "last_values", "of_generation"]
+__all__ = ["LAST", "Interval", "interval_of", "last_mean", "last_values", "of_generation", "resampled_difference"]
 
 Floats = NDArray[np.float64]
 LAST = 3  # generations whose mean is reported
@@ -28,6 +28,18 @@ class Interval:
 
     def __str__(self) -> str:
         return f"{self.mean:.3g} [{self.low:.3g}, {self.high:.3g}]"
+
+
+def resampled_difference(of: Floats, less: Floats, resamples: int, chance: np.random.Generator) -> Floats:
+    """Mean of one sample less that of another, each drawn anew with replacement, (resamples,)."""
+    drawn = [one[chance.integers(one.size, size=(resamples, one.size))].mean(axis=1) for one in (less, of)]
+    return np.asarray(drawn[1] - drawn[0])
+
+
+def interval_of(mean: float, drawn: Floats) -> Interval:
+    """95 % of what was drawn, around a mean."""
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return Interval(mean, float(low), float(high))
 
 
 def of_generation(rows: Iterable[Row], value: Callable[[Row], float]) -> tuple[Floats, Floats]:

@@ -19,7 +19,7 @@ from evolve.config.run_config import EyeConfig
 from experiments import designed
 from experiments.best_pupil import contrast_of, measures
 from experiments.designed import Design, Trained
-from experiments.means import Interval
+from experiments.means import Interval, interval_of, resampled_difference
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.store import Origin
 
@@ -77,23 +77,18 @@ def worth(rows: Sequence[Trained], aperture: float, seed: int = 0) -> Interval |
     lenses = {power: lens_of(aperture, power) for power in _powers(rows, aperture)}
     best = max((lens.contrast for lens in lenses.values()), default=math.nan)
     good = {power: lens for power, lens in lenses.items() if lens.contrast >= (1 - NEARLY) * best}
-    kinds = [
-        np.array(
-            [
-                row.fitness
-                for p, lens in good.items()
-                if (lens.strehl > SHARP) is sharp
-                for row in _lives(rows, aperture, p)
-            ]
-        )
-        for sharp in (True, False)
-    ]
-    if not all(kind.size for kind in kinds):
+    sharp, nearly = (
+        np.array([r.fitness for p, lens in good.items() if kind(lens) for r in _lives(rows, aperture, p)])
+        for kind in (_is_sharp, lambda lens: not _is_sharp(lens))
+    )
+    if not (sharp.size and nearly.size):
         return None
-    chance = np.random.default_rng(seed)
-    drawn = [kind[chance.integers(kind.size, size=(RESAMPLES, kind.size))].mean(axis=1) for kind in kinds]
-    low, high = np.quantile(drawn[0] - drawn[1], [0.025, 0.975])
-    return Interval(float(kinds[0].mean() - kinds[1].mean()), float(low), float(high))
+    drawn = resampled_difference(sharp, nearly, RESAMPLES, np.random.default_rng(seed))
+    return interval_of(float(sharp.mean() - nearly.mean()), drawn)
+
+
+def _is_sharp(lens: Lens) -> bool:
+    return lens.strehl > SHARP
 
 
 def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
@@ -108,7 +103,7 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
             "worth": _worths(rows),
             "sigma": f"{SIGMA:g}",
             "sharp": f"{SHARP:g}",
-            "nearly": f"{NEARLY:.0%}",
+            "nearly": f"{100 * NEARLY:g} %",
             "steps": f"{max(row.steps for row in rows):,}",
             "lives": f"{min(lives)}" if min(lives) == max(lives) else f"{min(lives)} or {max(lives)}",
             "resamples": f"{RESAMPLES:,}",

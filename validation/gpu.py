@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -39,12 +39,12 @@ class Case:
     make: Callable[[], Callable[[], Any]]
 
 
-def relief(radius: float, seed: int) -> Any:
+def relief(radius: float) -> Any:
     """Control points near a lens that focuses at FOCUS."""
     import optics
 
     exact = optics.BSplineRelief.paraboloid(0.0, 2 / FOCUS, radius).control_points
-    return exact + 1e-6 * np.random.default_rng(seed).random((4, 4))
+    return exact + 1e-6 * np.random.default_rng(0).random((4, 4))
 
 
 def one_picture(side: int, radius: float, dtype: str) -> Callable[[], Callable[[], Any]]:
@@ -53,7 +53,7 @@ def one_picture(side: int, radius: float, dtype: str) -> Callable[[], Callable[[
     def make() -> Callable[[], Any]:
         import optics
 
-        pupil = optics.Pupil(radius, optics.BSplineRelief(relief(radius, 0)))
+        pupil = optics.Pupil(radius, optics.BSplineRelief(relief(radius)))
         asked = {"dx": 0.25e-6, "shape": (side, side), "dtype": dtype}
         return lambda: optics.psf(pupil, [GREEN], FOCUS, **asked).psf
 
@@ -65,9 +65,9 @@ def many_pictures(count: int) -> Callable[[], Callable[[], Any]]:
 
     def make() -> Callable[[], Any]:
         import optics
+        from validation.D2_populations import eyes
 
-        radii = np.random.default_rng(0).uniform(15e-6, 40e-6, count)
-        pupils = [optics.Pupil(r, optics.BSplineRelief(relief(r, seed))) for seed, r in enumerate(radii)]
+        pupils = eyes(count)
         return lambda: optics.psf_batch(pupils, [GREEN], FOCUS, dx=0.25e-6, shape=(65, 65), tolerance=0.01).psf
 
     return make
@@ -81,7 +81,7 @@ def gradient() -> Callable[[], Any]:
     from optics.numerics.precision import precision
 
     types = precision("float64")
-    start = relief(30e-6, 0)
+    start = relief(30e-6)
 
     def call() -> Any:
         heights = types.Tensor(start)
@@ -112,16 +112,10 @@ def kernel() -> Callable[[], Any]:
     """What a receptor sees, four bands."""
     from sim import Eyes
     from sim.eyes.receptive_fields import cells_for
+    from validation.sim_throughput import with_pupil
 
-    eye = behind_lens(Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45)).eye()
+    eye = with_pupil(Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45)).eye()
     return lambda: eye.kernel(cells_for(eye))
-
-
-def behind_lens(eyes: Any) -> Any:
-    """The same eyes behind a pupil a quarter as wide as the retina, with a lens in focus."""
-    import optics
-
-    return replace(eyes, optics=optics.Pupil(eyes.sensor_width / 8, thin_lens_focal_length=eyes.eye().sensor_distance))
 
 
 def looks(worlds: int, lens: bool, samples: str) -> Callable[[], Callable[[], Any]]:
@@ -130,9 +124,10 @@ def looks(worlds: int, lens: bool, samples: str) -> Callable[[], Callable[[], An
     def make() -> Callable[[], Any]:
         import sim
         from sim.envs.simulation import Simulation
+        from validation.sim_throughput import with_pupil
 
         plain = sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_deg=60)
-        eyes = behind_lens(plain) if lens else plain
+        eyes = with_pupil(plain) if lens else plain
         world = sim.build_world("detection")
         light = "direct" if samples == "rays" else "all"
         fidelity = sim.Fidelity(4.0 if samples == "rays" else 1.0, eyes.bands, light=light, samples=samples)

@@ -19,7 +19,7 @@ def focal_length(width: float, fov_deg: Scalar) -> Scalar:
     if is_differentiable(fov_deg):
         import drjit as dr
 
-        sine, cosine = dr.sincos(dr.deg2rad(fov_deg) / 2)  # dr.tan errs by 1e-6 on a GPU beyond 45 degrees
+        sine, cosine = dr.sincos(dr.deg2rad(fov_deg) / 2)  # dr.tan takes dr.rcp beyond 45 degrees, 1e-6 off on a GPU
         return width * cosine / (2 * sine)
     return width / (2 * math.tan(math.radians(fov_deg) / 2))
 

@@ -56,8 +56,8 @@ def _on_the_device(value: Array) -> None:
     wanted, where = ("drjit.llvm", "the processor") if place == "cpu" else ("drjit.cuda", "a GPU")
     if given.startswith(("drjit.llvm", "drjit.cuda")) and not given.startswith(wanted):
         raise BackendError(
-            f"an array of {given}.{type(value).__name__}: must be of {wanted}.ad, where optics computes on {where} "
-            f"({VARIABLE} says on which)"
+            f"an array of {given}.{type(value).__name__}: must be of {wanted}.ad, because optics computes on {where}; "
+            f"{VARIABLE} chooses"
         )
 
 

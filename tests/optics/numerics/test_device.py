@@ -72,7 +72,7 @@ def test_arrays_of_another_device_are_refused(monkeypatch):
     radius = precision("float64").Float64(30e-6)
     monkeypatch.setenv(device.VARIABLE, "cuda")
     monkeypatch.setattr(device, "has_gpu", lambda: True)
-    with pytest.raises(BackendError, match=r"drjit.llvm.ad.Float64: must be of drjit.cuda.ad, where .* a GPU"):
+    with pytest.raises(BackendError, match=r"drjit.llvm.ad.Float64: must be of drjit.cuda.ad, because .* a GPU"):
         optics.Pupil(radius)
 
 

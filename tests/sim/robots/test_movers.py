@@ -88,24 +88,30 @@ def test_all_kinds_together():
     assert agreement(found, expected) > 0.998
 
 
-def test_on_a_gpu_each_mesh_has_a_kernel_of_its_own(monkeypatch):
-    """OptiX meets one scene per kernel. As if this were a GPU: the same depths, and a kernel more for every mesh."""
-    kernels, expected = {}, {}
+def kernels_of(look, datas):
+    """How many are launched by the first look, and what it sees."""
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        dr.kernel_history_clear()
+        found = look(datas)
+        return sum(each["type"] == dr.KernelType.JIT for each in dr.kernel_history()), found
+
+
+@pytest.mark.parametrize(("what", "more"), [("depth", 1), ("signals", 2)])
+def test_on_a_gpu_each_mesh_has_kernels_of_its_own(monkeypatch, what, more):
+    """OptiX meets one scene per kernel. As if this were a GPU: the same is seen, and every mesh has a kernel more for
+    what is looked at, and one for the shadow of the lamp."""
+    launched, expected = {}, {}
     for gpu in (False, True):
         for place in (movers, variant):
             monkeypatch.setattr(place, "on_gpu", lambda gpu=gpu: gpu)
         for meshes in (1, 2, 3):
             model = model_of(SHAPES["box"], *[SHAPES["mesh"]] * meshes)
             renderer = sim.ModelRenderer(model, EYE, [sim.Mount("eye")], 1, sim.Fidelity(1, bands=1))
-            with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
-                dr.kernel_history_clear()
-                found = renderer.depth([posed(model, 0)])
-                kernels[gpu, meshes] = sum(each["type"] == dr.KernelType.JIT for each in dr.kernel_history())
+            launched[gpu, meshes], found = kernels_of(getattr(renderer, what), [posed(model, 0)])
             np.testing.assert_array_equal(found, expected.setdefault(meshes, found))
-    assert kernels[False, 1] == kernels[False, 2] == kernels[False, 3]
-    assert kernels[True, 2] == kernels[True, 1] + 1
-    assert kernels[True, 3] == kernels[True, 1] + 2
-    assert kernels[True, 1] >= kernels[False, 1] + 2  # what stands still and primitives, the mesh, what is made of it
+    assert launched[False, 1] == launched[False, 2] == launched[False, 3]
+    assert launched[True, 2] - launched[True, 1] == launched[True, 3] - launched[True, 2] == more
+    assert launched[True, 1] >= launched[False, 1] + 2 * more  # before the mesh, it, and what is made of it
 
 
 @pytest.mark.parametrize("name", ["ellipsoid", "capsule", "cylinder", "box"])
