@@ -24,5 +24,6 @@ exr_export       what an agent saw, as EXR files
 rerun_recording  an episode for rerun
 rerun_plan       where one of rhabdom's own tasks plays, for rerun
 rerun_bodies     the model of somebody's own task, for rerun
+rerun_layout     what a recording opens with
 rerun_stream     what these are written with
 """

@@ -9,6 +9,7 @@ numbers over time, and `outcome` says how an episode in a task of somebody's own
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +19,14 @@ from evolve.report import rerun_bodies, rerun_plan
 from evolve.report.footage import AnyEpisode, Stage, stage_of
 from evolve.report.ground_plan import GroundPlan
 from evolve.report.picture import display
+from evolve.report.rerun_layout import layout
 from evolve.report.rerun_stream import RerunStream, require_rerun
 from evolve.store.atomic_files import unfinished
 
 __all__ = ["write_recording"]
+
+# Told apart by the colour-blind (Okabe and Ito 2008), on black.
+COLORS = ((235, 235, 235), (230, 159, 0), (86, 180, 233), (213, 94, 0), (0, 158, 115), (240, 228, 66), (204, 121, 167))
 
 
 def write_recording(episode: AnyEpisode, path: Path) -> Path:
@@ -34,11 +39,13 @@ def write_recording(episode: AnyEpisode, path: Path) -> Path:
     stage = stage_of(episode)
     name = f"{episode.task}, candidate {episode.candidate_id}, seed {episode.seed}"
     stream = rr.RecordingStream("rhabdom", recording_id=name, send_properties=False)
+    eyes = (rerun_bodies if isinstance(episode, FilmedEpisode) else rerun_plan).EYES
+    opens_with = layout(rr, episode, stage, eyes)
     strict = rr.strict_mode()
     rr.set_strict_mode(True)  # else it warns and leaves out what it does not understand
     try:
         with unfinished(path) as neighbour:
-            stream.save(neighbour)
+            stream.save(neighbour, default_blueprint=opens_with)
             stream.set_log_time_enabled(False)  # when it was written says nothing about the episode
             stream.set_log_tick_enabled(False)
             _write(RerunStream(rr, stream, stage.seconds), episode, stage)
@@ -83,7 +90,8 @@ def _count(to: RerunStream, episode: AnyEpisode, commands: dict[str, np.ndarray]
     numbers: dict[tuple[str, ...], np.ndarray] = {("reward",): episode.reward}  # no term has its name
     numbers |= {("reward", name): term for name, term in episode.reward_terms.items()}
     numbers |= {("action", name): commanded for name, commanded in commands.items()}
-    for entity, values in numbers.items():
+    for (entity, values), color in zip(numbers.items(), itertools.cycle(COLORS), strict=False):
+        to.always(entity, to.rr.SeriesLines(colors=color, names=entity[-1]))
         to.columns(entity, len(episode), to.rr.Scalars.columns(scalars=values.astype(np.float64)))
 
 

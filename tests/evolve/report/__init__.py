@@ -22,6 +22,7 @@ replay: analysis/test_episode.py, test_rerun_recording.py
 rerun_recording: test_rerun_recording.py, test_rerun_bodies.py
 rerun_plan: test_rerun_recording.py
 rerun_bodies: test_rerun_bodies.py
+rerun_layout: test_rerun_recording.py, test_rerun_bodies.py
 rerun_stream: test_rerun_recording.py, test_rerun_bodies.py
 exr_export: analysis/test_episode.py
 comparison: cli/test_status_and_compare.py

@@ -34,3 +34,21 @@ def vectors(columns, entity, component):
 def frames(columns, entity):
     """Rotations, from components that are by columns."""
     return vectors(columns, entity, "Transform3D:mat3x3").reshape(-1, 3, 3).swapaxes(1, 2)
+
+
+def views(episode, folder):
+    """Of a recording of it, each view that it opens with: what it shows of which entity, by kind."""
+    pytest.importorskip("rerun", reason="the extra rerun is not installed")
+    from rerun.chunk import RrdReader
+
+    reader = RrdReader(write_recording(episode, folder / "laid_out.rrd"))
+    (blueprint,) = reader.blueprints()
+    shown = {}
+    for chunk in reader.stream(store=blueprint):
+        batch = chunk.to_record_batch()
+        if "ViewBlueprint:space_origin" in batch.schema.names:
+            kind, origin = (
+                batch.column(f"ViewBlueprint:{n}").to_pylist() for n in ("class_identifier", "space_origin")
+            )
+            shown.setdefault(kind[0][0], set()).add(origin[0][0])
+    return shown

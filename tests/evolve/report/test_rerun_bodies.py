@@ -14,7 +14,7 @@ from evolve.learning.policy import load_policy
 from evolve.learning.worlds import own_task_for
 from sim.envs.task_vec_env import TaskVecEnv
 from tests.evolve.learning.test_task_module import BALL, small
-from tests.evolve.report.read_back import frames, read_back, vectors
+from tests.evolve.report.read_back import frames, read_back, vectors, views
 
 SEED = 5
 # An arm of every kind of geom swings on the cart; it is turned, and so are they.
@@ -197,3 +197,14 @@ def test_how_it_ended_is_told(episode, tmp_path, how, told, level):
     columns = read_back(replace(episode, **how), tmp_path)
     assert columns["/outcome", "TextLog:text"] == [[told]]
     assert columns["/outcome", "TextLog:level"] == [[level]]
+
+
+def test_it_opens_with_the_world_the_eyes_and_how_it_ended(columns, episode, tmp_path):
+    shown = views(episode, tmp_path)
+    there = {entity for entity, _ in columns}
+    elsewhere = {origin for origins in shown.values() for origin in origins} - there
+    assert elsewhere <= {"/world", "/action"}, "or what is below them"
+    assert shown["TextLog"] == {"/outcome"}
+    eyes = {entity for entity, _ in columns if entity.startswith("/world/eyes/")}
+    assert eyes
+    assert eyes < shown["2D"]

@@ -8,7 +8,7 @@ import pytest
 from evolve.cli.main import main
 from evolve.report import replay
 from evolve.report.ground_plan import GroundPlan
-from tests.evolve.report.read_back import frames, read_back, vectors
+from tests.evolve.report.read_back import frames, read_back, vectors, views
 
 
 @pytest.fixture(scope="module")
@@ -92,3 +92,14 @@ def test_agent_and_objects_are_balls_of_their_size(columns, episode):
     for name, radius in sizes.items():
         (half,) = columns[f"/world/{name}", "Ellipsoids3D:half_sizes"]
         np.testing.assert_allclose(half, [[radius] * 3], rtol=1e-6)
+
+
+def test_it_opens_with_the_world_numbers_over_time_and_every_eye(columns, episode, tmp_path):
+    shown = views(episode, tmp_path)
+    assert shown["3D"] == {"/world"}
+    assert shown["TimeSeries"] == {"/reward", "/action", "/contact"}
+    above = ("world/agent/eyes", "perfect_lens", "scene")
+    assert shown["2D"] == {f"/{entity}/{eye}" for entity in above for eye in ("left", "right")}
+    assert shown["Tensor"] == {"/signals/left", "/signals/right"}
+    there = {entity for entity, _ in columns}
+    assert all(any(entity.startswith(origin) for entity in there) for origins in shown.values() for origin in origins)
