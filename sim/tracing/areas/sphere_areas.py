@@ -38,24 +38,12 @@ class SphereTexture:
 
 
 @dataclass(frozen=True)
-class Strip:
+class Slice:
     """Of what an area sees of a sphere.
 
-    share: of the area that it fills · part: which that is, nearly
+    share: of the area that it fills
     seen, along, across: direction of its middle, and its sides on the area's plane · patch: what is seen there
     """
-
-    share: Array
-    part: Rectangle
-    seen: Array
-    along: Array
-    across: Array
-    patch: Patch
-
-
-@dataclass(frozen=True)
-class Slice:
-    """Of a strip. share: of the area that it fills · seen, along, across: as of a strip · patch: what is seen there"""
 
     share: Array
     seen: Array
@@ -67,6 +55,13 @@ class Slice:
         """1/z along the eye's axis [1/m]."""
         found: Array = dr.norm(self.seen) * dr.rcp(dr.norm(self.patch.point - area.origin))
         return found
+
+
+@dataclass(frozen=True)
+class Strip(Slice):
+    """Slices in a row, as one. part: which of the area that is, nearly"""
+
+    part: Rectangle
 
 
 class SphereView:
@@ -112,7 +107,7 @@ class SphereView:
         seen = self._ahead + self._across * place + self._along * middle
         sides = self._along * length, self._across * width
         upright = Rectangle(place, middle, width, length), Rectangle(middle, place, length, width)
-        return Strip(length * width, dr.select(self._upright, *upright), seen, *sides, self._patch(seen, *sides))
+        return Strip(length * width, seen, *sides, self._patch(seen, *sides), dr.select(self._upright, *upright))
 
     def slice(self, strip: Strip, number: Array) -> Slice:
         """One of a strip's."""
