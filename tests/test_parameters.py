@@ -190,6 +190,7 @@ FIELDS = {
     "search.steady_state": Case("search.steady_state=true", history),
     "search.population": Case("search.population=4", history),
     "search.generations": Case("search.generations=3", history),
+    "search.active": Case("search.active=true", history),
     "search.sigma": Case("search.sigma=0.1", history),
     "search.rungs": Case("search.rungs=2", budget_stages),
     "search.promoted": Case("search.promoted=0.7", budget_stages, ("search.rungs=2", *PERFECT)),

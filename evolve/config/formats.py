@@ -3,7 +3,8 @@
 1   no number in the file. The task "navigation" was a maze, and `learning.rays_per_eye` limited the rays in training.
 2   "navigation" is a course, "maze" the maze, and `learning.rays_per_receptor` limits the rays.
 
-Runs of both formats may lack `learning.least_epochs`: theirs did as many passes throughout.
+Runs of both formats may lack `learning.least_epochs`: theirs did as many passes throughout. They may lack
+`search.active`: their CMA-ES learnt from the worse candidates, too.
 
 A run of a former format is opened, replayed and reported on as what it was. Its trainings cannot be carried on, because
 their light was another.
@@ -44,6 +45,8 @@ def upgraded(tree: Mapping[str, Any]) -> Tree:
     now = {key: value for key, value in tree.items() if key != "format"}
     if isinstance(learning := now.get("learning"), dict):
         now["learning"] = _learning_then(learning, number)
+    if isinstance(search := now.get("search"), dict) and "optimizer" in search:
+        now["search"] = {"active": True, **search}
     if number == 1 and "task" in now:
         now["task"] = task_then(now["task"])
     return now

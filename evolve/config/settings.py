@@ -139,6 +139,12 @@ class SearchConfig:
     generations: int = setting(50, Interval(1, 100_000), "generations")
     sigma: float = setting(0.2, Interval(0, 1, open_low=True), "initial step size, as a fraction of each gene's range")
     optimizer: str = setting("CMA", None, "CMA, mutation, or the name of any nevergrad optimizer")
+    active: bool = setting(
+        False,
+        None,
+        "CMA learns from the worse half of a population, too; where the fittest are at the end of a gene's range, its "
+        "steps then grow without bound",
+    )
     steady_state: bool = setting(
         False, None, "propose a new candidate as soon as one has been evaluated; if false, generation by generation"
     )

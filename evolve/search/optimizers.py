@@ -151,7 +151,9 @@ class CMA(Named):
         from nevergrad.optimization.optimizerlib import ParametrizedCMA
 
         def scaled(scale: float) -> Any:
-            configured = ParametrizedCMA(scale=scale, popsize=search.population)
+            # Where samples are reflected at a bound, negative weights shrink the covariance across it to nothing, and
+            # what is left of a step there counts as so long that the step size grows without bound.
+            configured = ParametrizedCMA(scale=scale, popsize=search.population, inopts={"CMA_active": search.active})
             return configured(_array(space, 1.0), num_workers=search.population)
 
         # nevergrad shrinks the step in bounded spaces by a factor of its own choosing; it is divided out.

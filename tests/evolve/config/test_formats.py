@@ -43,6 +43,14 @@ def test_runs_that_say_nothing_of_fewer_passes_made_none_fewer():
         from_text(silent.replace("n_epochs = 7", "n_epochs = 7\nrays_per_eye = 32.0"))
 
 
+def test_runs_that_say_nothing_of_active_searches_had_one():
+    config = assemble("navigation")
+    assert not config.search.active
+    assert from_text(to_toml(config)) == config
+    assert from_text(to_toml(config).replace("active = false\n", "")).search.active
+    assert from_toml(RECORDS / "navigation-0" / "config.toml").search.active
+
+
 def test_what_somebody_asks_for_is_of_this_format(tmp_path):
     """A file without a number is a wish, not a run; another run's whole config.toml may be one, too."""
     file = tmp_path / "mine.toml"
