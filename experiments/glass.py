@@ -15,7 +15,7 @@ from evolve.genome.phenotype import Phenotype
 from evolve.report.eye_figures import relief_heights
 from optics.eye.geometry import focal_length
 
-__all__ = ["paraboloid", "power", "relief_of"]
+__all__ = ["blur", "paraboloid", "power", "relief_of"]
 
 
 def power(animal: Phenotype, config: EyeConfig) -> float:
@@ -33,6 +33,23 @@ def power(animal: Phenotype, config: EyeConfig) -> float:
     way = (animal.refractive_index - 1) * config.relief_height * fall + 0.0  # no -0
     width = retina_width(animal.resolution[1], config)
     return 4 * way / (animal.relative_aperture**2 * width * math.tan(math.radians(animal.fov_deg) / 2))
+
+
+def blur(animal: Phenotype, config: EyeConfig) -> float:
+    """Width of a far point's image by rays, in receptors: root mean square distance from its middle; that of the hole
+    where there is no glass, NaN for the perfect lens.
+
+    A ray through the pupil at r lands at r + f (n - 1) grad h (paraxial; Goodman, §5.1), f from pupil to retina. Light
+    that is diffracted is left out.
+    """
+    if animal.relief is None or animal.relative_aperture is None or animal.refractive_index is None:
+        return math.nan
+    heights, width = np.array(animal.relief), retina_width(animal.resolution[1], config)
+    radius, places, slopes = animal.relative_aperture * width / 2, *_slopes(math.isqrt(heights.size))
+    bend = (animal.refractive_index - 1) * config.relief_height / radius
+    landed = radius * places + focal_length(width, animal.fov_deg) * bend * np.tensordot(heights, slopes, 1)
+    spread = ((landed - landed.mean(axis=0)) ** 2).sum(axis=1).mean()
+    return math.sqrt(spread) * animal.resolution[1] / width
 
 
 def paraboloid(
@@ -70,3 +87,13 @@ def _fall(side: int) -> NDArray[np.float64]:
     terms = np.stack([np.ones(len(away)), (away**2).sum(axis=1)], axis=1)
     found: NDArray[np.float64] = -(np.linalg.pinv(terms) @ np.stack([h[inside] for h, _ in reliefs], axis=1))[1]
     return found
+
+
+@cache
+def _slopes(side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places in the pupil of radius 1, (n, 2), and the slopes there per height, (side², n, 2)."""
+    reliefs = [relief_heights(optics.Pupil(1.0, relief_of(gene))) for gene in np.eye(side * side)]
+    inside, pixels = reliefs[0][1], len(reliefs[0][1])
+    places = (np.argwhere(inside) + 0.5) * 2 / pixels - 1
+    slopes = [np.stack(np.gradient(heights, 2 / pixels, edge_order=2), axis=-1)[inside] for heights, _ in reliefs]
+    return places, np.array(slopes)

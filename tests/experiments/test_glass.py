@@ -8,7 +8,7 @@ import pytest
 
 from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
-from experiments.glass import power
+from experiments.glass import blur, power
 from optics import BSplineRelief
 
 EYE = EyeConfig()
@@ -70,3 +70,23 @@ def test_retinas_as_wide_as_their_receptors_have_the_same_power():
     lens = replace(ANIMAL, relief=paraboloid(1.0, 0.5 * 0.4 * EYE.sensor_width))
     pitched, wide = replace(EYE, receptor_pitch=4e-6), replace(EYE, sensor_width=60e-6)
     assert power(lens, pitched) == pytest.approx(power(lens, wide)) != pytest.approx(power(lens, EYE))
+
+
+@pytest.mark.parametrize("strength", [-0.5, 0.0, 0.8, 1.0])
+def test_paraxial_lens_blurs_by_what_it_falls_short_of_its_power(strength):
+    """Rays through a disk of radius R land on one of radius |1 - P| R, whose root mean square is R / sqrt(2)."""
+    radius = 0.4 * 15 / 2  # in receptors
+    lens = replace(ANIMAL, relief=paraboloid(strength, 0.5 * 0.4 * EYE.sensor_width))
+    expected = abs(1 - strength) * radius / math.sqrt(2)
+    assert blur(lens, EYE) == pytest.approx(expected, abs=2e-3 * radius)  # 161 pixels across
+
+
+def test_a_prism_moves_a_point_and_does_not_blur_it_more():
+    tilt = np.add.outer(np.zeros(4), np.linspace(0, 0.5, 4))
+    flat, prism = (replace(ANIMAL, relief=tuple(relief.ravel())) for relief in (0 * tilt, tilt))
+    assert blur(prism, EYE) == pytest.approx(blur(flat, EYE), rel=1e-9)
+    cylinder = (
+        np.array(paraboloid(1.0, 0.5 * 0.4 * EYE.sensor_width)).reshape(4, 4).mean(axis=0)[None].repeat(4, axis=0)
+    )
+    assert 0.6 < blur(replace(ANIMAL, relief=tuple(cylinder.ravel())), EYE) / blur(flat, EYE) < 0.8, "sqrt(1/2)"
+    assert math.isnan(blur(replace(ANIMAL, relief=None, relative_aperture=None, refractive_index=None), EYE))
