@@ -209,10 +209,13 @@ def draw(told_: Told, path: Path) -> None:
     for place, case in enumerate(reversed(cases)):
         strehl = [max(row.strehl, 1e-4) for row in told_.rows if row.case == case]
         axes[0, 1].semilogx(strehl, [place] * len(strehl), "o", color="#222222", ms=5, alpha=0.4, mec="none")
-    axes[0, 1].axvline(sharp_lenses.SHARP, color="#777777", ls=":", lw=1, label=f"Strehl ratio {sharp_lenses.SHARP:g}")
+    axes[0, 1].axvline(sharp_lenses.SHARP, color="#777777", ls=":", lw=1)
     axes[0, 1].set_yticks(range(len(cases)), cases[::-1])
-    axes[0, 1].set(xlabel="Strehl ratio in the end", xlim=(1e-4, 1), title="imitated searches, a dot each")
-    axes[0, 1].legend(frameon=False, loc="upper left", fontsize=8)
+    axes[0, 1].set(
+        xlabel=f"Strehl ratio in the end (dotted: {sharp_lenses.SHARP:g})",
+        xlim=(1e-4, 1),
+        title="imitated searches, a dot each",
+    )
     figure.suptitle(_message(told_.rows))
     save(figure, path)
 
