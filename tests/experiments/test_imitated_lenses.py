@@ -67,7 +67,7 @@ def test_searches_climb_what_there_is_to_climb(monkeypatch):
     assert ended == [searched("short", 0, land) for land in (TRUE, replace(TRUE, high=0.0))]
     found, lost = ended
     assert 0.7 < found.power < 1.3
-    assert found.blur < 0.6 < lost.blur
+    assert found.blur < 1 < lost.blur  # .2 to .5, and 1.7 to 5, in six searches
     assert found.fitness > 100
     assert found.strehl > lost.strehl or math.isnan(lost.strehl)
 
