@@ -5,6 +5,7 @@ python -m experiments.bending_light [--runs VARIANT=DIR ...] [--answer TEXT] [--
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -18,7 +19,7 @@ from experiments.candidates import Row
 from experiments.drift import SEEDS, shade
 from experiments.evolved import Store, conduct_table, null_model, null_table
 from experiments.glass import relief_of
-from experiments.means import LAST, last_mean, of_generation
+from experiments.means import LAST, last_mean, last_values, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.store import read_rows
 
@@ -142,8 +143,41 @@ def draw(store: Store, path: Path) -> None:
     axes[-1, -1].plot([], [], color="#777777", ls="--", label="best hole for stripes")
     axes[-1, -1].plot([], [], color="#777777", ls=":", label="from here glass may change")
     axes[-1, -1].legend(loc="center", frameon=False)
-    figure.suptitle("A pupil that evolves alone closes; where glass may become a lens, it opens again")
+    figure.suptitle(message(store))
     save(figure, path)
+
+
+def message(store: Store) -> str:
+    """How many pupils closed alone, and how many opened again with glass that may bend light and without."""
+    found = [(group in lenses(store), pupils(store, group, seed)) for group, seed in searches(store)]
+    closed = sum(alone < begun for _, (begun, alone, _) in found)
+    opened = {may: [end > alone for its, (_, alone, end) in found if its == may] for may in (True, False)}
+    with_, without = (f"{sum(of)} of {len(of)}" for of in opened.values())
+    return (
+        f"Alone, {closed} of {len(found)} pupils close; where glass may become a lens {with_} open again, "
+        f"where it may not {without}"
+    )
+
+
+def searches(store: Store) -> list[tuple[str, int]]:
+    """Group and seed of each."""
+    return [(group, seed) for group in store.groups for seed in sorted({row.seed for row in store.group(group)})]
+
+
+def lenses(store: Store) -> set[str]:
+    """Groups whose glass may bend light."""
+    return {row.group for row in store.rows if row.refractive_index != 1}
+
+
+def pupils(store: Store, group: str, seed: int) -> tuple[float, float, float]:
+    """Mean relative aperture in a search's first generation, in the last ones of phase I, and in its last ones; NaN
+    where it has not come so far."""
+    phases = ([row for row in of_phase(store, group, phase) if row.seed == seed] for phase in (0, 1))
+    alone, joined = (of_generation(rows, QUANTITIES["relative aperture a"])[1] for rows in phases)
+    begun, closed, end = (
+        float(of.mean()) if of.size else math.nan for of in (alone[:1], alone[-LAST:], joined[-LAST:])
+    )
+    return begun, closed, end
 
 
 def extremes(rows: Sequence[Row]) -> tuple[Row, Row] | tuple[()]:
@@ -157,7 +191,7 @@ def extremes(rows: Sequence[Row]) -> tuple[Row, Row] | tuple[()]:
 
 def draw_reliefs(store: Store, path: Path) -> None:
     """Height maps, two per seed, all on one scale."""
-    runs = [(g, s) for g in store.groups for s in sorted({row.seed for row in store.group(g)})]
+    runs = searches(store)
     figure, axes = new_figure(max(4.0, 1.7 * len(runs)), 4.2, columns=len(runs), rows=2)
     chosen = {run: extremes([row for row in store.group(run[0]) if row.seed == run[1]]) for run in runs}
     maps = {(run, i): longer(row, store) for run, rows in chosen.items() for i, row in enumerate(rows)}
@@ -171,8 +205,19 @@ def draw_reliefs(store: Store, path: Path) -> None:
             axes[i, column].set_title(title, fontsize=7)
     if maps:
         figure.colorbar(shown, ax=axes, shrink=0.7, label="optical path through the relief [µm]")
-    figure.suptitle("Where it may bend light, the glass becomes thickest in the middle: a lens")
+    figure.suptitle(message_of_reliefs(store))
     save(figure, path)
+
+
+def message_of_reliefs(store: Store) -> str:
+    """How many of the last animals whose glass may bend light have one that gathers it."""
+    late = [
+        power
+        for group in store.groups if group in lenses(store)
+        for powers in last_values(of_phase(store, group, 1), QUANTITIES["power of its glass"])
+        for power in powers
+    ]  # fmt: skip
+    return f"Where glass may become a lens, {sum(p > 0 for p in late)} of the last {len(late)} animals' gathers light"
 
 
 def longer(row: Row, store: Store) -> np.ndarray:

@@ -185,6 +185,32 @@ def test_variants_are_compared_at_the_same_generations(tmp_path):
         assert [float(cell.split()[0]) for cell in line.split("|")[2:6:2]] == pytest.approx([mean, mean])
 
 
+def test_messages_of_figures_count_pupils_and_lenses():
+    def search(group, seed, widths, power, index):
+        return [
+            replace(ROW, group=group, seed=seed, generation=g, phase=int(g > 3), relative_aperture=a,
+                    refractive_index=index, glass_power=power * (g > 3))
+            for g, a in enumerate(widths)
+        ]  # fmt: skip
+
+    closes_and_opens, stays, opens_at_once = (
+        (0.8, 0.3, 0.3, 0.3, 0.5, 0.5, 0.5),
+        (0.8, 0.3, 0.3, 0.3, 0.2, 0.2, 0.2),
+        (0.8, 0.9, 0.9, 0.9, 0.8, 0.8, 0.8),
+    )
+    rows = [
+        *(search("lens", 0, closes_and_opens, 1, 1.5) + search("lens", 1, stays, -1, 1.5)),
+        *(search("lens", 2, opens_at_once, 1, 1.2) + search("index1", 0, stays, 0, 1.0)),
+    ]
+    store = Store(rows, [], [], Origin.here(1.0), "")
+    assert bending_light.message(store) == (
+        "Alone, 3 of 4 pupils close; where glass may become a lens 1 of 3 open again, where it may not 0 of 1"
+    )
+    assert bending_light.message_of_reliefs(store) == (
+        "Where glass may become a lens, 6 of the last 9 animals' gathers light"
+    )
+
+
 def test_no_error_still_has_a_logarithm():
     assert brains_and_acuity.error(replace(ROW, success_rate=1.0, episodes=4)) == pytest.approx(0.1)
 
