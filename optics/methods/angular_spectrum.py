@@ -29,9 +29,6 @@ __all__ = [
 ]
 
 
-TOO_WIDE = 1.5  # choice: times the cheapest taper's cost, beyond which wider ones have not been seen to cost less
-
-
 class SpectrumSampling:
     """Samples of a spectrum, and of what it becomes.
 
@@ -150,11 +147,12 @@ def split_spectrum(problem: Problem) -> list[GridSampling]:
 
 
 def _samplings(problem: Problem, method: str) -> list[GridSampling]:
-    """By wider and wider tapers, as far as that pays: narrow ones need more frequencies, wide ones more room."""
+    """By wider and wider tapers, until one costs more than the last: narrow ones need more frequencies, wide ones more
+    room, and between them costs have one least."""
     found: list[GridSampling] = []
     for taper in tapers(problem):
         found.append(_sampling(problem, taper, method))
-        if found[-1].seconds > TOO_WIDE * min(each.seconds for each in found):
+        if len(found) > 1 and found[-1].seconds > found[-2].seconds:
             break
     return found
 

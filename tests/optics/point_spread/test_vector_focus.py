@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import optics
+from optics.point_spread import converging
 from validation.reference.richards_wolf import Light, focal_integrals
 
 WAVE, F = 500e-9, 1e-3
@@ -147,6 +148,33 @@ def test_plane_waves_have_the_fields_phase():
     assert np.linalg.norm(rough.field - exact.field) < 1e-2 * np.linalg.norm(exact.field)
 
 
+def test_a_plan_counts_every_field_that_is_propagated(monkeypatch):
+    found = optics.vector_focus(optics.Pupil(20e-6, thin_lens_focal_length=40e-6), WAVE, 45e-6, shape=(5, 5))
+    beams, integral = [], converging.smythe
+
+    def counted(beam, window, propagated):
+        return integral(beam, window, lambda one: beams.append(one) or propagated(one))
+
+    monkeypatch.setattr(converging, "smythe", counted)
+    again = found.towards.onto(found.grid)
+    scalar = found.towards._scalar(found.grid, again.plan.dtype)
+    assert again.plan.seconds == pytest.approx((len(beams) + 1) * scalar.plan.seconds)
+    np.testing.assert_array_equal(again.psf, found.psf)
+
+
+def test_where_single_precision_will_not_do_double_is_taken():
+    """The relief turns the light away, and a mask leaves it no rings: in the window is a ten thousand millionth."""
+    ramp = np.broadcast_to(np.linspace(0, 10e-6, 4), (4, 4))
+    view = {"dx": 0.2e-6, "shape": (9, 9), "tolerance": 1e-4}
+    plans = {}
+    for waist in (20e-6, 10e-6):
+        mask = optics.GaussianMask(waist)
+        pupil = optics.Pupil(25e-6, ramp, thin_lens_focal_length=200e-6, mask=mask)
+        plans[waist] = optics.vector_focus(pupil, WAVE, **view).plan
+    assert {waist: plan.dtype for waist, plan in plans.items()} == {20e-6: "float32", 10e-6: "float64"}
+    assert max(plan.predicted_error for plan in plans.values()) < 1e-4
+
+
 def test_evanescent_rays_are_refused():
     """Aslant by half a radian, those of a lens as wide as it is far are to leave under a sine of 1.17."""
     with pytest.raises(optics.AccuracyError, match=r"sine of 1\.17: must be at most 0\.98"):
@@ -154,13 +182,14 @@ def test_evanescent_rays_are_refused():
 
 
 def test_single_components_behind_thin_rings():
-    """What a plane wave's bent path does to them is of first order, where it is of second to their sum."""
+    """What a plane wave's bent path does to them is of first order, where it is of second to their sum. It is largest
+    in light that circles; what is foretold of it is nearly all that is foretold here, and less than twice too much."""
     pupil = optics.Pupil(300e-6, thin_lens_focal_length=400e-6, aperture=optics.Annulus(0.98))
-    view = {"polarization": (1, 0.5j), "dx": 0.1e-6, "shape": (9, 9)}
+    view = {"polarization": (1, 1j), "dx": 0.06e-6, "shape": (9, 9)}
     rough, exact = (optics.vector_focus(pupil, WAVE, tolerance=tolerance, **view) for tolerance in (1e-2, 1e-8))
     off = np.linalg.norm(rough.intensity - exact.intensity, axis=(1, 2)) / np.linalg.norm(exact.psf)
     assert rough.plan.method == "plane_waves"
-    assert 1e-6 < off.max() < rough.plan.predicted_error
+    assert 0.5 * rough.plan.predicted_error < off.max() < rough.plan.predicted_error
 
 
 def test_flat_rays_aslant_keep_their_polarisation():
