@@ -12,13 +12,14 @@ from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
 from optics.apertures.soft_polygon import SoftPolygon
 from optics.apertures.triangulation import crossing, kernel_point, triangle_nodes, triangles
-from optics.numerics.arguments import finite, positive, shown, without_derivative
+from optics.numerics.arguments import finite, positive, shown, whole, without_derivative
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["Polygon", "Slit"]
 
 # Rounding allowed to a vertex on the unit circle.
 RIM = 1 + 1e-9
+MOST_SIDES = 10_000  # choice: looking for edges that cross takes its square, seconds; more sides are a circle
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +46,10 @@ class Polygon(Aperture):
         """n equal sides in the unit circle, the first vertex `rotation_deg` from the x axis.
 
         Raises:
-            ValueError: n not a whole number of at least 3, or rotation_deg not finite.
+            ValueError: n not a whole number from 3 to 10,000, or rotation_deg not finite.
         """
-        if not isinstance(n, int | np.integer) or n < 3:
-            raise ValueError(f"n = {shown(n)}: must be a whole number of vertices, at least 3")
-        angle = np.deg2rad(finite("rotation_deg", rotation_deg)) + 2 * np.pi * np.arange(n) / n
+        turned = np.deg2rad(finite("rotation_deg", rotation_deg))
+        angle = turned + 2 * np.pi * np.arange(whole("n", n, 3, MOST_SIDES)) / n
         return cls(np.column_stack([np.cos(angle), np.sin(angle)]))
 
     @property

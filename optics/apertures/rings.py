@@ -12,7 +12,7 @@ from optics.apertures.aperture import Aperture, Nodes, SoftAperture
 from optics.apertures.circular import disk_table, ring_nodes
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
-from optics.numerics.arguments import positive, reals, shown, vacuum_wavelength
+from optics.numerics.arguments import flag, positive, reals, shown, vacuum_wavelength
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import SOFT_EDGE_SAMPLE
 from optics.numerics.precision import Precision
@@ -65,7 +65,7 @@ class Rings(Aperture):
         n = np.arange(int(zones * (1 + 1e-12)) + 1)
         ends = np.sqrt(n * half * (2 * focal + n * half)) / radius
         ends = np.minimum(np.append(ends[ends < 1 - 1e-9], 1.0), 1.0)
-        ends = ends if open_centre else ends[1:]
+        ends = ends if flag("open_centre", open_centre) else ends[1:]
         return cls(ends[: len(ends) // 2 * 2])
 
     @property

@@ -150,8 +150,9 @@ class Pupil:
         derivative moves it.
 
         Raises:
-            ValueError: the lens makes no real image.
+            ValueError: the lens makes no real image, or the distance is none.
         """
+        positive("source_distance", source_distance, infinite=True)
         if self.thin_lens_focal_length is None:
             return SENSOR_DISTANCE
         before = self.index_before(MIDDLE) / self.index_behind(MIDDLE)

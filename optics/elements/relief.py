@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from optics.elements.square_samples import on_both_sides, square_samples
-from optics.numerics.arguments import reals
+from optics.numerics.arguments import finite, positive, reals
 from optics.numerics.autodiff import Array, is_differentiable, plain
 from optics.numerics.interpolation import cubic_bsplines
 from optics.numerics.matrices import matmul
@@ -101,7 +101,11 @@ class BSplineRelief(Relief):
 
         On uniform knots the polar form gives x² the control values X_i² - δ²/3, X_i = (2i - 3) a the Greville
         abscissae and δ = 2a the knot spacing.
+
+        Raises:
+            ValueError: names argument, value and valid range.
         """
+        finite("height", height), finite("curvature", curvature), positive("radius", radius)
         greville = (2 * np.arange(4) - 3) * radius
         square = greville**2 - (2 * radius) ** 2 / 3
         return cls(height - curvature * (square[:, None] + square[None, :]) / 2)

@@ -20,7 +20,7 @@ from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kern
 from optics.eye.retinal_image import centred, with_centre
 from optics.eye.signals import signals, with_noise
 from optics.eye.summary import Description, describe
-from optics.numerics.arguments import in_range, of_kind, positive, radiance_cube, shape_2d, whole
+from optics.numerics.arguments import in_range, of_kind, one_of, positive, radiance_cube, shape_2d, whole
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.ommatidia.waveguide import Waveguide
 from optics.point_spread.psf_result import PSFResult
@@ -235,13 +235,12 @@ class Eye:
             than half as much there, by O(samples_per_receptor^-2).
 
         Raises:
-            ValueError: another light_from, or another argument out of range.
+            ValueError: names argument, value and valid range.
             AccuracyError: see `optics.psf`, or the tolerance needs more kernels than any eye is given.
         """
         within = self.tolerance if tolerance is None else in_range("tolerance", tolerance, 1e-6, 0.5)
-        s, from_cell = whole("samples_per_receptor", samples_per_receptor, 1, 64), light_from == LIGHT_FROM[0]
-        if light_from not in LIGHT_FROM:
-            raise ValueError(f"light_from = {light_from!r}: must be {' or '.join(map(repr, LIGHT_FROM))}")
+        s = whole("samples_per_receptor", samples_per_receptor, 1, 64)
+        from_cell = one_of("light_from", light_from, LIGHT_FROM) == LIGHT_FROM[0]
         half = self.sensor_width / (2 * number(self.sensor_distance))
         half_field = (half, half * self.resolution[0] / self.resolution[1])
 

@@ -115,7 +115,7 @@ def prepare(
     receptor's signal is the mean over its cells."""
     s, depths = samples_per_receptor, _Range.of(z)
     layers, zones = (
-        None if count == "auto" else whole(name, count, 1, MOST_NODES)
+        None if isinstance(count, str) and count == "auto" else whole(name, count, 1, MOST_NODES)
         for name, count in zip(("depth_layers", "field_zones"), counts, strict=True)
     )
     mean = s if averaged else 1

@@ -13,6 +13,7 @@ __all__ = [
     "complexes",
     "did_you_mean",
     "finite",
+    "flag",
     "in_range",
     "is_sized",
     "items",
@@ -59,6 +60,13 @@ def finite(name: str, value: float, *, carried: bool = False) -> float:
     if not math.isfinite(number):
         raise ValueError(f"{name} = {shown(value)}: must be finite")
     return number
+
+
+def flag(name: str, value: Any) -> bool:
+    """`value` as bool; ValueError unless it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name} = {shown(value)}: must be True or False")
+    return bool(value)
 
 
 def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False, carried: bool = False) -> float:

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from optics.numerics.arguments import finite, in_range, of_kind, positive, vacuum_wavelength, whole
+from optics.numerics.arguments import finite, in_range, of_kind, positive, shown, vacuum_wavelength, whole
 from optics.ommatidia.ommatidium import Ommatidium
 
 __all__ = ["AppositionEye", "hexagonal_directions"]
@@ -77,6 +77,8 @@ class AppositionEye:
         Raises:
             ValueError: the radiance is not finite, or of another shape than its angles.
         """
+        if not callable(radiance):
+            raise ValueError(f"radiance = {shown(radiance)}: must be a function of angles x and y [rad]")
         x, y, weights = self.field(wavelength)
         own = self.directions
         scene = np.asarray(radiance(own[:, :1] + x, own[:, 1:] + y), dtype=np.float64)

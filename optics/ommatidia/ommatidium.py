@@ -58,11 +58,13 @@ class Ommatidium:
         along x and y off the axis.
 
         Raises:
-            ValueError: an angle whose sine is above 0.5, or the rhabdom guides nothing.
+            ValueError: an angle whose sine is above 0.5, angles of different shapes, or the rhabdom guides nothing.
         """
-        x, y = np.broadcast_arrays(
-            *(reals(name, value) for name, value in (("angle_x", angle_x), ("angle_y", angle_y)))
-        )
+        x, y = reals("angle_x", angle_x), reals("angle_y", angle_y)
+        try:
+            x, y = np.broadcast_arrays(x, y)
+        except ValueError:
+            raise ValueError(f"angle_x has shape {x.shape} and angle_y {y.shape}: must be alike") from None
         for name, value in (("angle_x", x), ("angle_y", y)):
             in_range(f"abs({name})", float(np.abs(value).max(initial=0.0)), 0.0, math.asin(STEEPEST[-1]))
         tx, ty = np.tan(x), np.tan(y)

@@ -13,7 +13,7 @@ import numpy as np
 from optics.apertures.circular import disk_profile
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import point_2d, reals, shown
+from optics.numerics.arguments import flag, point_2d, reals, shown
 from optics.numerics.autodiff import Array, to_user
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
@@ -55,6 +55,7 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     """
     import drjit as dr
 
+    flag("with_error", with_error)
     if not isinstance(result, PSFResult):
         return a_mixture(result).strehl_ratio(with_error)
     types = precision("float64")
@@ -201,6 +202,7 @@ def encircled_energy(
     """
     import drjit as dr
 
+    flag("with_error", with_error)
     if not isinstance(result, PSFResult):
         return a_mixture(result).encircled_energy(radii, centre, with_error)
     wanted = np.atleast_1d(reals("radii", radii))

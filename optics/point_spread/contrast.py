@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import in_range, positive, reals, shown
+from optics.numerics.arguments import flag, in_range, positive, reals, shown
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
@@ -177,6 +177,7 @@ def image_quality(
     positive("nyquist", nyquist)
     in_range("throughput", throughput, 0, 1, carried=True)
     in_range("noise_sigma", noise_sigma, 0, 1e6)
+    flag("with_error", with_error)
     transfer = mtf(result, tolerance=tolerance)
     waves = transfer.tensor.shape[0]
     if number(throughput) == 0:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import in_range, of_kind, without_derivative
+from optics.numerics.arguments import flag, in_range, of_kind, without_derivative
 from optics.point_spread.converging import VectorFocus
 from optics.point_spread.disk_sum import DiskSum
 
@@ -61,6 +61,7 @@ class Microvilli:
             AccuracyError: it is too large for samples as fine as it needs.
         """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
+        flag("with_error", with_error)
         disk = DiskSum.over(light, radius, centre)
         found = disk.of(self.absorbed(disk.light))
         return found if with_error else found[0]

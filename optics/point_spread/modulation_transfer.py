@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import reals, shown
+from optics.numerics.arguments import reals, shown, whole
 from optics.numerics.autodiff import Array, plain, to_user
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2
@@ -76,7 +76,12 @@ class MTF:
         return np.asarray(self.tensor.numpy())
 
     def first(self, count: int) -> MTF:
-        """The first `count` of its wavelengths."""
+        """The first `count` of its wavelengths.
+
+        Raises:
+            ValueError: there are fewer, or count is no whole number.
+        """
+        count = whole("count", count, 1, self.tensor.shape[0])
         tensor, shares = (_first(part, count) for part in (self.tensor, self.shares))
         return MTF(tensor, self.fx, self.fy, self.cutoff[:count], self.predicted_error[:count], shares)
 

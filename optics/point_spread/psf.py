@@ -11,7 +11,7 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import Plan
-from optics.numerics.arguments import of_kind, shown, vacuum_wavelength, vacuum_wavelengths
+from optics.numerics.arguments import flag, of_kind, vacuum_wavelength, vacuum_wavelengths
 from optics.numerics.autodiff import Scalar, number
 from optics.numerics.grid import Grid
 from optics.point_spread.planner import FIELDS
@@ -60,9 +60,7 @@ def psf(
         raise ValueError("wavelengths is empty: must hold at least one wavelength [m]")
     if lambdas.ndim > 1:
         raise ValueError(f"wavelengths has shape {lambdas.shape}: must be one wavelength [m], or a row of them")
-    if not isinstance(field, (bool, np.bool_)):
-        raise ValueError(f"field = {shown(field)}: must be True or False")
-    if field and method not in ("auto", "exact", *FIELDS):
+    if flag("field", field) and method not in ("auto", "exact", *FIELDS):
         raise ValueError(
             f"method = {method!r} has no phase: with field=True must be 'auto' or one of {', '.join(FIELDS)}"
         )

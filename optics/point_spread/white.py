@@ -12,7 +12,7 @@ import numpy as np
 
 from optics.elements.pupil import Pupil
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import in_range, reals, shown, whole
+from optics.numerics.arguments import flag, in_range, reals, shown, whole
 from optics.numerics.autodiff import Array, plain, to_user
 from optics.numerics.precision import precision
 from optics.point_spread.concentration import encircled_energy, strehl_ratio
@@ -87,6 +87,7 @@ class WhitePSF:
         """
         import drjit as dr
 
+        flag("with_error", with_error)
         each = [strehl_ratio(self.waves.mean(row), with_error=True) for row in self.weights]
         ratios, errors = ([row[part] for row in each] for part in (0, 1))
         around = np.linalg.norm(self.psf, axis=(1, 2)) / self.psf.max(axis=(1, 2))
@@ -110,6 +111,7 @@ class WhitePSF:
             ValueError: see `optics.encircled_energy`.
             AccuracyError: see `optics.encircled_energy`.
         """
+        flag("with_error", with_error)
         each, errors = encircled_energy(self.waves, radii, centre, with_error=True)
         known = plain(each)
         change = np.abs((self.weights - self.coarse) @ known)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import shown, whole
+from optics.numerics.arguments import flag, shown, whole
 from optics.numerics.interpolation import linear_weights
 from optics.spectra.pigment import pigment_absorptance
 from optics.spectra.receptors import Receptors, receptors_of
@@ -67,6 +67,7 @@ class SpectralBands:
             raise ValueError(
                 f"radiance = {shown(radiance)}: must be a Spectrum, such as illuminant('D65'), or a function"
             )
+        flag("nonnegative", nonnegative)
         at = radiance.at if isinstance(radiance, Spectrum) else radiance
         nm, catch = _catch(receptors_of(receptors))
         catch /= catch.sum(axis=1, keepdims=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optics.numerics.arguments import in_range, positive
+from optics.numerics.arguments import in_range, of_kind, positive
 from optics.spectra.bands import SpectralBands
 from optics.spectra.spectrum import cie_1931, daylight
 
@@ -53,7 +53,11 @@ class PhotonBudget:
         etendue: G [m² sr], pupil area times the solid angle from which a receptor takes light. With
         G = (π/4) D² (d/f)² it is Land's sensitivity (Warrant & Nilsson 1998, Vision Research 38:195, eq. 1) with
         daylight's spectrum instead of one wavelength, for square receptors of side d.
+
+        Raises:
+            ValueError: names argument, value and valid range.
         """
+        of_kind("bands", bands, SpectralBands, "SpectralBands.uniform(4)")
         positive("etendue", etendue, "m² sr")
         radiance = self.spectral_irradiance / math.pi
         caught = self.quantum_efficiency * self.integration_time * etendue

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import is_sized, one_of, shown, without_derivative
+from optics.numerics.arguments import is_sized, one_of, reals, shown, without_derivative
 from optics.spectra.pigment import Pigment
 from optics.spectra.spectrum import LIMITS_NM, Spectrum, cone_fundamentals, daylight
 
@@ -76,7 +76,11 @@ class Receptors:
         """What each type catches of unit daylight per wavelength [nm], (type, wavelength), up to a common factor.
 
         Receptors count photons, radiance is energy: hence the factor λ beside the quantal sensitivity, whose peak is 1.
+
+        Raises:
+            ValueError: wavelengths that are none.
         """
+        nm = reals("nm", nm)
         light = daylight(nm * 1e-9)
         peaks = [max(kind.values) if isinstance(kind, Spectrum) else 1.0 for kind in self.types]
         return np.stack([kind.at(nm * 1e-9) / peak * nm * light for kind, peak in zip(self.types, peaks, strict=True)])
