@@ -177,9 +177,9 @@ def _descend(tried: Callable[[Floats], tuple[float, Floats]], genome: Floats, mo
 
 
 def by_cma(watch: Watch, spots: Sequence[float | None]) -> None:
-    """CMA-ES as evolution uses it; stages share its generations evenly."""
+    """CMA-ES as evolution used it when this was stored, active; stages share its generations evenly."""
     genes = [(GENES[name], GENES[name].default) for name in GENE_NAMES]
-    search = SearchConfig(population=POPULATION, generations=GENERATIONS, sigma=STEP)
+    search = SearchConfig(population=POPULATION, generations=GENERATIONS, sigma=STEP, active=True)
     optimizer = build_optimizer(Space(genes, start(watch.seed), (watch.seed,)), search)
     for generation in range(GENERATIONS):
         stage, within = divmod(generation * len(spots), GENERATIONS)
