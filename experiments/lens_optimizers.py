@@ -187,10 +187,12 @@ def by_cma(watch: Watch, spots: Sequence[float | None]) -> None:
             watch.begin_stage()
         asked = range(generation * POPULATION, (generation + 1) * POPULATION)
         genomes = {identity: optimizer.ask(identity)[0] for identity in asked}
-        losses = {identity: float(loss(genome, spots[stage])) for identity, genome in genomes.items()}
+        losses = {}
+        for identity, genome in genomes.items():
+            losses[identity] = float(loss(genome, spots[stage]))
+            watch.saw(genome, losses[identity])
         for identity, value in losses.items():
             optimizer.tell(identity, -value)
-            watch.saw(genomes[identity], value)
 
 
 METHODS: dict[str, tuple[Callable[[Watch, Sequence[float | None]], None], Sequence[float | None]]] = {
