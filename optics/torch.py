@@ -86,7 +86,7 @@ class PointSpread(torch.nn.Module):
     def __init__(
         self,
         radius: float,
-        wavelengths: Sequence[float] = (550e-9,),
+        wavelengths: Sequence[float] | float = (550e-9,),
         *,
         heights: torch.Tensor | None = None,
         n: float = 1.5,
@@ -99,7 +99,7 @@ class PointSpread(torch.nn.Module):
         start = torch.zeros(4, 4, dtype=torch.float64) if heights is None else heights.detach().double()
         self.relief = torch.nn.Parameter(start / unit)
         self.radius, self.n, self.unit = radius, n, unit
-        self.view = {"wavelengths": tuple(wavelengths), **view}
+        self.view = {"wavelengths": wavelengths, **view}
 
     @property
     def heights(self) -> torch.Tensor:

@@ -17,6 +17,8 @@ MM, UM = 1e-3, 1e-6
 SECTORS, ROUND = 8, 0.9  # choice: around the pupil, in each of which light reaches so far out, of the farthest
 RAYS_PER_MODE = 3  # choice
 LIT = 1e-3  # choice: of the brightest sample
+EVEN = 0.1  # choice: of the median amplitude, by which others may differ within ROUND of the radius
+CENTRE, FILLED = 1 / 3, 0.25  # choice: of the radius, and of the rays that lie so far in where rays are spread evenly
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +48,8 @@ def read_exit_pupil(
     order: of the highest Zernike mode that is fitted.
 
     Raises:
-        ValueError: the object has neither set of names, too few samples, or a pupil that is not round; or a bad
-            argument.
+        ValueError: the object has neither set of names, too few samples, or a pupil that is not round, obscured, or of
+            uneven light; or a bad argument.
     """
     vacuum_wavelength(wavelength)
     count = whole("order", order, 1, 30)
@@ -105,7 +107,18 @@ def _of_samples(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray,
     lit = np.abs(data) > np.sqrt(LIT) * np.abs(data).max()
     y, x = ((np.arange(n) - n // 2) * pitch for n in data.shape)
     rows, columns = np.nonzero(lit)
+    _check_even(np.abs(data), x, y, (rows, columns))
     return x[columns], y[rows], -_unwrapped(data, lit)[lit] * wavelength / (2 * np.pi)
+
+
+def _check_even(amplitude: np.ndarray, x: np.ndarray, y: np.ndarray, lit: tuple[np.ndarray, np.ndarray]) -> None:
+    """ValueError unless the circle around what is lit is open all over, and its light alike."""
+    (top, bottom), (left, right) = ((at[n].min(), at[n].max()) for at, n in zip((y, x), lit, strict=True))
+    off = np.hypot(y[:, None] - (top + bottom) / 2, x[None, :] - (left + right) / 2)
+    within = amplitude[off < ROUND * max(bottom - top, right - left) / 2]
+    middle = np.median(within) if within.size else 0.0
+    if within.size and np.abs(within - middle).max() > EVEN * middle:
+        raise ValueError("data: the pupil is obscured, not round, or its light uneven: only open circles are read")
 
 
 def _unwrapped(data: np.ndarray, lit: np.ndarray) -> np.ndarray:
@@ -127,6 +140,8 @@ def _fitted(x: np.ndarray, y: np.ndarray, ahead: np.ndarray, distance: float, me
     if farthest.min() < ROUND * farthest.max():
         raise ValueError("the pupil is not round: only circles are read")
     radius = float(farthest.max())
+    if np.mean(r < CENTRE * radius) < FILLED * CENTRE**2:
+        raise ValueError("the pupil is obscured: only open circles are read")
     basis = np.stack([mode(n, m, x / radius, y / radius) for n, m in modes], axis=1)
     found = np.linalg.lstsq(basis, ahead, rcond=None)[0]
     residual = float(np.sqrt(np.mean(np.square(ahead - basis @ found))))

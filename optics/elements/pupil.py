@@ -119,9 +119,20 @@ class Pupil:
         """[m²]"""
         return self.aperture.area * self.radius**2
 
-    @cached_property
+    @property
     def transmission(self) -> Scalar:
         """Share of the light on the open aperture that the mask lets through, with derivatives; 1 without a mask."""
+        return self._let_through() if self._transmission is None else self._transmission
+
+    @cached_property
+    def _transmission(self) -> float | None:
+        """None where the mask asks for a derivative: its graph serves one backward pass."""
+        import drjit as dr
+
+        found = self._let_through()
+        return None if dr.grad_enabled(found) else number(found)
+
+    def _let_through(self) -> Scalar:
         if self.mask is None:
             return 1.0
         import drjit as dr
@@ -129,8 +140,7 @@ class Pupil:
         types = precision("float64")
         nodes = self.aperture.nodes(2 * self.mask.bandwidth(LEVEL, self.radius) * self.radius, TRANSMISSION_DIGITS)
         amplitude = self.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types)
-        found = dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
-        return found if dr.grad_enabled(found) else number(found)
+        return dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
 
     def amplitude(self, x: Array, y: Array, types: Precision) -> Array:
         """The mask's, at points in units of R."""

@@ -135,17 +135,26 @@ class Eye:
     @property
     def throughput(self) -> Scalar:
         """a², times the share of the aperture's disk that is open, and of that light what a mask lets through."""
-        if self.pupil is None:
-            return throughput(self.relative_aperture, 1.0)
-        return throughput(self.relative_aperture, self.pupil.aperture.area / math.pi) * self.pupil.transmission
+        return self.aperture_throughput * (1.0 if self.pupil is None else self.pupil.transmission)
 
-    @cached_property
+    @property
+    def aperture_throughput(self) -> Scalar:
+        """a², times the share of the aperture's disk that is open. Kernels are multiplied by it: what a mask lets
+        through is in them."""
+        return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
+
+    @property
     def white_signal(self) -> Scalar:
         """Of a receptor that sees white in daylight wherever it looks: the throughput, times what waveguides take of
         it, mean of the channels."""
         if self.waveguide is None:
             return self.throughput
-        return number(self.throughput) * white_share(plain(self.kernel(1)), self.spectral_bands)
+        return number(self.aperture_throughput) * self._guided_share
+
+    @cached_property
+    def _guided_share(self) -> float:
+        """What waveguides take of white light on the open aperture."""
+        return white_share(plain(self.kernel(1)), self.spectral_bands)
 
     @property
     def channels(self) -> int:
@@ -285,7 +294,8 @@ class Eye:
         scene = radiance_cube(radiance, self.bands, shape)
         centred(scene, shape)
         parts = taken_by(self.microvilli, self.resolution, scene, polarization)
-        bank = self.sight(s, z) if sight is None else of_kind("sight", sight, KernelBank, "eye.sight(4)").of(shape)
+        bank = self.sight(s, z) if sight is None else of_kind("sight", sight, KernelBank, "eye.sight(4)")
+        bank.check(shape, self.bands, averaged=self.waveguide is None)
         found = signals(self, parts, bank, s, z)
         return to_user(found if rng is None else with_noise(self, found, rng))
 

@@ -33,13 +33,15 @@ class KernelBank:
     """The kernels of an eye at all nodes, and what each cell of a scene has of them.
 
     vergence: (nearest, farthest) 1/z [1/m]; field: (half height, half width) of the retina in cells.
-    kernels: per node (layer, row, column): Dr.Jit (band, k, k). choices: one per stage.
+    kernels: per node (layer, row, column): Dr.Jit (band, k, k). choices: one per stage. averaged: whether a
+    receptor's signal is the mean over its cells; not so with waveguides.
     """
 
     vergence: tuple[float, float]
     field: tuple[float, float]
     kernels: dict[tuple[int, int, int], Array]
     choices: tuple[Choice, ...]
+    averaged: bool = True
 
     def shares(self, shape: tuple[int, int], z: Any) -> list[Any]:
         """Share of every node in each cell of a scene, (Y, X) per node; distances z [m], a number or (Y, X).
@@ -64,12 +66,17 @@ class KernelBank:
         )
         return [by_depth[i] * by_row[j][:, None] * by_column[k] for i, j, k in self.kernels]
 
-    def of(self, shape: tuple[int, int]) -> KernelBank:
-        """Itself; ValueError unless it was made for a retina of `shape` cells."""
+    def check(self, shape: tuple[int, int], bands: int, *, averaged: bool) -> None:
+        """ValueError unless it was made for a retina of `shape` cells, so many bands, and receptors as they are."""
         if (shape[0] / 2, shape[1] / 2) != self.field:
             made = " x ".join(f"{2 * half:g}" for half in self.field)
             raise ValueError(f"sight is for a retina of {made} cells: must be for {shape[0]} x {shape[1]}")
-        return self
+        own = next(iter(self.kernels.values())).shape[0]
+        if own != bands:
+            raise ValueError(f"sight is for {own} bands: must be for {bands}, as the eye has")
+        if averaged != self.averaged:
+            made, wanted = ("with", "without") if averaged else ("without", "with")
+            raise ValueError(f"sight is for an eye {made} waveguides: must be for one {wanted}")
 
     def __str__(self) -> str:
         return "\n".join(map(str, self.choices))
@@ -131,7 +138,7 @@ def prepare(
     deep, down, right = (nodes(n) for n in (*depth.counts, *wide.counts))
     places = itertools.product(range(len(deep)), range(len(down)), range(len(right)))
     kernels = {(i, j, k): kernel_at(depths.distance(deep[i]), right[k], down[j]) for i, j, k in places}
-    return KernelBank(depths.vergence, (resolution[0] * s / 2, resolution[1] * s / 2), kernels, (depth, wide))
+    return KernelBank(depths.vergence, (resolution[0] * s / 2, resolution[1] * s / 2), kernels, (depth, wide), averaged)
 
 
 def _chosen(stage: NodeChoice, asked: tuple[int, ...] | None, tolerance: float) -> Choice:

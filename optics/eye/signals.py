@@ -31,7 +31,7 @@ class SeeingEye(Protocol):
     def spectral_bands(self) -> SpectralBands: ...
 
     @property
-    def throughput(self) -> Scalar: ...
+    def aperture_throughput(self) -> Scalar: ...
 
     @property
     def waveguide(self) -> Waveguide | None: ...
@@ -65,7 +65,7 @@ def _caught(eye: SeeingEye, scenes: list[np.ndarray], bank: KernelBank, s: int, 
     shape = eye.resolution[0] * s, eye.resolution[1] * s
     image = blur(scenes, list(bank.kernels.values()), shape, types)
     irradiance = (receptor_average if eye.waveguide is None else at_receptors)(image, s, types)
-    return quantum_catch(irradiance, eye.spectral_bands.weights, eye.throughput, types)
+    return quantum_catch(irradiance, eye.spectral_bands.weights, eye.aperture_throughput, types)
 
 
 def with_noise(eye: SeeingEye, signal: Array, rng: np.random.Generator) -> Array:

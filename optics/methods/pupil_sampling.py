@@ -19,7 +19,7 @@ from optics.numerics.autodiff import Array
 from optics.numerics.cost import PIXEL_NODE_GEOMETRY
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
-from optics.numerics.precision import Precision, opaque
+from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = ["GridSamples", "PixelSamples", "PupilSamples", "pixel_samples", "samples_of"]
 
@@ -112,8 +112,8 @@ class PixelSamples:
 
     def field(self, beam: Beam, types: Precision) -> Field:
         radius, at = opaque(types, beam.radius), self.aperture.rows(self.across)
-        x, y = (types.Float64(np.ascontiguousarray(axis.ravel())) for axis in np.meshgrid(at, at))
-        weight = types.Float64(self.aperture.weights(self.across).ravel()) * radius * radius
+        x, y = (types.Float64(padded_for_packets(axis)) for axis in np.meshgrid(at, at))
+        weight = types.Float64(padded_for_packets(self.aperture.weights(self.across))) * radius * radius
         if beam.pupil.mask is not None:
             weight *= beam.pupil.amplitude(x, y, types)
         grid = Grid.square(len(at), 2 * self.radius / len(at))

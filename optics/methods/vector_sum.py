@@ -99,8 +99,9 @@ class VectorSum:
         weight = -1j * nodes.weight * radius**2 * k / (2 * math.pi)
         if self.aplanatic:
             return x, y, weight / z * (1 - (x * x + y * y) / z**2) ** -0.25
-        at = types.Float64(x), types.Float64(y)
-        passed = pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types).numpy() * np.ones(len(x))
+        at = types.Float64(padded_for_packets(x)), types.Float64(padded_for_packets(y))
+        inside = types.Float64(padded_for_packets(nodes.x)), types.Float64(padded_for_packets(nodes.y))
+        passed = pupil.amplitude(*inside, types).numpy() * np.ones(len(x))
         cx, cy = self.window.centre
         across = (cx - x) ** 2 + (cy - y) ** 2
         d2 = across + z * z

@@ -21,7 +21,7 @@ from optics.methods.rayleigh_sommerfeld import cached_nodes
 from optics.numerics.arguments import without_derivative
 from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
-from optics.numerics.precision import precision
+from optics.numerics.precision import padded_for_packets, precision
 from optics.numerics.scattered_sum import ScatteredSum
 from optics.ommatidia.radiation import DIGITS, radiated, reach
 from optics.ommatidia.waveguide import Mode
@@ -102,8 +102,9 @@ def modes_at_pupil(
     detail = 0.0 if pupil.mask is None else pupil.mask.bandwidth(1e-6, pupil.radius) * pupil.radius
     nodes = cached_nodes(pupil.aperture, cycles + detail, digits)
     x, y = nodes.x * pupil.radius, nodes.y * pupil.radius
-    at = types.Float64(x), types.Float64(y)
-    waves, passed = beam.waves(*at, types), pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types)
+    at = types.Float64(padded_for_packets(x)), types.Float64(padded_for_packets(y))
+    inside = types.Float64(padded_for_packets(nodes.x)), types.Float64(padded_for_packets(nodes.y))
+    waves, passed = beam.waves(*at, types), pupil.amplitude(*inside, types)
     known = (("aperture_radius", pupil.aperture_radius), ("lens", waves), ("lens.mask", passed))
     for name, value in (*known, ("distance", beam.distance)):
         without_derivative(name, value)

@@ -65,7 +65,7 @@ class AppositionEye:
         eye, at = self.ommatidium, vacuum_wavelength(wavelength)
         half = WIDTHS * max(eye.acceptance_angle(at), eye.acceptance_angle(at, 90.0))
         half = min(half, math.asin(FINEST) / 1.5)
-        pitch = at / (2 * eye.pupil.radius * PER_CYCLE)
+        pitch = at / (2 * eye.pupil.radius * eye.pupil.index_before(at) * PER_CYCLE)
         steps = pitch * np.arange(-math.ceil(half / pitch), math.ceil(half / pitch) + 1)
         x, y = (axis.ravel() for axis in np.meshgrid(steps, steps))
         weights = eye.sensitivity(x, y, at)
@@ -89,7 +89,8 @@ class AppositionEye:
 
     def contrast(self, cycles_per_degree: float, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
         """Of a sine grating as an ommatidium sees it, the transform of its angular sensitivity: what falls as the
-        grating becomes finer; none beyond 2R/λ cycles per radian. (Neighbours tell gratings apart up to 1/(√3 Δφ).)
+        grating becomes finer; none beyond 2R n/λ cycles per radian, n before the lens. (Neighbours tell gratings
+        apart up to 1/(√3 Δφ).)
 
         Raises:
             ValueError: a frequency below 0, or numbers that are not finite.
@@ -97,7 +98,8 @@ class AppositionEye:
         in_range("cycles_per_degree", cycles_per_degree, 0.0, 1e9)
         turn = math.radians(finite("azimuth_deg", azimuth_deg))
         per_radian = math.degrees(cycles_per_degree)
-        if per_radian >= 2 * self.ommatidium.pupil.radius / vacuum_wavelength(wavelength):
+        pupil, at = self.ommatidium.pupil, vacuum_wavelength(wavelength)
+        if per_radian >= 2 * pupil.radius * pupil.index_before(at) / at:
             return 0.0
         x, y, weights = self.field(wavelength)
         phase = 2 * np.pi * np.degrees(x * math.cos(turn) + y * math.sin(turn)) * cycles_per_degree

@@ -14,9 +14,9 @@ from optics.apertures.circular import disk_profile
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import flag, point_2d, reals, shown
-from optics.numerics.autodiff import Array, to_user
+from optics.numerics.autodiff import Array, number, to_user
 from optics.numerics.grid import Grid
-from optics.numerics.precision import opaque, precision
+from optics.numerics.precision import opaque, padded_for_packets, precision
 from optics.point_spread.mixture import Mixture, a_mixture, flat
 from optics.point_spread.psf_result import SUM_ERROR, PSFResult
 
@@ -32,6 +32,7 @@ NEIGHBOURHOOD = 9  # choice: samples a side of such a window
 PARABOLOID_ERROR = 3e-5
 OF_A_MASK = 1e-6  # choice: of its spectrum, which the unaberrated peak is good to
 RIPPLE = 1e-5  # choice: of the circle's spectrum
+DIGITS = 10.0  # choice: of the peak without aberration
 FINE = 1 / 3  # choice: of 1/cutoff, the coarsest pitch for circles; the finer, the less they need around them
 
 
@@ -77,7 +78,9 @@ def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
     types = precision("float64")
     mask, own = result.pupil.mask, result.pupil.radius
     bends = 0.0 if mask is None else mask.bandwidth(OF_A_MASK, own) * own
-    nodes = result.pupil.aperture.nodes(0.5 + bends, 10.0)
+    # Slants turn nothing, but are no polynomials: their poles lie at height z.
+    poles = DIGITS * np.log(10) / (2 * np.pi) * own / number(result.sensor_distance)
+    nodes = result.pupil.aperture.nodes(0.5 + bends + poles, DIGITS)
     radius, z = opaque(types, result.pupil.aperture_radius), opaque(types, result.sensor_distance)
     weight = types.Float(nodes.weight)
     slant = dr.sqrt(z * z + radius * radius * types.Float(nodes.x**2 + nodes.y**2))
@@ -235,10 +238,11 @@ def encircled_energy(
         found = np.einsum("wp,rp->wr", seen.psf.reshape(waves, size).astype(np.float64), inside) * seen.dx**2
         return (found, error) if with_error else found
     values = types.Float(dr.ravel(seen.tensor))
+    shares = [types.Float(padded_for_packets(row)) for row in inside]
     parts = [
-        dr.sum(dr.gather(types.Float, values, dr.arange(types.Index, size) + k * size) * types.Float(row.copy()))
+        dr.sum(dr.gather(types.Float, values, dr.arange(types.Index, size) + k * size) * share)
         for k in range(waves)
-        for row in inside
+        for share in shares
     ]
     total = to_user(
         types.Tensor((parts[0] if len(parts) == 1 else dr.concat(parts)) * seen.dx**2, (waves, len(wanted)))

@@ -76,7 +76,8 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
         raise AccuracyError(f"tolerance = {tolerance:g}: contrasts err by up to {float(error.max()):.2g}: widen it")
     shortest = np.array([result.wavelengths[row != 0].min() for row in weights])
     sums = replace(seen, tensor=mixed(seen.tensor, weights), wavelengths=shortest, requests=())
-    return _transformed(sums, precision("float64").Float(weights @ known), error)
+    arriving = mixed(precision("float64").Tensor(light, (len(known), 1)), weights)
+    return _transformed(sums, flat(arriving), error)
 
 
 def _wide(result: PSFResult, known: np.ndarray, tolerance: float) -> PSFResult:

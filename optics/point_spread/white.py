@@ -14,7 +14,7 @@ from optics.elements.pupil import Pupil
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import flag, in_range, reals, shown, whole
 from optics.numerics.autodiff import Array, plain, to_user
-from optics.numerics.precision import precision
+from optics.numerics.precision import padded_for_packets, precision
 from optics.point_spread.concentration import encircled_energy, strehl_ratio
 from optics.point_spread.contrast import combined_mtf
 from optics.point_spread.mixture import mixed
@@ -222,8 +222,8 @@ def _with_middles(result: PSFResult, between: PSFResult) -> PSFResult:
     size, parts = height * width, [types.Float(dr.ravel(each.tensor)) for each in (result, between)]
     both = dr.concat(parts)
     plane = np.array(braided(range(count), range(count, 2 * count - 1)))
-    at = types.Index(np.repeat(plane * size, size).astype(np.uint32)) + types.Index(
-        np.tile(np.arange(size), 2 * count - 1).astype(np.uint32)
+    at = types.Index(padded_for_packets(np.repeat(plane * size, size).astype(np.uint32))) + types.Index(
+        padded_for_packets(np.tile(np.arange(size), 2 * count - 1).astype(np.uint32))
     )
     return replace(
         result,

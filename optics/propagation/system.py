@@ -96,6 +96,8 @@ def propagate_through(
     if source is not None:
         of_kind("source", source, PointSource, "PointSource(), a plane wave")
     field, window, brightest = _start(u, dx, out_dx, out_shape)
+    if backward and field is None:
+        raise ValueError("u = None: must be given, behind the last element, to be carried back")
     stops = _stops(elements, backward, window)
     if field is None and (stops[0].pupil is None or stops[0].distance != 0):
         raise ValueError("u = None: must be given, unless the first element is a Pupil for a source to shine on")

@@ -167,7 +167,7 @@ class FieldSampling:
         return Trial(plane, _unused(plane), lattice.weights(self.fields, receptors), _extent(self.eye, lattice.size))
 
     def _lattice(self, per_receptor: float, in_rows: bool) -> FieldAreas:
-        beyond = min(allowed_error(self.eye, self.tolerance) / self.eye.throughput, BEYOND)
+        beyond = min(allowed_error(self.eye, self.tolerance) / self.eye.aperture_throughput, BEYOND)
         return FieldAreas.of(self.fields, _parts_or_share(per_receptor, in_rows), beyond)
 
     def _sensor(self, rays: int) -> ReceptiveFieldSensor:
@@ -256,4 +256,4 @@ def on_tangent_plane(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
 
 def negligible_share(eye: optics.Eye) -> float:
     """Share of a receptor's weights that can be left out: a share s changes a signal by a² s at most."""
-    return min(NEGLIGIBLE * eye.noise_sigma / eye.throughput, eye.tolerance)
+    return min(NEGLIGIBLE * eye.noise_sigma / eye.aperture_throughput, eye.tolerance)

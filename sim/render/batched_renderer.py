@@ -99,8 +99,8 @@ class BatchedRenderer:
         if self.eye.pupil is None or (fidelity.samples == AREAS and asked >= 1):  # of its own for every receptor: whole
             self.fidelity = replace(fidelity, rays_per_receptor=float(max(1, round(asked))))
         self._check_memory(n_envs, self._samples_per_receptor)
-        mixing = self.eye.throughput * self.bands.weights
-        self.brightest = float((mixing @ white).max())
+        mixing = self.eye.aperture_throughput * self.bands.weights
+        self.brightest = float((self.eye.throughput * self.bands.weights @ white).max())
         self._receptor_sums = self.sensor.receptor_sums(mixing, self.tracer.basis)
         self._set_width(n_envs)
 

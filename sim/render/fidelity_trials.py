@@ -221,7 +221,7 @@ class FidelityTrials:
         """(channel, component, band): signals_c = sum_b mixing[c, b] sum_l sum_k basis[k, b] sum_p W_lb[r, p]
         light_lk[p]."""
         basis = (self._scene.areas if trial.extent else self._scene.tracers.of)(light).basis
-        return self._eye.throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
+        return self._eye.aperture_throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
 
     def _see_areas(self, views: RandomViews, trial: Trial, light: str, depth: DepthLayers) -> list[np.ndarray]:
         """Components of the mean light in a trial's areas, for each depth layer, flat (view, area)."""

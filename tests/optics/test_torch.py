@@ -87,3 +87,8 @@ def test_a_gpu_that_torch_cannot_use_is_refused(monkeypatch):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     with pytest.raises(optics.BackendError, match="RHABDOM_DEVICE asks for a GPU, and this torch has none"):
         optics.torch.psf(torch.zeros(4, 4), radius=30e-6, sensor_distance=240e-6)
+
+
+def test_one_wavelength_may_stand_alone():
+    for wavelengths in (500e-9, [500e-9]):
+        assert optics.torch.PointSpread(15e-6, wavelengths, **VIEW)().shape == (1, 21, 17)

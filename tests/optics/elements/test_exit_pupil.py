@@ -135,6 +135,24 @@ def test_what_cannot_be_read_is_said_in_a_line(system, more, says):
     assert "\n" not in str(error.value)
 
 
+def test_obscured_and_uneven_pupils_are_refused():
+    """Their rims are round: read as open circles they would be other lenses, in silence."""
+    at = (np.arange(64) - 32) / (32 * 0.9)
+    r = np.hypot(at[None, :], at[:, None])
+    for amplitude in (r > 0.5, np.exp(-(r**2)), r > 0.1):
+        system = wavefront()
+        system.data = system.data * amplitude
+        with pytest.raises(ValueError, match="obscured, not round, or its light uneven: only open circles"):
+            read_exit_pupil(system, WAVE, focal_length=0.1, order=2)
+    system = traced()
+    off = np.hypot(system.pupil_x, system.pupil_y)
+    kept = off > 0.5 * off.max()
+    for name in ("pupil_x", "pupil_y", "pupil_z", "opd", "intensity"):
+        setattr(system, name, getattr(system, name)[kept])
+    with pytest.raises(ValueError, match="the pupil is obscured"):
+        read_exit_pupil(system, WAVE, order=2)
+
+
 def test_a_pupil_that_is_not_round_is_refused():
     system = traced()
     kept = np.abs(system.pupil_y) < 0.5

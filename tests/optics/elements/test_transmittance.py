@@ -51,6 +51,31 @@ def test_what_a_mask_lets_through():
     assert eye.throughput == pytest.approx((2 * R / 200e-6) ** 2 * pupil.transmission)
 
 
+@pytest.mark.parametrize("waveguide", [None, optics.Waveguide(2e-6)])
+def test_signals_hold_a_masks_share_once(waveguide):
+    """Of light that an even mask halves in amplitude a quarter arrives: as the eye says of white, and as it sees it."""
+    plain, masked = (
+        optics.Eye(optics.Pupil(30e-6, thin_lens_focal_length=240e-6, mask=mask), (3, 3), bands=1, waveguide=waveguide)
+        for mask in (None, MaskMap(np.full((4, 4), 0.5), reach=40e-6))
+    )
+    scene = np.ones((1, 6, 6))
+    np.testing.assert_allclose(masked.see(scene, 2), plain.see(scene, 2) / 4, rtol=1e-3)
+    assert masked.white_signal == pytest.approx(plain.white_signal / 4, rel=1e-5)
+
+
+def test_a_masks_share_has_its_derivative_each_time():
+    """A graph serves one backward pass: one that was kept would leave nothing to the second."""
+    waist, found = Float64(R / 2), []
+    dr.enable_grad(waist)
+    pupil = lens(GaussianMask(waist))
+    for _ in range(2):
+        dr.set_grad(waist, 0.0)
+        dr.backward(pupil.transmission)
+        found.append(waist.grad[0])
+    assert found[0] > 0
+    assert found[1] == found[0]
+
+
 def test_contrast_behind_a_gaussian_is_gaussian():
     """The OTF is the amplitude's autocorrelation, exp(-(λfF)²/2w²), and 1 at 0 whatever is let through."""
     waist = R / 4

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from optics import AccuracyError, BSplineRelief, Eye, Pupil
+from optics import AccuracyError, BSplineRelief, Eye, Pupil, Waveguide
 from optics.eye.eye import LIGHT_FROM
 from optics.eye.kernel_bank import KernelBank
 from optics.eye.kernel_interpolation import NodeChoice, checks, nodes, worst_difference
@@ -224,6 +224,10 @@ def test_a_sight_of_another_eye():
     assert isinstance(bank, KernelBank)
     with pytest.raises(ValueError, match="sight is for a retina of 30 x 30 cells"):
         LENS.see(np.zeros((1, 14, 18)), S, sight=bank)
+    with pytest.raises(ValueError, match="sight is for 2 bands: must be for 1, as the eye has"):
+        LENS.see(np.zeros((1, 14, 18)), S, sight=replace(LENS, bands=2).sight(S))
+    with pytest.raises(ValueError, match="sight is for an eye without waveguides: must be for one with"):
+        replace(LENS, waveguide=Waveguide(2e-6)).see(np.zeros((1, 14, 18)), S, sight=LENS.sight(S))
 
 
 def test_depths_of_another_shape():
@@ -286,7 +290,7 @@ class TestLightFrom:
         return (0.5 + 0.25 * (np.sin(2.3 * across) + np.cos(1.7 * down)[:, None]))[None]
 
     def test_unknown_readings_are_refused(self):
-        with pytest.raises(ValueError, match="light_from = 'points': must be 'cells' or 'centres'"):
+        with pytest.raises(ValueError, match="light_from = 'points': must be one of 'cells', 'centres'"):
             LENS.sight(S, light_from="points")
 
 

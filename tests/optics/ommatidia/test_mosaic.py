@@ -63,3 +63,18 @@ def test_nothing_is_left_of_gratings_finer_than_a_facet_passes():
     assert [eye.contrast(factor * finest) for factor in (1.01, 3.7, 4.0)] == [0.0, 0.0, 0.0]
     with pytest.raises(ValueError, match="cycles_per_degree = nan"):
         eye.contrast(math.nan)
+
+
+def test_in_water_a_facet_passes_finer_gratings():
+    """Waves are shorter before it: contrast ends at 2R n/λ, and is the sensitivity's transform up to there."""
+    lens = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.34)
+    eye = AppositionEye(Ommatidium(lens, Waveguide(1e-6)), 1, 1.5)
+    in_air = 2 * lens.radius / 500e-9
+    steps = np.linspace(-0.25, 0.25, 401)
+    x, y = (axis.ravel() for axis in np.meshgrid(steps, steps))
+    weights = eye.ommatidium.sensitivity(x, y)
+    for factor in (0.9, 1.1):
+        exact = (weights * np.cos(2 * np.pi * factor * in_air * x)).sum() / weights.sum()
+        assert eye.contrast(math.radians(factor * in_air)) == pytest.approx(exact, abs=6e-4)
+    assert exact > 5e-3
+    assert eye.contrast(math.radians(1.35 * in_air)) == 0.0

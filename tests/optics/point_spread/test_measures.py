@@ -177,6 +177,35 @@ def test_contrasts_know_how_much_light_a_mask_leaves_at_the_rim():
     assert waist.grad[0] == pytest.approx(across, rel=2e-3)
 
 
+def test_white_contrasts_know_it_too():
+    """Contrast is a share of the light that arrives, which a mask's width changes."""
+    import drjit as dr
+
+    from tests.optics.device_types import Float64
+
+    def contrast(waist):
+        pupil = optics.Pupil(15e-6, thin_lens_focal_length=120e-6, mask=optics.GaussianMask(waist))
+        view = {"sensor_distance": 120e-6, "dx": 0.6e-6, "shape": (41, 41), "dtype": "float64", "tolerance": 1e-3}
+        return optics.white_psf(pupil, **view).mtf(tolerance=0.05).profile([1e5])
+
+    waist = Float64(10e-6)
+    dr.enable_grad(waist)
+    dr.backward(dr.sum(contrast(waist).array))
+    step = 1e-4 * 10e-6
+    across = (np.sum(np.asarray(contrast(10e-6 + step))) - np.sum(np.asarray(contrast(10e-6 - step)))) / (2 * step)
+    assert waist.grad[0] == pytest.approx(across, rel=1e-2)  # with the light held, several times as much
+
+
+@pytest.mark.parametrize("steepness", [2.3, 8.0])
+def test_a_perfect_lens_is_perfect_however_wide(steepness):
+    """Radius over distance: near the pupil slants are no polynomials, and want more nodes."""
+    z = 100e-6
+    pupil = optics.Pupil(steepness * z, thin_lens_focal_length=z)
+    seen = optics.psf(pupil, [500e-9], sensor_distance=z, dx=0.05e-6, shape=(33, 33), tolerance=1e-4)
+    ratio, error = optics.strehl_ratio(seen, with_error=True)
+    assert abs(ratio[0] - 1) < error[0] < 1e-4
+
+
 @pytest.mark.parametrize(
     "measure", [optics.mtf, optics.strehl_ratio, lambda seen: optics.encircled_energy(seen, 1e-6)], ids=["m", "s", "e"]
 )

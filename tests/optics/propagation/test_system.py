@@ -180,3 +180,9 @@ def test_derivatives_are_refused_not_dropped():
     dr.enable_grad(radius)
     with pytest.raises(ValueError, match="no derivatives"):
         propagate_through([FreeSpace(3e-5), Pupil(radius), FreeSpace(3e-5)], OBJECT, dx=DX, wavelength=WAVELENGTH)
+
+
+def test_nothing_is_carried_back_from_nowhere():
+    with pytest.raises(ValueError, match="u = None: must be given, behind the last element"):
+        propagate_through([FreeSpace(3e-5), Pupil(1e-5)], None, wavelength=WAVELENGTH, backward=True, out_dx=DX,
+                          out_shape=(9, 9))  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sim
-from optics import PhotonBudget, Pupil, Receptors, Waveguide
+from optics import MaskMap, PhotonBudget, Pupil, Receptors, Waveguide
 from sim.eyes.eyes import BODY_RADIUS, camera_rotations, eye_positions, eye_rotations
 
 
@@ -142,3 +142,15 @@ def test_unknown_receptors_come_with_the_nearest_name():
 @pytest.mark.parametrize("placement", [0.0, 0.5, 360.0])
 def test_placement_may_be_none_at_all_and_the_whole_way_round(placement):
     assert sim.Eyes(placement_range_deg=placement).placement_range_deg == placement
+
+
+def test_a_mask_darkens_signals_once():
+    """Half the amplitude everywhere is a quarter of the light."""
+    seen = []
+    for mask in (None, MaskMap(np.full((4, 4), 0.5), reach=60e-6)):
+        pupil = Pupil(50e-6, thin_lens_focal_length=240e-6, mask=mask)
+        eyes = sim.Eyes(1, (3, 3), optics=pupil, noise_sigma=1e-6)
+        venv = sim.make_vec_env("detection", eyes=eyes, n_envs=2, seed=0, rays_per_receptor=16.0)
+        seen.append(venv.reset()["eyes"].mean())
+        venv.close()
+    assert seen[1] == pytest.approx(seen[0] / 4, rel=1e-2)
