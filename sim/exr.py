@@ -48,6 +48,7 @@ class View:
     receptors: (channel, y, x) float32, or None
     rgb: (y, x, 3) float32 linear sRGB preview of the radiance; None: made when written
     attributes: whatever JSON can hold: seed, time step, position, ...
+    peaks_nm: (channel,), the receptors': their preview shows the longest as red; None: they stand from long to short
     """
 
     name: str
@@ -56,6 +57,7 @@ class View:
     receptors: np.ndarray | None = None
     rgb: np.ndarray | None = None
     attributes: Mapping[str, Any] = field(default_factory=dict)
+    peaks_nm: Sequence[float] | np.ndarray | None = None
 
     def __post_init__(self) -> None:
         where = f"View {shown(self.name)}"
@@ -75,6 +77,12 @@ class View:
                 raise ValueError(f"{where}: needs one distinct wavelength per band of {self.radiance.shape}")
             if self.rgb is not None and _shape(self.rgb) != (*self.radiance.shape[1:], 3):
                 raise ValueError(f"{where}: rgb {_kind(self.rgb)}: must be an array (y, x, 3) like the radiance")
+        if self.peaks_nm is not None:
+            peaks = reals(f"{where}: peaks_nm", self.peaks_nm)
+            if self.receptors is None or peaks.shape != (len(self.receptors),) or not np.isfinite(peaks).all():
+                raise ValueError(
+                    f"{where}: peaks_nm = {shown(self.peaks_nm)}: must be a finite number for each channel of receptors"
+                )
 
 
 def _shape(image: Any) -> tuple[int, ...]:
@@ -179,8 +187,9 @@ def _part(view: View, kind: str) -> tuple[str, dict[str, np.ndarray], dict[str, 
     else:
         assert view.receptors is not None
         image, names = view.receptors, [f"receptor_{c}" for c in range(len(view.receptors))]
-        # Channels are ordered from long to short wavelengths: red, green, blue; one channel is grey.
-        rgb = np.moveaxis(np.asarray(image)[np.minimum(range(3), len(image) - 1)], 0, -1)
+        if view.peaks_nm is not None:
+            held["peaks_nm"] = [float(nm) for nm in view.peaks_nm]
+        rgb = _false_colors(image, view.peaks_nm)
     try:
         attributes[_HELD] = json.dumps(held, sort_keys=True)
     except TypeError as error:
@@ -188,6 +197,13 @@ def _part(view: View, kind: str) -> tuple[str, dict[str, np.ndarray], dict[str, 
     planes = dict(zip(names, image, strict=True)) | dict(zip(_PREVIEW, np.moveaxis(rgb, -1, 0), strict=True))
     channels = {name: np.ascontiguousarray(plane, dtype=np.float32) for name, plane in planes.items()}
     return f"{view.name}.{kind}", channels, attributes
+
+
+def _false_colors(receptors: np.ndarray, peaks_nm: Sequence[float] | np.ndarray | None) -> np.ndarray:
+    """(y, x, 3): the longest waves' receptors as red, the next as green, then blue; a single channel is grey."""
+    count = len(receptors)
+    order = np.arange(count) if peaks_nm is None else np.argsort(-np.asarray(peaks_nm, float), kind="stable")
+    return np.moveaxis(np.asarray(receptors)[order[np.minimum(range(3), count - 1)]], 0, -1)
 
 
 def _digest(name: str, channels: Mapping[str, np.ndarray], attributes: Mapping[str, str]) -> str:
@@ -234,6 +250,7 @@ def _views(parts: list[tuple[str, dict[str, np.ndarray], dict[str, Any]]]) -> li
         else:
             count = sum(c.startswith("receptor_") for c in channels)
             view["receptors"] = np.stack([channels[f"receptor_{c}"] for c in range(count)])
+            view["peaks_nm"] = held.get("peaks_nm")
     return [View(**view) for view in fields.values()]
 
 

@@ -100,9 +100,8 @@ class Eye:
         if self.photon_budget is not None:
             of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
-        spectral = (
-            self._chosen_bands() if str(self.bands) == "auto" else SpectralBands.uniform(self.bands, self.receptors)
-        )
+        auto = str(self.bands) == "auto"
+        spectral = self._chosen_bands() if auto else SpectralBands.uniform(self.bands, self.receptors)
         object.__setattr__(self, "spectral_bands", spectral)
         object.__setattr__(self, "bands", len(spectral.wavelengths))
 
@@ -139,21 +138,18 @@ class Eye:
 
     @property
     def aperture_throughput(self) -> Scalar:
-        """a², times the share of the aperture's disk that is open. Kernels are multiplied by it: what a mask lets
-        through is in them."""
+        """The same without the mask: kernels, which are multiplied by it, hold what a mask lets through."""
         return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
 
     @property
     def white_signal(self) -> Scalar:
-        """Of a receptor that sees white in daylight wherever it looks: the throughput, times what waveguides take of
-        it, mean of the channels."""
+        """Of a receptor that sees white everywhere: the throughput, or what waveguides take of it, mean of types."""
         if self.waveguide is None:
             return self.throughput
         return number(self.aperture_throughput) * self._guided_share
 
     @cached_property
     def _guided_share(self) -> float:
-        """What waveguides take of white light on the open aperture."""
         return white_share(plain(self.kernel(1)), self.spectral_bands)
 
     @property
@@ -176,9 +172,7 @@ class Eye:
 
     def psf(self, z: Scalar = math.inf) -> PSFResult:
         """PSF on the retina (sensor orientation) of a point at distance z [m] along the axis, in the direction that the
-        patch looks in, over the kernel's window.
-
-        The perfect lens has one sample that holds all power.
+        patch looks in, over the kernel's window. The perfect lens has one sample that holds all power.
 
         Raises:
             AccuracyError: see `optics.psf`.
@@ -209,11 +203,8 @@ class Eye:
         """
         positive("z", z, infinite=True, carried=True)
         asked = self.eccentricity_deg if direction_deg is None else direction("direction_deg", direction_deg)
-        retina, guided = (
-            self._retina(whole("samples_per_receptor", samples_per_receptor, 1, 64)),
-            self.waveguide is not None,
-        )
-        return to_user(receptor_kernel(self, retina, z, tangents(asked), guided))
+        retina = self._retina(whole("samples_per_receptor", samples_per_receptor, 1, 64))
+        return to_user(receptor_kernel(self, retina, z, tangents(asked), self.waveguide is not None))
 
     def _retina(self, samples_per_receptor: int) -> Retina:
         cell = self.receptor_pitch / samples_per_receptor

@@ -195,13 +195,11 @@ def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
 
 def _fidelity_of(rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | None, eyes: Eyes) -> Fidelity | None:
     """What was asked for by either name; None: to be chosen."""
-    if isinstance(rays_per_receptor, Fidelity):
-        return rays_per_receptor
-    asked = fidelity_asked(rays_per_receptor, eyes)
+    if fidelity is not None and not isinstance(fidelity, Fidelity):
+        raise ValueError(f"fidelity = {shown(fidelity)}: must be a sim.Fidelity or None, see rays_per_receptor")
+    asked = rays_per_receptor if isinstance(rays_per_receptor, Fidelity) else fidelity_asked(rays_per_receptor, eyes)
     if fidelity is None:
         return asked
-    if not isinstance(fidelity, Fidelity):
-        raise ValueError(f"fidelity = {shown(fidelity)}: must be a sim.Fidelity or None, see rays_per_receptor")
     if asked is not None:
         raise ValueError(f"rays_per_receptor = {shown(rays_per_receptor)}: must be left out where a fidelity is given")
     return fidelity

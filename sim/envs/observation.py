@@ -47,10 +47,10 @@ class Memory:
     def remember(self, frame: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         """Add a frame (env, ...); `fresh`: numbers of the worlds that have just started.
 
-        Returns (env, memory, ...), the caller's own, as `frame` is from now on.
+        Returns (env, memory, ...), the caller's own, which may be written to; `frame` no longer is.
         """
         if self.frames == 1:
-            self._past = [frame]
+            self._past = [frame.copy()]
             return frame[:, None]
         if not self._past:
             self._past = [frame.copy() for _ in range(self.frames)]

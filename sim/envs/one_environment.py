@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn
 
+import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
 
 class OneEnvironment(VecEnv):
@@ -22,6 +24,17 @@ class OneEnvironment(VecEnv):
         """Seed all random streams at the next reset. World i draws from streams derived from (seed, i)."""
         self._seeds = [seed] * self.num_envs
         return self._seeds
+
+    def render(self, mode: str | None = None) -> np.ndarray | None:
+        """All worlds' pictures, tiled. Stable-baselines3 asks each environment for a mode that it does not know, and
+        they are all this one.
+
+        Raises:
+            RuntimeError: before the first reset.
+        """
+        if self.render_mode == "eyes" and mode in (None, "eyes"):
+            return tile_images(self.get_images())
+        return super().render(mode)
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]

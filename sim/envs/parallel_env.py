@@ -66,8 +66,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
             ValueError: an action is missing, or somebody's who is not there, or has another shape.
             RuntimeError: before the first reset.
         """
-        if not self._begun:
-            raise RuntimeError("the world has not begun: call reset first")
+        self._require_begun()
         if not self.agents:
             return {}, {}, {}, {}, {}
         outcomes = self._named(self._animals.act(self._commanded(actions)))
@@ -81,12 +80,23 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         return observations, rewards, terminated, truncated, infos
 
     def render(self) -> np.ndarray | list[np.ndarray] | None:
-        """A picture (y, x, 3) uint8 of the world, or what each animal's eyes see, as `render_mode` asks."""
+        """A picture (y, x, 3) uint8 of the world, or what each animal's eyes see, as `render_mode` asks.
+
+        Raises:
+            RuntimeError: before the first reset, if there is anything to show.
+        """
+        if self.render_mode is None:
+            return None
+        self._require_begun()
         pictures = self._pictures.taken()
-        return pictures[0] if self.render_mode == "rgb_array" else pictures or None
+        return pictures[0] if self.render_mode == "rgb_array" else pictures
 
     def close(self) -> None:
         self._animals.worlds.close()
+
+    def _require_begun(self) -> None:
+        if not self._begun:
+            raise RuntimeError("the world has not begun: call reset first")
 
     def _named(self, values: Any) -> dict[str, Any]:
         return dict(zip(self.possible_agents, values, strict=True))

@@ -71,7 +71,7 @@ class Senses:
         """With new frames of all worlds; fresh: those that have just begun."""
         remembered = {name: sight.memory.remember(seen[name], fresh) for name, sight in self.sights.items()}
         self._told = {name: seen[name] for auxiliary in self._auxiliary for name in auxiliary.spaces}
-        return {**remembered, **self._told, **self._beside(slice(None))}
+        return {**remembered, **self._copied(), **self._beside(slice(None))}
 
     def preview(self, seen: Seen, worlds: np.ndarray) -> dict[str, np.ndarray]:
         """Of these worlds, with these of the new frames of all; nothing is remembered."""

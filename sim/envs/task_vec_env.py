@@ -24,11 +24,11 @@ class TaskVecEnv(OneEnvironment):
     """Many worlds of a `sim.Task`, or of a `sim.Encounter` whose animals, alike, learn one policy.
 
     Worlds start anew by themselves, as stable-baselines3 has it: what is returned is then the first observation of the
-    new episode, and info["terminal_observation"] the last of the old one. Observations are "eyes" (memory, eye,
-    channel, height, width), noise included (of several kinds of eyes an array each, by their names), "previous_action",
-    and "feels", if the task's animal feels anything. `info` has reward_terms, is_success, varied (if the task varies
-    anything), and failure where one of the task's methods fails: that ends the world's episode, and the others go on.
-    Of an encounter, the first animal of all worlds comes first, then the second.
+    new episode, info["terminal_observation"] the last of the old one, and `reset_infos` what is said of beginnings.
+    Observations are "eyes" (memory, eye, channel, height, width), noise included (of several kinds of eyes an array
+    each, by their names), "previous_action", and "feels", if the task's animal feels anything. `info` has reward_terms,
+    is_success, varied (if the task varies anything), and failure where one of the task's methods fails: that ends the
+    world's episode, and the others go on. Of an encounter, the first animal of all worlds comes first, then the second.
 
     failures: of the tasks' methods, and how many episodes each has ended
 
@@ -78,9 +78,7 @@ class TaskVecEnv(OneEnvironment):
         self._reset_options()
         self._returns[:] = 0.0
         observations = self.animals.reset()
-        self.reset_infos = [
-            {"reward_terms": {}, "is_success": False, **self._varied(row)} for row in range(self.num_envs)
-        ]
+        self.reset_infos = [self._first_info(row) for row in range(self.num_envs)]
         return _rows(observations)
 
     def step_async(self, actions: np.ndarray) -> None:
@@ -115,6 +113,8 @@ class TaskVecEnv(OneEnvironment):
                     infos[number * n + world]["terminal_observation"] = row
             self._returns[done] = 0.0
             self.animals.begin_again(ended, seen)
+            for index in np.flatnonzero(done).tolist():
+                self.reset_infos[index] = self._first_info(index)
         reward = np.array([sum(outcome.terms.values()) for outcome in outcomes], np.float32)
         return _rows(self.animals.remember(seen, ended)), reward, done, infos
 
@@ -183,6 +183,10 @@ class TaskVecEnv(OneEnvironment):
                 info["episode"] = {"r": float(self._returns[row]), "l": int(steps)}
             infos.append(info)
         return infos
+
+    def _first_info(self, row: int) -> dict[str, Any]:
+        """Before an episode's first action."""
+        return {"reward_terms": {}, "is_success": False, **self._varied(row)}
 
     def _varied(self, row: int) -> dict[str, Any]:
         """How the world of a row differs from others, if they differ."""

@@ -179,11 +179,8 @@ class TaskWorlds:
     def _judged(self, world: int, failure: str | None) -> list[StepOfWorld]:
         """What the step is worth to each that learns. The episode ends for all as soon as it ends for anybody."""
         data = self.datas[world]
-        if failure is None and any(data.warning[kind].number for kind in _UNSTABLE):  # MuJoCo has begun it anew
-            failure = (
-                "physics is unstable: positions, speeds or accelerations are huge or not finite; a shorter timestep or "
-                "the integrator implicitfast may help"
-            )
+        if failure is None:
+            failure = _broken(data)
         outcomes: list[StepOfWorld] = []
         over = self.steps[world] >= self.episode_steps
         if failure is None:
@@ -198,10 +195,31 @@ class TaskWorlds:
             except Exception as error:
                 failure = _told(error)
         if failure is not None:
-            return [StepOfWorld(truncated=True, failure=failure) for _ in self.learners]
+            if not _has_place(data):  # else the last look at it would end all worlds
+                mujoco.mj_resetData(data.model, data)
+                mujoco.mj_forward(data.model, data)
+            # Not truncated: nothing might have come after it that a learner could count with.
+            return [StepOfWorld(terminated=True, failure=failure) for _ in self.learners]
         for outcome in outcomes:
             outcome.truncated = bool(over) and not outcome.terminated
         return outcomes
+
+
+def _broken(data: mujoco.MjData) -> str | None:
+    """How its physics broke down, if it did. MuJoCo has begun it anew by then, unless its model forbids that."""
+    if any(data.warning[kind].number for kind in _UNSTABLE):
+        return (
+            "physics is unstable: positions, speeds or accelerations are huge or not finite; a shorter timestep or "
+            "the integrator implicitfast may help"
+        )
+    if not _has_place(data):
+        return "physics is unstable: places of bodies are not finite; what `act` writes must be"
+    return None
+
+
+def _has_place(data: mujoco.MjData) -> bool:
+    """Whether all that is seen of it is somewhere."""
+    return all(np.isfinite(places).all() for places in (data.xpos, data.xmat, data.geom_xpos))
 
 
 def _told(error: Exception) -> str:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
 from sim.envs.auxiliary import Auxiliary
 from sim.envs.follow_camera import FollowCamera
@@ -31,7 +30,8 @@ class EyesVecEnv(OneEnvironment):
 
     Observations, rewards, endings and `info` are in docs/tasks.md. Worlds start anew by themselves; the
     observation returned is then the first of the new episode, and info["terminal_observation"] the last of the
-    old one. World i's episodes depend on the seed and i alone, not on the number of worlds.
+    old one, and `reset_infos` are of the episodes' beginnings. World i's episodes depend on the seed and i alone, not
+    on the number of worlds.
 
     failures: what worlds could not go on for, and how many episodes each has ended
     """
@@ -126,7 +126,10 @@ class EyesVecEnv(OneEnvironment):
         """Start the episodes of these worlds anew, and look at them."""
         self._returns[ended], self._lengths[ended] = 0.0, 0
         self._light_anew(ended)
-        return self._signals.begin_some(self.simulation.restart(ended), ended)
+        state = self.simulation.restart(ended)
+        for world, info in zip(ended, self._with_light(first_infos(state.take(ended)), ended), strict=True):
+            self.reset_infos[world] = info
+        return self._signals.begin_some(state, ended)
 
     def _advance(self) -> tuple[Step, PendingFrame]:
         """Move, and look while it is judged what that led to."""
@@ -161,12 +164,6 @@ class EyesVecEnv(OneEnvironment):
             return [self._follow_camera.picture(state, world) for world in range(state.n)]
         return []
 
-    def render(self, mode: str | None = None) -> np.ndarray | None:
-        """All worlds' pictures, tiled."""
-        if self.render_mode == "eyes" and mode in (None, "eyes"):
-            return tile_images(self.get_images())
-        return super().render(mode)
-
     # --- observations
 
     def _observation(self, seen: np.ndarray, fresh: np.ndarray, contact: np.ndarray) -> dict[str, np.ndarray]:
@@ -199,9 +196,11 @@ class EyesVecEnv(OneEnvironment):
         if variation is not None and level is not None:
             level[worlds] = [variation.draw(self.simulation.streams.light[world])["light"] for world in worlds]
 
-    def _with_light(self, infos: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    def _with_light(
+        self, infos: list[dict[str, Any]], worlds: np.ndarray | slice = slice(None)
+    ) -> list[dict[str, Any]]:
         if self._signals.level is not None:
-            for info, level in zip(infos, self._signals.level.tolist(), strict=True):
+            for info, level in zip(infos, self._signals.level[worlds].tolist(), strict=True):
                 info["varied"] = {"light": level}
         return infos
 

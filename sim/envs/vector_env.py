@@ -18,7 +18,8 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     """The batched environment behind Gymnasium's own face.
 
     Worlds start anew in the step that ends them (`AutoresetMode.SAME_STEP`): what is returned is then the first
-    observation of the new episode, and info["final_obs"] has the last of the old one.
+    observation of the new episode, and what `reset` would say of it, while info["final_obs"] and info["final_info"]
+    have the last of the old one: as Gymnasium's own `SyncVectorEnv` has it.
 
     task, eyes, memory, mode ...: as in `sim.make_vec_env`
 
@@ -55,12 +56,14 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
         self, actions: np.ndarray
     ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         observation, reward, done, infos = self._batch.step(actions)
-        truncated = np.array([info.pop("TimeLimit.truncated", False) for info in infos])
-        for info in infos:
-            info.pop("episode", None)  # stable-baselines3's; Gymnasium leaves that name to its wrappers
-            if (last := info.pop("terminal_observation", None)) is not None:
-                info["final_obs"] = last
-        return observation, reward, done & ~truncated, done & truncated, self._together(infos)
+        truncated = np.array([info.get("TimeLimit.truncated", False) for info in infos])
+        last: dict[str, Any] = {}
+        for world in np.flatnonzero(done):
+            ended, infos[world] = infos[world], self._batch.reset_infos[world]
+            ended.pop("episode")  # stable-baselines3's; Gymnasium leaves that name to its wrappers
+            seen = ended.pop("terminal_observation")
+            last = self._add_info(last, {"final_obs": seen, "final_info": ended}, world)
+        return observation, reward, done & ~truncated, done & truncated, last | self._together(infos)
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """A picture (y, x, 3) uint8 of every world as `render_mode` asks."""

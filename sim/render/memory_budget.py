@@ -11,6 +11,12 @@ from pathlib import Path
 INDICES = 2**32  # of one Dr.Jit array
 RAY_BYTES = 64  # direction and place of a ray, and what they are made from
 GIB = 2**30
+CGROUPS = Path("/sys/fs/cgroup")
+# Of versions 2 and 1: limit, use, statistics, and there what goes before the names of files' pages.
+_GROUPS = (
+    ("memory.max", "memory.current", "memory.stat", ""),
+    ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes", "memory/memory.stat", "total_"),
+)
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,12 @@ def check_memory(demand: Demand) -> None:
 
 
 def available() -> float:
-    """Bytes that can be had without swapping; infinite where the system does not say."""
+    """Bytes that can be had without swapping, by the machine and by the container that this runs in; infinite where the
+    system does not say."""
+    return min(_of_machine(), _of_container(CGROUPS))
+
+
+def _of_machine() -> float:
     try:
         for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
             name, _, value = line.partition(":")
@@ -77,6 +88,27 @@ def available() -> float:
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (AttributeError, OSError, ValueError):
         return math.inf
+
+
+def _of_container(root: Path) -> float:
+    """What control groups leave of their limits; at least one byte, since a group may be above its limit."""
+    free = math.inf
+    for limit, used, statistics, prefix in _GROUPS:
+        try:
+            left = int((root / limit).read_text("ascii")) - int((root / used).read_text("ascii"))
+        except (OSError, ValueError):  # there is no such group, or its limit is "max"
+            continue
+        free = min(free, max(1.0, left + _of_files(root / statistics, prefix)))
+    return free
+
+
+def _of_files(statistics: Path, prefix: str) -> int:
+    """Bytes of files' pages in use, which make way for whatever needs the memory."""
+    try:
+        lines = [line.split() for line in statistics.read_text("ascii").splitlines()]
+        return sum(int(size) for name, size in lines if name in (f"{prefix}active_file", f"{prefix}inactive_file"))
+    except (OSError, ValueError):
+        return 0
 
 
 def _rounded_down(value: float) -> float:

@@ -17,6 +17,8 @@ model_wavefront     its kernels
 optic_flow          where what eyes look at moves on their retinas
 edge_rays           many rays where a receptor sees an edge, few elsewhere
 model_scene         what stands still, as a Mitsuba scene, and what moves
+as_built            what a renderer was built of, and what therefore must not change
+renderable          what eyes may be, and how finely they may see
 model_lights        lights, that may move
 model_tracer        light along rays
 primitives          rays that meet ellipsoids, capsules, cylinders and boxes

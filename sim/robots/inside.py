@@ -6,10 +6,17 @@ import mujoco
 import numpy as np
 
 _TYPES = mujoco.mjtGeom
+# Unit vectors all around, by the golden angle, so that few edges of meshes are met: openings are found that take up
+# 20 degrees to all sides.
+_N_WAYS = 64
+_HEIGHTS, _AROUND = 1 - (2 * np.arange(_N_WAYS) + 1) / _N_WAYS, np.arange(_N_WAYS) * np.pi * (3 - np.sqrt(5))
+_WAYS = np.column_stack([np.sqrt(1 - _HEIGHTS**2) * f(_AROUND) for f in (np.cos, np.sin)] + [_HEIGHTS])
+_BEYOND = 1e-9  # of a mesh's radius: where a ray goes on behind a crossing, far above rounding
 
 
 def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
-    """Below the surface of a primitive [m], at most, for ellipsoids about; 0 outside, and for all other geoms."""
+    """Below the surface of a primitive or a closed mesh [m], at most, for ellipsoids and meshes about; 0 outside, and
+    for all other geoms."""
     p = data.geom_xmat[geom].reshape(3, 3).T @ (point - data.geom_xpos[geom])
     size, kind = model.geom_size[geom], model.geom_type[geom]
     if kind == _TYPES.mjGEOM_SPHERE:
@@ -22,6 +29,33 @@ def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: n
         depth = min(size[0] - np.hypot(p[0], p[1]), size[1] - abs(p[2]))
     elif kind == _TYPES.mjGEOM_BOX:
         depth = (size - np.abs(p)).min()
+    elif kind == _TYPES.mjGEOM_MESH:
+        depth = _inside_mesh(model, data, geom, point)
     else:
         return 0.0
     return max(float(depth), 0.0)
+
+
+def _inside_mesh(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
+    """How far the nearest crossing is, where rays all around leave a mesh; 0 where one does not."""
+    if np.linalg.norm(point - data.geom_xpos[geom]) > model.geom_rbound[geom]:
+        return 0.0
+    nearest = np.inf
+    for way in _WAYS:
+        crossings = _crossings(model, data, geom, point, way)
+        if len(crossings) % 2 == 0:
+            return 0.0
+        nearest = min(nearest, crossings[0])
+    return nearest
+
+
+def _crossings(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray, way: np.ndarray
+) -> list[float]:
+    """Where a ray crosses a mesh [m], nearest first."""
+    found: list[float] = []
+    so_far, beyond = 0.0, _BEYOND * model.geom_rbound[geom]
+    while (further := mujoco.mj_rayMesh(model, data, geom, point + so_far * way, way)) >= 0:
+        found.append(so_far + further)
+        so_far = found[-1] + beyond
+    return found

@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 
 import optics
-from optics.numerics.arguments import of_kind, whole
+from optics.numerics.arguments import whole
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.allowed_error import allowed_error
 from sim.eyes.sampling import BoxSampling, directions_of, eye_sampling
-from sim.render.fidelity import AREAS, EDGES, Fidelity
+from sim.render.fidelity import EDGES, Fidelity
 from sim.render.memory_budget import Demand, check_memory
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.robots.appearances import Varied
@@ -26,10 +26,10 @@ from sim.robots.model_wavefront import ModelWavefront
 from sim.robots.mounts import Mount
 from sim.robots.optic_flow import flow_between, receptor_centres
 from sim.robots.poses import Poses
+from sim.robots.renderable import check_renderable
 from sim.scene import source
 from sim.scene.mirror import VISIBLE_GROUPS
 from sim.scene.variant import variant as in_variant
-from sim.tracing import lighting
 
 MOST_ENVS = 2**31 - 1
 SIXTEEN_RAYS = Fidelity(16, bands=4)
@@ -53,9 +53,9 @@ class ModelRenderer:
     Warns (`sim.MirrorWarning`) once of what eyes do not see of the model.
 
     Raises:
-        ValueError: a bad argument, a mount on what the model does not have, an eye that is inside of a sphere, a
-            capsule or another primitive in the model's reference pose, or a fidelity that wants areas or light that is
-            reflected more often, or more rays than there is memory for.
+        ValueError: a bad argument, a mount on what the model does not have, an eye that looks aside of it, or is inside
+            of a sphere, a capsule, another primitive or a closed mesh in the model's reference pose, or a fidelity that
+            wants areas or light that is reflected more often, or more rays than there is memory for.
         optics.AccuracyError: a pupil whose light spreads too far.
     """
 
@@ -72,8 +72,7 @@ class ModelRenderer:
         varied: Varied = (),
     ) -> None:
         self.n_envs = whole("n_envs", n_envs, 1, MOST_ENVS)
-        of_kind("eye", eye, optics.Eye, "optics.Eye(resolution=(15, 15))")
-        _check(fidelity, eye)
+        check_renderable(fidelity, eye)
         self.model, self.mounts, self.fidelity = source.load(model), mounts_of("mounts", mounts), fidelity
         self.eye = replace(eye, bands=fidelity.bands)
         self._places = [_Place(mount, self.model) for mount in self.mounts]
@@ -86,11 +85,12 @@ class ModelRenderer:
         sampling = eye_sampling(self.eye, fidelity.depth)
         at_edges = fidelity.samples == EDGES
         self.sensor = sampling.sensor(FIRST if at_edges else fidelity.rays_per_receptor)
-        mixing = self.eye.throughput * self.eye.spectral_bands.weights
+        mixing = self.eye.aperture_throughput * self.eye.spectral_bands.weights
         with in_variant(self._scene.variant):
             self._tracer = ModelTracer(self._scene, wavelengths, fidelity.light)
             suns = [light.level for light in self._scene.lights.found if light.kind == "directional"]
-            self._sunlight = mixing * np.sum([np.zeros(len(wavelengths)), *suns], axis=0) / np.pi
+            arriving = np.sum([np.zeros(len(wavelengths)), *suns], axis=0) / np.pi
+            self._sunlight = self.eye.throughput * self.eye.spectral_bands.weights * arriving
             self.brightest = self.brightest_in(np.ones(len(wavelengths)))
             basis = self._tracer.basis
             self._sums = self.sensor.receptor_sums(mixing, basis)
@@ -117,8 +117,8 @@ class ModelRenderer:
         light: what all lights of each world are multiplied by, (env, band); None: nothing
 
         Raises:
-            ValueError: another number of worlds, another model's data, poses that are not finite, or light of another
-                shape.
+            ValueError: another number of worlds, another model's data, poses that are not finite or not known yet, what
+                differs from the model and is not in `varied`, or light of another shape.
         """
         return self.begin(poses, light).wait()
 
@@ -230,10 +230,16 @@ class ModelRenderer:
             raise ValueError(f"poses of {poses.n} worlds, this renderer was built for n_envs = {self.n_envs}")
         if poses.geom_xpos.shape[1] != self.model.ngeom or poses.xpos.shape[1] != self.model.nbody:
             raise ValueError("poses of another model")
-        self._scene.refuse_differences(poses)
         if not np.isfinite(poses.geom_xpos).all():
             world = int(np.flatnonzero(~np.isfinite(poses.geom_xpos).all(axis=(1, 2)))[0])
             raise ValueError(f"poses of world {world} are not finite")
+        placed = poses.geom_xmat.any(axis=(1, 2, 3))
+        if not placed.all():
+            raise ValueError(
+                f"data of world {int(np.argmin(placed))} says nothing yet of where things are; call "
+                "mujoco.mj_forward(model, data) first"
+            )
+        self._scene.as_built.refuse_differences(poses)
 
     def _refuse_eyes_inside(self) -> None:
         data = mujoco.MjData(self.model)
@@ -263,21 +269,3 @@ class _Place:
 
 def _placed(poses: Poses | Sequence[mujoco.MjData]) -> Poses:
     return poses if isinstance(poses, Poses) else Poses.of(poses)
-
-
-def _check(fidelity: Fidelity, eye: optics.Eye) -> None:
-    of_kind("fidelity", fidelity, Fidelity, "Fidelity(16, bands=4)")
-    if fidelity.light == lighting.ALL or fidelity.samples == AREAS:
-        raise ValueError(
-            f"fidelity: light = {fidelity.light!r}, samples = {fidelity.samples!r}: models of one's own are seen by "
-            "rays, which follow two reflections at most"
-        )
-    if fidelity.samples == EDGES and fidelity.light == lighting.BOUNCE:
-        raise ValueError("fidelity: samples = 'edges': is for direct light; light that bounces differs from ray to ray")
-    if fidelity.samples == EDGES and fidelity.rays_per_receptor < FIRST:
-        raise ValueError(
-            f"fidelity: rays_per_receptor = {fidelity.rays_per_receptor:g}: must be at least {FIRST} where samples = "
-            f"'edges', which looks with {FIRST} everywhere first"
-        )
-    if fidelity.samples == EDGES and eye.pupil is not None:
-        raise ValueError("fidelity: samples = 'edges': is for perfect lenses; behind a pupil receptors share all rays")

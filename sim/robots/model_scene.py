@@ -17,10 +17,10 @@ import numpy as np
 
 from optics.spectra.spectrum import Spectrum
 from sim.robots.appearances import Appearance, Varied, appearances_of, varied_geoms
+from sim.robots.as_built import AsBuilt
 from sim.robots.model_lights import Lights, model_lights
 from sim.robots.movers import Movers, kind_of
 from sim.robots.paint import Paint
-from sim.robots.poses import Poses
 from sim.scene import bsdfs, inventory, lights, shapes, sky, surfaces
 from sim.scene.merged_parts import PlacedPart, merged
 from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
@@ -42,6 +42,7 @@ class ModelScene:
     glows: BSDFs whose reflectance is the radiance of what glows, by look; these are met like movers
     paint: of sizes and colours that differ from world to world, `varied` by name: what differs is met like a mover,
         though it may stand still
+    as_built: what worlds are compared with
     bsdfs: of every mover, in their order; kept here, since a BSDFPtr does not keep its objects alive
 
     Warns (`sim.MirrorWarning`) once of what has no counterpart.
@@ -60,11 +61,6 @@ class ModelScene:
         light: str = DIRECT,
     ) -> None:
         self.model, self.variant = model, default_variant()
-        self._as_built = {
-            "size": model.geom_size.copy(),
-            "colour": model.geom_rgba.copy(),
-            "material": model.geom_matid[:, None].copy(),
-        }
         self.spectra: Spectra = resolve(model, spectra)
         seen = surfaces.visible(model, groups)
         self.geoms = [g for g in seen if shapes.has_shape(model, g)]
@@ -72,9 +68,9 @@ class ModelScene:
             raise ValueError("the model has no visible geom of a kind that can be mirrored")
         with in_variant(self.variant):
             differ = varied_geoms(model, self.geoms, varied, self.spectra)
-            self._drawn = {geom: materials for geom, materials in differ.items() if materials}
-            painted = [geom for geom in differ if geom not in self._drawn]
-            looks = appearances_of(model, self.geoms, self._drawn)
+            drawn = {geom: materials for geom, materials in differ.items() if materials}
+            painted = [geom for geom in differ if geom not in drawn]
+            looks = appearances_of(model, self.geoms, drawn)
             self.glows = {look: glow for look in looks if (glow := self._glow(look)) is not None}
             matt = {look: self._matt(look, look.geom in painted) for look in looks}
             moving = [each for each in looks if _moves(model, each.geom) or each.geom in differ or each in self.glows]
@@ -87,6 +83,8 @@ class ModelScene:
             self._matt_still = {look.geom: matt[look] for look in looks if look not in moving}
             self.scene = self._still()
             self.has_sky = self.scene.environment() is not None
+        reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
+        self.as_built = AsBuilt(model, self.geoms, [g for g in reachable if g not in seen], self.movers, differ)
         left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, looks, light)]
         if left_out:
             warnings.warn(f"eyes do not see: {'; '.join(left_out)}", MirrorWarning, stacklevel=_outside())
@@ -123,45 +121,6 @@ class ModelScene:
         for shape, name in known.items():
             geoms[shape] = int(name.split("_")[1])
         return scene, geoms
-
-    def refuse_differences(self, poses: Poses) -> None:
-        """Sizes, colours and materials that differ from the model's where they cannot.
-
-        Raises:
-            ValueError: they do.
-        """
-        self._refuse_other_materials(poses)
-        material = None if poses.geom_matid is None else poses.geom_matid[..., None]
-        for what, here, may in (
-            ("size", poses.geom_size, self.movers.resizable),
-            ("colour", poses.geom_rgba, self.paint.geoms),
-            ("material", material, list(self._drawn)),
-        ):
-            if here is None:
-                continue
-            own = self._as_built[what]
-            alike = here[:1] if here.strides[0] == 0 else here
-            if np.array_equal(np.broadcast_to(own, alike.shape), alike):
-                continue
-            differs = (alike != own).any(axis=(0, 2))
-            differs[may] = False
-            wrong = [g for g in np.flatnonzero(differs) if g in self.geoms]
-            if wrong:
-                name = self.model.geom(int(wrong[0])).name or str(wrong[0])
-                more = {"size": ", and be a primitive without a texture", "material": ", with its materials"}.get(
-                    what, ""
-                )
-                raise ValueError(
-                    f"geom {name!r} has another {what} than in the renderer's model: must be in `varied`{more}"
-                )
-
-    def _refuse_other_materials(self, poses: Poses) -> None:
-        own = self._as_built["material"][None, :, 0]
-        for geom, materials in self._drawn.items():
-            here = (own if poses.geom_matid is None else poses.geom_matid)[:, geom]
-            if not np.isin(here, materials).all():
-                listed = inventory.listed_materials(self.model, list(materials))
-                raise ValueError(f"geom {self.model.geom(geom).name!r} has a material beside {listed}, see `varied`")
 
     def _still_parts(self) -> list[PlacedPart]:
         data = mujoco.MjData(self.model)

@@ -33,7 +33,7 @@ class Mount:
     kind: "site", "camera" or "body", where several have that name; None: the first of these
 
     Raises:
-        ValueError: angles or offsets that are not finite, and an unknown kind.
+        ValueError: no name, angles or offsets that are not finite, and an unknown kind.
     """
 
     on: str
@@ -44,6 +44,8 @@ class Mount:
     kind: str | None = None
 
     def __post_init__(self) -> None:
+        if not of_kind("Mount: on", self.on, str, "'head'"):
+            raise ValueError(f"Mount: on = {self.on!r}: must be the name of a site, a camera or a body, such as 'head'")
         for name in ("azimuth_deg", "elevation_deg", "roll_deg"):
             object.__setattr__(self, name, finite(f"Mount: {name}", getattr(self, name)))
         offset = reals("Mount: offset", self.offset)

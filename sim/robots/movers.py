@@ -208,7 +208,7 @@ class Movers:
             si = scene.ray_intersect(_local_ray(ray, frame), mi.RayFlags.All, True, self._is_there(k, frame))
             nearer = si.is_valid() & (si.t < t)
             t, which = dr.select(nearer, si.t, t), dr.select(nearer, k, which)
-            normal = dr.select(nearer, frame.given(mi.Vector3f(si.n)), normal)
+            normal = dr.select(nearer, frame.given(mi.Vector3f(si.sh_frame.n)), normal)
             uv = dr.select(nearer, si.uv, uv)
         if self.apart:
             computed(t, which, normal, uv)
@@ -283,8 +283,8 @@ def _may_meet(ray: Array, rows: Array, first: Array) -> Array:
     x, y, z, radius = dr.gather(mi.Vector4f, rows, first)
     way, square = mi.Vector3f(x, y, z) - ray.o, radius * radius
     along = dr.dot(way, ray.d)
-    away = dr.squared_norm(way)
-    return (away < square) | ((along > 0) & (away - along * along < square))
+    aside = way - along * ray.d  # a difference of squares would lose what is small and far away
+    return (dr.squared_norm(way) < square) | ((along > 0) & (dr.squared_norm(aside) < square))
 
 
 def _loop(kind: int, inputs: dict[str, Array], step: Callable[..., Any], *state: Array) -> tuple[Array, ...]:

@@ -5,11 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
+from zlib import crc32
 
 import mujoco
 import numpy as np
 
-_OF_MODELS = ("geom_size", "geom_rgba", "geom_matid")
+OF_MODELS = (
+    "geom_size",
+    "geom_rgba",
+    "geom_matid",
+    "mat_rgba",
+    "mat_emission",
+    "light_diffuse",
+    "light_active",
+    "heights",
+)
 
 
 @dataclass(frozen=True)
@@ -17,8 +27,9 @@ class Poses:
     """Positions [m] (world, thing, 3) and rotations (world, thing, 3, 3) as mjData has them after mj_forward.
 
     geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat, xpos, xmat (of bodies) · light_xpos, light_xdir
-    geom_size (world, geom, 3), geom_rgba (world, geom, 4), geom_matid (world, geom): as each world's own mjModel has
-        them; None: as the renderer's model
+    geom_size (world, geom, 3), geom_rgba (world, geom, 4), geom_matid (world, geom), mat_rgba, mat_emission,
+        light_diffuse, light_active: as each world's own mjModel has them; None: as the renderer's model
+    heights: a checksum of each height field's, (world, hfield), since they are many
     """
 
     geom_xpos: np.ndarray
@@ -34,15 +45,20 @@ class Poses:
     geom_size: np.ndarray | None = None
     geom_rgba: np.ndarray | None = None
     geom_matid: np.ndarray | None = None
+    mat_rgba: np.ndarray | None = None
+    mat_emission: np.ndarray | None = None
+    light_diffuse: np.ndarray | None = None
+    light_active: np.ndarray | None = None
+    heights: np.ndarray | None = None
 
     @classmethod
     def of(cls, datas: Sequence[mujoco.MjData]) -> Poses:
         """Of as many worlds as there are data."""
-        names = [f.name for f in fields(cls) if f.name not in _OF_MODELS]
+        names = [f.name for f in fields(cls) if f.name not in OF_MODELS]
         stacked = {name: np.stack([getattr(data, name) for data in datas]) for name in names}
         found = {name: _square(array) if name.endswith("mat") else array for name, array in stacked.items()}
         models = [data.model for data in datas]
-        return cls(**found, **{name: _of_models(models, name) for name in _OF_MODELS})
+        return cls(**found, **{name: _of_models(models, name) for name in OF_MODELS})
 
     @classmethod
     def joined(cls, *parts: Poses) -> Poses:
@@ -64,9 +80,18 @@ class Poses:
 
 def _of_models(models: Sequence[mujoco.MjModel], name: str) -> np.ndarray:
     if all(model is models[0] for model in models):
-        field = getattr(models[0], name).copy()  # it may be written to later
+        field = of_model(models[0], name).copy()  # it may be written to later
         return np.broadcast_to(field, (len(models), *field.shape))
-    return np.stack([getattr(model, name) for model in models])
+    return np.stack([of_model(model, name) for model in models])
+
+
+def of_model(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """One of OF_MODELS as a model has it now."""
+    if name != "heights":
+        found: np.ndarray = getattr(model, name)
+        return found
+    sizes = zip(model.hfield_adr, model.hfield_nrow * model.hfield_ncol, strict=True)
+    return np.array([crc32(model.hfield_data[start : start + size]) for start, size in sizes], np.uint32)
 
 
 def _square(rows: np.ndarray) -> np.ndarray:

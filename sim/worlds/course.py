@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from optics.numerics.arguments import of_kind
+from optics.numerics.arguments import of_kind, whole
 from sim.worlds.layout import CELL, cell_centers
 
 Cell = tuple[int, int]  # row, column
@@ -21,6 +21,7 @@ Cell = tuple[int, int]  # row, column
 MOST_FALL = 1.5  # [m] by which the distance from the start may have to fall on the way on, wherever an agent has got to
 GOAL_COLUMNS = 3  # the free cells of the last columns but the outer wall are the goal
 LOOK_AHEAD = 3  # cells on the shortest way: where they lead is the way's direction
+MOST_STEPS = 10**9  # of an episode
 _WALL, _FREE, _START, _TRAINING_START = "#.Ss"
 
 
@@ -32,15 +33,16 @@ class Course:
     episode_steps: actions, then an episode is truncated; None: as many as everywhere
 
     Raises:
-        ValueError: lines of different lengths, another sign, an open border, no start, a start from which there is no
-            way to the goal, or one on whose way the distance from it falls by more than MOST_FALL.
+        ValueError: lines of different lengths, another sign, an open border, no start, a start in the goal or from
+            which there is no way to it, one on whose way the distance from it falls by more than MOST_FALL, or
+            episode_steps that are not a whole number above 0.
     """
 
     drawing: str
     episode_steps: int | None = None
 
     def __post_init__(self) -> None:
-        of_kind("course: drawing", self.drawing, str, "'#####\\n#S..#\\n#####'")
+        of_kind("course: drawing", self.drawing, str, "'######\\n#S...#\\n######'")
         lines = self.drawing.split()
         if len({len(line) for line in lines}) != 1 or (signs := set(self.drawing) - set("#.Ss \n")):
             what = "all lines must be as long" if len({len(line) for line in lines}) != 1 else f"signs {sorted(signs)}"
@@ -52,12 +54,18 @@ class Course:
             raise ValueError(f"course: cell ({row}, {column}) of its border is free: must be a wall")
         if not self.starts:
             raise ValueError("course: no start: must have an 'S'")
-        if self.episode_steps is not None and self.episode_steps < 1:
-            raise ValueError(f"course: episode_steps = {self.episode_steps}: must be at least 1")
+        if self.episode_steps is not None:
+            steps = whole("course: episode_steps", self.episode_steps, 1, MOST_STEPS)
+            object.__setattr__(self, "episode_steps", steps)
         for start in self.training_starts:
             self._check(start)
 
     def _check(self, start: Cell) -> None:
+        if self.goal[start]:
+            raise ValueError(
+                f"course: start in cell {start} is in the goal, the free cells of the last {GOAL_COLUMNS} columns but "
+                "the outer wall: must be west of it"
+            )
         if not np.isfinite(self.way[start]):
             raise ValueError(f"course: start in cell {start} has no way to the goal")
         fall, at = self.fall(start)

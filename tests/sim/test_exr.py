@@ -11,9 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 import pytest
 
-from optics.spectra.bands import daylight
 from sim.exr import ExrError, View, _digest, read_exr, write_exr
-from sim.scene.color import preview
 
 NM = np.array([410.0, 450.125, 1640 / 3, 690.0])
 
@@ -227,17 +225,6 @@ def test_files_may_be_read_by_whoever_may_read_others(tmp_path):
     write_exr(tmp_path / "a.exr", views())
     (tmp_path / "plain").touch()
     assert (tmp_path / "a.exr").stat().st_mode == (tmp_path / "plain").stat().st_mode
-
-
-def test_preview_of_daylight_is_white():
-    nm = np.linspace(400, 700, 8)
-    radiance = 0.5 * daylight(nm * 1e-9)[:, None, None] * np.ones((8, 2, 3))
-    np.testing.assert_allclose(preview(radiance, nm), 0.5, atol=1e-6)
-    red = np.where(nm > 600, 1.0, 0.0)[:, None, None] * np.ones((8, 1, 1))
-    r, g, b = preview(red, nm)[0, 0]
-    assert r > 5 * max(g, b)
-    # Bands in any order mean the same.
-    np.testing.assert_allclose(preview(red[::-1], nm[::-1]), preview(red, nm))
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ from sim.eyes.eyes import EYE_HEIGHT
 from sim.scene.color import encode_srgb
 
 EYES = sim.Eyes(n_eyes=2, resolution=(3, 4), fov_deg=60)
+FINE = {"rays_per_receptor": sim.Fidelity(2, bands=3)}
 
 
 @pytest.mark.parametrize("id_", IDS)
@@ -214,6 +215,11 @@ def test_renders_nothing_before_the_world_has_begun():
         ({"memory": 0}, "memory = 0"),
         ({"memory": 1.5}, "memory = 1.5: must be a whole number"),
         ({"episode_steps": 0}, "episode_steps = 0: must be a whole number"),
+        (
+            {**FINE, "fidelity": sim.Fidelity(3, bands=2)},
+            r"rays_per_receptor = Fidelity\(.*: must be left out where a ",
+        ),
+        ({**FINE, "fidelity": "nonsense"}, "fidelity = 'nonsense': must be a sim.Fidelity or None"),
         ({"world_seed": 1.5}, "world_seed = 1.5: must be a whole number"),
     ],
 )

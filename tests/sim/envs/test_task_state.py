@@ -94,6 +94,28 @@ def test_every_entry_counts(env):
     assert np.array_equal(seen["previous_action"], early["action"])
 
 
+class Told(Pushed):
+    auxiliary = ("depth", "ids", "flow")
+
+
+@pytest.mark.parametrize("memory", [1, 2])
+def test_what_a_caller_does_to_its_observations_changes_nothing_else(memory):
+    touched, left = (sim.make_vec_env(Told(), n_envs=2, seed=3, memory=memory, render_mode="eyes") for _ in range(2))
+    for moment in (lambda env: env.reset(), lambda env: env.step(np.full((2, 1), 0.5))[0]):
+        observation, expected = moment(touched), moment(left)
+        for array in observation.values():
+            array -= 5
+        np.testing.assert_array_equal(touched.get_images(), left.get_images())
+        state = touched.get_state()
+        for name, array in left.get_state().items():
+            np.testing.assert_array_equal(state[name], array, err_msg=name)
+        seen = touched.set_state(state)
+        for name, array in expected.items():
+            np.testing.assert_array_equal(seen[name], array, err_msg=name)
+            seen[name] -= 5
+    assert same(played(touched, 3, 1), played(left, 3, 1))
+
+
 @pytest.mark.parametrize(
     ("change", "worlds", "words"),
     [

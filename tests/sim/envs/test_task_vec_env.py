@@ -154,6 +154,7 @@ def test_a_failing_method_ends_its_world_and_the_others_go_on(task, words):
     np.testing.assert_array_equal(done, fails)
     for failed, info, r in zip(fails, infos, reward, strict=True):
         assert ("failure" in info) == failed
+        assert info.get("TimeLimit.truncated") == (False if failed else None)  # else learners count with a fresh start
         assert r == (0 if failed else 1)
 
 

@@ -6,7 +6,7 @@ import sys
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import sim
 from sim.envs.vector_env import EyesVectorEnv
@@ -48,6 +48,61 @@ def test_worlds_start_anew_in_the_step_that_ends_them():
     assert not terminated.any()
     assert np.abs(info["final_obs"][0]["eyes"] - observation["eyes"][0]).max() > 0.05
     assert env.single_observation_space.contains(info["final_obs"][1])
+
+
+class Leaving(Face):
+    """Ends where the cart has left the middle, and differs from episode to episode."""
+
+    episode_steps, vary = 6, {"light": (0.5, 2.0)}
+
+    def terminated(self, data):
+        return data.qpos[0] > 0.1
+
+
+def form(info):
+    """Its keys, its masks, and what kinds of arrays there are."""
+    return {
+        key: form(value)
+        if isinstance(value, dict)
+        else value.tolist()
+        if key[0] == "_"
+        else (value.dtype.kind, value.shape)
+        for key, value in info.items()
+    }
+
+
+def of_first_world(info):
+    """What it says of it but what is seen, which is there only if its mask says so."""
+    return {
+        key: of_first_world(value) if isinstance(value, dict) else value[0]
+        for key, value in info.items()
+        if key[0] != "_" and key != "final_obs" and info[f"_{key}"][0]
+    }
+
+
+@pytest.mark.parametrize(
+    ("task", "options", "actions"),
+    [
+        (Leaving(), {}, [[1], [-1]]),
+        (Leaving(), {}, [[-1], [1]]),
+        ("detection", {"vary": {"light": (0.1, 1.0)}, "episode_steps": 3, **OPTIONS}, [[0.5, 0.1], [1, 0]]),
+    ],
+)
+def test_what_is_said_of_ended_episodes_is_where_gymnasium_has_it(task, options, actions):
+    """World 0 is the same in both."""
+    env = EyesVectorEnv(2, task=task, **options)
+    single = SyncVectorEnv([lambda: sim.make_env(task, **options)] * 2, autoreset_mode=AutoresetMode.SAME_STEP)
+    assert form(env.reset(seed=3)[1]) == form(single.reset(seed=3)[1])
+    ends = 0
+    for _ in range(7):
+        *here, info = env.step(np.array(actions, np.float32))
+        *there, expected = single.step(np.array(actions, np.float32))
+        assert form(info) == form(expected)
+        assert of_first_world(info) == of_first_world(expected)
+        np.testing.assert_array_equal(here[0]["eyes"][0], there[0]["eyes"][0])
+        assert [array[0] for array in here[2:]] == [array[0] for array in there[2:]]
+        ends += "final_info" in info
+    assert ends > 1
 
 
 @pytest.mark.parametrize("steps", [3, 300])

@@ -46,3 +46,54 @@ def test_more_than_an_array_can_number_is_refused_whatever_the_memory(monkeypatc
 
 def test_memory_is_known():
     assert 1e8 < memory_budget.available() < 1e14
+
+
+V2 = {
+    "memory.max": "8000000",
+    "memory.current": "5000000",
+    "memory.stat": "anon 9\nactive_file 300\ninactive_file 20\n",
+}
+V1 = {
+    "memory/memory.limit_in_bytes": "9000000\n",
+    "memory/memory.usage_in_bytes": "7000000\n",
+    "memory/memory.stat": "active_file 5\ninactive_file 6\ntotal_active_file 70\ntotal_inactive_file 8\n",
+}
+
+
+def groups(root, files):
+    """A folder as a container finds it."""
+    for name, text in files.items():
+        (root / name).parent.mkdir(exist_ok=True)
+        (root / name).write_text(text)
+    return root
+
+
+@pytest.mark.parametrize(
+    ("files", "free"),
+    [
+        ({}, math.inf),
+        (V2, 3_000_320),
+        ({**V2, "memory.max": "max\n"}, math.inf),
+        ({name: text for name, text in V2.items() if name != "memory.stat"}, 3_000_000),
+        ({**V2, "memory.stat": "no numbers"}, 3_000_000),
+        ({**V2, "memory.current": "8000321"}, 1),
+        ({"memory.max": "8000000"}, math.inf),
+        (V1, 2_000_078),
+        ({**V1, "memory/memory.limit_in_bytes": "9223372036854771712"}, 9223372036854771712 - 7_000_000 + 78),
+        ({**V1, **V2}, 2_000_078),
+    ],
+)
+def test_a_containers_limit_counts(tmp_path, monkeypatch, files, free):
+    """What files keep in memory makes way, and does not count as taken."""
+    monkeypatch.setattr(memory_budget, "CGROUPS", groups(tmp_path, files))
+    monkeypatch.setattr(memory_budget, "_of_machine", lambda: math.inf)
+    assert memory_budget.available() == free
+    monkeypatch.setattr(memory_budget, "_of_machine", lambda: 7.0)
+    assert memory_budget.available() == min(free, 7)
+
+
+def test_a_container_without_room_is_told_in_one_line(tmp_path, monkeypatch):
+    monkeypatch.setattr(memory_budget, "CGROUPS", groups(tmp_path, {**V2, "memory.current": "9000000"}))
+    with pytest.raises(ValueError, match=r"use at most .* rays per receptor, or fewer worlds at once") as error:
+        check_memory(SOME)
+    assert "\n" not in str(error.value)

@@ -1,6 +1,7 @@
 """Who tests what of sim/robots.
 
 model_renderer: test_model_renderer.py
+renderable: test_model_renderer.py, test_edge_rays.py
 model_wavefront: test_model_renderer.py
 model_fidelity: test_model_fidelity.py, test_model_light.py
 edge_rays: test_edge_rays.py
@@ -11,6 +12,7 @@ encounter: envs/test_encounter.py, envs/test_bad_encounters.py
 variation: test_variation.py
 world_models: envs/test_differing_worlds.py
 paint: envs/test_differing_worlds.py
+as_built: test_as_built.py
 appearances: envs/test_differing_materials.py
 optic_flow: test_labels.py
 eye_marks: test_eye_marks.py

@@ -169,6 +169,10 @@ def test_eyes_behind_a_pupil_see_it_too(model):
         ({"mounts": []}, r"mounts = \[\]: must be one sim.Mount at least"),
         ({"eye": sim.Eyes()}, "eye = .*: must be a kind of Eye"),
         ({"fidelity": sim.Fidelity(4, bands=3, light="all", samples="areas")}, "light = .all., samples = .areas."),
+        (
+            {"eye": optics.Eye(resolution=(3, 3), eccentricity_deg=(0, -10))},
+            r"eye: eccentricity_deg = \(0.0, -10.0\): eyes in a world look along their Mount: turn that instead",
+        ),
         ({"fidelity": 16}, "fidelity = 16: must be a kind of Fidelity"),
         ({"groups": (5,)}, "no visible geom"),
         ({"n_envs": 10**8}, "worlds with 1 eyes of 40 x 56 receptors would take .* GiB of memory"),
@@ -192,6 +196,17 @@ def test_bad_poses_are_named(model):
     lost.geom_xpos[3] = np.nan
     with pytest.raises(ValueError, match="poses of world 1 are not finite"):
         renderer.signals([posed(model, 0), lost])
+
+
+def test_data_before_mj_forward_is_refused(model):
+    """Everything would be at the origin, without size, and dark. The mirror says the same."""
+    words = r"says nothing yet of where things are; call mujoco.mj_forward\(model, data\) first"
+    renderer = sim.ModelRenderer(model, EYE, [sim.Mount("side")], 2, sim.Fidelity(1, bands=BANDS))
+    for look in (renderer.signals, renderer.depth, renderer.ids):
+        with pytest.raises(ValueError, match="data of world 1 " + words):
+            look([posed(model, 0), mujoco.MjData(model)])
+    with pytest.raises(ValueError, match=words):
+        sim.mirror(model, mujoco.MjData(model))
 
 
 def test_what_is_not_matt_is_named():

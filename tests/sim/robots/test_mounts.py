@@ -79,6 +79,10 @@ def test_both_sides_mirror():
         (lambda: sim.Mount("haed"), "no site or camera or body 'haed' in the model.*head"),
         (lambda: sim.Mount("head", kind="camera"), "no camera 'head' in the model"),
         (lambda: sim.Mount("head", kind="geom"), "kind = 'geom': must be one of"),
+        (lambda: sim.Mount(None), "Mount: on = None: must be a kind of str, such as 'head'"),
+        (lambda: sim.Mount(b"head"), "Mount: on = b'head': must be a kind of str"),
+        (lambda: sim.Mount(""), "Mount: on = '': must be the name of a site, a camera or a body"),
+        (lambda: sim.ring(None, 2, 90, 0.2)[0], "Mount: on = None: must be a kind of str"),
         (lambda: sim.Mount("head", azimuth_deg=np.inf), "azimuth_deg = inf: must be finite"),
         (lambda: sim.Mount("head", offset=(1, 2)), "offset = .* must be three lengths"),
         (lambda: sim.Mount("head", offset=(0.05, 0, 0)), "inside geom 'skull', 0.05 m below its surface: offset must"),
@@ -109,3 +113,54 @@ def test_depth_inside(shape, point, depth):
     mujoco.mj_forward(model, data)
     place = data.geom_xpos[0] + data.geom_xmat[0].reshape(3, 3) @ point
     assert depth_inside(model, data, 0, place) == pytest.approx(depth, abs=1e-9)
+
+
+CORNERS = np.array(list(np.ndindex(2, 2, 2))) - 0.5
+# Each side of a cube as two triangles, outwards; the last is its lid, at z = 0.5.
+SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+
+
+def cube(*sizes, lids=True):
+    """Cubes in each other, as one mesh, with or without lids, that stands askew."""
+    vertices = np.concatenate([size * CORNERS for size in sizes])
+    sides = SIDES if lids else SIDES[:-1]
+    faces = [
+        [8 * k + corner for corner in triangle]
+        for k in range(len(sizes))
+        for a, b, c, d in sides
+        for triangle in ((a, b, c), (a, c, d))
+    ]
+    vertex, face = (" ".join(map(str, np.ravel(numbers))) for numbers in (vertices, faces))
+    return f"""<mujoco><visual><headlight active="0"/></visual>
+        <asset><mesh name="cube" inertia="shell" vertex="{vertex}" face="{face}"/></asset><worldbody>
+        <light type="directional"/><body name="head" pos="1 2 3" euler="20 30 40"><freejoint/>
+        <geom name="skull" type="mesh" mesh="cube" mass="1"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("text", "point", "least", "most"),
+    [
+        (cube(1), (0, 0, 0), 0.5, 0.5 * 1.1),
+        (cube(1), (0.2, 0.1, -0.45), 0.05, 0.05 * 1.1),
+        (cube(1), (0.2, 0.1, -0.51), 0, 0),
+        (cube(1), (5, 0, 0), 0, 0),
+        (cube(1, lids=False), (0, 0, -0.4), 0, 0),  # an open box
+        (cube(1, 0.5), (0, 0, 0.3), 0.05, 0.05 * 1.1),  # between shells
+        (cube(1, 0.5), (0, 0, 0.2), 0, 0),  # in the hollow
+    ],
+)
+def test_depth_inside_of_meshes(text, point, least, most):
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    centre = data.xpos[1] + data.xmat[1].reshape(3, 3) @ point  # MuJoCo puts a mesh's origin elsewhere in its geom
+    assert least <= depth_inside(model, data, 0, centre) <= most
+
+
+def test_eyes_inside_a_mesh_are_refused():
+    def made(text, ahead):
+        return sim.ModelRenderer(text, EYE, [sim.Mount("head", offset=(ahead, 0, 0))], 1, sim.Fidelity(1, bands=1))
+
+    with pytest.raises(ValueError, match=r"inside geom 'skull', 0\.0[45].* m below its surface: offset must lead out"):
+        made(cube(1), 0.46)
+    assert made(cube(1), 0.51).moving == made(cube(1, lids=False), 0.4).moving == 1

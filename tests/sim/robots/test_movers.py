@@ -144,3 +144,53 @@ def test_too_many_meshes_for_one_kernel_are_named(monkeypatch):
     monkeypatch.setattr(movers, "MESHES", 1)
     with pytest.raises(ValueError, match="2 moving meshes: must be 1 at most; hide some by group"):
         depths(model_of(SHAPES["mesh"], SHAPES["mesh"]), [])
+
+
+def still_and_moving(geom, assets=""):
+    """What an eye at the origin sees of a geom 2 m ahead, along x, that stands still, and of one that could move."""
+    models = [
+        mujoco.MjModel.from_xml_string(f"""<mujoco><visual><headlight active="0"/></visual>{assets}<worldbody>
+            <light type="directional" dir="1 .5 -.5"/><body name="eye"/>
+            <geom type="box" size=".1 900 900" pos="300 0 0"/>
+            <body>{joint}{geom}</body></worldbody></mujoco>""")
+        for joint in ("", "<freejoint/>")
+    ]
+    return models, [posed_as_is(model) for model in models]
+
+
+def posed_as_is(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def coarse_ball():
+    """With normals that MuJoCo makes smooth: neighbouring faces differ by less than a right angle."""
+    polar, around = np.linspace(0, np.pi, 9)[1:-1], np.arange(14) * 2 * np.pi / 14
+    rings = [[np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)] for p in polar for a in around]
+    vertices = " ".join(map(str, np.ravel([*rings, [0, 0, 1], [0, 0, -1]])))
+    return f'<asset><mesh name="ball" smoothnormal="true" vertex="{vertices}"/></asset>'
+
+
+def test_a_smooth_mesh_is_shaded_alike_whether_it_moves_or_not():
+    models, datas = still_and_moving('<geom type="mesh" mesh="ball" pos="4 0 0" euler="10 20 30"/>', coarse_ball())
+    eye = Eye(resolution=(40, 40), fov_deg=30, bands=1)
+    still, moving = (
+        sim.ModelRenderer(model, eye, [sim.Mount("eye")], 1, sim.Fidelity(4, bands=1)).signals([data])
+        for model, data in zip(models, datas, strict=True)
+    )
+    assert len(np.unique(still.round(3))) > 40  # shades
+    np.testing.assert_allclose(moving, still, atol=2e-4)
+
+
+def test_what_is_small_and_far_is_met_by_all_its_rays():
+    """A ball of 5 cm 100 m away, whose squared distances float32 tells apart by steps of a third of its square."""
+    models, datas = still_and_moving('<geom name="far" size=".05" pos="100 3 2"/>')
+    azimuth, elevation = np.degrees([np.arctan2(3, 100), np.arctan2(2, np.hypot(3, 100))])
+    mount = sim.Mount("eye", azimuth_deg=float(azimuth), elevation_deg=float(elevation))
+    seen = []
+    for model, data in zip(models, datas, strict=True):
+        renderer = sim.ModelRenderer(model, Eye(resolution=(40, 40), fov_deg=0.07, bands=1), [mount], 1)
+        seen.append(renderer.ids([data])[0, 0] == model.geom("far").id)
+    assert 600 < seen[0].sum() < 1100
+    assert (seen[0] != seen[1]).sum() < 20  # at the limb

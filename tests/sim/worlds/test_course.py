@@ -1,6 +1,8 @@
 """A course can be run: whoever keeps getting farther from its start arrives."""
 
+import ast
 import math
+import re
 from contextlib import suppress
 
 import numpy as np
@@ -149,6 +151,12 @@ def test_a_course_of_ones_own():
         (STRAIGHT.replace("S", "."), "no start: must have an 'S'"),
         (STRAIGHT.replace("#S", ".S"), r"cell \(1, 0\) of its border is free: must be a wall"),
         (STRAIGHT.replace("S.", "S#"), r"start in cell \(1, 1\) has no way to the goal"),
+        (
+            STRAIGHT.replace("...#", "S..#"),
+            r"start in cell \(1, 6\) is in the goal, .* last 3 columns .*: must be west",
+        ),
+        (STRAIGHT.replace("...#", "..s#"), r"start in cell \(1, 8\) is in the goal"),
+        ("#####\n#S..#\n#####", r"start in cell \(1, 1\) is in the goal"),
         (HOOK, r"from cell \(\d, \d\) on, the distance from the start in cell \(5, 1\) has to fall by"),
     ],
 )
@@ -164,8 +172,21 @@ def test_courses_are_navigations_alone():
         ValueError, match=r"course = 'lnog': must be sim.Course or one of 'short', 'long'; did you mean 'long'"
     ):
         sim.build_world("navigation", course="lnog")
-    with pytest.raises(ValueError, match="episode_steps = 0: must be at least 1"):
-        Course(STRAIGHT, episode_steps=0)
+
+
+@pytest.mark.parametrize("steps", [0, "10", 2.5, math.inf, [3]])
+def test_a_courses_length_is_a_whole_number(steps):
+    words = f"course: episode_steps = {steps!r}: must be a whole number in [1, 1000000000]"
+    with pytest.raises(ValueError, match=f"^{re.escape(words)}$"):
+        Course(STRAIGHT, episode_steps=steps)
+
+
+def test_what_is_no_drawing_is_shown_one():
+    with pytest.raises(ValueError, match="drawing = 3: must be a kind of str, such as '#") as caught:
+        Course(3)
+    example = str(caught.value).split("such as ")[1]
+    course = Course(ast.literal_eval(example))
+    assert course.way[course.starts[0]] > 0, "there is a way to go"
 
 
 def test_a_training_episode_ends_at_the_least_return():

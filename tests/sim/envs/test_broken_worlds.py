@@ -1,0 +1,95 @@
+"""Worlds of tasks of one's own that cannot go on: their episodes are over, and the others never know."""
+
+import numpy as np
+import pytest
+
+import sim
+from tests.sim.envs.hunt import Predator, Prey, hunt
+from tests.sim.envs.test_task_vec_env import CART, Face
+
+
+class Unmended(Face):
+    """MuJoCo does not begin it anew when it breaks down."""
+
+    model = CART.replace('<option timestep=".02"/>', '<option timestep=".02"><flag autoreset="disable"/></option>')
+
+
+class Nowhere(Face):
+    """An action of 1 puts the ball nowhere, which MuJoCo does not mind."""
+
+    def act(self, data, action):
+        super().act(data, action)
+        if action[0] == 1:
+            data.mocap_pos[0] = np.nan
+
+
+def moved_off(env):
+    env.worlds.datas[1].qvel[:] = np.nan
+
+
+@pytest.mark.parametrize(
+    ("task", "break_down", "words"),
+    [
+        (Face, moved_off, "physics is unstable: positions, speeds"),
+        (Unmended, moved_off, "physics is unstable: positions, speeds"),
+        (Nowhere, lambda env: None, "physics is unstable: places of bodies are not finite; what `act` writes must be"),
+    ],
+)
+def test_a_world_that_breaks_down_ends_alone_and_for_good(task, break_down, words):
+    broken, well = (sim.make_vec_env(task(), n_envs=3, seed=4) for _ in range(2))
+    broken.reset()
+    well.reset()
+    break_down(broken)
+    with pytest.warns(UserWarning, match=words):
+        found, reward, done, infos = broken.step(np.array([[0.5], [1], [-0.5]]))
+    expected, paid, *_ = well.step(np.array([[0.5], [0], [-0.5]]))
+    np.testing.assert_array_equal(done, [False, True, False])
+    assert infos[1]["failure"].startswith(words)
+    assert infos[1]["TimeLimit.truncated"] is False
+    assert reward[1] == 0
+    assert np.isfinite(infos[1]["terminal_observation"]["eyes"]).all()
+    for _ in range(3):
+        np.testing.assert_array_equal(found["eyes"][[0, 2]], expected["eyes"][[0, 2]])
+        np.testing.assert_array_equal(reward[[0, 2]], paid[[0, 2]])
+        assert broken.observation_space["eyes"].contains(found["eyes"][1])
+        (found, reward, done, _), (expected, paid, *_) = (env.step(np.full((3, 1), 0.2)) for env in (broken, well))
+        assert not done.any()
+
+
+@pytest.mark.parametrize("action", [1.0, np.nan])
+def test_the_only_world_ends_so_too(action):
+    env = sim.make_env(Nowhere())
+    env.reset(seed=1)
+    with pytest.warns(UserWarning, match="its episode ends here"):
+        observation, _, terminated, truncated, info = env.step(np.array([action]))
+    assert (terminated, truncated) == (True, False)
+    assert "failure" in info
+    assert np.isfinite(observation["eyes"]).all()
+
+
+def lost(encounter):
+    """What two animals are told when the prey's place is no number."""
+    env = sim.make_parallel_env(encounter, seed=1)
+    env.reset()
+    env._animals.worlds.datas[0].qvel[0] = np.nan
+    return env.step({name: np.zeros(2) for name in env.agents})
+
+
+def test_an_encounter_that_breaks_down_ends_for_all():
+    _, _, terminated, truncated, infos = lost(hunt())
+    assert terminated == {"Prey": True, "Predator": True}
+    assert truncated == {"Prey": False, "Predator": False}
+    assert all(info["failure"].startswith("physics is unstable") for info in infos.values())
+
+
+def test_whose_other_animal_fails_has_no_more_to_come():
+    class Clumsy(Predator):
+        def act(self, data, action):
+            raise ArithmeticError("no leg to stand on")
+
+    env = sim.make_vec_env(sim.Encounter(Prey(), Clumsy()).alone("Prey", {}), n_envs=2)
+    env.reset()
+    with pytest.warns(UserWarning, match="no leg to stand on"):
+        *_, done, infos = env.step(np.zeros((2, 2)))
+    assert done.all()
+    assert not any(info["TimeLimit.truncated"] for info in infos)

@@ -1,0 +1,134 @@
+"""What a task changes in a model after its renderer was made is refused, unless eyes follow it."""
+
+import copy
+
+import mujoco
+import numpy as np
+import pytest
+
+import sim
+from optics import Eye
+
+MODEL = mujoco.MjModel.from_xml_string("""
+    <mujoco><visual><headlight active="0"/></visual><asset>
+      <hfield name="hills" nrow="3" ncol="3" size="1 1 .5 .1"/>
+      <hfield name="unseen" nrow="3" ncol="3" size="1 1 .5 .1"/>
+      <material name="red" rgba=".8 .1 .1 1"/><material name="clear" rgba="1 1 1 0"/><material name="spare"/>
+    </asset><worldbody>
+      <light name="sun" type="directional" dir="0 0 -1"/><light name="off" type="directional" active="false"/>
+      <geom name="wall" type="box" size=".1 1 1" pos="2 0 1" euler="0 0 10" material="red"/>
+      <geom name="land" type="hfield" hfield="hills" pos="0 3 0"/>
+      <geom name="ghost" size=".2" pos="1 0 1" rgba="1 0 0 0"/>
+      <geom name="pane" size=".2" pos="1 1 1" material="clear"/>
+      <geom name="own" size=".1" pos="0 9 0" rgba=".2 .2 .2 1" material="spare"/>
+      <body name="post" pos="2 2 1"><geom name="ball" size=".2" rgba=".1 .9 .1 1"/></body>
+      <geom name="apart" group="4" size=".1" pos="0 0 9"/>
+      <body><freejoint/><geom name="stone" size=".1" pos="0 -1 0" rgba=".1 .9 .1 1"/></body>
+      <site name="eye" pos="0 0 1" group="3"/></worldbody></mujoco>""")
+WORLDS = 2
+
+
+def renderer_of(varied=()):
+    eye = Eye(resolution=(3, 3), bands=1)
+    return sim.ModelRenderer(MODEL, eye, [sim.Mount("eye")], WORLDS, sim.Fidelity(1, bands=1), varied=varied)
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    return renderer_of()
+
+
+def worlds(change=None, shared=False):
+    """Poses of worlds of which the last, or all, has a model that was changed."""
+    models = [copy.copy(MODEL)] * WORLDS if shared else [copy.copy(MODEL) for _ in range(WORLDS)]
+    if change is not None:
+        change(models[-1])
+    datas = [mujoco.MjData(model) for model in models]
+    for model, data in zip(models, datas, strict=True):
+        mujoco.mj_forward(model, data)
+    return datas
+
+
+def setting(field, value, kind=None, name=None):
+    """A change of a field, or of a named thing's."""
+
+    def change(model):
+        getattr(model, field)[... if kind is None else getattr(model, kind)(name).id] = value
+
+    return change
+
+
+ANEW = "as .* when they were made: make them anew"
+HANG = "stands still in the renderer's model and is elsewhere now: must hang on a joint or on a mocap body"
+REFUSED = {
+    "place": (setting("geom_pos", [2, 0, 1.5], "geom", "wall"), f"geom 'wall' {HANG}"),
+    "turn": (setting("geom_quat", [0.9, 0, 0, 0.435889894], "geom", "wall"), f"geom 'wall' {HANG}"),
+    "place of a body": (setting("body_pos", [2, 2, 1.001], "body", "post"), f"geom 'ball' {HANG}"),
+    "heights": (setting("hfield_data", 0.5), f"hfield 'hills' has another hfield_data than in .*{ANEW}"),
+    "material": (setting("mat_rgba", 1, "material", "red"), f"material 'red' has another mat_rgba than in .*{ANEW}"),
+    "glow": (setting("mat_emission", 1, "material", "red"), f"material 'red' has another mat_emission than .*{ANEW}"),
+    "lamp": (setting("light_diffuse", 0.1, "light", "sun"), f"light 'sun' has another light_diffuse than .*{ANEW}"),
+    "switch": (setting("light_active", 1, "light", "off"), f"light 'off' has another light_active than in .*{ANEW}"),
+    "ghost": (setting("geom_rgba", 1, "geom", "ghost"), f"geom 'ghost' has an alpha of 0 in .* now: .*{ANEW}"),
+    "pane": (setting("mat_rgba", 1, "material", "clear"), f"material 'clear' has another mat_rgba than in .*{ANEW}"),
+    "other pane": (
+        setting("geom_matid", 0, "geom", "pane"),
+        f"geom 'pane' has an alpha of 0 .* to be seen now: .*{ANEW}",
+    ),
+    "size": (setting("geom_size", 0.3, "geom", "ball"), "geom 'ball' has another size than .* must be in `varied`"),
+}
+FOLLOWED = {
+    "nothing": None,
+    "what moves": setting("geom_pos", [0, -2, 0], "geom", "stone"),
+    "a material without things": setting("mat_rgba", 0, "material", "spare"),
+    "another ghost": setting("geom_rgba", [0, 1, 0, 0], "geom", "ghost"),
+    "what is in no group": setting("geom_pos", [0, 0, 8], "geom", "apart"),
+    "a field without a geom": lambda model: model.hfield_data.__setitem__(slice(9, None), 0.5),
+}
+
+
+@pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_eyes_would_not_notice_is_refused(renderer, name, shared):
+    change, words = REFUSED[name]
+    datas = worlds(change, shared)
+    for look in (renderer.signals, renderer.depth, renderer.ids):
+        with pytest.raises(ValueError, match=words) as refused:
+            look(datas)
+        assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize("name", FOLLOWED)
+def test_what_makes_no_difference_is_not(renderer, name, shared):
+    assert np.isfinite(renderer.signals(worlds(FOLLOWED[name], shared))).all()
+
+
+def test_what_varies_is_not():
+    """Wherever it is, too: it is met like something that moves."""
+    renderer = renderer_of({"ball": (), "wall": ("red", "spare")})
+    for change in (
+        setting("geom_size", 0.3, "geom", "ball"),
+        setting("geom_rgba", [0, 0, 1, 1], "geom", "ball"),
+        setting("body_pos", [2, 2, 2], "body", "post"),
+        setting("geom_matid", MODEL.material("spare").id, "geom", "wall"),
+    ):
+        assert np.isfinite(renderer.signals(worlds(change))).all()
+    with pytest.raises(ValueError, match="material 'spare' has another mat_rgba"):
+        renderer.signals(worlds(setting("mat_rgba", 0.1, "material", "spare")))
+
+
+def test_float32_is_no_difference(renderer):
+    """Arrays that another simulator has stacked, of things 3 m away and of fields that they do not name."""
+    exact = sim.Poses.of(worlds())
+    names = ("geom_xpos", "geom_xmat", "site_xpos", "site_xmat", "cam_xpos", "cam_xmat", "xpos", "xmat")
+    names = (*names, "light_xpos", "light_xdir")
+    rounded = sim.Poses(**{name: np.asarray(getattr(exact, name), np.float32) for name in names})
+    np.testing.assert_allclose(renderer.signals(rounded), renderer.signals(exact), atol=1e-6)
+
+
+def test_another_models_things_are_refused(renderer):
+    other = copy.copy(sim.Poses.of(worlds()))
+    object.__setattr__(other, "mat_rgba", other.mat_rgba[:, :1])
+    with pytest.raises(ValueError, match="poses of another model"):
+        renderer.signals(other)

@@ -1,0 +1,68 @@
+"""What plain viewers show of EXR files: daylight is white, and long waves are red."""
+
+import numpy as np
+import pytest
+
+from optics.spectra.bands import daylight
+from sim.exr import View, read_exr, write_exr
+from sim.scene.color import preview
+
+
+def test_preview_of_daylight_is_white():
+    nm = np.linspace(400, 700, 8)
+    radiance = 0.5 * daylight(nm * 1e-9)[:, None, None] * np.ones((8, 2, 3))
+    np.testing.assert_allclose(preview(radiance, nm), 0.5, atol=1e-6)
+    red = np.where(nm > 600, 1.0, 0.0)[:, None, None] * np.ones((8, 1, 1))
+    r, g, b = preview(red, nm)[0, 0]
+    assert r > 5 * max(g, b)
+    # Bands in any order mean the same.
+    np.testing.assert_allclose(preview(red[::-1], nm[::-1]), preview(red, nm))
+
+
+def written_preview(path, view):
+    """R, G and B of what the receptors of the one view say, as a viewer reads them."""
+    import OpenEXR
+
+    write_exr(path, [view])
+    (part,) = OpenEXR.File(str(path), separate_channels=True).parts
+    return [part.channels[name].pixels for name in "RGB"]
+
+
+def test_the_longest_waves_are_red_whatever_the_channels_order(tmp_path):
+    signals, peaks = np.random.default_rng(3).random((3, 4, 6), dtype=np.float32), (350, 440, 530)
+    shown = written_preview(tmp_path / "a.exr", View("eye", receptors=signals, peaks_nm=peaks))
+    turned = written_preview(tmp_path / "b.exr", View("eye", receptors=signals[::-1], peaks_nm=peaks[::-1]))
+    np.testing.assert_array_equal(shown, signals[::-1])
+    np.testing.assert_array_equal(turned, shown)
+    np.testing.assert_array_equal(written_preview(tmp_path / "c.exr", View("eye", receptors=signals)), signals)
+    (back,), (other,) = read_exr(tmp_path / "a.exr"), read_exr(tmp_path / "b.exr")
+    np.testing.assert_array_equal(back.receptors, signals)
+    np.testing.assert_array_equal(other.receptors, signals[::-1])
+    assert list(back.peaks_nm) == list(peaks) == list(other.peaks_nm)[::-1]
+    assert read_exr(tmp_path / "c.exr")[0].peaks_nm is None
+
+
+@pytest.mark.parametrize(("count", "order"), [(1, [0, 0, 0]), (2, [1, 0, 0]), (4, [3, 2, 1])])
+def test_more_and_fewer_receptors_are_shown_from_long_to_short(tmp_path, count, order):
+    signals = np.random.default_rng(4).random((count, 2, 2), dtype=np.float32)
+    view = View("eye", receptors=signals, peaks_nm=np.arange(count) * 50 + 350.0)
+    np.testing.assert_array_equal(written_preview(tmp_path / "a.exr", view), signals[order])
+
+
+@pytest.mark.parametrize(
+    ("count", "peaks", "words"),
+    [
+        (3, (400, 500), r"peaks_nm = \(400, 500\): must be a finite number for each channel"),
+        (1, 400, "peaks_nm = 400: must be a finite number for each channel"),
+        (1, [np.nan], r"peaks_nm = \[nan\]: must be a finite number for each channel"),
+        (1, "long", "peaks_nm: must be real numbers, not 'long'"),
+    ],
+)
+def test_peaks_that_are_not_the_receptors_are_refused(count, peaks, words):
+    with pytest.raises(ValueError, match=f"View 'eye': {words}"):
+        View("eye", receptors=np.ones((count, 2, 2)), peaks_nm=peaks)
+
+
+def test_radiance_alone_has_no_peaks():
+    with pytest.raises(ValueError, match=r"peaks_nm = \(500,\): must be a finite number for each channel of receptors"):
+        View("eye", np.array([500.0]), np.ones((1, 2, 2)), peaks_nm=(500,))
