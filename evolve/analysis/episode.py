@@ -90,7 +90,8 @@ class Episode:
         }
         terms = {f"term_{name}": term for name, term in self.reward_terms.items()}
         content = io.BytesIO()
-        np.savez_compressed(content, allow_pickle=False, **arrays, **terms, rest=np.array(json.dumps(rest)))
+        columns: dict[str, Any] = {**arrays, **terms, "rest": np.array(json.dumps(rest))}
+        np.savez_compressed(content, **columns)  # without allow_pickle: NumPy 2.0 would take it for an array
         write_whole(Path(path), content.getvalue())
 
     @classmethod

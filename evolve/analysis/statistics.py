@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -82,7 +83,7 @@ def succeeded(candidate: Candidate) -> bool:
 def by_generation(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]]]:
     """Candidates of each generation, generations and indices ascending."""
     ordered = sorted(candidates, key=lambda c: (c.generation, c.index))
-    return [(g, [c for c in ordered if c.generation == g]) for g in sorted({c.generation for c in ordered})]
+    return [(generation, list(members)) for generation, members in groupby(ordered, lambda c: c.generation)]
 
 
 def champions(candidates: Sequence[Candidate]) -> list[tuple[int, Candidate]]:

@@ -6,6 +6,7 @@ import multiprocessing
 import time
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from itertools import cycle, islice
 from pathlib import Path
@@ -14,11 +15,17 @@ from tempfile import TemporaryDirectory
 from evolve.config.run_config import ConfigError, LearningConfig, RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.schedule import mean_passes, schedule
+from evolve.search.job import ExecutorError
 from evolve.search.worker import evaluate_candidate, prepare_device
 
 __all__ = ["Pace", "measure_pace"]
 
 ROLLOUTS = 4  # chosen, the fewest that tell start, step and evaluation apart; evaluations follow the second and fourth
+
+DIED = (
+    "a process died that measured this machine's pace, as systems have it that run out of memory: take fewer workers "
+    "(workers in the settings), or free some"
+)
 
 
 @dataclass(frozen=True)
@@ -59,18 +66,22 @@ def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: i
     Raises:
         BackendError: Dr.Jit cannot work here.
         ConfigError: an animal cannot be evaluated here: its eyes cannot be computed, say; names which and why.
+        ExecutorError: a process died.
     """
     context = multiprocessing.get_context("spawn")
     tried = list(islice(cycle(animals), max(workers, len(animals))))
     paces: dict[str, list[Pace]] = {name: [] for name in animals}
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=prepare_device) as pool:
-        lives = [pool.submit(_short_life, config, animals[name], seed) for seed, name in enumerate(tried)]
-        for name, life in zip(tried, lives, strict=True):
-            try:
-                paces[name].append(life.result())
-            except ValueError as error:
-                pool.shutdown(cancel_futures=True)
-                raise ConfigError(f"an animal like the {name} one cannot be evaluated here: {error}") from error
+    try:
+        with ProcessPoolExecutor(workers, mp_context=context, initializer=prepare_device) as pool:
+            lives = [pool.submit(_short_life, config, animals[name], seed) for seed, name in enumerate(tried)]
+            for name, life in zip(tried, lives, strict=True):
+                try:
+                    paces[name].append(life.result())
+                except ValueError as error:
+                    pool.shutdown(cancel_futures=True)
+                    raise ConfigError(f"an animal like the {name} one cannot be evaluated here: {error}") from error
+    except BrokenProcessPool as error:
+        raise ExecutorError(DIED) from error
     return {name: _slowest(found) for name, found in paces.items()}
 
 
@@ -96,10 +107,12 @@ def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
     with TemporaryDirectory() as folder:
         policy = Path(folder) / "policy"
         began = time.perf_counter()
-        evaluate_candidate(
+        outcome = evaluate_candidate(
             *(animal, once, seed, policy),
             progress=lambda steps, planned: marks.append(time.perf_counter()),
         )
+        if outcome.failure is not None:
+            raise ValueError(outcome.failure)
         size = policy.stat().st_size
     first, second, third, fourth = marks
     all_passes, fewer, few = (schedule(short, number * rollout)[0] for number in (1, 2, 3))

@@ -61,7 +61,8 @@ class RunPlan:
         """Wall time of the whole run if all candidates were like each of the animals, and trained to the end."""
         search, learning = self.config.search, self.config.learning
         if search.steady_state:
-            rounds = -(-self.config.candidates // self.workers)
+            busy = min(self.workers, search.population)  # no more candidates are under way at once
+            rounds = -(-self.config.candidates // busy)
             return {name: rounds * pace.candidate_s(self.config) / 3600 for name, pace in self.paces.items()}
         stages = list(zip(sizes(search), pairwise((0, *budgets(search, learning))), strict=True))
         return {

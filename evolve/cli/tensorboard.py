@@ -62,8 +62,10 @@ class TensorBoardWriter:
             }
             values |= {f"genes/{name}": value for name, value in genes.items() if math.isfinite(value)}
             self._add("candidates", values, candidate.id)
+            learning = f"learning/{candidate.id:06d}"
             for steps, value in candidate.curve:
-                self._add(f"learning/{candidate.id:06d}", {"return": value}, steps)
+                self._add(learning, {"return": value}, steps)
+            self._close(learning)  # a writer is a thread and an open file
         if candidate.generation not in self._shown and complete(self._run, candidate.generation):
             self._shown.add(candidate.generation)
             rows = {row.generation: row for row in generation_statistics(self._run.candidates)}
@@ -71,6 +73,11 @@ class TensorBoardWriter:
             if row.evaluated > row.failed:
                 values = {"best": row.best, "median": row.median, "best_so_far": row.best_so_far}
                 self._add("generations", {f"fitness/{name}": v for name, v in values.items()}, candidate.generation)
+
+    def _close(self, name: str) -> None:
+        """Until there is more to add: another writer writes another file then, and TensorBoard reads both."""
+        if name in self._writers:
+            self._writers.pop(name).close()
 
     def _add(self, name: str, values: dict[str, float], step: int) -> None:
         from tensorboard.compat.proto.event_pb2 import Event

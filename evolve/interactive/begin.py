@@ -13,7 +13,7 @@ import numpy as np
 from evolve.cli.start_from import starts_from
 from evolve.config.assemble import assemble
 from evolve.config.checks import ConfigError, quoted
-from evolve.interactive.carry_on import Callback, carry_on
+from evolve.interactive.carry_on import Callback, carry_on, require_callbacks
 from evolve.interactive.opened_run import OpenedRun
 from evolve.search.search import Search
 from evolve.store.directory import next_directory
@@ -49,11 +49,12 @@ def run(
     progress: whether to print how it goes, to stderr
 
     Raises:
-        ConfigError: a setting that cannot be used; one line.
+        ConfigError: a setting or an argument that cannot be used; one line.
         RunError: the directory holds something already, or cannot be written.
         BackendError: Dr.Jit has no LLVM that it can use.
     """
-    _check(task=task, scale=scale, settings=settings, config=config, start_from=start_from)
+    _check(task=task, preset=preset, settings=settings, config=config, scale=scale, start_from=start_from, out=out)
+    require_callbacks(callbacks)
     starts = starts_from(start_from) if start_from else None
     assignments = [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
     chosen = assemble(task, preset, None if config is None else Path(config), assignments, starts, scale)
@@ -73,10 +74,12 @@ def run(
 
 RIGHT: Mapping[str, tuple[Any, str]] = {
     "task": (str, "a task's name, or 'FILE.py:CLASS'"),
+    "preset": (str, "a preset's name: 'quick', 'paper' or an experiment's"),
     "scale": (str, "'laptop' or 'paper'"),
     "settings": (Mapping, "names and values, {'search.generations': 2}"),
     "config": ((str, os.PathLike), "a file's path"),
     "start_from": (str, "'RUN:ID'"),
+    "out": ((str, os.PathLike), "a directory's path"),
 }
 
 
@@ -84,7 +87,7 @@ def _check(**given: Any) -> None:
     """ConfigError for what is none of its kind."""
     for name, value in given.items():
         kinds, right = RIGHT[name]
-        if value is not None and not isinstance(value, kinds):
+        if (value is not None or name == "preset") and not isinstance(value, kinds):
             raise ConfigError(f"{name} = {quoted(value)}: must be {right}")
 
 

@@ -10,13 +10,14 @@ from typing import Any
 
 from evolve.cli.output import voices
 from evolve.cli.progress import Watchers, watcher
+from evolve.config.checks import ConfigError, quoted
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
 from evolve.search.worker import evaluate_candidate, prepare_device
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 
-__all__ = ["Callback", "carry_on"]
+__all__ = ["Callback", "carry_on", "require_callbacks"]
 
 Callback = Callable[[Run, Candidate], Any]
 
@@ -34,6 +35,16 @@ class CallbackWatcher:
     def evaluated(self, candidate: Candidate) -> None:
         for callback in self.callbacks:
             callback(self.run, candidate)
+
+
+def require_callbacks(callbacks: Any) -> None:
+    """Before the first candidate is trained, after which one would be called.
+
+    Raises:
+        ConfigError: no list of functions.
+    """
+    if not isinstance(callbacks, Sequence) or not all(map(callable, callbacks)):
+        raise ConfigError(f"callbacks = {quoted(callbacks)}: must be a list of functions of a run and a candidate")
 
 
 def carry_on(run: Run, callbacks: Sequence[Callback], progress: bool) -> None:

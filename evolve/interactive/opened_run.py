@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from evolve.analysis.statistics import generation_statistics
 from evolve.config.run_config import EyeConfig
-from evolve.interactive.carry_on import Callback, carry_on
+from evolve.interactive.carry_on import Callback, carry_on, require_callbacks
 from evolve.interactive.summary import animal_as_html, run_as_html
 from evolve.interactive.table import candidate_table
 from evolve.search.successive_halving import finished
@@ -101,13 +101,18 @@ class OpenedRun(Run):
         Raises:
             LockedError: another process works on it.
             RunError: its format is a former one.
+            ConfigError: its task is somebody's own and has not been named, or cannot be begun; or callbacks are none.
         """
+        from evolve.learning.task_trial import try_task
+
+        require_callbacks(callbacks)
         device.make_ready()
         with self.lock():
             self.repair()
             if finished(self):
                 return
             self.require_present_format()
+            try_task(self.config)  # before anything is written
             record_start(self.path, len(self.candidates))
             carry_on(self, callbacks, progress)
 

@@ -31,7 +31,7 @@ def executed_task(own: OwnTask) -> Task:
         task = cls()
         compiled(task)
         return with_settled_others(task)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ConfigError(f"{own.label}: {_told(error, own)}", "task") from error
 
 
@@ -45,13 +45,13 @@ def _executed(own: OwnTask) -> ModuleType:
         sys.path.append(str(own.file.parent))  # last: a neighbour of the file shadows nobody
     try:
         exec(compile(own.text, str(own.file), "exec"), module.__dict__)
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # sys.exit, too, would end us without a word
         del sys.modules[name]
         raise ConfigError(f"{own.file.name}: {_told(error, own)}", "task") from error
     return module
 
 
-def _told(error: Exception, own: OwnTask) -> str:
+def _told(error: BaseException, own: OwnTask) -> str:
     """The line of the user's file that it comes from, if it does, and what it says."""
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(own.file)]
     said = " ".join(f"{type(error).__name__}: {error}".split())

@@ -53,7 +53,8 @@ def export_episode(episode: Episode | FilmedEpisode, directory: Path, doing: Doi
 
 def _views(episode: Episode | FilmedEpisode, frame: int) -> list[sim.View]:
     """What each eye saw at one kept time."""
-    t = int(episode.radiance_frames[frame])
+    t, eye_of_all = int(episode.radiance_frames[frame]), episode.eyes.eye()
+    peaks = None if eye_of_all.mosaic is not None else [kind.peak_nm for kind in eye_of_all.receptors.types]
     return [
         sim.View(
             name=name,
@@ -61,6 +62,7 @@ def _views(episode: Episode | FilmedEpisode, frame: int) -> list[sim.View]:
             radiance=episode.radiance[frame, eye],
             receptors=episode.signals[t, eye],
             attributes=_attributes(episode, t, eye),
+            peaks_nm=peaks,
         )
         for eye, name in enumerate(episode.eyes.names())
     ]

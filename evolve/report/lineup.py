@@ -33,10 +33,14 @@ def lineup(run: Run) -> Html:
         *(best[-1][0], last, last),
     )
     return html(
-        '<div class="lineup"><div class="first"><h4>The first generation’s best</h4>{}</div>'
-        "<div><h4>{}</h4>{}</div></div>\n",
-        *(_card(run, *first, "line-first"), slider if last else html("The best of all"), cards),
+        '<div class="lineup"><div class="first"><h4>{}</h4>{}</div><div><h4>{}</h4>{}</div></div>\n',
+        *(_whose(first[0]), _card(run, *first, "line-first"), slider if last else html("The best of all"), cards),
     )
+
+
+def _whose(generation: int) -> str:
+    """The earliest animal; all of the generations before it may have failed."""
+    return f"Generation {generation}’s best, the first to succeed" if generation else "The first generation’s best"
 
 
 def _thinned(best: list[tuple[int, Candidate]]) -> list[tuple[int, Candidate]]:

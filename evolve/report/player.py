@@ -39,9 +39,10 @@ def episode_sentence(episode: AnyEpisode) -> str:
     """One sentence on how the episode went."""
     total = rounded(float(episode.reward.sum(dtype=np.float64)), 4)
     terms = ", ".join(f"{name} {rounded(float(term.sum()))}" for name, term in episode.reward_terms.items())
+    parts = f" ({terms})" if terms else ""
     failed = episode.failure if isinstance(episode, FilmedEpisode) else None
     end = "" if failed is None else f" It ended because the task failed: {failed}."
-    return f"Evaluation episode with seed {episode.seed}: {len(episode)} actions, return {total} ({terms}).{end}"
+    return f"Evaluation episode with seed {episode.seed}: {len(episode)} actions, return {total}{parts}.{end}"
 
 
 def player(episode: AnyEpisode, stage: Stage) -> Html:
@@ -141,7 +142,7 @@ def _score(episode: AnyEpisode) -> Html:
 
 def _film(episode: AnyEpisode, stage: Stage) -> dict[str, Any]:
     """What player.js reads; everything over the frames that are kept."""
-    kept = np.arange(0, len(episode), _stride(episode))
+    kept = _kept(episode)
     terms = {name: np.cumsum(term, dtype=np.float64)[kept] for name, term in episode.reward_terms.items()}
     seen, columns = film_sheet(display(episode.signals[kept], stage.gain))
     perfect, _ = film_sheet(display(episode.perfect_signals[kept]))
@@ -155,7 +156,7 @@ def _film(episode: AnyEpisode, stage: Stage) -> dict[str, Any]:
         "times": _rounded(kept * stage.seconds),
         "eyes": {"count": stage.eyes.n_eyes, "resolution": stage.eyes.resolution},
         "terms": {name: _rounded(values) for name, values in terms.items()},
-        "total": _rounded(np.sum(list(terms.values()), axis=0)),
+        "total": _rounded(sum(terms.values(), np.zeros(len(kept)))),
         "sheet_columns": columns,
         **part,
         "sheets": {"seen": data_uri(seen), "perfect": data_uri(perfect), **part.get("sheets", {})},
@@ -182,10 +183,12 @@ def _from_above(episode: Episode, stage: GroundPlan, kept: np.ndarray) -> dict[s
     }
 
 
-def _stride(episode: AnyEpisode) -> int:
-    """Every so many frames are kept: all, but for eyes so many and fine that the page would grow too large."""
+def _kept(episode: AnyEpisode) -> np.ndarray:
+    """Frames that are kept: all, but for eyes so many and fine that the page would grow too large. The last action
+    always is: with it come the whole return, and what ended the episode."""
     pixels = episode.signals[0, :, 0].size * 3
-    return max(1, -(-len(episode) * pixels // LARGEST_FILM))
+    stride, last = max(1, -(-len(episode) * pixels // LARGEST_FILM)), len(episode) - 1
+    return np.append(np.arange(0, last, stride), last)
 
 
 def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:

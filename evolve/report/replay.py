@@ -45,7 +45,8 @@ def write_replay(
 def write_page(run: Run, episode: AnyEpisode, out: Path | None = None) -> Path:
     """Write the page that plays an episode of a run, to `out` or into the run directory; returns its path."""
     path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{episode.seed}.html"
-    path.parent.mkdir(parents=True, exist_ok=True)
+    if out is not None:  # a run that was deleted meanwhile stays so
+        path.parent.mkdir(parents=True, exist_ok=True)
     return write_player(episode, path)
 
 

@@ -35,6 +35,7 @@ def write(run: Run, episode: AnyEpisode | None = None, out: Path | None = None, 
         doing("the best agent plays an episode", 0.0)
         episode = record(run)
     path = out or run.path / FILE
-    path.parent.mkdir(parents=True, exist_ok=True)
+    if out is not None:  # a run that was deleted meanwhile stays so
+        path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, render(run, episode, doing))
     return path

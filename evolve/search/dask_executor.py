@@ -83,8 +83,8 @@ class DaskExecutor:
         """Evaluate all jobs; each comes out as soon as it is done, in any order. A deque may be added to meanwhile.
 
         Raises:
-            ExecutorError: no worker can do the work, a worker's machine refuses something (its disk is full), or the
-                scheduler is gone for good.
+            ExecutorError: no worker can do the work, a worker's machine refuses something (its disk is full), the run's
+                settings cannot be used there, or the scheduler is gone for good.
         """
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
         under_way: dict[Any, _Trial] = {}

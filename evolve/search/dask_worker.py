@@ -17,6 +17,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from evolve.config.assemble import from_text
+from evolve.config.checks import ConfigError
 from evolve.config.own_task import OwnTask
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.training_stage import TrainingStage
@@ -106,6 +107,8 @@ def evaluate(order: Order) -> Reply:
             return _evaluate(getattr(import_module(module), name), order, progress)
         except (OSError, MemoryError) as error:
             raise UnfitWorker(f"a worker's machine refuses: {refusal(error)}, and go on with evolve resume") from error
+        except ConfigError as error:
+            raise UnfitWorker(" ".join(str(error).split())) from error
 
 
 def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:

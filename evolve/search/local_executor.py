@@ -47,10 +47,10 @@ class LocalExecutor:
     count: workers; 0: one per core that this process may use
     prepare: called once in each new worker; an exception there ends the run, because no candidate could be evaluated
 
-    An exception in `evaluate` is that candidate's failure, but an OSError, which ends the run. A worker that dies takes
-    nobody with it: it is replaced and its candidate evaluated again, `ATTEMPTS` times in all. Only what the animal may
-    have caused is then its failure: a worker that is killed each time, as the system does for want of memory, ends the
-    run.
+    An exception in `evaluate` is that candidate's failure, but an OSError or a ConfigError, which end the run. A worker
+    that dies takes nobody with it: it is replaced and its candidate evaluated again, `ATTEMPTS` times in all. Only what
+    the animal may have caused is then its failure: a worker that is killed each time, as the system does for want of
+    memory, ends the run.
     """
 
     evaluate: Callable[..., Evaluation]
@@ -79,7 +79,8 @@ class LocalExecutor:
         """Evaluate all jobs; each comes out as soon as it is done, in any order. A deque may be added to meanwhile.
 
         Raises:
-            ExecutorError: a worker could not be made ready, or the machine refuses something, such as a file or memory.
+            ExecutorError: a worker could not be made ready, the machine refuses something, such as a file or
+                memory, or the run's settings cannot be used.
         """
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
         deaths: dict[int, list[str]] = {}

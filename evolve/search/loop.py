@@ -21,7 +21,7 @@ from evolve.search.search import Proposal, Search, training_seed
 from evolve.search.successive_halving import budgets, reaching
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
-from evolve.store.evaluation import Evaluation
+from evolve.store.evaluation import Evaluation, mishaps_in_all
 from evolve.store.policies import digest
 
 __all__ = ["Executor", "Watcher", "evolve"]
@@ -115,9 +115,18 @@ def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, wat
     if job.stage is not None:
         candidate = replace(candidate, rung=job.stage.number)
         if (before := run.on_record(candidate.id, candidate.rung - 1)) is not None:
-            candidate = replace(candidate, seconds=before.seconds + candidate.seconds)
+            candidate = _after(before, candidate)
     if candidate.failure is None:
         candidate = replace(candidate, policy=digest(job.policy_path))
     run.append(candidate)
     watcher.evaluated(candidate)
     return candidate
+
+
+def _after(before: Candidate, candidate: Candidate) -> Candidate:
+    """A candidate after a later budget stage, all of its life counted in; where that stage fails, it has learned what
+    it had learned before."""
+    if candidate.failure is not None:
+        candidate = replace(candidate, steps=before.steps, curve=before.curve)
+    mishaps = mishaps_in_all(before.mishaps, candidate.mishaps)
+    return replace(candidate, seconds=before.seconds + candidate.seconds, mishaps=mishaps)

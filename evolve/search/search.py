@@ -29,7 +29,8 @@ class Proposal:
 
     place: of the candidate in the search
     genome: (dimension,) in [0, 1]
-    parents: ids of the candidates that it was made from
+    parents: ids of the candidates that it was made from; in a later phase, before its optimizer names any, that one
+        around which the phase began
     """
 
     place: Place
@@ -61,6 +62,7 @@ class Search:
         self._genotype = Genotype(config.genome)
         self._next = 0
         self._fittest, self._best = self._genotype.start, -math.inf
+        self._fittest_id: int | None = None
         self._worst = math.inf
         self._asked: dict[int, tuple[Optimizer, Proposal]] = {}
         self._begin_phase(0)
@@ -78,7 +80,7 @@ class Search:
         part, parents = self._optimizer.ask(self._next)
         genome = self._base.copy()
         genome[self._varied] = part
-        proposal = Proposal(place, tuple(genome.tolist()), parents)
+        proposal = Proposal(place, tuple(genome.tolist()), parents or self._origin)
         self._asked[self._next] = self._optimizer, proposal
         self._next += 1
         return proposal
@@ -110,11 +112,12 @@ class Search:
             optimizer, proposal = self._asked.pop(candidate_id)
             optimizer.tell(candidate_id, value if math.isfinite(value) else worst)
             if value > self._best:
-                self._best, self._fittest = value, proposal.vector
+                self._best, self._fittest, self._fittest_id = value, proposal.vector, candidate_id
 
     def _begin_phase(self, generation: int) -> None:
         """A new optimizer over the genes open in this generation, around the best genome so far."""
         self._base = self._fittest
+        self._origin = () if self._fittest_id is None else (self._fittest_id,)
         self._varied = self._genotype.varied(generation)
         genes = [(gene, self._config.genome[gene.name]) for gene in self._genotype.open_genes]
         phase = [generation] if generation else []

@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, Literal
 
-from evolve.config.run_config import RunConfig
+from evolve.config.run_config import ConfigError, RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.training_stage import TrainingStage
 from evolve.store.evaluation import Evaluation
@@ -56,6 +56,9 @@ def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: C
             outcome = evaluated(evaluate, arguments, lambda *steps: connection.send(Message("progress", steps)))
         except (OSError, MemoryError) as error:
             connection.send(Message("unfit", f"{refusal(error)}, and go on with evolve resume"))
+            return
+        except ConfigError as error:
+            connection.send(Message("unfit", " ".join(str(error).split())))
             return
         connection.send(Message("done", outcome))
 
@@ -108,16 +111,18 @@ def evaluated(
     evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], progress: Callable[[int, int], None]
 ) -> Evaluation:
     """The candidate's evaluation; whatever goes wrong in it becomes its failure, but what the machine refuses: a disk
-    that is full says nothing about an animal, and neither does memory that others have taken.
+    that is full says nothing about an animal, and neither does memory that others have taken. Nor do settings that
+    cannot be used: they are the same for all.
 
     Raises:
         OSError: its policy cannot be written, say.
         MemoryError: there is no more.
+        ConfigError: its run's own task cannot be begun here, say.
     """
     began = time.perf_counter()
     try:
         return evaluate(*arguments, progress=progress)
-    except (OSError, MemoryError):
+    except (OSError, MemoryError, ConfigError):
         raise
     except Exception as error:
         if isinstance(error, RuntimeError) and any(words in str(error) for words in NO_MEMORY):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from pathlib import Path
 from evolve.store.regular_files import created, folder, require_regular, sync_folder
 
 UNFINISHED = ".unfinished"
+POLICIES, TRAININGS = "policies", "trainings"  # folders of a run
 
 
 def sweep(folder: Path) -> None:
@@ -20,8 +22,9 @@ def sweep(folder: Path) -> None:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that a reader, or a machine that dies meanwhile, sees the old one or all of the new one. Its
-    folder is made if it is missing, but not what that stands in: a run that was deleted stays so.
+    """Write a file so that a reader, or a machine that dies meanwhile, sees the old one or all of the new one. A run's
+    folder of policies or trainings is made if it is missing, but not what that stands in: a run that was deleted stays
+    so.
 
     Raises:
         StrangeFileError: a link, FIFO, device or directory bears its name.
@@ -42,7 +45,7 @@ def unfinished(path: Path) -> Iterator[Path]:
     neighbour = path.with_name(f".{path.name}.{os.getpid()}{UNFINISHED}")
     try:
         require_regular(path)
-        if not path.parent.is_dir():
+        if path.parent.name in (POLICIES, TRAININGS) and not path.parent.is_dir():
             folder(path.parent)
         created(neighbour).close()
         yield neighbour
@@ -54,5 +57,7 @@ def unfinished(path: Path) -> Iterator[Path]:
         with contextlib.suppress(OSError):  # what went wrong first is what is told
             neighbour.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise type(error)(error.errno, error.strerror, str(path)) from error
+            # Libraries raise OSErrors that have a message alone.
+            number, said = (error.errno, error.strerror) if error.errno is not None else (errno.EIO, str(error))
+            raise type(error)(number, said, str(path)) from error
         raise

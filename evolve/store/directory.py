@@ -19,7 +19,7 @@ from evolve.config.assemble import from_text, to_toml
 from evolve.config.formats import FORMAT, LAST_OF_FORMER, format_of
 from evolve.config.run_config import RunConfig
 from evolve.config.sources import parsed_toml
-from evolve.store.atomic_files import UNFINISHED, sweep, write_whole
+from evolve.store.atomic_files import POLICIES, TRAININGS, UNFINISHED, sweep, write_whole
 from evolve.store.candidate import Candidate
 from evolve.store.lock import LONGEST, RunLock
 from evolve.store.policies import lost
@@ -32,8 +32,6 @@ __all__ = ["Candidate", "Run", "RunError", "next_directory"]
 
 CONFIG = "config.toml"
 CANDIDATES = "candidates.jsonl"
-POLICIES = "policies"
-TRAININGS = "trainings"
 PRODUCTS = ("exr", "tensorboard")  # folders of what is made from a run
 
 
@@ -202,7 +200,10 @@ class Run:
 
     def steps_of(self, candidate_id: int) -> int:
         """Steps that a candidate has been trained so far, as far as is on record."""
-        return max((line.steps for line in self.record.lines.values() if line.id == candidate_id), default=0)
+        steps = stage = 0
+        while (line := self.on_record(candidate_id, stage)) is not None:
+            steps, stage = max(steps, line.steps), stage + 1
+        return steps
 
     def evaluated_at(self, stage: int) -> set[int]:
         """Ids of all candidates that have been evaluated after a budget stage."""

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 
-__all__ = ["Evaluation", "most_frequent"]
+__all__ = ["Evaluation", "mishaps_in_all", "most_frequent"]
 
 KINDS, LONGEST = 4, 300  # of mishaps that are told apart, and letters of each
 OTHERS = "others"
@@ -44,9 +44,18 @@ def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
     told: Counter[str] = Counter()
     for failure, episodes in failures.items():
         told[_in_one_line(failure)[:LONGEST]] += episodes
+    others = told.pop(OTHERS, 0)  # of mishaps that were ranked before
     ranked = sorted(told.items(), key=lambda item: (-item[1], item[0]))
-    others = sum(episodes for _, episodes in ranked[KINDS:])
+    others += sum(episodes for _, episodes in ranked[KINDS:])
     return (*ranked[:KINDS], (OTHERS, others)) if others else tuple(ranked)
+
+
+def mishaps_in_all(*mishaps: tuple[tuple[str, int], ...]) -> tuple[tuple[str, int], ...]:
+    """Mishaps of several parts of a life as those of all of it."""
+    counts: Counter[str] = Counter()
+    for part in mishaps:
+        counts.update(dict(part))
+    return most_frequent(counts)
 
 
 def _in_one_line(text: str) -> str:

@@ -41,9 +41,13 @@ def require_policy(candidate: Candidate, path: Path) -> None:
     """The policy with which a candidate was evaluated, and no other.
 
     Raises:
-        RunError: it is lost, or another one is in its place.
+        RunError: it is lost, or another one is in its place, or there never was one.
     """
     found = digest(path)
+    if found is None and candidate.failure is not None:
+        raise RunError(f"candidate {candidate.id} has no policy, as it failed: {candidate.failure}")
+    if found is None and candidate.policy is None:
+        raise RunError(f"no policy at {path}, and the record names none that was kept: choose another candidate")
     if found is None:
         raise RunError(f"no policy at {path}: {REMEDY}")
     if candidate.policy is not None and found != candidate.policy:

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 from evolve.config.assemble import assemble
+from evolve.config.checks import ConfigError
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
@@ -96,6 +97,11 @@ def disk_full(phenotype, config, seed, policy_path, progress):
     if int(policy_path.stem) == 1:
         raise OSError(errno.ENOSPC, "No space left on device", str(policy_path))
     return bowl(phenotype, config, seed, policy_path, progress)
+
+
+def cannot_begin(phenotype, config, seed, policy_path, progress):
+    """The run's own task cannot be executed here."""
+    raise ConfigError("mine.py: line 1: ModuleNotFoundError:\nNo module named 'nowhere'", "task")
 
 
 def threads(phenotype, config, seed, policy_path, progress):

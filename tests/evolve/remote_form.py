@@ -5,10 +5,14 @@ import hashlib
 import os
 import signal
 import time
+from dataclasses import replace
 from pathlib import Path
 
+from evolve.config.checks import ConfigError
 from evolve.store.atomic_files import write_whole
 from evolve.store.evaluation import Evaluation
+
+MISHAPS = (("slipped", 9), ("fell", 5), ("lost", 4), ("stuck", 3), ("others", 2))
 
 
 def bowl(phenotype, config, seed, policy_path, progress):
@@ -41,6 +45,11 @@ def endless(phenotype, config, seed, policy_path, progress):
 def disk_full(phenotype, config, seed, policy_path, progress):
     """There is no room for anybody's policy."""
     raise OSError(errno.ENOSPC, "No space left on device", str(policy_path))
+
+
+def cannot_begin(phenotype, config, seed, policy_path, progress):
+    """The run's own task cannot be executed here."""
+    raise ConfigError("mine.py: line 1: ModuleNotFoundError:\nNo module named 'nowhere'", "task")
 
 
 def fails_for_some(phenotype, config, seed, policy_path, progress):
@@ -85,3 +94,12 @@ def in_stages(phenotype, config, seed, policy_path, stage, progress):
     fitness = -abs(phenotype.fov_deg - 70.0) + 20 * luck
     curve = tuple((steps, fitness) for steps in stage.ends)
     return Evaluation(fitness, (fitness,) * config.evaluation.episodes, 0.5, stage.ends[-1], 0.01, curve)
+
+
+def fails_late(phenotype, config, seed, policy_path, stage, progress):
+    """As `in_stages`, with mishaps in every stage; of the second, candidates of odd ids do not come through."""
+    if stage.number and int(policy_path.stem) % 2:
+        raise ValueError("no luck")
+    outcome = in_stages(phenotype, config, seed, policy_path, stage, progress)
+    curve = tuple((steps, outcome.fitness) for steps in stage.ends[: stage.number + 1])
+    return replace(outcome, steps=stage.ends[stage.number], curve=curve, mishaps=MISHAPS)

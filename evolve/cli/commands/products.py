@@ -44,7 +44,6 @@ class Products:
 def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
     """The best animal's episode as EXR files and report, and, if asked for, as a page that plays it; a bar meanwhile,
     if `shown`. The report comes last: where it is, all is there."""
-    (run.path / REPORT).unlink(missing_ok=True)
     with Waiting(3 + replay, shown) as wait:
         wait.step("the best agent plays an episode")
         from evolve.analysis import episode
@@ -53,6 +52,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
         from evolve.report.write import write
 
         best, played = episode.record(run), None
+        (run.path / REPORT).unlink(missing_ok=True)  # of an hour ago; where no episode can be played, it is kept
         if replay:
             wait.step("writing the replay")
             played = write_page(run, best)

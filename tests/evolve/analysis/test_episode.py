@@ -1,10 +1,12 @@
 """A recorded episode: what it holds agrees with the worlds it was played in, and with its file."""
 
 import dataclasses
+import io
 import json
 import math
 import os
 import pickle
+import zipfile
 
 import numpy as np
 import pytest
@@ -65,6 +67,26 @@ def test_file_holds_the_episode(episode, tmp_path):
     stored = Episode.load(tmp_path / "episode.npz")
     np.testing.assert_equal(vars(stored), vars(episode))
     assert [path.name for path in tmp_path.iterdir()] == ["episode.npz"]
+
+
+def test_a_file_holds_nothing_else_with_the_first_numpy_2(episode, tmp_path, monkeypatch):
+    """Whose savez takes every argument for an array."""
+    save = np.savez_compressed
+
+    def of_2_0(file, **arrays):
+        with zipfile.ZipFile(file, "w") as archive:
+            for name, value in arrays.items():
+                content = io.BytesIO()
+                np.save(content, value)
+                archive.writestr(f"{name}.npy", content.getvalue())
+
+    monkeypatch.setattr(np, "savez_compressed", of_2_0)
+    episode.save(tmp_path / "then.npz")
+    monkeypatch.setattr(np, "savez_compressed", save)
+    episode.save(tmp_path / "now.npz")
+    with np.load(tmp_path / "then.npz") as then, np.load(tmp_path / "now.npz") as now:
+        assert set(then) == set(now)
+    assert Episode.load(tmp_path / "then.npz").seed == episode.seed
 
 
 def test_a_file_that_is_no_episode_is_refused(episode, tmp_path):

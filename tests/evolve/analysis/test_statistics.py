@@ -10,6 +10,7 @@ import optics
 from evolve.analysis.statistics import (
     acuity_cpd,
     bootstrap_interval,
+    by_generation,
     eye_image_quality,
     gene_values,
     generation_statistics,
@@ -52,6 +53,27 @@ GENERATIONS = [
     candidate(4, 1, 1, -math.inf, "rewards not finite", fov_deg=40.0),
     candidate(5, 1, 2, 2.5, fov_deg=50.0),
 ]
+
+
+def test_generations_are_found_in_one_pass():
+    """A run may have thousands of them."""
+
+    class Looked:
+        looks = 0
+
+        def __init__(self, number):
+            self.number, self.index = number, number % 2
+
+        @property
+        def generation(self):
+            Looked.looks += 1
+            return self.number // 2
+
+    found = by_generation([Looked(number) for number in reversed(range(400))])
+    assert [(generation, [c.number for c in members]) for generation, members in found] == [
+        (generation, [2 * generation, 2 * generation + 1]) for generation in range(200)
+    ]
+    assert Looked.looks <= 3 * 400
 
 
 def test_statistics_of_a_generation():

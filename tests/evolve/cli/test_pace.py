@@ -1,5 +1,6 @@
 """The pace is measured on the real thing, and an animal that cannot be evaluated is named."""
 
+import os
 from dataclasses import replace
 
 import pytest
@@ -11,6 +12,8 @@ from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.fitness import evaluate
 from evolve.learning.schedule import schedule
+from evolve.search.job import ExecutorError
+from evolve.store.evaluation import Evaluation
 from optics.numerics import backend
 from tests.evolve.small_run import PHENOTYPE, small_config
 
@@ -24,6 +27,24 @@ def test_animal_that_cannot_be_evaluated_is_named():
     blurred = replace(PHENOTYPE, fov_deg=13.8, relative_aperture=0.243, relief=rough, refractive_index=1.85)
     with pytest.raises(ConfigError, match="an animal like the middle one cannot be evaluated here: tolerance"):
         measure_pace(config, {"middle": blurred}, 1)
+
+
+def test_a_life_that_fails_says_why(monkeypatch):
+    """And not that a temporary file is missing."""
+    monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", lambda *_, **__: Evaluation.failed("weights are NaN"))
+    with pytest.raises(ValueError, match=r"^weights are NaN$"):
+        _short_life(small_config(), PHENOTYPE, 0)
+
+
+def test_a_process_that_dies_is_told_in_one_line(monkeypatch):
+    monkeypatch.setattr(evolve.cli.pace, "_short_life", dies)
+    monkeypatch.setattr(evolve.cli.pace, "prepare_device", None)
+    with pytest.raises(ExecutorError, match=r"^a process died that measured this machine's pace.*or free some$"):
+        measure_pace(small_config(), {"start": PHENOTYPE}, 1)
+
+
+def dies(*_):
+    os._exit(9)
 
 
 def test_pace_is_measured_with_the_real_thing(tmp_path, short_episodes):
@@ -63,6 +84,7 @@ class Clock:
             if steps % learning.eval_interval == 0:
                 self.now += 3.0
         policy.write_bytes(b"1234567")
+        return Evaluation(1.0)
 
 
 @pytest.mark.parametrize(("n_epochs", "least_epochs"), [(10, 3), (10, 6), (5, 1)])
@@ -89,7 +111,7 @@ def test_a_pass_takes_no_more_than_the_whole(monkeypatch):
                 progress(steps, planned)
                 self.now += 1e3 * (steps == 4096)
 
-            super().evaluate(animal, config, seed, policy, later)
+            return super().evaluate(animal, config, seed, policy, later)
 
     clock = Busy()
     monkeypatch.setattr(evolve.cli.pace, "time", clock)

@@ -3,11 +3,14 @@
 
 import io
 import json
+import shutil
 
 import pytest
 
 from evolve.cli import waiting
 from evolve.cli.commands import products
+from evolve.report.replay import write_page
+from evolve.report.write import write as write_report
 from evolve.store.directory import Run
 
 
@@ -81,6 +84,27 @@ def test_a_wait_shows_what_is_done_on_a_terminal_alone():
     assert "its second half" in seen.getvalue()
     assert "\x1b]0;" not in seen.getvalue()
     assert unseen.getvalue() == quiet.getvalue() == ""
+
+
+def test_where_no_episode_can_be_played_the_report_is_kept(call, finished, tmp_path):
+    """A run that was copied without its policies and EXR files."""
+    run = shutil.copytree(finished, tmp_path / "run")
+    (run / "report.html").write_text("of an hour ago")
+    code, _, err = call("resume", run)
+    assert code == 2
+    assert "no policy at" in err
+    assert (run / "report.html").read_text() == "of an hour ago"
+
+
+@pytest.mark.parametrize("write", [write_report, write_page])
+def test_a_run_that_is_deleted_while_its_report_is_made_stays_deleted(run, episode, tmp_path, write):
+    path = shutil.copytree(run.path, tmp_path / "run")
+    deleted = Run.open(path)
+    shutil.rmtree(path)
+    with pytest.raises(OSError, match="No such file or directory") as caught:
+        write(deleted, episode)
+    assert caught.value.filename.startswith(f"{path}/re")
+    assert not path.exists()
 
 
 def test_who_is_stopped_among_the_exr_files_has_no_report_yet(finished, monkeypatch):

@@ -34,6 +34,8 @@ def test_hours_count_rounds_of_workers_and_all_that_a_candidate_does(tmp_path, p
     assert plan.hours["start"] == pytest.approx(10 * 2 * candidate_s / 3600), "6 on 4 workers take two rounds"
     steady = RunPlan.of(replace(config, search=replace(config.search, steady_state=True)), tmp_path).measured()
     assert steady.hours["start"] == pytest.approx(15 * candidate_s / 3600), "60 on 4 workers, nobody waits"
+    many = RunPlan.of(replace(steady.config, workers=64), tmp_path).measured()
+    assert many.hours["start"] == pytest.approx(10 * candidate_s / 3600), "no more than 6 are under way at once"
 
 
 def test_disk_holds_policies_and_record_and_a_small_disk_is_noticed(tmp_path, paced, monkeypatch):

@@ -54,6 +54,14 @@ def test_compare_puts_runs_side_by_side(call, finished, tmp_path):
     assert both["runs"][0]["best_so_far"] == sorted(both["runs"][0]["best_so_far"])
 
 
+def test_compare_shows_settings_as_they_are_set(call, finished, tmp_path):
+    """Names in their letters, true and false as TOML has them."""
+    other = Run.create(tmp_path / "other", tiny("search.optimizer=DE", "search.active=true"))
+    rows = {line.split("  ")[0]: line.split()[-2:] for line in call("compare", finished, other.path)[1].splitlines()}
+    assert rows["search.optimizer"] == ["CMA", "DE"]
+    assert rows["search.active"] == ["false", "true"]
+
+
 @pytest.fixture
 def failed(tmp_path):
     """A run of which nothing has succeeded."""

@@ -1,6 +1,8 @@
 """What TensorBoard shows is what is on record."""
 
 import shutil
+import threading
+from dataclasses import replace
 
 import pytest
 
@@ -25,3 +27,20 @@ def test_numbers_are_the_records(finished, tmp_path):
     assert shown["candidates"]["genes/fov_deg"] == pytest.approx({c.id: c.phenotype.fov_deg for c in run.candidates})
     best = {g: max(c.fitness for c in run.generation(g)) for g in range(3)}
     assert shown["generations"]["fitness/best"] == pytest.approx(best, rel=1e-6)
+
+
+def test_only_what_goes_on_is_open(finished, tmp_path):
+    """A writer is a thread and a file, and a run may have thousands of candidates."""
+    accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    run = Run.open(shutil.copytree(finished, tmp_path / "run"))
+    learned = [replace(c, curve=((2048, 1.0), (4096, float(c.id)))) for c in run.candidates]
+    before = threading.active_count()
+    with TensorBoardWriter(run) as writer:
+        for candidate in learned:
+            writer.evaluated(candidate)
+        assert threading.active_count() <= before + 2, "candidates' and generations'"
+        writer.evaluated(replace(learned[0], curve=((8192, 9.0),)))  # after another budget stage
+    events = accumulator.EventAccumulator(str(run.path / "tensorboard" / "learning" / "000000"))
+    events.Reload()
+    shown = sorted((event.step, event.value) for event in events.Scalars("return"))
+    assert shown == [(2048, 1.0), (4096, 0.0), (8192, 9.0)]

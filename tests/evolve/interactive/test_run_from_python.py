@@ -13,6 +13,7 @@ import pytest
 from nbclient import NotebookClient
 
 import evolve
+from evolve.config.assemble import assemble
 from evolve.interactive import carry_on
 from evolve.search.local_executor import LocalExecutor
 from evolve.store.directory import Run
@@ -79,15 +80,36 @@ def test_a_callback_may_end_the_run_which_can_go_on(closed_form, tmp_path):
     assert (run.path / "versions.json").read_bytes() == starts, "a finished run is left as it is"
 
 
+def test_a_task_of_ones_own_that_is_not_named_ends_before_anything_is_written(closed_form, tmp_path):
+    """Else every candidate would be on record as failed, for ever."""
+    task = f"{ROOT / 'examples' / 'find_ball.py'}:FindBall"
+    config = assemble(task, "quick", assignments=["search.population=2", "search.generations=1", "workers=1"])
+    path = Run.create(tmp_path / "run", config).path
+    before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file() and file.name != "lock"}
+    with pytest.raises(evolve.ConfigError, match=r"find_ball\.py:FindBall.*runs only if you name it"):
+        evolve.Run.open(path).resume(progress=False)
+    assert {file: file.read_bytes() for file in before} == before
+    assert not Run.open(path).candidates
+    named = evolve.Run.open(path, task)
+    with pytest.raises(evolve.ConfigError, match=r"callbacks = .*print.*: must be a list of functions"):
+        named.resume(print, progress=False)
+    named.resume(progress=False)
+    assert len(named.candidates) == 2
+
+
 def test_what_cannot_be_used_is_refused_before_anything_is_written(tmp_path):
     for arguments, message in (
         ({"settings": {"search.poplation": 3}}, "did you mean"),
         ({"settings": {"search.population": 1.5}}, "must be an integer"),
         ({"preset": "qick"}, "did you mean 'quick'"),
         ({"settings": {"search.optimizer": "none"}}, "none"),
+        ({"preset": None}, "preset = None: must be a preset's name"),
+        ({"out": 5}, "out = 5: must be a directory's path"),
+        ({"callbacks": print}, "callbacks = .*print.*: must be a list of functions"),
+        ({"callbacks": [print, 3]}, "callbacks = .*3.*: must be a list of functions"),
     ):
         with pytest.raises(evolve.ConfigError, match=message):
-            evolve.run("detection", out=tmp_path / "run", **arguments)
+            evolve.run("detection", **{"out": tmp_path / "run", **arguments})
     assert not (tmp_path / "run").exists()
 
 

@@ -165,6 +165,12 @@ def test_dask_is_sent_the_text(tmp_path):
     ("old", "new", "words"),
     [
         ("import sim\n", "import sim\nimport nowhere\n", r"mine\.py: line \d+: ModuleNotFoundError: No module named"),
+        ("import sim\n", "import sim\nimport sys\nsys.exit(3)\n", r"^mine\.py: line \d+: SystemExit: 3$"),
+        (
+            "    episode_steps",
+            "    def __init__(self): raise SystemExit\n    episode_steps",
+            r"FindBall: line \d+: SystemExit",
+        ),
         ("class FindBall(sim.Task)", "class FindBall", "must be a class that derives from sim.Task"),
         ("    episode_steps", "    def __init__(self, a): ...\n    episode_steps", "TypeError"),
         ("<mujoco>", "<mujoko>", "mujoko"),

@@ -12,6 +12,8 @@ from evolve.config.run_config import RunConfig
 from evolve.report import lineup as cards
 from evolve.report.agent_figure import agent_figure
 from evolve.report.markup import duration
+from evolve.store.candidate import Candidate
+from evolve.store.evaluation import Evaluation
 from tests.evolve.learning.test_task_module import BALL, small, written
 from tests.evolve.report.reported import BEST
 
@@ -43,6 +45,16 @@ def test_first_and_best_are_the_records(run, content):
     found = re.findall(r'data-generation="(\d+)">.*?<dt>candidate</dt><dd>(\d+)</dd>', content, re.DOTALL)
     assert found == [expected[0], *expected]
     assert found[-1][1] == str(BEST)
+
+
+def test_the_first_animal_is_of_the_first_generation_that_has_one(run, content):
+    assert "<h4>The first generation’s best</h4>" in content
+    failed = Evaluation.failed("no luck")
+    fell = {c.id: Candidate.of(c.place, c.genome, c.phenotype, c.seed, failed) for c in run.generation(0)}
+    late = replace(run, record=replace(run.record, candidates=tuple(fell.get(c.id, c) for c in run.candidates)))
+    shown = cards.lineup(late).markup
+    assert "<h4>Generation 1’s best, the first to succeed</h4>" in shown
+    assert "first generation" not in shown
 
 
 def test_a_long_run_shows_its_first_and_its_last(run):

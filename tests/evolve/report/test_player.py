@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 
 import sim
+from evolve.analysis.filmed_episode import film as filmed
+from evolve.learning.fitness import evaluate
+from evolve.learning.policy import load_policy
 from evolve.report.ground_plan import GroundPlan
 from evolve.report.picture import display
 from evolve.report.player import write_player
+from tests.evolve.learning.test_task_module import small, written
 from tests.evolve.report.reported import Page, film_of, picture
+
+NEAR = '{"near": -abs(data.mocap_pos[0, 1] - data.qpos[0]) / 10}'
 
 
 def test_film_is_the_episode(run, episode, content):
@@ -67,9 +73,24 @@ def test_long_films_of_many_receptors_are_thinned(episode, tmp_path):
     film = film_of(write_player(many, tmp_path / "replay.html").read_text())
     steps = np.diff(film["times"])
     assert steps[0] > 0.2
-    assert steps == pytest.approx(steps[0])
+    assert steps[:-1] == pytest.approx(steps[0])
+    assert film["times"][-1] == pytest.approx(255 * 0.2), "with the last action comes all that was earned"
+    assert film["total"][-1] == pytest.approx(many.reward.sum(), abs=1e-3)
     assert len(film["times"]) * fine[0, :, 0].size * 3 <= 1.6e6
     assert len(film["position"]) == len(film["total"]) == len(film["times"])
+
+
+def test_a_task_may_name_no_reward(tmp_path):
+    """One of somebody's own; what it earned is then nothing, at every moment."""
+    config, animal = small("genome.placement_range_deg.start=40", named=written(tmp_path, NEAR, "{}"))
+    assert evaluate(animal, config, 3, tmp_path / "policy").failure is None
+    episode = filmed(animal, config, load_policy(tmp_path / "policy"), 0, 1, 8)
+    assert episode.reward_terms == {}
+    text = write_player(episode, tmp_path / "replay.html").read_text()
+    shown = film_of(text)
+    assert shown["terms"] == {}
+    assert shown["total"] == [0.0] * len(shown["times"]) == [0.0] * 20
+    assert "20 actions, return 0." in text
 
 
 def test_stage_is_the_world(episode):

@@ -147,6 +147,14 @@ def test_a_full_disk_is_no_animals_failure(tmp_path, cluster):
         list(executor.run(jobs(tmp_path)))
 
 
+def test_settings_that_cannot_be_used_are_no_animals_failure(tmp_path, cluster):
+    with (
+        cluster.executor("cannot_begin") as executor,
+        pytest.raises(ExecutorError, match=r": mine\.py: line 1: ModuleNotFoundError: No module named 'nowhere'$"),
+    ):
+        list(executor.run(jobs(tmp_path)))
+
+
 def test_worker_killed_in_mid_candidate_is_replaced_and_its_candidate_evaluated_again(tmp_path, cluster):
     cluster.calls()
     with cluster.executor("killed_once") as executor:

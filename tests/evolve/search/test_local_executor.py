@@ -17,6 +17,7 @@ from evolve.search.local_executor import ExecutorError, Job, LocalExecutor
 from tests.evolve.closed_form import (
     bowl,
     calls,
+    cannot_begin,
     disk_full,
     fails_for_some,
     killed_always,
@@ -63,6 +64,11 @@ def test_every_job_comes_out_once_with_its_own_outcome(tmp_path, evaluate):
 def test_a_full_disk_is_no_animals_failure(tmp_path):
     with pytest.raises(ExecutorError, match=r"No space left on device.*000001.*go on with evolve resume"):
         outcomes(disk_full, tmp_path, workers=1)
+
+
+def test_settings_that_cannot_be_used_are_no_animals_failure(tmp_path):
+    with pytest.raises(ExecutorError, match=r"^mine\.py: line 1: ModuleNotFoundError: No module named 'nowhere'$"):
+        outcomes(cannot_begin, tmp_path, workers=1)
 
 
 @pytest.mark.parametrize(

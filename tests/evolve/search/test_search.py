@@ -147,6 +147,29 @@ def test_genes_open_in_their_generation_and_the_search_goes_on_from_the_best(opt
         np.testing.assert_allclose(asked[3].mean(axis=0), best, atol=5 * 0.02 / math.sqrt(8))
 
 
+@pytest.mark.parametrize("optimizer", ["CMA", "mutation", "DE"])
+def test_a_later_phase_descends_from_the_fittest(optimizer):
+    """Its optimizer knows nobody yet, but begins around the best genome so far."""
+    late = ("genome.fov_deg.opens_at=2", "search.population=6", f"search.optimizer={optimizer}")
+    search = Search(tiny(*late))
+    for generation in range(4):
+        proposals = search.propose_generation()
+        parents = {proposal.parents for proposal in proposals}
+        if generation == 0:
+            assert parents == {()}
+        if generation == 2:
+            assert parents == {(4,)}
+        if generation == 3 and optimizer != "DE":  # which may well try somebody without parents
+            assert all(one >= 12 for ids in parents for one in ids)
+        search.tell([(p.id, 100.0 if p.id == 4 else -float(p.id)) for p in proposals])
+
+
+def test_a_later_phase_after_failures_alone_descends_from_nobody():
+    search = Search(tiny("genome.fov_deg.opens_at=1"))
+    search.tell([(proposal.id, -math.inf) for proposal in search.propose_generation()])
+    assert {proposal.parents for proposal in search.propose_generation()} == {()}
+
+
 def test_failure_counts_as_the_worst_fitness_so_far():
     config = tiny("search.generations=6")
     spoil = {1: 2, 3: 0}  # generation -> candidate that fails

@@ -2,9 +2,11 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
+from evolve.cli import progress
 from evolve.config.assemble import assemble
 from evolve.config.run_config import ConfigError, LearningConfig, SearchConfig
 from evolve.learning.checkpoint import load_checkpoint
@@ -15,7 +17,7 @@ from evolve.search.loop import evolve
 from evolve.search.successive_halving import budgets, evaluations, finished, promoted, sizes, steps
 from evolve.store.directory import Run, RunError
 from tests.evolve.closed_form import tiny
-from tests.evolve.remote_form import in_stages
+from tests.evolve.remote_form import MISHAPS, fails_late, in_stages
 from tests.evolve.search.test_loop import SilentWatcher
 from tests.evolve.small_run import PHENOTYPE, small_config
 
@@ -94,6 +96,44 @@ def test_interrupted_anywhere_it_goes_on_to_the_same_history(tmp_path, monkeypat
         run, _ = carry(folder / "run", None, monkeypatch)
         assert (folder / "run" / "candidates.jsonl").read_bytes().startswith(kept)
         assert lines(run) == lines(whole)
+
+
+def test_what_was_lived_before_a_stage_that_fails_is_kept(tmp_path, monkeypatch):
+    """Steps, curve and mishaps of the stage before, and of mishaps also where nothing fails."""
+    run, _ = carry(tmp_path / "run", tiny(*HALVING, "search.generations=1"), monkeypatch, fails_late)
+    failed = [c for c in run.candidates if c.failure is not None]
+    assert {c.rung for c in failed} == {1}
+    for candidate in run.in_order_of_finish:
+        before = run.on_record(candidate.id, candidate.rung - 1)
+        if candidate.failure is not None:
+            assert candidate.steps == before.steps == 4096
+            assert candidate.curve == before.curve != ()
+            assert candidate.mishaps == before.mishaps == MISHAPS
+    whole = next(c for c in run.candidates if c.rung == 2)
+    assert whole.steps == 16384
+    # Of four kinds and others, three times: others stay what is not told by name.
+    assert dict(whole.mishaps) == {said: 3 * number for said, number in MISHAPS}
+
+
+def test_progress_of_a_stage_that_fails_never_runs_backwards(tmp_path, monkeypatch):
+    class Counting:
+        def __init__(self):
+            self.tally, self.paces = None, []
+
+        def training(self, candidate_id, steps, planned):
+            """Nothing."""
+
+        def evaluated(self, candidate):
+            self.tally.evaluated(candidate)
+            self.paces.append(self.tally.steps_per_second)
+
+    monkeypatch.setenv("RHABDOM_TEST", str(tmp_path))
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: 0.0))  # only steps tell paces apart
+    run, counting = Run.create(tmp_path / "run", tiny(*HALVING, "search.generations=1")), Counting()
+    counting.tally = progress.Tally(run)
+    with LocalExecutor(fails_late, 1) as executor:
+        evolve(run, executor, counting)
+    assert counting.paces == sorted(counting.paces)
 
 
 def test_a_lost_checkpoint_is_trained_again(tmp_path, monkeypatch):

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from evolve.store.atomic_files import UNFINISHED, sweep, write_whole
+from evolve.store.atomic_files import UNFINISHED, sweep, unfinished, write_whole
 
 
 def test_a_writer_that_fails_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
-    path = tmp_path / "folder" / "file"
+    path = tmp_path / "policies" / "file"
     write_whole(path, b"old")
 
     def full(descriptor):
@@ -22,6 +22,23 @@ def test_a_writer_that_fails_leaves_the_old_file_and_nothing_else(tmp_path, monk
     assert caught.value.filename == str(path), "not the name of the file in between"
     assert path.read_bytes() == b"old"
     assert list(path.parent.iterdir()) == [path]
+
+
+def test_an_error_that_has_a_message_alone_keeps_it(tmp_path):
+    """As libraries raise them that write pictures."""
+    with pytest.raises(OSError, match="no room for a picture") as caught, unfinished(tmp_path / "file"):
+        raise OSError("no room for a picture")
+    assert (caught.value.strerror, caught.value.filename) == ("no room for a picture", str(tmp_path / "file"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_folders_of_a_run_that_is_there_are_made(tmp_path):
+    for path in (tmp_path / "run" / "report.html", tmp_path / "run" / "policies" / "0"):
+        with pytest.raises(FileNotFoundError):
+            write_whole(path, b"content")
+    assert list(tmp_path.iterdir()) == []
+    for folder in ("policies", "trainings"):
+        write_whole(tmp_path / folder / "0", b"content")
 
 
 def test_what_killed_writers_left_is_swept_up(tmp_path):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from evolve.search.local_executor import LocalExecutor
@@ -52,3 +53,13 @@ def test_an_exchanged_policy_is_not_played(run):
     with pytest.raises(RunError, match="is not the policy with which candidate 0 was evaluated: put the file back"):
         require_policy(run.candidates[0], run.policy_path(0))
     require_policy(candidate(0), run.policy_path(0))
+
+
+def test_a_policy_that_never_was_is_not_looked_for_in_copies(run):
+    for one, message in (
+        (candidate(0, -np.inf, "rewards are not finite"), r"^candidate 0 has no policy, as it failed: rewards are"),
+        (candidate(1), r"^no policy at .*000001\.safetensors, and the record names none that was kept: choose another"),
+    ):
+        with pytest.raises(RunError, match=message) as caught:
+            require_policy(one, run.policy_path(one.id))
+        assert "copy" not in str(caught.value)
