@@ -53,8 +53,8 @@ def export_episode(episode: Episode | FilmedEpisode, directory: Path, doing: Doi
 
 def _views(episode: Episode | FilmedEpisode, frame: int) -> list[sim.View]:
     """What each eye saw at one kept time."""
-    t, eye_of_all = int(episode.radiance_frames[frame]), episode.eyes.eye()
-    peaks = None if eye_of_all.mosaic is not None else [kind.peak_nm for kind in eye_of_all.receptors.types]
+    t, optics = int(episode.radiance_frames[frame]), episode.eyes.eye()
+    peaks = None if optics.mosaic is not None else [kind.peak_nm for kind in optics.receptors.types]
     return [
         sim.View(
             name=name,

@@ -174,6 +174,8 @@ def test_exr_files_hold_what_the_eyes_saw(episode, tmp_path):
     np.testing.assert_array_equal(right.receptors, episode.signals[64, 1])
     assert left.attributes["position_m"] == episode.position[64].tolist()
     assert left.attributes["eye_azimuth_deg"] == pytest.approx(30)
+    red, green, blue = left.peaks_nm  # by which previews choose their colours
+    assert red > green > blue
 
 
 def test_replay_sums_up_and_writes_a_page(run, episode):
