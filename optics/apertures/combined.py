@@ -18,7 +18,7 @@ from optics.apertures.shapes import Disk, Shape
 from optics.apertures.soft_edge import SoftEdge
 from optics.apertures.soft_outline import SoftOutline
 from optics.apertures.strips import strips
-from optics.numerics.arguments import finite, in_range, is_sized, shown, whole
+from optics.numerics.arguments import finite, in_range, is_sized, one_of, shown, whole
 
 __all__ = ["Combined", "difference", "hexagonal_segments", "intersection", "union"]
 
@@ -46,8 +46,9 @@ class Combined(Aperture):
     shapes: tuple[Shape, ...]
 
     def __post_init__(self) -> None:
-        if self.rule not in RULES:
-            raise ValueError(f"rule = {shown(self.rule)}: must be one of {', '.join(map(repr, RULES))}")
+        one_of("rule", self.rule, RULES)
+        if not is_sized(self.shapes):
+            raise ValueError(f"shapes = {shown(self.shapes)}: must be several, such as (Disk(0.2), Circle())")
         least = 2 if self.rule == "difference" else 1
         if len(self.shapes) < least:
             raise ValueError(f"{len(self.shapes)} shapes: a {self.rule} must have {least} or more")

@@ -110,7 +110,7 @@ def _members(
     if sensor_distance is not None:
         positive("sensor_distance", sensor_distance, carried=True)
     lambdas = [vacuum_wavelength(wavelength) for wavelength in wavelengths]
-    first = number(PointSource(source_distances[0]).distance)
+    first = number(PointSource(next(iter(source_distances))).distance)
     for depth in source_distances:
         positive("source_distance", depth, infinite=True, carried=True)
     for pupil in pupils:

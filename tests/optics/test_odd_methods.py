@@ -140,3 +140,9 @@ def test_flags_of_measures():
     ):  # fmt: skip
         with pytest.raises(ValueError, match=r"with_error = 'no': must be True or False"):
             measure(spot, *others, with_error="no")
+
+
+@pytest.mark.parametrize(("rule", "shapes", "says"), [([], (optics.Circle(),), "rule"), ("union", None, "shapes")])
+def test_openings_of_what_is_none(rule, shapes, says):
+    with pytest.raises(ValueError, match=f"^{says} = .*: must be"):
+        optics.Combined(rule, shapes)
