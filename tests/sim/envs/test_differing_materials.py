@@ -1,6 +1,7 @@
 """Worlds of one batch whose geoms are of different materials see what a model sees that is built with them."""
 
 import functools
+import gc
 
 import mujoco
 import numpy as np
@@ -78,6 +79,7 @@ def material_of(data, geom="thing"):
 def test_eyes_see_what_a_model_sees_that_is_built_so(kind, light):
     """Over ends of episodes. Light that bounces falls on the floor, too, and what glows sends some."""
     task = with_ranges({"thing.material": MATERIALS}, room(kind=kind), light)
+    gc.collect()  # Mitsuba's objects that die meanwhile, of tests before this one, would have the kernel recorded anew
     env = sim.make_vec_env(task, n_envs=8, seed=2)
     seen, infos, met = env.reset()["eyes"], env.reset_infos, set()
     for _ in range(2):
