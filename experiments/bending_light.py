@@ -217,7 +217,9 @@ def message_of_reliefs(store: Store) -> str:
         for powers in last_values(of_phase(store, group, 1), QUANTITIES["power of its glass"])
         for power in powers
     ]  # fmt: skip
-    return f"Where glass may become a lens, {sum(p > 0 for p in late)} of the last {len(late)} animals' gathers light"
+    return (
+        f"Where glass may become a lens, it gathers light in {sum(p > 0 for p in late)} of the last {len(late)} animals"
+    )
 
 
 def longer(row: Row, store: Store) -> np.ndarray:

@@ -14,7 +14,7 @@ import torch
 
 from optics.elements.pupil import Pupil
 from optics.elements.relief import BSplineRelief, HeightMap
-from optics.numerics.arguments import of_kind
+from optics.numerics.arguments import of_kind, vacuum_wavelengths
 from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.backend import BackendError
 from optics.numerics.device import VARIABLE, make_ready
@@ -99,7 +99,7 @@ class PointSpread(torch.nn.Module):
         start = torch.zeros(4, 4, dtype=torch.float64) if heights is None else heights.detach().double()
         self.relief = torch.nn.Parameter(start / unit)
         self.radius, self.n, self.unit = radius, n, unit
-        self.view = {"wavelengths": wavelengths, **view}
+        self.view = {"wavelengths": vacuum_wavelengths(wavelengths), **view}
 
     @property
     def heights(self) -> torch.Tensor:

@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -73,13 +74,13 @@ def run(
 
 
 RIGHT: Mapping[str, tuple[Any, str]] = {
-    "task": (str, "a task's name, or 'FILE.py:CLASS'"),
+    "task": ((str, NoneType), "a task's name, or 'FILE.py:CLASS'"),
     "preset": (str, "a preset's name: 'quick', 'paper' or an experiment's"),
-    "scale": (str, "'laptop' or 'paper'"),
-    "settings": (Mapping, "names and values, {'search.generations': 2}"),
-    "config": ((str, os.PathLike), "a file's path"),
-    "start_from": (str, "'RUN:ID'"),
-    "out": ((str, os.PathLike), "a directory's path"),
+    "scale": ((str, NoneType), "'laptop' or 'paper'"),
+    "settings": ((Mapping, NoneType), "names and values, {'search.generations': 2}"),
+    "config": ((str, os.PathLike, NoneType), "a file's path"),
+    "start_from": ((str, NoneType), "'RUN:ID'"),
+    "out": ((str, os.PathLike, NoneType), "a directory's path"),
 }
 
 
@@ -87,7 +88,7 @@ def _check(**given: Any) -> None:
     """ConfigError for what is none of its kind."""
     for name, value in given.items():
         kinds, right = RIGHT[name]
-        if (value is not None or name == "preset") and not isinstance(value, kinds):
+        if not isinstance(value, kinds):
             raise ConfigError(f"{name} = {quoted(value)}: must be {right}")
 
 

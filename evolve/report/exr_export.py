@@ -53,8 +53,8 @@ def export_episode(episode: Episode | FilmedEpisode, directory: Path, doing: Doi
 
 def _views(episode: Episode | FilmedEpisode, frame: int) -> list[sim.View]:
     """What each eye saw at one kept time."""
-    t, optics = int(episode.radiance_frames[frame]), episode.eyes.eye()
-    peaks = None if optics.mosaic is not None else [kind.peak_nm for kind in optics.receptors.types]
+    t, lens = int(episode.radiance_frames[frame]), episode.eyes.eye()
+    peaks = None if lens.mosaic is not None else [kind.peak_nm for kind in lens.receptors.types]
     return [
         sim.View(
             name=name,

@@ -18,7 +18,9 @@ SECTORS, ROUND = 8, 0.9  # choice: around the pupil, in each of which light reac
 RAYS_PER_MODE = 3  # choice
 LIT = 1e-3  # choice: of the brightest sample
 EVEN = 0.1  # choice: of the median amplitude, by which others may differ within ROUND of the radius
-CENTRE, FILLED = 1 / 3, 0.25  # choice: of the radius, and of the rays that lie so far in where rays are spread evenly
+# Choice: of the radius, and of the rays that lie so far in where all are spread evenly. Of rays in rings there are as
+# many whatever the number of rings.
+CENTRE, FILLED = 0.4, 0.25
 
 
 @dataclass(frozen=True, eq=False)

@@ -127,9 +127,11 @@ class Pupil:
     @cached_property
     def _transmission(self) -> float | None:
         """None where the mask asks for a derivative: its graph serves one backward pass."""
+        found = self._let_through()
+        if isinstance(found, float):
+            return found
         import drjit as dr
 
-        found = self._let_through()
         return None if dr.grad_enabled(found) else number(found)
 
     def _let_through(self) -> Scalar:

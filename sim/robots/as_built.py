@@ -87,8 +87,8 @@ class AsBuilt:
             wrong = [thing for thing in self._differing(poses, name) if thing in self._counts[name]]
             if wrong:
                 raise ValueError(
-                    f"{self._named(kind, wrong[0])} has another {known_as} than in the renderer's model: eyes see it "
-                    "as it was when they were made: make them anew"
+                    f"{self._named(kind, wrong[0])} has another {known_as} than in the renderer's model: it is shown "
+                    "as it was when the renderer was made: make a new one"
                 )
         self._refuse_what_appears(poses)
         self._refuse_what_is_elsewhere(poses)
@@ -132,8 +132,8 @@ class AsBuilt:
         seen = self._hidden[(alpha > 0).any(axis=0)]
         if len(seen):
             raise ValueError(
-                f"{self._named('geom', seen[0])} has an alpha of 0 in the renderer's model and is to be seen now: eyes "
-                "see things as they were when they were made: make them anew"
+                f"{self._named('geom', seen[0])} has an alpha of 0 in the renderer's model and is to be seen now: it "
+                "is shown as it was when the renderer was made: make a new one"
             )
 
     def _refuse_what_is_elsewhere(self, poses: Poses) -> None:

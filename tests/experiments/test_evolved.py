@@ -207,7 +207,7 @@ def test_messages_of_figures_count_pupils_and_lenses():
         "Alone, 3 of 4 pupils close; where glass may become a lens 1 of 3 open again, where it may not 0 of 1"
     )
     assert bending_light.message_of_reliefs(store) == (
-        "Where glass may become a lens, 6 of the last 9 animals' gathers light"
+        "Where glass may become a lens, it gathers light in 6 of the last 9 animals"
     )
 
 

@@ -52,7 +52,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
         from evolve.report.write import write
 
         best, played = episode.record(run), None
-        (run.path / REPORT).unlink(missing_ok=True)  # of an hour ago; where no episode can be played, it is kept
+        (run.path / REPORT).unlink(missing_ok=True)  # the former one, which is kept where no episode can be played
         if replay:
             wait.step("writing the replay")
             played = write_page(run, best)

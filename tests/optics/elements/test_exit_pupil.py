@@ -1,12 +1,13 @@
 """Lenses of other programs, played by a ray tracer of this test's own: Navarro's eye."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import optics
-from optics.elements.exit_pupil import read_exit_pupil
+from optics.elements.exit_pupil import _fitted, read_exit_pupil
 from optics.elements.wavefront import mode
 
 WAVE = 0.5876e-6
@@ -151,6 +152,20 @@ def test_obscured_and_uneven_pupils_are_refused():
         setattr(system, name, getattr(system, name)[kept])
     with pytest.raises(ValueError, match="the pupil is obscured"):
         read_exit_pupil(system, WAVE, order=2)
+
+
+@pytest.mark.parametrize("rings", [2, 3, 4, 5, 9])
+def test_few_rings_of_rays_are_no_obscured_pupil(rings):
+    """Hexapolar ones, 6k rays in the k-th; a pupil of half the width in their middle leaves too few."""
+    rays = [(0.0, 0.0)] + [
+        (k / rings * math.cos(turn), k / rings * math.sin(turn))
+        for k in range(1, rings + 1) for turn in np.arange(6 * k) * math.pi / (3 * k)
+    ]  # fmt: skip
+    x, y = np.array(rays).T * 1e-3
+    assert _fitted(x, y, 0 * x, 0.1, 1.0, 1).pupil.radius == pytest.approx(1e-3)
+    outer = np.hypot(x, y) > 0.5e-3
+    with pytest.raises(ValueError, match="obscured"):
+        _fitted(x[outer], y[outer], 0 * x[outer], 0.1, 1.0, 1)
 
 
 def test_a_pupil_that_is_not_round_is_refused():

@@ -66,7 +66,8 @@ def test_nothing_is_left_of_gratings_finer_than_a_facet_passes():
 
 
 def test_in_water_a_facet_passes_finer_gratings():
-    """Waves are shorter before it: contrast ends at 2R n/λ, and is the sensitivity's transform up to there."""
+    """Waves are shorter before it: contrast ends at 2R n/λ, and is the sensitivity's transform up to there. To what
+    this window cuts off; with the index left out there is no contrast at the second frequency."""
     lens = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.34)
     eye = AppositionEye(Ommatidium(lens, Waveguide(1e-6)), 1, 1.5)
     in_air = 2 * lens.radius / 500e-9

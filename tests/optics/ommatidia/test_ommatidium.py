@@ -142,7 +142,7 @@ def test_bad_input_names_itself(make, message):
 
 
 def test_fields_of_thin_rhabdoms_reach_far(monkeypatch):
-    """At V = 1 a mode falls by e over five core radii: twelve are not enough by .3 %, a hundred are."""
+    """At V = 1 a mode falls by e over five core radii: twelve are not enough by .3 %, forty are: e^-8."""
     thin = Ommatidium(FacetLens(25e-6, 30e-6), Waveguide(0.64e-6))
     power = {}
     for radii in (12.0, radiation.FARTHEST, 400.0):
@@ -150,5 +150,5 @@ def test_fields_of_thin_rhabdoms_reach_far(monkeypatch):
         _coupled.cache_clear()
         power[radii] = thin.mode_power(np.zeros(1), np.zeros(1))[0, 0]
     few, chosen, many = power.values()
-    assert chosen == pytest.approx(many, rel=1e-6)
+    assert chosen == pytest.approx(many, rel=2e-5)  # what it lacks goes with the field where it ends, or its square
     assert few < 0.998 * many

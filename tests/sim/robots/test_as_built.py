@@ -58,7 +58,7 @@ def setting(field, value, kind=None, name=None):
     return change
 
 
-ANEW = "as .* when they were made: make them anew"
+ANEW = "as .* when .* was made: make a new one"
 HANG = "stands still in the renderer's model and is elsewhere now: must hang on a joint or on a mocap body"
 REFUSED = {
     "place": (setting("geom_pos", [2, 0, 1.5], "geom", "wall"), f"geom 'wall' {HANG}"),
