@@ -39,14 +39,15 @@ def evaluate(
 
     A training that diverges is a failed Evaluation, not an exception.
     """
-    began = time.perf_counter()
+    began, failures = time.perf_counter(), Counter[str]()
     try:
         if stage is None:
-            training, episodes, failures = _live(phenotype, config, seed, progress)
+            training, episodes = _live(phenotype, config, seed, failures, progress)
         else:
-            training, episodes, failures = _live_until(stage, phenotype, config, seed, progress)
+            training, episodes = _live_until(stage, phenotype, config, seed, failures, progress)
     except TrainingDiverged as error:
-        return Evaluation.failed(str(error), time.perf_counter() - began)
+        diverged = Evaluation.failed(str(error), time.perf_counter() - began)
+        return replace(diverged, mishaps=most_frequent(failures))
     save_policy(training.policy, policy_path)
     return Evaluation(
         fitness=float(episodes.returns.mean()),
@@ -60,10 +61,15 @@ def evaluate(
 
 
 def _live_until(
-    stage: TrainingStage, phenotype: Phenotype, config: RunConfig, seed: int, progress: Progress | None
-) -> tuple[Training, Episodes, Counter[str]]:
+    stage: TrainingStage,
+    phenotype: Phenotype,
+    config: RunConfig,
+    seed: int,
+    failures: Counter[str],
+    progress: Progress | None,
+) -> tuple[Training, Episodes]:
     """Through all stages up to this one, from the latest whose checkpoint there is; failures are those since then."""
-    begun, first, failures = None, 0, Counter[str]()
+    begun, first = None, 0
     for earlier in reversed(range(stage.number)):
         if begun is None and (begun := load_checkpoint(stage.checkpoints[earlier])) is not None:
             first = earlier + 1
@@ -72,21 +78,23 @@ def _live_until(
         # A stage has none itself: a little budget, divided once more, may be too little for one.
         life = replace(config, learning=learning, search=replace(config.search, rungs=1))
         entropy = [seed, number] if number else seed  # the first stage begins as a whole training does
-        training, episodes, more = _live(phenotype, life, entropy, progress, begun)
-        begun, failures = training.end, failures + more
+        training, episodes = _live(phenotype, life, entropy, failures, progress, begun)
+        begun = training.end
         save_checkpoint(begun, stage.checkpoints[number])
-    return training, episodes, failures
+    return training, episodes
 
 
 def _live(
     phenotype: Phenotype,
     config: RunConfig,
     entropy: int | list[int],
+    failures: Counter[str],
     progress: Progress | None,
     begun: Checkpoint | None = None,
-) -> tuple[Training, Episodes, Counter[str]]:
+) -> tuple[Training, Episodes]:
     """Training, and the evaluation episodes after it, from starts and objects' places never seen before. Mazes are
-    the same for all of a run, and of all runs. What failed in any of them."""
+    the same for all of a run, and of all runs. What failed in any of them is counted in `failures`, also where learning
+    diverges."""
     weights, *seeds = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     places = worlds_of(phenotype, config, *seeds)
     with (
@@ -95,6 +103,9 @@ def _live(
         closing(places.finals) as finals,
     ):
         brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder)
-        training = train(Worlds(lessons, checkpoints), brain, config.learning, weights, progress, begun)
-        episodes = play(training.policy, finals, seeds[1])
-        return training, episodes, lessons.failures + checkpoints.failures + finals.failures
+        try:
+            training = train(Worlds(lessons, checkpoints), brain, config.learning, weights, progress, begun)
+            return training, play(training.policy, finals, seeds[1])
+        finally:
+            for worlds in (lessons, checkpoints, finals):
+                failures.update(worlds.failures)

@@ -16,7 +16,7 @@ from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.fitness import evaluate
-from evolve.learning.policy import load_policy
+from evolve.learning.policy import TrainingDiverged, load_policy
 from evolve.learning.task_module import executed_task
 from evolve.learning.task_trial import try_task
 from evolve.learning.worlds import own_task_for, worlds_of
@@ -126,6 +126,18 @@ def test_what_fails_in_the_middle_of_a_life_is_counted(tmp_path):
     assert episodes == 8 * 2 + (1 + 1 + 1) * 3
     reply = dask_worker._text(outcome), b"", b""
     assert dask_worker.decode(reply)[0] == outcome
+
+
+def test_what_failed_before_learning_diverged_is_counted_too(tmp_path, monkeypatch):
+    def diverges(*_):
+        raise TrainingDiverged("signals not finite")
+
+    monkeypatch.setattr("evolve.learning.fitness.play", diverges)
+    config, animal = small(named=written(tmp_path, "    def succeeded", FAILING))
+    with pytest.warns(UserWarning, match="its episode ends here"):
+        outcome = evaluate(animal, config, 3, tmp_path / "policy")
+    assert outcome.failure == "signals not finite"
+    assert [episodes for _, episodes in outcome.mishaps] == [8 * 2 + (1 + 1) * 3]
 
 
 FAILING = """    def terminated(self, data):
