@@ -1,12 +1,7 @@
-"""The null model of a search: the same search with random fitness.
-
-A gene that begins near one end of its range can only move away from it, and selection by random fitness moves genes
-too. A result counts as the work of selection only where it lies outside the range of the null model.
-"""
+"""The null model of the searches on a page, as it is stored."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,17 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evolve.config.run_config import EyeConfig, RunConfig
-from evolve.genome.phenotype import Phenotype, develop
-from evolve.search.search import Search
+from evolve.genome.phenotype import Phenotype
+from evolve.search.null_model import last_generations, null_model, p_value
 from experiments.candidates import NO_NUMBER, Row, anatomy
-from experiments.means import LAST
 
-__all__ = ["POOLS", "SEEDS", "Drift", "drifted", "of_the_end", "shade"]
+__all__ = ["SEEDS", "Drift", "drifted", "of_the_end", "shade"]
 
 SEEDS = 1000
-POOLS = 20_000  # of searches drawn together, where several runs are compared with the null model as one
-TIE = 1e-5  # relative: what `ends` tell, six digits, may be equal to a value that has more
-FIRST_SEED = 10_000  # none that anybody takes for a run
 
 
 @dataclass(frozen=True)
@@ -47,14 +38,8 @@ class Drift:
         return self.low == self.high
 
     def p(self, *values: float) -> float:
-        """Two-sided p of a value, were it drawn like these: the one that is asked about counts as one of them (Davison
-        and Hinkley 1997, §4.2), so that it is 2 / (searches + 1) at the least. Of several runs' values: that of their
-        mean, among the means of as many searches drawn at random, and no less than of one."""
-        ends, asked = np.array(self.ends.split(), float), float(np.mean(values))
-        several = np.random.default_rng(0).choice(ends, (POOLS, len(values))).mean(axis=1)
-        drawn, near = ends if len(values) == 1 else several, TIE * abs(asked)
-        share = min((drawn <= asked + near).sum(), (drawn >= asked - near).sum()) / drawn.size
-        return min(1.0, 2 * (float(share) * ends.size + 1) / (ends.size + 1))
+        """Two-sided p of a run's value, or of several runs' values together."""
+        return p_value(values, np.array(self.ends.split(), float))
 
     def __str__(self) -> str:
         return f"held at {self.median:.3g}" if self.held else f"{self.median:.3g} [{self.low:.3g}, {self.high:.3g}]"
@@ -65,20 +50,19 @@ def drifted(
 ) -> list[Drift]:
     """Of SEEDS searches with these settings and so many generations; quantities that are no numbers without a life are
     left out."""
-    searches = [_means(replace(config, seed=FIRST_SEED + i), quantities, generations) for i in range(SEEDS)]
-    means, counts = np.moveaxis(np.array(searches), 2, 0)  # (search, quantity, generation) each
-    starts = sorted({use.opens_at for use in config.genome.values() if use.open and use.opens_at < generations})
-    rows = []
-    for place, name in enumerate(quantities):
-        mine = means[:, place]
-        if np.isfinite(mine).any(axis=0).all():
-            rows += [_drift(group, name, generation, mine[:, generation]) for generation in range(generations)]
-            for start, end in zip(starts, [*starts[1:], generations], strict=True):
-                late = slice(max(start, end - LAST), end)
-                known = counts[:, place, late]
-                some = known.any(axis=1)
-                ends = np.nansum(mine[some, late] * known[some], axis=1) / known[some].sum(axis=1)  # as `last_values`
-                rows.append(replace(_drift(group, name, end - 1, ends), ends=" ".join(f"{one:.6g}" for one in ends)))
+
+    def measure(animal: Phenotype) -> dict[str, float]:
+        row = _row(animal, config.eye)
+        return {name: value(row) for name, value in quantities.items()}
+
+    model, rows = null_model(config, measure, generations, SEEDS), []
+    for name, means in model.means.items():
+        if np.isfinite(means).any(axis=0).all():
+            rows += [_drift(group, name, generation, means[:, generation]) for generation in range(generations)]
+            for last in last_generations(config, generations):
+                ends = model.ends(name, last)  # as `last_values`
+                told = " ".join(f"{one:.6g}" for one in ends)
+                rows.append(replace(_drift(group, name, last[-1], ends), ends=told))
     return rows
 
 
@@ -102,24 +86,7 @@ def _drift(group: str, quantity: str, generation: int, means: NDArray[np.float64
     return Drift(group, quantity, generation, low, median, high)
 
 
-def _means(
-    config: RunConfig, quantities: Mapping[str, Callable[[Row], float]], generations: int
-) -> list[tuple[list[float], list[int]]]:
-    """Of each quantity, for the first generations of one search: means, and of how many candidates."""
-    search, chance = Search(config), np.random.default_rng(config.seed)
-    found: list[tuple[list[float], list[int]]] = [([], []) for _ in quantities]
-    for generation in range(generations):
-        proposals = search.propose_generation()
-        rows = [_row(develop(proposal.vector, config), config.eye, generation) for proposal in proposals]
-        search.tell([(proposal.id, chance.normal()) for proposal in proposals])
-        for (means, counts), value in zip(found, quantities.values(), strict=True):
-            finite = [v for v in map(value, rows) if math.isfinite(v)]
-            means.append(float(np.mean(finite)) if finite else NO_NUMBER)
-            counts.append(len(finite))
-    return found
-
-
-def _row(animal: Phenotype, eye: EyeConfig, generation: int) -> Row:
+def _row(animal: Phenotype, eye: EyeConfig) -> Row:
     """Of an animal that has not lived."""
     none: dict[str, Any] = {
         "failed": 0,
@@ -128,4 +95,4 @@ def _row(animal: Phenotype, eye: EyeConfig, generation: int) -> Row:
         "episodes": 0,
         "parameters": 0,
     }
-    return Row(group="", seed=0, generation=generation, phase=0, index=0, **none, **anatomy(animal, eye))
+    return Row(group="", seed=0, generation=0, phase=0, index=0, **none, **anatomy(animal, eye))

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from evolve.search.null_model import SEVERAL
 from experiments import evolved
 from experiments.candidates import Row
-from experiments.drift import POOLS, SEEDS, shade
+from experiments.drift import SEEDS, shade
 from experiments.evolved import Store, conduct_table, null_model, null_table
 from experiments.means import LAST, last_mean, last_values, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
@@ -80,7 +81,7 @@ def contrast(store: Store, less: str, more: str) -> str:
     value = {group: float(np.mean([seed.mean() for seed in found[group]])) for group in found}
     chance = np.random.default_rng(0)
     drawn = {
-        group: chance.choice(np.array(one.ends.split(), float), (POOLS, len(found[group]))).mean(axis=1)
+        group: chance.choice(np.array(one.ends.split(), float), (SEVERAL, len(found[group]))).mean(axis=1)
         for group, one in null.items()
         if one is not None
     }

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from evolve.search.null_model import LAST
 from experiments.candidates import Row
 
 __all__ = ["LAST", "Interval", "interval_of", "last_mean", "last_values", "of_generation", "resampled_difference"]
 
 Floats = NDArray[np.float64]
-LAST = 3  # generations whose mean is reported
 RESAMPLES = 4000
 
 

@@ -34,6 +34,7 @@ EXAMPLES = {
     "resume": "  evolve resume runs/first --open\n",
     "status": "  evolve status runs/first --watch\n",
     "compare": "  evolve compare runs/first runs/second --html both.html\n",
+    "drift": "  evolve drift runs/first\n  evolve drift runs/seed-0 runs/seed-1 --searches 1000\n",
     "replay": "  evolve replay runs/first --open\n  evolve replay runs/first --candidate 12 --seed 3\n",
     "report": "  evolve report runs/first --open\n",
     "export": "  evolve export runs/first --candidate 12 --out frames\n",
@@ -187,6 +188,12 @@ def _add_watching(commands: Commands) -> None:
     compare.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories")
     compare.add_argument("--json", action="store_true", help="print JSON")
     compare.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page with their fitness curves")
+    drift = _command(commands, "drift", "drift.drift", "say which genes moved further than chance moves them")
+    drift.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories that differ in seeds")
+    drift.add_argument(
+        "--searches", type=_searches, default=200, metavar="N", help="with random fitness, to compare with (default: 200)"
+    )
+    drift.add_argument("--json", action="store_true", help="print JSON")
 
 
 def _add_products(commands: Commands) -> None:
@@ -252,6 +259,13 @@ def _seed(text: str) -> int:
     """A seed as NumPy takes it."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 0 or more")
+    return int(text)
+
+
+def _searches(text: str) -> int:
+    """As many as a p can be made of."""
+    if not text.isdecimal() or int(text) < 2:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 2 or more")
     return int(text)
 
 

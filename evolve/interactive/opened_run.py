@@ -120,6 +120,19 @@ class OpenedRun(Run):
         """A row per candidate, by its id: how it fared, and the value of every gene that shows in it."""
         return candidate_table(self.candidates)
 
+    def drift(self, searches: int = 200) -> pd.DataFrame:
+        """A row per open gene, for the acuity and for the number of receptors: its mean over the last generations, that
+        of searches with random fitness (median, and the range of 95 % of them), and the p of the run's.
+
+        Raises:
+            RunError: no generation is complete yet.
+            ValueError: fewer than two searches.
+        """
+        from evolve.interactive.table import drift_table
+        from evolve.report.drift import drift_of
+
+        return drift_table(drift_of([self], searches))
+
     def plot_fitness(self, axes: Axes | None = None) -> Axes:
         """Fitness over the generations: every candidate, the generations' medians, the best so far. Returns the axes,
         new ones unless given."""

@@ -11,7 +11,9 @@ from evolve.store.candidate import Candidate
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["candidate_table"]
+    from evolve.report.drift import Drift
+
+__all__ = ["candidate_table", "drift_table"]
 
 OUTCOME = ("generation", "index", "fitness", "success_rate", "steps", "seconds", "seed", "failure", "parents")
 
@@ -23,6 +25,15 @@ def candidate_table(candidates: Sequence[Candidate]) -> pd.DataFrame:
 
     rows = [_row(candidate) for candidate in candidates]
     return pd.DataFrame(rows, index=pd.Index([candidate.id for candidate in candidates], name="id"))
+
+
+def drift_table(drift: Drift) -> pd.DataFrame:
+    """A row per quantity, by its name: where the run ended, and searches with random fitness."""
+    import pandas as pd
+
+    rows = [(one.mean, one.median, one.low, one.high, one.p) for one in drift.moved]
+    names = pd.Index([one.quantity for one in drift.moved], name="quantity")
+    return pd.DataFrame(rows, columns=["run", "median", "low", "high", "p"], index=names)
 
 
 def _row(candidate: Candidate) -> dict[str, object]:

@@ -7,9 +7,10 @@ import pytest
 
 from evolve.config.assemble import assemble
 from evolve.genome.phenotype import develop
+from evolve.search.null_model import FIRST_SEED
 from evolve.search.search import Search
 from experiments.candidates import Row
-from experiments.drift import FIRST_SEED, Drift, _row, drifted, of_the_end
+from experiments.drift import Drift, _row, drifted, of_the_end
 from experiments.evolved import Conduct, Store, null_table
 from experiments.store import Origin
 
@@ -98,9 +99,9 @@ def test_ends_are_means_over_candidates_as_those_of_runs_are():
     [end] = [one for one in drifted(config, "detection", some, 3) if one.ends]
     search, values = Search(replace(config, seed=FIRST_SEED)), []
     chance = np.random.default_rng(FIRST_SEED)
-    for generation in range(3):
+    for _ in range(3):
         proposals = search.propose_generation()
-        rows = [_row(develop(one.vector, config), config.eye, generation) for one in proposals]
+        rows = [_row(develop(one.vector, config), config.eye) for one in proposals]
         values += [v for v in map(some["several"], rows) if np.isfinite(v)]
         search.tell([(one.id, chance.normal()) for one in proposals])
     assert float(end.ends.split()[0]) == pytest.approx(np.mean(values), rel=1e-5)

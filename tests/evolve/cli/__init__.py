@@ -20,4 +20,5 @@ commands.demo: test_demo.py
 commands.completion: test_main.py
 commands.checks: test_checks.py
 commands.compare: test_status_and_compare.py
+commands.drift: report/test_drift.py
 """

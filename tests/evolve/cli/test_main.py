@@ -99,6 +99,7 @@ FLAGS = {
     "resume": ("--executor", "--scheduler", "--tls-ca-file", "--tls-cert", "--json", "--tensorboard"),
     "status": ("--json", "--watch"),
     "compare": ("--json", "--html"),
+    "drift": ("--json", "--searches"),
     "replay": ("--candidate", "--seed", "--rrd", "--gif", "--mp4"),
     "export": ("--candidate", "--seed"),
     "doctor": ("--json",),

@@ -1,0 +1,25 @@
+"""`evolve drift`: runs beside the null model of their search."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+
+from evolve.cli.waiting import Waiting
+from evolve.report.drift import drift_of
+from evolve.store.directory import Run
+
+__all__ = ["drift"]
+
+
+def drift(arguments: Namespace) -> int:
+    """Print which genes moved further than chance moves them."""
+    runs = [Run.open(directory) for directory in arguments.directories]
+    said = "searches with random fitness"
+    with Waiting(1).of_one_step(said) as wait:
+        found = drift_of(runs, arguments.searches, lambda share: wait.within(said, share))
+    if arguments.json:
+        print(json.dumps(found.as_plain_values(), indent=1, allow_nan=False))
+    else:
+        print("\n".join(found.lines()))
+    return 0

@@ -1,0 +1,136 @@
+"""Selection or drift: where the open genes of runs end, beside searches with random fitness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from evolve.analysis.statistics import acuity_cpd, gene_values, succeeded
+from evolve.config.run_config import RunConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.report.comparison import differing_settings
+from evolve.search import successive_halving
+from evolve.search.null_model import Floats, last_generations, null_model, p_value
+from evolve.store.directory import Run, RunError
+
+__all__ = ["Drift", "Moved", "drift_of"]
+
+SEARCHES = 200
+ALLOWED_TO_DIFFER = ("seed", "workers")
+
+
+@dataclass(frozen=True)
+class Moved:
+    """One quantity at the end of runs and of searches with random fitness, as means over candidates.
+
+    runs: of each run · low, median, high: of the searches, whose middle 95 % lie between low and high
+    p: two-sided, of the runs' mean
+    """
+
+    quantity: str
+    runs: tuple[float, ...]
+    low: float
+    median: float
+    high: float
+    p: float
+
+    @property
+    def mean(self) -> float:
+        return float(np.mean(self.runs))
+
+
+@dataclass(frozen=True)
+class Drift:
+    """The comparison: of how many runs, over which generations, numbered from 0, with how many searches."""
+
+    of: int
+    generations: range
+    searches: int
+    moved: tuple[Moved, ...]
+
+    def as_plain_values(self) -> dict[str, Any]:
+        """Such as JSON has."""
+        first, last = self.generations[0], self.generations[-1]
+        return {"generations": [first, last], "searches": self.searches, "moved": [asdict(one) for one in self.moved]}
+
+    def lines(self) -> list[str]:
+        """As a table for a terminal."""
+        rows = [("", "run" if self.of == 1 else f"mean of {self.of} runs", "null model", "95 % of its searches", "p")]
+        for one in self.moved:
+            numbers = (f"{one.mean:.4g}", f"{one.median:.4g}", f"{one.low:.4g} to {one.high:.4g}", f"{one.p:.2g}")
+            rows.append((one.quantity, *numbers))
+        widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
+        table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+        first, last = self.generations[0] + 1, self.generations[-1] + 1
+        return [
+            *table,
+            f"Means over candidates of generations {first} to {last}; null model: {self.searches} searches with random "
+            "fitness.",
+            f"p is two-sided, and {2 / (self.searches + 1):.2g} at the least; by chance alone it is below 0.05 in one "
+            "of twenty rows.",
+        ]
+
+
+def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[float], None] = lambda _: None) -> Drift:
+    """Open genes, acuity [cycles/degree] and number of receptors at the end of runs that differ in nothing but their
+    seeds, as far as all of them have come, beside searches with random fitness (`evolve.search.null_model`).
+
+    Raises:
+        RunError: settings differ in more than seeds, or a run is named twice; or one has no complete generation.
+        ValueError: fewer than two searches.
+    """
+    if searches < 2:
+        raise ValueError(f"searches = {searches}: must be 2 or more")
+    _require_alike(runs)
+    config, generations = runs[0].config, min(_complete(run) for run in runs)
+    model = null_model(config, lambda animal: _measured(animal, config), generations, searches, done)
+    last, moved = last_generations(config, generations)[-1], []
+    for quantity in model.means:
+        found, ends = [_end(run, quantity, last) for run in runs], model.ends(quantity, last)
+        if all(map(math.isfinite, found)) and ends.size and np.ptp(ends) > 0:
+            low, median, high = (float(q) for q in np.quantile(ends, [0.025, 0.5, 0.975]))
+            moved.append(Moved(quantity, tuple(found), low, median, high, p_value(found, ends)))
+    return Drift(len(runs), last, searches, tuple(moved))
+
+
+def _require_alike(runs: Sequence[Run]) -> None:
+    differing = set(differing_settings(runs)) - set(ALLOWED_TO_DIFFER)
+    if differing:
+        raise RunError(
+            f"{runs[0].path} and others differ in {', '.join(sorted(differing))}: runs that are taken together may "
+            "differ in their seeds only"
+        )
+    seeds = [run.config.seed for run in runs]
+    if twice := [seed for seed in seeds if seeds.count(seed) > 1]:
+        raise RunError(f"two of these runs have seed {twice[0]}: they are the same search, and count as one")
+
+
+def _complete(run: Run) -> int:
+    """Generations of which all is known."""
+    known = [successive_halving.complete(run, generation) for generation in range(run.config.search.generations)]
+    done = [*known, False].index(False)
+    if not done:
+        raise RunError(f"{run.path}: no generation is complete yet")
+    return done
+
+
+def _measured(animal: Phenotype, config: RunConfig) -> Mapping[str, float]:
+    height, width = animal.resolution
+    genes = {name: value for name, value in gene_values(animal, config.eye).items() if _open(name, config)}
+    return {**genes, "acuity_cpd": acuity_cpd(animal), "receptors": float(animal.n_eyes * height * width)}
+
+
+def _open(name: str, config: RunConfig) -> bool:
+    return name in config.genome and config.genome[name].open
+
+
+def _end(run: Run, quantity: str, generations: range) -> float:
+    """Mean over the candidates that succeeded; NaN if none has the quantity."""
+    alive = [c for c in run.candidates if c.generation in generations and succeeded(c)]
+    values: Floats = np.array([_measured(c.phenotype, run.config)[quantity] for c in alive])
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else math.nan

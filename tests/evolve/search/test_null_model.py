@@ -1,0 +1,88 @@
+"""The null model is the search itself with fitness by chance, and its p is right where nothing is selected."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from evolve.analysis.statistics import gene_values
+from evolve.search.loop import evolve
+from evolve.search.null_model import FIRST_SEED, NullModel, last_generations, null_model, p_value
+from evolve.store.directory import Run
+from evolve.store.evaluation import Evaluation
+from tests.evolve.closed_form import tiny
+
+OPEN = ("n_eyes", "fov_deg", "resolution_width")
+
+
+class Chance:
+    """Whoever comes gets a fitness that has nothing to do with it."""
+
+    training = evaluated = None
+
+    def __init__(self, seed):
+        self.chance = np.random.default_rng(seed)
+
+    def run(self, jobs, progress=None):
+        while jobs:
+            yield jobs.popleft(), Evaluation(self.chance.normal())
+
+
+class Nobody:
+    def training(self, candidate_id, steps, planned):
+        """Nothing."""
+
+    def evaluated(self, candidate):
+        """Nothing."""
+
+
+def measured(animal):
+    return {name: value for name, value in gene_values(animal).items() if name in OPEN}
+
+
+@pytest.mark.parametrize(
+    "settings", [(), ("search.steady_state=true",), ("genome.fov_deg.opens_at=2", "search.generations=5")]
+)
+def test_it_is_the_loop_with_fitness_by_chance(settings, tmp_path):
+    config = tiny(f"seed={FIRST_SEED}", *settings)
+    run = Run.create(tmp_path / "run", config)
+    evolve(run, Chance(FIRST_SEED), Nobody())
+    generations = config.search.generations
+    model = null_model(replace(config, seed=3), measured, generations, 1)
+    for name in OPEN:
+        lived = [[measured(c.phenotype)[name] for c in run.generation(g)] for g in range(generations)]
+        assert model.means[name].tolist() == [[np.mean(values) for values in lived]]
+        assert (model.counts[name] == 4).all()
+
+
+def test_every_search_has_a_seed_of_its_own():
+    model = null_model(tiny(), measured, 3, 5)
+    assert len(set(model.means["fov_deg"][:, 2])) == 5
+
+
+def test_what_few_candidates_have_counts_by_how_many():
+    """A search in which nobody has it is left out."""
+    nan = np.nan
+    means = np.array([[9.0, 1.0, 4.0], [9.0, nan, 2.0], [9.0, nan, nan]])
+    model = NullModel({"x": means}, {"x": np.array([[5, 3, 1], [5, 0, 2], [5, 0, 0]])})
+    assert model.ends("x", range(1, 3)).tolist() == [(3 * 1.0 + 4.0) / 4, 2.0]
+    assert model.ends("x", range(3)).tolist()[2] == 9.0
+
+
+def test_a_phase_ends_with_its_own_last_generations():
+    config = tiny("genome.fov_deg.opens_at=2", "search.generations=9")
+    assert last_generations(config, 9) == [range(2), range(6, 9)]
+    assert last_generations(config, 3) == [range(2), range(2, 3)]
+    assert last_generations(config, 2) == [range(2)]
+
+
+def test_p_is_uniform_where_nothing_is_selected():
+    """As many searches with other seeds, and means of three of them: a p of less than .05 comes in 5 % of the cases.
+    (300 draws; a p that were one-sided, or that took the mean of three for one, fails at once.)"""
+    chance = np.random.default_rng(1)
+    ends = chance.gamma(2.0, size=999)
+    for several in (1, 3):
+        found = [p_value(chance.gamma(2.0, size=several), ends) for _ in range(300)]
+        assert kstest(found, "uniform").pvalue > 1e-3
+    assert kstest([p_value([chance.gamma(2.0, size=3).mean()], ends) for _ in range(300)], "uniform").pvalue < 1e-3
