@@ -4,6 +4,7 @@ ask_tell            the whole idea in a page: read this first
 loop                propose, evaluate, write down, tell
 search              Search: proposals, phases, seeds
 optimizers          CMA-ES and others
+null_model          the same search with random fitness
 same_search         whether a search proposes what is on record
 successive_halving  who is trained further
 job                 what executors are given
