@@ -17,7 +17,6 @@ from evolve.config.checks import ConfigError, quoted
 from evolve.interactive.carry_on import Callback, carry_on, require_callbacks
 from evolve.interactive.opened_run import OpenedRun
 from evolve.search.search import Search
-from evolve.store.directory import next_directory
 from optics.numerics import device
 
 __all__ = ["run"]
@@ -65,9 +64,11 @@ def run(
         from evolve.learning.task_trial import try_task
 
         try_task(chosen)
-    named = chosen.task_name, preset.removesuffix(f"-{chosen.task}")
-    directory = Path(out) if out is not None else next_directory(*named)
-    begun = OpenedRun.create(directory, chosen, starts.name.removeprefix("--from ") if starts else None)
+    origin = starts.name.removeprefix("--from ") if starts else None
+    if out is None:
+        begun = OpenedRun.create_next(chosen, preset.removesuffix(f"-{chosen.task}"), origin)
+    else:
+        begun = OpenedRun.create(out, chosen, origin)
     with begun.lock():
         carry_on(begun, callbacks, progress)
     return begun

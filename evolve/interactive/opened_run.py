@@ -110,6 +110,7 @@ class OpenedRun(Run):
         with self.lock():
             self.repair()
             if finished(self):
+                self.forget_trainings(candidate.id for candidate in self.candidates)
                 return
             self.require_present_format()
             try_task(self.config)  # before anything is written

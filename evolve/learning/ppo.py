@@ -127,9 +127,13 @@ class AdaptingPPO(PPO):
     @torch.no_grad()
     def _adapt_unit(self) -> None:
         """Measure rewards in units of the spread of returns; what the critic says of the worlds stays the same
-        (Pop-Art: van Hasselt et al. 2016, eq. 5)."""
+        (Pop-Art: van Hasselt et al. 2016, eq. 5). A rollout without any reward says nothing of their spread: its
+        returns are what the critic says, discounted, and the unit would shrink without end."""
+        if not self.env.paid:
+            return
+        self.env.paid = False
         change = max(float(self.rollout_buffer.returns.std()), FLAT)
-        if self.num_timesteps > self.rollout_buffer.rewards.size:  # not the first rollout: forget gradually
+        if self.env.unit != 1:  # not the first rollout that pays: forget gradually
             change **= UNIT_RATE
         self.env.unit *= change
         for parameter in self.policy.value_net.parameters():

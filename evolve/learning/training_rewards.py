@@ -14,11 +14,15 @@ CONTACT_FIRST = 0.1  # of what contact costs in the end; with a third, agents tu
 
 
 class RewardsInUnits(VecEnvWrapper):
-    """Worlds whose rewards come in units that the learner sets, and in which contact costs a share of its price."""
+    """Worlds whose rewards come in units that the learner sets, and in which contact costs a share of its price.
+
+    paid: whether there was any reward but 0 since it was last set to False
+    """
 
     def __init__(self, worlds: VecEnv) -> None:
         super().__init__(worlds)
         self.unit = self.contact_share = 1.0
+        self.paid = False
 
     def reset(self) -> dict[str, np.ndarray]:
         observation: dict[str, np.ndarray] = self.venv.reset()
@@ -29,6 +33,7 @@ class RewardsInUnits(VecEnvWrapper):
         if self.contact_share < 1:
             price = np.array([terms["contact"] for terms in map(terms_of, infos)], np.float32)
             reward = reward - np.float32(1 - self.contact_share) * price
+        self.paid |= bool(reward.any())
         return observation, reward / np.float32(self.unit), done, infos
 
 

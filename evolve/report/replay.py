@@ -8,11 +8,13 @@ from typing import Any
 
 from evolve.analysis.episode import Episode, record
 from evolve.analysis.filmed_episode import FilmedEpisode
+from evolve.config.checks import ConfigError
 from evolve.report.footage import AnyEpisode
 from evolve.report.moving_picture import require_ffmpeg, write_gif, write_mp4
 from evolve.report.player import write_player
 from evolve.report.rerun_recording import write_recording
 from evolve.report.rerun_stream import require_rerun
+from evolve.store.atomic_files import require_file_name
 from evolve.store.directory import Run
 
 __all__ = ["BESIDE", "episode_facts", "episode_table", "write_page", "write_replay"]
@@ -31,8 +33,11 @@ def write_replay(
 
     Raises:
         RunError: there is no such candidate, or no policy of it.
-        ConfigError: rerun or ffmpeg are needed, but not installed.
+        ConfigError: rerun or ffmpeg are needed, but not installed; or `out` ends as what may lie beside the page.
+        StrangeFileError: `out` is a directory, say.
     """
+    if out is not None:
+        _require_page(out)
     if "rrd" in also:
         require_rerun()
     if "mp4" in also:
@@ -40,6 +45,14 @@ def write_replay(
     episode = record(run, candidate_id, seed)
     page = write_page(run, episode, out)
     return episode, [page, *(BESIDE[form](episode, page.with_suffix(f".{form}")) for form in BESIDE if form in also)]
+
+
+def _require_page(out: Path) -> None:
+    """Before an episode is played."""
+    require_file_name(out)
+    if (form := out.suffix.lower().removeprefix(".")) in BESIDE:
+        page = out.with_suffix(".html")
+        raise ConfigError(f"out = {out}: names the page, such as {page}; with --{form}, {out.name} lies beside it")
 
 
 def write_page(run: Run, episode: AnyEpisode, out: Path | None = None) -> Path:

@@ -26,11 +26,14 @@ def write(run: Run, episode: AnyEpisode | None = None, out: Path | None = None, 
 
     Raises:
         ValueError: the best candidate's policy is missing or damaged.
+        StrangeFileError: `out` is a directory, say.
     """
     from evolve.analysis.episode import record
     from evolve.report.page import render
-    from evolve.store.atomic_files import write_whole
+    from evolve.store.atomic_files import require_file_name, write_whole
 
+    if out is not None:  # before an episode is played
+        require_file_name(out)
     if episode is None and run.best is not None:
         doing("the best agent plays an episode", 0.0)
         episode = record(run)

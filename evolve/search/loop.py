@@ -69,6 +69,7 @@ def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watch
             same.require(proposals[candidate.id], candidate)
         for stage in range(run.config.search.rungs):
             missing = sorted(reaching(run, generation, stage) - run.evaluated_at(stage))
+            same.require_complete(generation, missing)
             jobs = deque(_job(run, proposals[candidate_id], stage) for candidate_id in missing)
             for job, outcome in executor.run(jobs, watcher.training):
                 _write_down(run, proposals[job.id], job, outcome, watcher)

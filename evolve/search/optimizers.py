@@ -60,7 +60,8 @@ def build_optimizer(space: Space, search: SearchConfig) -> Optimizer:
 class Mutation:
     """Children of the fittest, one mutation of each gene away: Gaussian for real genes, -1, 0 or +1 for integers.
 
-    Parents are the best quarter of the last two populations told. Luck in noisy fitness expires with them.
+    Parents are the fittest of the last two populations told, a quarter as many as one has. Luck in noisy fitness
+    expires with them.
     """
 
     def __init__(self, space: Space, search: SearchConfig) -> None:

@@ -8,6 +8,8 @@ bit differs for somebody else's, and shortens it if it is long.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from evolve.search.search import Proposal
@@ -52,3 +54,15 @@ class SameSearch:
             f"(started with {before}; here {after}). Continue it with the versions that began it, and an unchanged "
             f"config.toml"
         )
+
+    def require_complete(self, generation: int, missing: Collection[int]) -> None:
+        """Before anybody is trained for it: a search that has gone on from a generation knew all of it.
+
+        Raises:
+            RunError: candidates of a generation are missing although there are later ones.
+        """
+        if missing and any(candidate.generation > generation for candidate in self._run.candidates):
+            raise RunError(
+                f"{self._run.path} cannot be continued: generation {generation} lacks evaluations (candidate "
+                f"{min(missing)}), but later ones are on record. Continue it with an unchanged config.toml and record"
+            )

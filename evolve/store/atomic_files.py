@@ -16,9 +16,24 @@ POLICIES, TRAININGS = "policies", "trainings"  # folders of a run
 
 
 def sweep(folder: Path) -> None:
-    """Remove what writers left that were killed in the middle; nobody else may be writing there."""
+    """Remove what writers left that were killed in the middle. A replay may be written there meanwhile: what a process
+    writes that lives stays."""
     for path in folder.glob(f".*{UNFINISHED}"):
-        path.unlink(missing_ok=True)
+        if not _lives(path.name.removesuffix(UNFINISHED).rpartition(".")[2]):
+            path.unlink(missing_ok=True)
+
+
+def _lives(process: str) -> bool:
+    """Whether there is a process of this number, other than this one."""
+    if not process.isdecimal() or int(process) == os.getpid():
+        return False
+    try:
+        os.kill(int(process), 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass
+    return True
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -34,6 +49,15 @@ def write_whole(path: Path, content: bytes) -> None:
         file.write(content)
 
 
+def require_file_name(path: Path) -> None:
+    """What a file may be written under: neither "." nor "/", nor the name of what is no file.
+
+    Raises:
+        StrangeFileError: a link, FIFO, device or directory bears the name.
+    """
+    require_regular(path if path.name else path.resolve())
+
+
 @contextmanager
 def unfinished(path: Path) -> Iterator[Path]:
     """A neighbour of `path` to write to, empty at first; afterwards it is on the disk, under the name of `path`.
@@ -42,9 +66,9 @@ def unfinished(path: Path) -> Iterator[Path]:
         StrangeFileError: a link, FIFO, device or directory bears its name.
         OSError: it cannot be written; names `path`.
     """
+    require_file_name(path)
     neighbour = path.with_name(f".{path.name}.{os.getpid()}{UNFINISHED}")
     try:
-        require_regular(path)
         if path.parent.name in (POLICIES, TRAININGS) and not path.parent.is_dir():
             folder(path.parent)
         created(neighbour).close()

@@ -21,7 +21,7 @@ from evolve.config.run_config import RunConfig
 from evolve.config.sources import parsed_toml
 from evolve.store.atomic_files import POLICIES, TRAININGS, UNFINISHED, sweep, write_whole
 from evolve.store.candidate import Candidate
-from evolve.store.lock import LONGEST, RunLock
+from evolve.store.lock import LONGEST, LockedError, RunLock
 from evolve.store.policies import lost
 from evolve.store.record import Record, RunError
 from evolve.store.regular_files import folder, opened, read, require_folder, require_regular
@@ -67,6 +67,7 @@ class Run:
                 folder(path / POLICIES)
                 opened(path / CANDIDATES, "ab", create=True).close()
                 text = to_toml(config)
+                (path / VERSIONS).unlink(missing_ok=True)  # of an attempt that was killed here
                 record_start(path, 0, origin, fingerprint(text))
                 write_whole(path / CONFIG, text.encode())
         except OSError as error:
@@ -97,6 +98,22 @@ class Run:
             config = config.with_own_task(task)
         return cls(path, config, Record.read(path / CANDIDATES, config))
 
+    @classmethod
+    def create_next(cls, config: RunConfig, preset: str, origin: str | None = None) -> Self:
+        """New run in the next free directory, also where others are begun at the same time.
+
+        Raises:
+            RunError: it cannot be written.
+        """
+        path = next_directory(config.task_name, preset)
+        while True:
+            try:
+                return cls.create(path, config, origin)
+            except (RunError, LockedError):
+                if (free := next_directory(config.task_name, preset)) == path:
+                    raise
+                path = free
+
     def require_present_format(self) -> None:
         """Trainings can be carried on in the light in which they began, and in no other.
 
@@ -120,7 +137,13 @@ class Run:
         return self._lock
 
     def repair(self) -> None:
-        """Cut off an unfinished last line and remove files half written (after `lock`); read the rest anew."""
+        """Cut off an unfinished last line and remove files half written (after `lock`); read the rest anew.
+
+        Raises:
+            RunError: the record is damaged or cannot be written, or config.toml is no longer as it was opened.
+        """
+        if from_text(read(self.path / CONFIG), str(self.path / CONFIG)) != self.config:
+            raise RunError(f"{self.path / CONFIG} has changed since the run was opened; open it again")
         self.record = Record.read(self.record.path, self.config)
         try:
             for folder in (self.path, self.path / POLICIES, self.path / TRAININGS):

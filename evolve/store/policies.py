@@ -43,9 +43,9 @@ def require_policy(candidate: Candidate, path: Path) -> None:
     Raises:
         RunError: it is lost, or another one is in its place, or there never was one.
     """
-    found = digest(path)
-    if found is None and candidate.failure is not None:
+    if candidate.failure is not None:  # a file there is of an earlier budget stage, and nothing is known of its fitness
         raise RunError(f"candidate {candidate.id} has no policy, as it failed: {candidate.failure}")
+    found = digest(path)
     if found is None and candidate.policy is None:
         raise RunError(f"no policy at {path}, and the record names none that was kept: choose another candidate")
     if found is None:

@@ -48,13 +48,15 @@ def start(arguments: Namespace) -> int:
     device.make_ready()
     if config.own_task is not None:
         _try(config)
-    directory = arguments.out or next_directory(config.task_name, arguments.preset.removesuffix(f"-{config.task}"))
+    preset = arguments.preset.removesuffix(f"-{config.task}")
     if arguments.dry_run:
+        directory = arguments.out or next_directory(config.task_name, preset)
         return _show(RunPlan.of(config, directory), arguments.json)
     notes = (
         [] if arguments.json or arguments.quiet else lint(config)
     )  # looks at the world, which takes its time: nothing is begun yet
-    run = Run.create(directory, config, starts.name.removeprefix("--from ") if starts else None)
+    origin = starts.name.removeprefix("--from ") if starts else None
+    run = Run.create(arguments.out, config, origin) if arguments.out else Run.create_next(config, preset, origin)
     if not arguments.json:
         for note in notes:
             print(f"note: {note}", file=sys.stderr)
@@ -75,6 +77,7 @@ def resume(arguments: Namespace) -> int:
         if run.notice and not arguments.quiet:
             print(f"note: {run.notice}", file=sys.stderr)
         if finished(run):
+            run.forget_trainings(candidate.id for candidate in run.candidates)
             if not arguments.json:
                 print(f"{run.path}: all {run.config.candidates} candidates have been evaluated")
             return _already_finished(run, arguments)

@@ -4,6 +4,7 @@
 import io
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -33,6 +34,18 @@ def test_replay_elsewhere_as_json_in_a_browser(call, run, browser, tmp_path):
     assert browser == [page.as_uri()]
     assert page.read_text().startswith("<!doctype html>")
     assert set(run.path.rglob("*")) == before
+
+
+def test_names_that_no_page_can_have_are_refused_before_an_episode_is_played(call, run, monkeypatch):
+    monkeypatch.setattr("evolve.report.replay.record", None)
+    monkeypatch.setattr("evolve.analysis.episode.record", None)
+    for command in ("replay", "report"):
+        code, _, err = call(command, run.path, "--out", ".")
+        assert (code, err) == (2, f"evolve: error: {Path.cwd()}: is a directory: must be a regular file\n")
+    for film in ("film.gif", "film.MP4", "film.rrd"):
+        code, _, err = call("replay", run.path, "--gif", "--out", film)
+        assert code == 2
+        assert f"out = {film}: names the page, such as film.html; with" in err
 
 
 def test_quiet_is_quiet_and_errors_are_not(call, run, browser, tmp_path):

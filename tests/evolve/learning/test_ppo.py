@@ -100,6 +100,34 @@ def test_the_unit_of_rewards_does_not_matter():
     assert play(training.policy, BrightSpot(64), 99).successes.mean() > 0.9
 
 
+class Poor(BrightSpot):
+    """Pays nothing before its `first` step."""
+
+    first, taken = np.inf, 0
+
+    def step_wait(self):
+        observation, reward, done, infos = super().step_wait()
+        self.taken += self.num_envs
+        return observation, reward * (self.taken > self.first), done, infos
+
+
+def test_the_unit_stays_where_nothing_is_paid_and_is_that_of_the_first_rewards():
+    """Returns are then what the critic says, discounted: a unit that followed them would halve with each rollout."""
+    model = AdaptingPPO(Poor(16), SMALL, QUICK, 0)
+    model.learn(20 * 512)
+    assert model.env.unit == 1
+    late = Poor(16)
+    late.first = 3 * 512
+    model = AdaptingPPO(late, SMALL, QUICK, 0)
+    model.learn(3 * 512)
+    assert model.env.unit == 1
+    model.learn(512, reset_num_timesteps=False)
+    spread = model.env.unit
+    assert spread == pytest.approx(float(model.rollout_buffer.returns.std()), rel=1e-6)
+    model.learn(512, reset_num_timesteps=False)
+    assert model.env.unit == pytest.approx(spread * float(model.rollout_buffer.returns.std()) ** 0.2, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("steps", "ramp", "share"),
     [(0, 0, 1.0), (0, 900, 0.1), (300, 900, 0.1), (600, 900, 0.1**0.5), (900, 900, 1.0), (5000, 900, 1.0)],

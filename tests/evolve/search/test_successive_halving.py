@@ -9,12 +9,14 @@ import pytest
 from evolve.cli import progress
 from evolve.config.assemble import assemble
 from evolve.config.run_config import ConfigError, LearningConfig, SearchConfig
+from evolve.interactive.opened_run import OpenedRun
 from evolve.learning.checkpoint import load_checkpoint
 from evolve.learning.fitness import evaluate
 from evolve.learning.training_stage import TrainingStage
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
 from evolve.search.successive_halving import budgets, evaluations, finished, promoted, sizes, steps
+from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run, RunError
 from tests.evolve.closed_form import tiny
 from tests.evolve.remote_form import MISHAPS, fails_late, in_stages
@@ -96,6 +98,15 @@ def test_interrupted_anywhere_it_goes_on_to_the_same_history(tmp_path, monkeypat
         run, _ = carry(folder / "run", None, monkeypatch)
         assert (folder / "run" / "candidates.jsonl").read_bytes().startswith(kept)
         assert lines(run) == lines(whole)
+
+
+def test_who_is_killed_after_the_last_line_leaves_no_trainings_behind(tmp_path, monkeypatch, call):
+    run, _ = carry(tmp_path / "run", tiny(*HALVING, "search.generations=1"), monkeypatch)
+    for resume in (lambda: call("resume", run.path, "--quiet"), lambda: OpenedRun.open(run.path).resume()):
+        left = run.checkpoint_path(6, 1)
+        write_whole(left, b"a training")
+        resume()
+        assert not left.exists()
 
 
 def test_what_was_lived_before_a_stage_that_fails_is_kept(tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ from evolve.store.evaluation import Evaluation
 from tests.evolve.closed_form import tiny
 
 CONFIG = tiny()
+NOBODY = 999_999_999  # no process has this number: systems give them up to 4,194,304
 DIMENSION = Genotype(CONFIG.genome).dimension
 
 

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from evolve.store.atomic_files import UNFINISHED, sweep, unfinished, write_whole
+from evolve.store.regular_files import StrangeFileError
+from tests.evolve.store.records import NOBODY
 
 
 def test_a_writer_that_fails_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
@@ -42,10 +44,19 @@ def test_only_folders_of_a_run_that_is_there_are_made(tmp_path):
 
 
 def test_what_killed_writers_left_is_swept_up(tmp_path):
+    """What a process writes that lives stays: a film, say, of which nobody told the run."""
     write_whole(tmp_path / "file", b"whole")
-    (tmp_path / f".file.77{UNFINISHED}").touch()
+    living = f".film.mp4.{os.getppid()}{UNFINISHED}"
+    for name in (f".file.{NOBODY}{UNFINISHED}", f".file.{os.getpid()}{UNFINISHED}", f".file{UNFINISHED}", living):
+        (tmp_path / name).touch()
     sweep(tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    assert {path.name for path in tmp_path.iterdir()} == {"file", living}
+
+
+@pytest.mark.parametrize("path", [".", "/", ".."])
+def test_a_directory_is_no_name_for_a_file(path):
+    with pytest.raises(StrangeFileError, match="is a directory: must be a regular file"):
+        write_whole(Path(path), b"")
 
 
 def test_content_is_on_the_disk_before_the_name_and_the_name_before_anybody_is_told(tmp_path, monkeypatch):

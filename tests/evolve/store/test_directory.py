@@ -11,9 +11,9 @@ import pytest
 from evolve.config.run_config import ConfigError
 from evolve.store.directory import Run, RunError, next_directory
 from evolve.store.lock import LockedError
-from evolve.store.versions import record_start
+from evolve.store.versions import origin, record_start
 from tests.evolve.closed_form import tiny
-from tests.evolve.store.records import CONFIG, candidate
+from tests.evolve.store.records import CONFIG, NOBODY, candidate
 
 
 def test_best_is_the_earliest_of_the_fittest(run):
@@ -74,9 +74,42 @@ def test_default_directory_is_the_first_that_is_free(tmp_path):
     assert next_directory("detection", "quick", tmp_path).name == "detection-quick-2"
 
 
+def test_two_that_begin_at_once_have_a_directory_each(tmp_path, monkeypatch):
+    """The second comes while the first is between its choice of a name and its config, and the third later still."""
+    monkeypatch.chdir(tmp_path)
+    made = []
+
+    def meanwhile(*arguments):
+        monkeypatch.setattr("evolve.store.directory.record_start", record_start)
+        made.append(Run.create_next(tiny("seed=2"), "quick"))
+        record_start(*arguments)
+
+    monkeypatch.setattr("evolve.store.directory.record_start", meanwhile)
+    made.append(Run.create_next(CONFIG, "quick"))
+    assert [run.path.as_posix() for run in made] == ["runs/detection-quick-2", "runs/detection-quick-1"]
+    assert [Run.open(run.path).config.seed for run in made] == [2, CONFIG.seed]
+    monkeypatch.setattr("evolve.store.directory.next_directory", lambda *_: Path("runs/detection-quick-1"))
+    with pytest.raises(RunError, match="is not empty"):
+        Run.create_next(CONFIG, "quick")
+
+
+def test_a_config_that_changed_since_the_run_was_opened_is_not_overlooked(run):
+    path = run.path / "config.toml"
+    path.write_text(path.read_text().replace("total_steps = 4096", "total_steps = 8192"))
+    with pytest.raises(RunError, match=r"config\.toml has changed since the run was opened; open it again"):
+        run.repair()
+    Run.open(run.path).repair()
+
+
+def test_a_run_that_is_begun_again_comes_from_where_this_attempt_says(tmp_path):
+    record_start(tmp_path, 0, "runs/a:3", "0")  # and then it was killed
+    Run.create(tmp_path, CONFIG)
+    assert origin(tmp_path) is None
+
+
 def test_run_killed_while_it_is_created_can_be_begun_again(tmp_path):
     """config.toml is written last; before it there is nothing to lose."""
-    for left in ((), ("versions.json",), ("versions.json", "candidates.jsonl", ".config.toml.123.unfinished")):
+    for left in ((), ("versions.json",), ("versions.json", "candidates.jsonl", f".config.toml.{NOBODY}.unfinished")):
         path = tmp_path / str(len(left))
         (path / "policies").mkdir(parents=True)
         for name in left:
@@ -91,7 +124,7 @@ def test_run_killed_while_it_is_created_can_be_begun_again(tmp_path):
 
 def test_repair_removes_what_was_half_written(run):
     for folder in (run.path, run.path / "policies"):
-        (folder / ".000001.77.unfinished").touch()
+        (folder / f".000001.{NOBODY}.unfinished").touch()
     run.repair()
     assert not list(run.path.rglob("*.unfinished"))
     assert (run.path / "config.toml").exists()

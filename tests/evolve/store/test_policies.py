@@ -63,3 +63,9 @@ def test_a_policy_that_never_was_is_not_looked_for_in_copies(run):
         with pytest.raises(RunError, match=message) as caught:
             require_policy(one, run.policy_path(one.id))
         assert "copy" not in str(caught.value)
+
+
+def test_the_policy_of_an_earlier_stage_is_not_played_for_one_that_failed_later(run):
+    write_whole(run.policy_path(0), b"of the first stage")
+    with pytest.raises(RunError, match="candidate 0 has no policy, as it failed: loss not finite"):
+        require_policy(candidate(0, -np.inf, "loss not finite"), run.policy_path(0))
