@@ -69,7 +69,7 @@ def page(store: Store) -> Page:
         command=(
             "evolve run --preset scaling\n"
             "evolve run tracking --preset scaling\n"
-            "evolve run navigation --preset scaling\n"
+            "evolve run maze --preset scaling\n"
             "python -m experiments.brains_and_acuity --runs detection=DIR navigation=DIR tracking=DIR"
         ),
         values={

@@ -49,8 +49,8 @@ def page(store: Store) -> Page:
     return Page(
         name=NAME,
         command=(
-            "evolve run --preset bifurcation-navigation --seed 0    # and 1, 2\n"
-            "evolve run --preset bifurcation-detection --seed 0\n"
+            "evolve run --preset bifurcation-navigation --set search.active=true --seed 0    # and 1, 2\n"
+            "evolve run --preset bifurcation-detection --set search.active=true --seed 0\n"
             "python -m experiments.goals_shape_eyes --runs navigation=DIR detection=DIR"
         ),
         values={

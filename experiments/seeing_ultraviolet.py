@@ -86,7 +86,7 @@ def page(store: Store) -> Page:
     return Page(
         name=NAME,
         command=(
-            "evolve run --preset ultraviolet --seed 0    # and others\n"
+            "evolve run --preset ultraviolet --set search.active=true --seed 0    # and others\n"
             "python -m experiments.seeing_ultraviolet --runs foraging=DIR foraging=DIR"
         ),
         values={
