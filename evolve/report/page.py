@@ -123,7 +123,8 @@ def genes_section(run: Run) -> Html:
     parts = [
         html(
             "<p>What the open {} came to: {} value in the best candidate so far, {}. The vertical axes span the "
-            "range that evolution may search. Chance moves genes, too: <code>evolve drift DIR</code> says how far.</p>\n",
+            "range that evolution may search. Chance moves genes, too: <code>evolve drift DIR</code> says how far."
+            "</p>\n",
             *(hint("genome", "genes"), key("accent"), POPULATION),
         )
     ]
