@@ -122,17 +122,17 @@ class Pupil:
     @property
     def transmission(self) -> Scalar:
         """Share of the light on the open aperture that the mask lets through, with derivatives; 1 without a mask."""
-        return self._let_through() if self._transmission is None else self._transmission
+        # A graph serves one backward pass; and who holds Dr.Jit's numbers may ask for a derivative at any time.
+        if is_differentiable(self.aperture_radius) or not (self.mask is None or self.mask.plain):
+            import drjit as dr
+
+            found = self._let_through()
+            return found if dr.grad_enabled(found) else number(found)
+        return self._transmission
 
     @cached_property
-    def _transmission(self) -> float | None:
-        """None where the mask asks for a derivative: its graph serves one backward pass."""
-        found = self._let_through()
-        if isinstance(found, float):
-            return found
-        import drjit as dr
-
-        return None if dr.grad_enabled(found) else number(found)
+    def _transmission(self) -> float:
+        return number(self._let_through())
 
     def _let_through(self) -> Scalar:
         if self.mask is None:

@@ -41,6 +41,11 @@ class Mask(ABC):
         """[m], of what it is known over; None: the pupil's, or everywhere."""
         return None
 
+    @property
+    def plain(self) -> bool:
+        """Whether its numbers are plain ones, of which nobody can ask for a derivative."""
+        return False
+
 
 @dataclass(frozen=True, eq=False)
 class GaussianMask(Mask):
@@ -69,6 +74,10 @@ class GaussianMask(Mask):
     @property
     def rotationally_symmetric(self) -> bool:
         return True
+
+    @property
+    def plain(self) -> bool:
+        return not is_differentiable(self.waist)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,3 +139,7 @@ class MaskMap(Mask):
     @property
     def radius(self) -> float | None:
         return self.reach
+
+    @property
+    def plain(self) -> bool:
+        return not is_differentiable(self.samples)
