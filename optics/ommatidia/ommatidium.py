@@ -55,7 +55,7 @@ class Ommatidium:
 
     def mode_power(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
         """Share of the light on the facet that each mode takes, (mode, ...), of a point far away at these angles [rad]
-        along x and y off the axis.
+        along the lens' x and y off the axis. It sends its light the other way: as `PointSource`'s, their negatives.
 
         Raises:
             ValueError: an angle whose sine is above 0.5, angles of different shapes, or the rhabdom guides nothing.
@@ -69,7 +69,7 @@ class Ommatidium:
             in_range(f"abs({name})", float(np.abs(value).max(initial=0.0)), 0.0, math.asin(STEEPEST[-1]))
         tx, ty = np.tan(x), np.tan(y)
         norm = np.sqrt(1 + tx * tx + ty * ty)
-        sines = tx / norm, ty / norm
+        sines = -tx / norm, -ty / norm
         steepest = float(np.hypot(*sines).max(initial=0.0))
         wide = next((limit for limit in STEEPEST if limit >= steepest), 1.0)
         found = _coupled(self, vacuum_wavelength(wavelength), wide).power(*sines)

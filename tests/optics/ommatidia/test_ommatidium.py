@@ -71,16 +71,18 @@ def test_every_mode_takes_what_the_formulas_say(diameter):
     np.testing.assert_allclose(found / found.max(), expected / expected.max(), atol=0.015)
 
 
+@pytest.mark.parametrize("wavefront", [None, optics.Zernike({(1, 1): 0.06, (3, -1): 0.08})], ids=["even", "lopsided"])
 @pytest.mark.parametrize("angle", [(0.0, 0.0), (0.02, -0.01)])
-def test_modes_take_the_overlap_with_the_field_in_the_focus(angle):
-    """The other way round: the field that the facet makes, summed with the mode over the sensor's plane."""
+def test_modes_take_the_overlap_with_the_field_in_the_focus(angle, wavefront):
+    """The other way round: the field that the facet makes, summed with the mode over the sensor's plane. From a point
+    on one side light travels to the other."""
     lens, guide = FacetLens(20e-6, 13e-6, -60e-6, 6e-6), Waveguide(1.8e-6, 1.37, 1.34)
-    eye = Ommatidium(lens, guide, lens.focal_length() + 3e-6)
+    eye = Ommatidium(lens.pupil(wavefront=wavefront), guide, lens.focal_length() + 3e-6)
     pupil, z, types = eye.pupil, lens.focal_length() + 3e-6, precision("float64")
     dx, n = 0.1e-6, 140
     at = (np.arange(n) - n / 2 + 0.5) * dx
     x, y = (axis.ravel() for axis in np.meshgrid(at, at))
-    beam = Beam(pupil, PointSource(math.inf, angle), WAVE, z)
+    beam = Beam(pupil, PointSource(math.inf, (-angle[0], -angle[1])), WAVE, z)
     field = (
         direct_sum(beam, (pupil.aperture, 15.0, 7.0, False), types.Float64(x), types.Float64(y), types).numpy().ravel()
     )
