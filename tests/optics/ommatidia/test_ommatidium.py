@@ -119,6 +119,23 @@ def test_hexagons_see_nearly_alike_all_around():
     assert turned == pytest.approx(float(eye.sensitivity(0.01, 0.0, WAVE)), rel=1e-4)
 
 
+@pytest.mark.parametrize("wavelength", [400e-9, 450e-9, 550e-9])
+def test_colours_have_foci_of_their_own_behind_glass_that_disperses(wavelength):
+    """A lens of the index at that wavelength alone, whose rhabdom has the same place behind its front: a thick lens'
+    principal plane moves as well. Without dispersion violet would be sharp."""
+    glass, shape = optics.RefractiveIndex.from_abbe(1.5, abbe_number=15.0), (25e-6, 24e-6, -40e-6, 20e-6)
+    guide, lens = Waveguide(1.6e-6), FacetLens(*shape, n=glass)
+    behind_front = lens.principal_planes()[1] + lens.focal_length()
+    alone = FacetLens(*shape, n=float(glass.at(wavelength)))
+    same = Ommatidium(alone, guide, behind_front - alone.principal_planes()[1])
+    angles, seen = np.radians(np.linspace(-2, 2, 9)), Ommatidium(lens, guide)
+    found = seen.mode_power(angles, 0.0, wavelength)
+    np.testing.assert_allclose(found, same.mode_power(angles, 0.0, wavelength), rtol=1e-9, atol=1e-12)
+    achromatic = Ommatidium(lens.pupil(), guide).mode_power(0.0, 0.0, wavelength).sum()
+    lost = 1 - seen.mode_power(0.0, 0.0, wavelength).sum() / achromatic
+    assert lost == pytest.approx(0, abs=1e-9) if wavelength == 550e-9 else lost > 0.1
+
+
 def test_superposition_narrows_what_one_facet_blurs():
     """Light of many facets that arrives in phase: the aperture's diffraction instead of a facet's (Stavenga 2006)."""
     narrow = Waveguide(0.8e-6, 1.38, 1.34)
