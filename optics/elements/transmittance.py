@@ -17,6 +17,7 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 __all__ = ["GaussianMask", "Mask", "MaskMap"]
 
 OVERSHOOT = 0.02  # choice: by which the spline may leave [-1, 1]
+MEAN_OVER = 64  # choice: points across a pupil for the mean of what is let through
 FINER = 4  # choice: steps per sample at which that is looked at
 
 
@@ -30,6 +31,11 @@ class Mask(ABC):
     @abstractmethod
     def bandwidth(self, level: float, radius: float) -> float:
         """Spatial frequency [1/m] above which its content is below `level`."""
+
+    def detail(self, share: float, radius: float) -> float:
+        """Spatial frequency [1/m] along x and y beyond which it sends no more than this share of the light that it lets
+        through a pupil of this radius [m]."""
+        return self.bandwidth(math.sqrt(share), radius)
 
     @property
     def rotationally_symmetric(self) -> bool:
@@ -70,6 +76,10 @@ class GaussianMask(Mask):
     def bandwidth(self, level: float, radius: float) -> float:
         """Its spectrum is exp(-π²w²f²)."""
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
+
+    def detail(self, share: float, radius: float) -> float:
+        """Of the light exp(-2π²w²f²) goes beyond f."""
+        return math.sqrt(max(-math.log(share), 0.0) / 2) / (math.pi * number(self.waist))
 
     @property
     def rotationally_symmetric(self) -> bool:
@@ -131,6 +141,13 @@ class MaskMap(Mask):
 
     def bandwidth(self, level: float, radius: float) -> float:
         return self._map.bandwidth(level) / (radius if self.reach is None else self.reach)
+
+    def detail(self, share: float, radius: float) -> float:
+        part = 1.0 if self.reach is None else min(radius / self.reach, 1.0)
+        at = (np.arange(MEAN_OVER) + 0.5) * 2 / MEAN_OVER - 1
+        inside = np.hypot(at, at[:, None]) <= 1
+        passed = np.square(self._map.on_grid(at * part))[inside].mean()
+        return self._map.detail(math.sqrt(share * passed), part) / radius
 
     @property
     def rotationally_symmetric(self) -> bool:

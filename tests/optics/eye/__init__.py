@@ -9,7 +9,7 @@ kernel_interpolation: test_kernel_interpolation.py, test_kernel_bank.py
 photoreceptor: test_photoreceptor.py
 polarization: test_polarization.py
 signals: test_eye.py, test_polarization.py
-receptive_field: test_receptive_field.py, test_eye.py, test_eye_robustness.py
+receptive_field: test_receptive_field.py, test_scattered_light.py, test_eye.py, test_eye_robustness.py
 guided_field: test_guided_field.py
 receptor_kernel: test_guided_field.py, test_eye.py
 retinal_image: test_retinal_image.py
