@@ -229,7 +229,7 @@ def _rim(pupil: Pupil) -> float:
     since it may rise steeply from it."""
     import drjit as dr
 
-    if pupil.mask is None:
+    if pupil.mask is None or number(pupil.transmission) == 0:
         return 1.0
     types, (x, y) = precision("float64"), pupil.aperture.outline.points().T
     with dr.suspend_grad():
