@@ -191,11 +191,7 @@ def _add_watching(commands: Commands) -> None:
     drift = _command(commands, "drift", "drift.drift", "say which genes moved further than chance moves them")
     drift.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories that differ in seeds")
     drift.add_argument(
-        "--searches",
-        type=_searches,
-        default=200,
-        metavar="N",
-        help="with random fitness, to compare with (default: 200)",
+        "--searches", type=_searches, default=200, metavar="N", help="with random fitness, to compare with (default: 200)"
     )
     drift.add_argument("--json", action="store_true", help="print JSON")
 

@@ -295,7 +295,6 @@ def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _power_beyond(relief: HeightMap, part: float) -> np.ndarray:
-    if part == 1:
-        return power_beyond(relief._heights)
-    n = math.ceil(part * len(relief._heights))
-    return power_beyond(relief.on_grid(((np.arange(n) + 0.5) * 2 / n - 1) * part))
+    """Of a square in the middle; see `fine_detail.power_beyond`."""
+    n = math.ceil(part * relief.knots)
+    return power_beyond(relief._heights if part == 1 else relief.on_grid(((np.arange(n) + 0.5) * 2 / n - 1) * part))
