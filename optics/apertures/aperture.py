@@ -20,10 +20,11 @@ from optics.numerics.autodiff import Array
 from optics.numerics.cost import SOFT_EDGE_SAMPLE
 from optics.numerics.precision import Precision, padded_for_packets
 
-__all__ = ["EDGE_REACH", "Aperture", "Nodes", "SoftAperture"]
+__all__ = ["EDGE_REACH", "LEAST_RIPPLE", "Aperture", "Nodes", "SoftAperture"]
 
 # Choice. The soft edge reaches at most this far beyond the aperture, in radii.
 EDGE_REACH = 0.25
+LEAST_RIPPLE = 1e-13  # choice: of a soft edge's spectrum, above float64's rounding
 
 
 class SoftAperture(ABC):
@@ -135,7 +136,7 @@ class Aperture(ABC):
             ValueError: passband negative, ripple outside [1e-13, 0.5], or widest_reach not positive.
         """
         in_range("passband", passband, 0.0, LARGEST)
-        in_range("ripple", ripple, 1e-13, 0.5)
+        in_range("ripple", ripple, LEAST_RIPPLE, 0.5)
         positive("widest_reach", widest_reach, "pupil radii")
         return self._softened(SoftEdge.cheapest(passband, ripple, widest_reach, self.half_widths))
 

@@ -4,6 +4,7 @@ source            PointSource
 pupil             Pupil: aperture, relief, ideal lens
 relief            Relief, HeightMap, BSplineRelief
 pixel_relief      PixelRelief: steps
+fine_detail       which frequencies samples hold
 square_samples    the numbers of reliefs, masks and wavefronts, as users give them
 wavefront         Zernike, WavefrontMap
 transmittance     GaussianMask, MaskMap

@@ -9,7 +9,7 @@ import numpy as np
 
 from optics.elements.pupil import Pupil
 from optics.elements.wavefront import Zernike, mode
-from optics.numerics.arguments import positive, vacuum_wavelength, whole
+from optics.numerics.arguments import complexes, is_sized, positive, shown, vacuum_wavelength, whole
 
 __all__ = ["ExitPupil", "read_exit_pupil"]
 
@@ -73,14 +73,17 @@ def read_exit_pupil(
 def _of_rays(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Places on the plane that touches the reference sphere at the chief ray, how far the wave is ahead there, and the
     sphere's radius: a point of the sphere lies in the direction of the plane's R tan θ."""
-    places = np.stack([_flat(getattr(system, name)) for name in ("pupil_x", "pupil_y", "pupil_z")]) * MM
-    intensity = _flat(getattr(system, "intensity", np.ones(places.shape[1])))
-    ahead = _flat(system.opd) * wavelength  # theirs is the chief ray's path less the ray's: positive is ahead
-    lit = np.isfinite(places).all(axis=0) & np.isfinite(ahead) & (intensity > LIT * np.nanmax(intensity))
+    x, y, z, opd, intensity = _alike(system)
+    places = np.stack([x, y, z]) * MM
+    ahead = opd * wavelength  # theirs is the chief ray's path less the ray's: positive is ahead
+    light = np.nan_to_num(intensity)
+    lit = np.isfinite(places).all(axis=0) & np.isfinite(ahead) & (light > LIT * light.max(initial=0.0))
+    if not lit.any():
+        raise ValueError("intensity: no ray has light and a finite place and path: some must")
     places, ahead = places[:, lit], ahead[lit]
-    radius = abs(float(_flat(system.radius)[0])) * MM
+    radius = abs(_one("radius", system.radius)) * MM
     given = getattr(system, "reference_center", None)
-    centre = _centre(places, radius) if given is None else np.array([float(_flat(at)[0]) for at in given]) * MM
+    centre = _centre(places, radius) if given is None else _point("reference_center", given) * MM
     away = places - centre[:, None]
     axis = away.mean(axis=1)
     axis /= np.linalg.norm(axis)
@@ -88,6 +91,17 @@ def _of_rays(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np
     across /= np.linalg.norm(across)
     along = away / np.abs(axis @ away) * radius
     return across @ along, np.cross(axis * np.sign(axis[2]), across) @ along, ahead, radius
+
+
+def _alike(system: Any) -> list[np.ndarray]:
+    """pupil_x, pupil_y, pupil_z, opd and intensity (1 where there is none) of every ray."""
+    found = {name: _flat(name, getattr(system, name)) for name in ("pupil_x", "pupil_y", "pupil_z", "opd")}
+    rays = len(found["pupil_x"])
+    found["intensity"] = _flat("intensity", getattr(system, "intensity", np.ones(rays)))
+    for name, values in found.items():
+        if len(values) != rays:
+            raise ValueError(f"{name} has {len(values)} numbers: must have one for each ray, {rays} as pupil_x")
+    return list(found.values())
 
 
 def _centre(places: np.ndarray, radius: float) -> np.ndarray:
@@ -101,12 +115,15 @@ def _centre(places: np.ndarray, radius: float) -> np.ndarray:
 
 def _of_samples(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places [m] on the pupil's plane, and how far the wave is ahead there: the negative of its phase."""
-    data, pitch = np.asarray(system.data), positive("dx", float(system.dx)) * MM
-    if data.ndim != 2 or not np.isfinite(data).all():
+    data, own = complexes("data", system.data), _one("wavelength", system.wavelength)
+    pitch = positive("dx", _one("dx", system.dx), "mm") * MM
+    if data.ndim != 2 or data.size == 0 or not np.isfinite(data).all():
         raise ValueError(f"data has shape {data.shape}: must be a plane of finite complex numbers")
-    if not np.isclose(float(system.wavelength) * UM, wavelength, rtol=1e-6):
-        raise ValueError(f"wavelength = {wavelength:g} m: the object's is {float(system.wavelength):g} µm")
+    if not np.isclose(own * UM, wavelength, rtol=1e-6):
+        raise ValueError(f"wavelength = {wavelength:g} m: the object's is {own:g} µm")
     lit = np.abs(data) > np.sqrt(LIT) * np.abs(data).max()
+    if not lit.any():
+        raise ValueError("data is dark everywhere: must hold the pupil's light")
     y, x = ((np.arange(n) - n // 2) * pitch for n in data.shape)
     rows, columns = np.nonzero(lit)
     _check_even(np.abs(data), x, y, (rows, columns))
@@ -153,7 +170,25 @@ def _fitted(x: np.ndarray, y: np.ndarray, ahead: np.ndarray, distance: float, me
     return ExitPupil(pupil, distance, rms, residual)
 
 
-def _flat(values: Any) -> np.ndarray:
+def _flat(name: str, values: Any) -> np.ndarray:
     """Of NumPy, or of a tensor that can be turned into it."""
     plain = values.detach().cpu().numpy() if hasattr(values, "detach") else values
-    return np.atleast_1d(np.asarray(plain, dtype=np.float64)).ravel()
+    try:
+        return np.atleast_1d(np.asarray(plain, dtype=np.float64)).ravel()
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {shown(values)}: must be real numbers") from None
+
+
+def _one(name: str, value: Any) -> float:
+    """A number, or the first of several, in the other program's unit."""
+    found = _flat(name, value)
+    if value is None or found.size == 0 or not abs(found[0]) > 0 or not np.isfinite(found[0]):
+        raise ValueError(f"{name} = {shown(value)}: must be a finite number that is not 0")
+    return float(found[0])
+
+
+def _point(name: str, given: Any) -> np.ndarray:
+    found = np.concatenate([_flat(name, at)[:1] for at in given]) if is_sized(given) and len(given) else np.empty(0)
+    if len(found) != 3 or not np.isfinite(found).all():
+        raise ValueError(f"{name} = {shown(given)}: must be three finite lengths (x, y, z)")
+    return found

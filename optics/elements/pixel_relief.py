@@ -56,6 +56,10 @@ class PixelRelief(Relief):
         """Jumps have no end of frequencies."""
         return 0.0 if self._level else math.inf
 
+    def detail(self, level: float) -> float:
+        """All of it is in `scatter`."""
+        return 0.0
+
     def scatter(self, turns: float, opening: Aperture, share: float) -> float:
         """Spatial frequency [cycles per aperture radius] along x and y beyond which no more than this share of the
         light goes that fills the opening, `turns` [1/m] waves per height: that of a transform over the pixels, sinc² of

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -122,17 +123,17 @@ class Pupil:
     @property
     def transmission(self) -> Scalar:
         """Share of the light on the open aperture that the mask lets through, with derivatives; 1 without a mask."""
-        return self._let_through() if self._transmission is None else self._transmission
+        # A graph serves one backward pass; and who holds Dr.Jit's numbers may ask for a derivative at any time.
+        if is_differentiable(self.aperture_radius) or not (self.mask is None or self.mask.plain):
+            import drjit as dr
+
+            found = self._let_through()
+            return found if dr.grad_enabled(found) else number(found)
+        return self._transmission
 
     @cached_property
-    def _transmission(self) -> float | None:
-        """None where the mask asks for a derivative: its graph serves one backward pass."""
-        found = self._let_through()
-        if isinstance(found, float):
-            return found
-        import drjit as dr
-
-        return None if dr.grad_enabled(found) else number(found)
+    def _transmission(self) -> float:
+        return number(self._let_through())
 
     def _let_through(self) -> Scalar:
         if self.mask is None:
@@ -256,12 +257,19 @@ class Pupil:
         return {}
 
     def scatter(self, wavelength: float, share: float) -> float:
-        """Spatial frequency [1/m] along x and y beyond which the jumps of a relief of pixels send no more than this
-        share of the light; 0 for a smooth one, which bends it (`slopes`)."""
-        if not isinstance(self.height, PixelRelief) or not self.bends(wavelength):
-            return 0.0
-        turns = number(self.index_step(wavelength)) / wavelength
-        return self.height.scatter(turns, self.aperture, share) / self.radius
+        """Spatial frequency [1/m] along x and y by which light leaves its rays, but for this share: by a relief's
+        jumps, a mask, and ripples, which send none further than their slopes and own frequency do (Carson's rule)."""
+        bends, found = self.bends(wavelength), 0.0
+        each = share / max(1, bends + (self.wavefront is not None) + (self.mask is not None))
+        turns, level = number(self.index_step(wavelength)) / wavelength, math.sqrt(each) / (2 * math.pi)  # waves
+        if bends and isinstance(self.height, PixelRelief):
+            found += self.height.scatter(turns, self.aperture, each) / self.radius
+        elif bends and turns != 0:
+            found += self.height.detail(level / abs(turns)) / self.radius
+        if self.wavefront is not None:
+            own = self.radius if self.wavefront.radius is None else self.wavefront.radius
+            found += self.wavefront.detail(level * wavelength, self.radius / own) / own
+        return found if self.mask is None else found + self.mask.detail(each, self.radius)
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
         """Spatial frequency [1/m] above which relief and wavefront change the phase by less than `tolerance` rad,

@@ -6,12 +6,14 @@ Row index and y grow together, as do column index and x.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
+from optics.elements.fine_detail import band_of, power_beyond, reach_of
 from optics.elements.square_samples import on_both_sides, square_samples
 from optics.numerics.arguments import finite, positive, reals
 from optics.numerics.autodiff import Array, is_differentiable, plain
@@ -34,6 +36,11 @@ class Relief(ABC):
     @abstractmethod
     def bandwidth(self, level: float) -> float:
         """Spatial frequency [cycles per aperture radius] above which the relief's content is below `level` [m]."""
+
+    def detail(self, level: float) -> float:
+        """Spatial frequency [cycles per aperture radius] along x and y beyond which what slopes do not tell of the
+        relief is below `level` [m], root mean square."""
+        return self.bandwidth(level)
 
     @property
     @abstractmethod
@@ -131,6 +138,9 @@ class BSplineRelief(Relief):
 
     def bandwidth(self, level: float) -> float:
         return 1.0  # a cubic polynomial: half a cycle per half width, doubled
+
+    def detail(self, level: float) -> float:
+        return 0.0
 
     @property
     def knots(self) -> int:
@@ -243,21 +253,11 @@ class HeightMap(Relief):
         return types.Index(cell) - 1, cubic_bsplines(place - cell)
 
     def bandwidth(self, level: float) -> float:
-        """From the samples' spectrum. A cubic spline repeats content of frequency f around multiples of the sampling
-        rate, weaker by the fourth power of the frequencies' ratio."""
-        n = len(self._heights)
-        if n < 4:
-            return 1.0
-        window = np.hanning(n + 2)[1:-1]
-        residue = self._heights - _plane(self._heights)
-        spectrum = np.abs(np.fft.fft2(residue * window[:, None] * window)) / n
-        frequency = np.abs(np.fft.fftfreq(n, 2 / n))
-        radial = np.maximum(frequency[:, None], frequency[None, :])
-        order = np.argsort(radial, axis=None)[::-1]
-        power = np.cumsum((spectrum.ravel()[order] / n) ** 2)
-        reached = radial.ravel()[order][int(np.searchsorted(power, level**2).clip(max=power.size - 1))]
-        images = (np.sum((spectrum / n * radial**4) ** 2) / level**2) ** 0.125
-        return float(max(1.0, reached, images if images > n / 2 - reached else 0.0))
+        return band_of(self._heights, level)
+
+    def detail(self, level: float, part: float = 1.0) -> float:
+        """part: half the side of the square in the middle that counts: then the frequency's own unit."""
+        return reach_of(_power_beyond(self, min(part, 1.0)), level)
 
     @property
     def knots(self) -> int:
@@ -293,8 +293,8 @@ def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
     return np.concatenate([before, core, after])
 
 
-def _plane(samples: np.ndarray) -> np.ndarray:
-    """Least-squares plane through the samples."""
-    position = np.linspace(-1, 1, len(samples))
-    slope = position / np.sum(position**2) / len(samples)
-    return samples.mean() + (slope @ samples.sum(axis=1)) * position[:, None] + (samples.sum(axis=0) @ slope) * position
+@lru_cache(maxsize=16)
+def _power_beyond(relief: HeightMap, part: float) -> np.ndarray:
+    """Of a square in the middle; see `fine_detail.power_beyond`."""
+    n = math.ceil(part * relief.knots)
+    return power_beyond(relief._heights if part == 1 else relief.on_grid(((np.arange(n) + 0.5) * 2 / n - 1) * part))

@@ -17,6 +17,7 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 __all__ = ["GaussianMask", "Mask", "MaskMap"]
 
 OVERSHOOT = 0.02  # choice: by which the spline may leave [-1, 1]
+MEAN_OVER = 64  # choice: points across a pupil for the mean of what is let through
 FINER = 4  # choice: steps per sample at which that is looked at
 
 
@@ -31,6 +32,11 @@ class Mask(ABC):
     def bandwidth(self, level: float, radius: float) -> float:
         """Spatial frequency [1/m] above which its content is below `level`."""
 
+    def detail(self, share: float, radius: float) -> float:
+        """Spatial frequency [1/m] along x and y beyond which it sends no more than this share of the light that it lets
+        through a pupil of this radius [m]."""
+        return self.bandwidth(math.sqrt(share), radius)
+
     @property
     def rotationally_symmetric(self) -> bool:
         """Whether it depends on the distance from the axis alone, under any change that is asked about."""
@@ -40,6 +46,11 @@ class Mask(ABC):
     def radius(self) -> float | None:
         """[m], of what it is known over; None: the pupil's, or everywhere."""
         return None
+
+    @property
+    def plain(self) -> bool:
+        """Whether its numbers are plain ones, of which nobody can ask for a derivative."""
+        return False
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +77,17 @@ class GaussianMask(Mask):
         """Its spectrum is exp(-π²w²f²)."""
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
 
+    def detail(self, share: float, radius: float) -> float:
+        """Of the light exp(-2π²w²f²) goes beyond f."""
+        return math.sqrt(max(-math.log(share), 0.0) / 2) / (math.pi * number(self.waist))
+
     @property
     def rotationally_symmetric(self) -> bool:
         return True
+
+    @property
+    def plain(self) -> bool:
+        return not is_differentiable(self.waist)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +142,13 @@ class MaskMap(Mask):
     def bandwidth(self, level: float, radius: float) -> float:
         return self._map.bandwidth(level) / (radius if self.reach is None else self.reach)
 
+    def detail(self, share: float, radius: float) -> float:
+        part = 1.0 if self.reach is None else min(radius / self.reach, 1.0)
+        at = (np.arange(MEAN_OVER) + 0.5) * 2 / MEAN_OVER - 1
+        inside = np.hypot(at, at[:, None]) <= 1
+        passed = np.square(self._map.on_grid(at * part))[inside].mean()
+        return self._map.detail(math.sqrt(share * passed), part) / radius
+
     @property
     def rotationally_symmetric(self) -> bool:
         return self._map.rotationally_symmetric
@@ -130,3 +156,7 @@ class MaskMap(Mask):
     @property
     def radius(self) -> float | None:
         return self.reach
+
+    @property
+    def plain(self) -> bool:
+        return not is_differentiable(self.samples)

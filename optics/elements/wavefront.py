@@ -41,6 +41,11 @@ class Aberration(ABC):
     def bandwidth(self, level: float) -> float:
         """Spatial frequency [cycles per radius] above which its content is below `level` [m]."""
 
+    def detail(self, level: float, part: float = 1.0) -> float:
+        """Spatial frequency [cycles per radius] along x and y beyond which what slopes do not tell of it is below
+        `level` [m], root mean square, over a pupil whose radius is this part of the wavefront's."""
+        return self.bandwidth(level)
+
     @property
     @abstractmethod
     def knots(self) -> int:
@@ -118,6 +123,10 @@ class Zernike(Aberration):
     def bandwidth(self, level: float) -> float:
         return max(1.0, self.order / 2) if self.span > level or self.asks else 0.0
 
+    def detail(self, level: float, part: float = 1.0) -> float:
+        """A mode turns by n/2 cycles, and at the rim its slopes, which grow with n², tell of more."""
+        return 0.0
+
     @property
     def knots(self) -> int:
         return max(1, self.order)
@@ -183,6 +192,9 @@ class WavefrontMap(Aberration):
 
     def bandwidth(self, level: float) -> float:
         return self._map.bandwidth(level)
+
+    def detail(self, level: float, part: float = 1.0) -> float:
+        return self._map.detail(level, part) / min(part, 1.0)
 
     @property
     def knots(self) -> int:

@@ -49,7 +49,9 @@ def choose_bands(
             return chosen
         coarse = chosen.white_light(kernels(chosen.wavelengths)) if coarse is None else coarse
         fine = finer.white_light(kernels(finer.wavelengths))
-        total += worst_difference([(1, coarse), (-1, fine)], samples_per_receptor)
+        worst = worst_difference([(1, coarse), (-1, fine)], samples_per_receptor)
+        # Masks and waveguides leave less of white than 1.
+        total += worst / float(fine.sum(axis=(1, 2)).mean()) if worst > 0 else 0.0
         if total <= tolerance:
             return chosen
         coarse = fine

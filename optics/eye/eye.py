@@ -250,8 +250,8 @@ class Eye:
             place = aside + right * half_field[0], below + down * half_field[1]
             return with_centre(receptor_kernel(self, self._retina(s), distance, place, from_cell))
 
-        counts, averaged = (depth_layers, field_zones), self.waveguide is None
-        return prepare(kernel_at, self.resolution, s, z, counts, within, averaged=averaged)
+        counts, white = (depth_layers, field_zones), number(self.white_signal) / number(self.aperture_throughput)
+        return prepare(kernel_at, self.resolution, s, z, counts, within, averaged=self.waveguide is None, white=white)
 
     def see(
         self,

@@ -116,10 +116,11 @@ def prepare(
     tolerance: float,
     *,
     averaged: bool = True,
+    white: float = 1.0,
 ) -> KernelBank:
     """Choose how many kernels, and make them. kernel_at(z, right, down): positions in the field from -1 to 1 at the
     retina's edges; counts of depth layers and of zones across the longer side, or "auto". averaged: whether a
-    receptor's signal is the mean over its cells."""
+    receptor's signal is the mean over its cells; white: what they leave of white's."""
     s, depths = samples_per_receptor, _Range.of(z)
     layers, zones = (
         None if isinstance(count, str) and count == "auto" else whole(name, count, 1, MOST_NODES)
@@ -127,22 +128,29 @@ def prepare(
     )
     mean = s if averaged else 1
     by_depth = [(n,) for n in DEPTH_COUNTS]
-    along = NodeChoice("depth", lambda at: kernel_at(depths.distance(at[0]), 0.0, 0.0), by_depth, mean)
+    along = NodeChoice("depth", lambda at: kernel_at(depths.distance(at[0]), 0.0, 0.0), by_depth, mean, white)
     by_place = [_grid(n, resolution) for n in FIELD_COUNTS]
-    across = NodeChoice("field", lambda at: kernel_at(depths.distance(0), at[1], at[0]), by_place, mean)
+    across = NodeChoice("field", lambda at: kernel_at(depths.distance(0), at[1], at[0]), by_place, mean, white)
     if depths.only is not None:
-        depth = Choice("depth", (1,), 0.0, "all at one distance")
+        depth: Choice | None = Choice("depth", (1,), 0.0, "all at one distance")
     else:
-        depth = _chosen(along, None if layers is None else (layers,), tolerance)
-    wide = _chosen(across, None if zones is None else _grid(zones, resolution), tolerance)
-    deep, down, right = (nodes(n) for n in (*depth.counts, *wide.counts))
+        depth = None if layers is None else Choice("depth", (layers,), None, "as asked")
+    wide = None if zones is None else Choice("field", _grid(zones, resolution), None, "as asked")
+    choices = _choices((along, across), (depth, wide), tolerance)
+    deep, down, right = (nodes(n) for choice in choices for n in choice.counts)
     places = itertools.product(range(len(deep)), range(len(down)), range(len(right)))
     kernels = {(i, j, k): kernel_at(depths.distance(deep[i]), right[k], down[j]) for i, j, k in places}
-    return KernelBank(depths.vergence, (resolution[0] * s / 2, resolution[1] * s / 2), kernels, (depth, wide), averaged)
+    return KernelBank(depths.vergence, (resolution[0] * s / 2, resolution[1] * s / 2), kernels, choices, averaged)
 
 
-def _chosen(stage: NodeChoice, asked: tuple[int, ...] | None, tolerance: float) -> Choice:
-    return stage.choose(tolerance) if asked is None else Choice(stage.stage, asked, None, "as asked")
+def _choices(
+    stages: tuple[NodeChoice, NodeChoice], asked: tuple[Choice | None, Choice | None], tolerance: float
+) -> tuple[Choice, Choice]:
+    """Depth's and the field's. Where both are to be chosen, depth may err by half of the tolerance, and the field by
+    what is left: at a corner, between two depths, errors add up."""
+    depth = asked[0] or stages[0].choose(tolerance, tolerance / 2 if asked[1] is None else None)
+    wide = asked[1] or stages[1].choose(tolerance, tolerance - depth.predicted_error if depth.predicted_error else None)
+    return depth, wide
 
 
 def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:

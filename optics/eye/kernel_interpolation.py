@@ -64,33 +64,36 @@ def _places(axes: Iterable[np.ndarray]) -> list[Place]:
 class NodeChoice:
     """One stage: how many nodes along each of its axes.
 
-    kernel_at: the kernel at a place in [-1, 1]^axes. candidates: node counts to try, from the fewest on.
+    kernel_at: the kernel at a place in [-1, 1]^axes. candidates: node counts to try, from the fewest on. white: what
+    kernels leave of the signal of white, by which errors are told: less than 1 behind masks, and of waveguides.
     """
 
     stage: str
     kernel_at: Callable[[Place], Array]
     candidates: Sequence[tuple[int, ...]]
     samples_per_receptor: int
+    white: float = 1.0
     known: dict[Place, np.ndarray] = field(default_factory=dict)
 
-    def choose(self, tolerance: float) -> Choice:
-        """The first candidate whose predicted error is within the tolerance.
+    def choose(self, tolerance: float, most: float | None = None) -> Choice:
+        """The first candidate whose predicted error is within the tolerance, or the part of it that may be used.
 
         Raises:
             AccuracyError: the last is not.
         """
-        error = math.inf
+        error, own = math.inf, "" if most is None else f"{most:.2g} of "
         for counts in self.candidates:
             error = CAUTION * self.error(counts)
-            if error <= tolerance:
-                return Choice(self.stage, counts, error, f"fewest within the tolerance of {tolerance:g}")
+            if error <= (tolerance if most is None else most):
+                return Choice(self.stage, counts, error, f"fewest within {own}the tolerance of {tolerance:g}")
         raise AccuracyError(
-            f"tolerance = {tolerance:g}: {' x '.join(map(str, self.candidates[-1]))} {self.stage} nodes leave "
-            f"{error:.1e} of white's signal; widen the tolerance or give a number of nodes"
+            f"tolerance = {tolerance:g}{f', {own}it for these' if own else ''}: "
+            f"{' x '.join(map(str, self.candidates[-1]))} {self.stage} nodes leave {error:.1e} of white's signal; "
+            "widen the tolerance or give a number of nodes"
         )
 
     def error(self, counts: tuple[int, ...]) -> float:
-        """Worst signal error, at `checks`, of what is interpolated between so many nodes."""
+        """Worst signal error, at `checks`, of what is interpolated between so many nodes, in units of white's."""
         coarse = _places(nodes(n) for n in counts)
         worst = 0.0
         for place in checks(counts):
@@ -98,7 +101,7 @@ class NodeChoice:
             shares = [math.prod(map(float, share)) for share in itertools.product(*by_axis)]
             between = [(s, self._kernel(node)) for s, node in zip(shares, coarse, strict=True) if s > 0]
             worst = max(worst, worst_difference([*between, (-1, self._kernel(place))], self.samples_per_receptor))
-        return worst
+        return worst / self.white if worst > 0 else 0.0
 
     def _kernel(self, place: Place) -> np.ndarray:
         if place not in self.known:

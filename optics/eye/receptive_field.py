@@ -18,7 +18,7 @@ from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
 from optics.numerics.matrices import matmul
-from optics.numerics.precision import precision
+from optics.numerics.precision import padded_for_packets, precision
 from optics.point_spread.pictures import pictures
 from optics.point_spread.psf_result import PSFResult, spread
 from optics.point_spread.request import Request
@@ -179,15 +179,18 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
     """What of a retina the light of one wavelength needs; centre: its geometric image (x, y) [m].
 
     The window may lose a share of the light, the tolerance: half of that as rays that end outside it, half as what the
-    pupil's edge diffracts off them. Diffraction adds frequencies, and frequencies are sines over λ: from a ray's end
-    the sine goes on by λ times the edge's frequencies, and z tan θ says where that lands.
+    pupil's edge diffracts off them. What masks, pixels and fine detail diffract has half of the rays' share.
+    Diffraction adds frequencies, and frequencies are sines over λ: from a ray's end the sine goes on by λ times these
+    frequencies, and z tan θ says where that lands.
     """
     pupil, z, radius = beam.pupil, number(retina.distance), beam.pupil.radius
     wavelength = beam.wavelength / beam.index
-    # Pixels send light off its direction, too, and lose as much beyond what is counted.
-    diffracted = _beyond_edge(pupil, retina.tolerance / 2) + pupil.scatter(beam.wavelength, retina.tolerance / 4)
+    scattered = pupil.scatter(beam.wavelength, retina.tolerance / 4)
+    diffracted = _beyond_edge(pupil, retina.tolerance / 2) + scattered
     half = WIDEST_TANGENT * z + radius
-    shadow = _shadow(beam, retina, centre)
+    # Through a mask may go the rays that end farthest off, and no others.
+    share = retina.tolerance * number(pupil.transmission) / (4 if scattered else 2)
+    shadow = _half_side(pupil.slopes(beam.wavelength, beam.source), (z, beam.index), centre, 1 - share)
     if math.isfinite(shadow):
         off_axis = max(abs(at) for at in centre)
         outermost = off_axis + shadow
@@ -200,16 +203,10 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
     return _WindowNeeds(half, 1 / (samples_per_cycle(retina.tolerance) * detail), band, shadow)
 
 
-def _shadow(beam: Beam, retina: Retina, centre: tuple[float, float]) -> float:
-    """Half side [m] of the square about `centre` in which all rays end, but for half the tolerance."""
-    slopes = beam.pupil.slopes(beam.wavelength, beam.source)
-    return _half_side(slopes, (number(retina.distance), beam.index), centre, 1 - retina.tolerance / 2)
-
-
 @lru_cache(maxsize=64)
 def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float, float], share: float) -> float:
-    """The same of a share of the rays; behind: distance [m] and index. Wavelengths have the same slopes where glass
-    does not disperse."""
+    """Half side [m] of the square about `centre` in which a share of the rays end; behind: distance [m] and index.
+    Wavelengths have the same slopes where glass does not disperse."""
     x, y = slopes.rays(*behind)
     farthest = np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1]))
     return float(np.quantile(farthest, share, method="higher"))
@@ -219,10 +216,25 @@ def _beyond_edge(pupil: Pupil, share: float) -> float:
     """Frequency δ [1/m] off its geometric direction beyond which an aperture's hard edge sends a share of the light.
 
     A straight edge has 1/(2π²f) of |its spectrum|² per length beyond the frequency f, an aperture of perimeter P and
-    area A thus P/(2π²Aδ) of its light: of a disk 1/(π²Rδ), as Airy's pattern has (Born & Wolf, §8.5.2).
+    area A thus P/(2π²Aδ) of its light: of a disk 1/(π²Rδ), as Airy's pattern has (Born & Wolf, §8.5.2). A mask that is
+    brighter at the edge than it is on average makes it more.
     """
     opening = pupil.aperture
-    return opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * share)
+    return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * share)
+
+
+@lru_cache(maxsize=64)
+def _rim(pupil: Pupil) -> float:
+    """How much brighter the light is along the edge than on average: 1 without a mask, and where it is darker there,
+    since it may rise steeply from it."""
+    import drjit as dr
+
+    if pupil.mask is None or number(pupil.transmission) == 0:
+        return 1.0
+    types, (x, y) = precision("float64"), pupil.aperture.outline.points().T
+    with dr.suspend_grad():
+        along = pupil.amplitude(types.Float64(padded_for_packets(x)), types.Float64(padded_for_packets(y)), types)
+    return max(1.0, float(np.square(along.numpy()).mean()) / number(pupil.transmission))
 
 
 def _cells_within(half: float, cell: float) -> int:

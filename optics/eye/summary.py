@@ -71,7 +71,9 @@ class DescribedEye(Protocol):
 class Description:
     """An eye's limits in white daylight, near its axis. Frequencies [cycles/degree] across the visual field.
 
-    relative_aperture: a; throughput: a²; f_number: f/2R. wavelength: daylight's mean by the receptors' weights [m].
+    relative_aperture: a; throughput: a². f_number: f/2R, f by which receptors see angles, n₀/n of the way to the
+        retina: the image's brightness goes with its inverse square. wavelength: daylight's mean by the receptors'
+        weights [m].
     diffraction_cpd: cut-off of an aperture this wide, 2 sin θ/λ on the retina. sampling_cpd: Nyquist frequency of the
         receptors, 1/(2 Δφ). noise_cpd: where the contrast that the optics leave first sinks below the noise.
     acuity_cpd: the least of the three; binding: which.
@@ -174,7 +176,7 @@ def describe(eye: DescribedEye, z: Scalar) -> Description:
         relative_aperture=number(eye.relative_aperture),
         throughput=number(eye.throughput),
         white_signal=light,
-        f_number=number(eye.retina_distance) / (2 * result.pupil.radius),
+        f_number=distance / (2 * result.pupil.radius),
         wavelength=wavelength,
         diffraction_cpd=diffraction * per_degree,
         sampling_cpd=per_degree / (2 * eye.receptor_pitch),

@@ -101,13 +101,14 @@ class PinholeSampling:
         types = precision(problem.dtype)
         zero = types.Float64(0)
         x, y, propagates = _landings(beam, zero, zero, types)
-        if dr.grad_enabled(x, y) or is_differentiable(beam.radius):
+        passed = beam.pupil.transmission
+        if dr.grad_enabled(x, y, passed) or is_differentiable(beam.radius):
             raise ValueError("method = 'pinhole': has no derivatives; ask for 'geometric' or a wave method")
         window = problem.window
         column, row = (round((float(at[0]) - first) / window.dx) for at, first in ((x, window.x[0]), (y, window.y[0])))
         image = np.zeros(window.shape, dtype=types.dtype)
         if 0 <= row < window.shape[0] and 0 <= column < window.shape[1] and bool(propagates[0]):
-            image[row, column] = beam.pupil.area * number(beam.pupil.transmission) / window.dx**2
+            image[row, column] = beam.pupil.area * number(passed) / window.dx**2
         return types.Float(padded_for_packets(image))
 
     def plane(self, problem: Problem) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
+from optics.methods.pupil_sampling import MOST_ACROSS
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import PUPIL_SAMPLE
 from optics.numerics.field import Field
@@ -114,7 +115,8 @@ def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]
 
 
 def sine_samples(problem: Problem) -> SineSamples | None:
-    """As few as the turns of pupil and path together allow; None where sines crowd too much towards the rim.
+    """As few as the turns of pupil and path together allow; None where sines crowd too much towards the rim, or the
+    grid would be too large.
 
     The map from sines to the pupil stretches by z/cos³θ at most, and turns per sine are as many times those per metre.
     """
@@ -129,5 +131,7 @@ def sine_samples(problem: Problem) -> SineSamples | None:
         return None
     pitch = 1 / (stretch * problem.distance * (problem.turning + edge.stopband))
     half = max(float(np.abs(at - middle_at).max()) for at, middle_at in zip(rim, middle, strict=True))
+    if half / pitch > MOST_ACROSS:
+        return None
     grid = Grid.square(2 * math.ceil(half / pitch) + 1, pitch)
     return SineSamples(edge, grid, centre, problem.distance, steepest)

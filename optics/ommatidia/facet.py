@@ -24,7 +24,8 @@ class FacetLens:
 
     diameter: [m], of a hexagon between opposite sides. radius_front, radius_back: of curvature [m], positive where the
         centre lies behind the surface: a lens that bulges to both sides has a negative back. thickness: [m].
-    n: of the lens. object_n: of what is before it; medium_n: of the cone behind it; numbers or curves.
+    n: of the lens. object_n: of what is before it; medium_n: of the cone behind it; numbers or curves. Foci of colours
+        lie apart where `Ommatidium` holds the lens; its `pupil` has one for all.
     shape: "hexagon", with corners along y, or "circle".
 
     Raises:
@@ -75,14 +76,14 @@ class FacetLens:
         second = thickness - self._index("medium_n", wavelength) * thickness * front / (n * power)
         return first, second
 
-    def pupil(self, **others: Any) -> Pupil:
-        """In the principal planes: the facet with an ideal lens of the focal length at 550 nm. others: of `Pupil`, as a
-        wavefront for the lens' aberrations."""
+    def pupil(self, wavelength: float = MIDDLE, **others: Any) -> Pupil:
+        """In the principal planes: the facet with an ideal lens, of this lens' focal length at one wavelength [m] for
+        light of all. others: of `Pupil`, as a wavefront for the lens' aberrations."""
         corners = 2 / math.sqrt(3) if self.shape == "hexagon" else 1.0
         return Pupil(
             corners * self.diameter / 2,
             aperture=self._opening(),
-            thin_lens_focal_length=self.focal_length(),
+            thin_lens_focal_length=self.focal_length(wavelength),
             medium_n=self.medium_n,
             object_n=self.object_n,
             **others,

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.elements.pupil import Pupil
+from optics.elements.pupil import MIDDLE, Pupil
 from optics.elements.source import PointSource
 from optics.numerics.arguments import in_range, of_kind, positive, reals, vacuum_wavelength
 from optics.ommatidia.coupling import ModesAtPupil, modes_at_pupil
@@ -28,7 +28,8 @@ class Ommatidium:
     """A lens and the waveguide on its axis.
 
     lens: a FacetLens, or any Pupil. rhabdom: the waveguide. distance: [m] from the lens' (second principal) plane to
-        the rhabdom's end; None: the lens' focus at 550 nm.
+        the rhabdom's end; None: the lens' focus. Both are those at 550 nm. The rhabdom stays there, and light of other
+        wavelengths is in focus where a FacetLens of curves has it.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -47,7 +48,20 @@ class Ommatidium:
 
     @property
     def pupil(self) -> Pupil:
+        """Of a FacetLens that at 550 nm."""
         return self.lens.pupil() if isinstance(self.lens, FacetLens) else self.lens
+
+    def _beam(self, wavelength: float) -> Beam:
+        """Light from straight ahead at a vacuum wavelength [m], to the rhabdom's end.
+
+        Raises:
+            ValueError: the lens' principal plane lies behind that end.
+        """
+        if not isinstance(self.lens, FacetLens):
+            return Beam(self.lens, PointSource(), wavelength, self._distance())
+        here, there = (self.lens.principal_planes(at)[1] for at in (MIDDLE, wavelength))
+        distance = positive("distance", self._distance() + here - there)
+        return Beam(self.lens.pupil(wavelength), PointSource(), wavelength, distance)
 
     def modes(self, wavelength: float = 500e-9) -> tuple[Mode, ...]:
         """What the rhabdom guides at a vacuum wavelength [m]: see `Waveguide.modes`."""
@@ -55,7 +69,7 @@ class Ommatidium:
 
     def mode_power(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
         """Share of the light on the facet that each mode takes, (mode, ...), of a point far away at these angles [rad]
-        along x and y off the axis.
+        along the lens' x and y off the axis. It sends its light the other way: as `PointSource`'s, their negatives.
 
         Raises:
             ValueError: an angle whose sine is above 0.5, angles of different shapes, or the rhabdom guides nothing.
@@ -69,7 +83,7 @@ class Ommatidium:
             in_range(f"abs({name})", float(np.abs(value).max(initial=0.0)), 0.0, math.asin(STEEPEST[-1]))
         tx, ty = np.tan(x), np.tan(y)
         norm = np.sqrt(1 + tx * tx + ty * ty)
-        sines = tx / norm, ty / norm
+        sines = -tx / norm, -ty / norm
         steepest = float(np.hypot(*sines).max(initial=0.0))
         wide = next((limit for limit in STEEPEST if limit >= steepest), 1.0)
         found = _coupled(self, vacuum_wavelength(wavelength), wide).power(*sines)
@@ -129,7 +143,7 @@ def _coupled(eye: Ommatidium, wavelength: float, steepest: float) -> ModesAtPupi
     modes = eye.modes(wavelength)
     if not modes:
         raise ValueError(f"rhabdom: guides nothing at {wavelength:g} m; must be wider, or of a higher index")
-    return modes_at_pupil(Beam(eye.pupil, PointSource(), wavelength, eye._distance()), modes, steepest)
+    return modes_at_pupil(eye._beam(wavelength), modes, steepest)
 
 
 def snyder_acceptance(diameter: float, focal_length: float, rhabdom: float, wavelength: float) -> float:

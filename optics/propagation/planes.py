@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optics.apertures.aperture import EDGE_REACH, SoftAperture
+from optics.apertures.aperture import EDGE_REACH, LEAST_RIPPLE, SoftAperture
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
@@ -66,6 +66,11 @@ class StepSettings:
     @property
     def ripple(self) -> float:
         return WRAP_RIPPLE_PER_TOLERANCE * self.tolerance
+
+    @property
+    def edge_ripple(self) -> float:
+        """The same of soft edges, which rounding keeps from less."""
+        return max(self.ripple, LEAST_RIPPLE)
 
     def reaching(self, half_widths: float, distance: float) -> float:
         """Highest frequency [1/m] that `propagate` keeps between planes whose half widths add up to so much, its fade
@@ -125,11 +130,11 @@ class PupilSampling:
                 "elements: a PixelRelief jumps, which the grids between planes cannot carry: use psf for one"
             )
         slope = SLOPE_MARGIN * pupil.slopes(settings.wavelength, source).steepest / settings.wavelength
-        turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.ripple)
+        turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.edge_ripple)
         band = settings.reaching(stop.half_width + following.half_width, following.distance)
         if math.isinf(band):
             band = turns  # seen in its own plane: an edge as soft as the light's own detail
-        soft = pupil.aperture.soften((turns + band) * pupil.radius, settings.ripple, EDGE_REACH)
+        soft = pupil.aperture.soften((turns + band) * pupil.radius, settings.edge_ripple, EDGE_REACH)
         pitch = 1 / (turns + band + soft.stopband / pupil.radius)
         across = 2 * math.ceil((1 + soft.reach) * pupil.radius / pitch) + 1
         if across > MOST_SAMPLES:

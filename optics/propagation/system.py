@@ -13,7 +13,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.refractive_index import Dispersion
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
-from optics.numerics.arguments import complexes, in_range, of_kind, positive, shown, vacuum_wavelength
+from optics.numerics.arguments import complexes, in_range, of_kind, positive, shape_2d, shown, vacuum_wavelength
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.propagation.planes import PlaneField, PupilSampling, StepSettings, Stop
@@ -135,7 +135,7 @@ def _start(
     if u is None:
         if out_dx is None or out_shape is None:
             raise ValueError("out_dx, out_shape: must be given where u is not")
-        return None, Grid(out_shape, out_dx), 1.0
+        return None, Grid(shape_2d("out_shape", out_shape), positive("out_dx", out_dx)), 1.0
     samples = complexes("u", u)
     if samples.ndim != 2 or samples.size == 0 or not np.isfinite(samples).all():
         raise ValueError(f"u has shape {samples.shape}: must be (y, x), not empty, and finite everywhere")
@@ -143,7 +143,8 @@ def _start(
         raise ValueError("dx: must be given with u")
     brightest = float(np.abs(samples).max()) or 1.0
     field = PlaneField(samples / brightest, positive("dx", dx), math.sqrt(0.5) / dx)
-    window = Grid(out_shape or (samples.shape[0], samples.shape[1]), field.dx if out_dx is None else out_dx)
+    shape = (samples.shape[0], samples.shape[1]) if out_shape is None else shape_2d("out_shape", out_shape)
+    window = Grid(shape, field.dx if out_dx is None else positive("out_dx", out_dx))
     return field, window, brightest
 
 
@@ -196,7 +197,7 @@ def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings) ->
     if last == 0:
         return 0.0
     error = sum(step.plan.predicted_error * math.sqrt(max(step.power_out / last, 1)) for step in steps)
-    edges = 8 * settings.ripple + 4 * FLOAT_NOISE[settings.dtype]
+    edges = 8 * settings.edge_ripple + 4 * FLOAT_NOISE[settings.dtype]
     error += sum(edges * math.sqrt(max(step.power_in / last, 1)) for step in steps)
     if not error <= tolerance:
         raise AccuracyError(

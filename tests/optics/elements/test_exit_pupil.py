@@ -120,6 +120,13 @@ def test_samples_of_a_phase_are_read_without_its_jumps():
     assert read.residual < 1e-3 * WAVE
 
 
+def changed(system, **others):
+    return SimpleNamespace(**(vars(system) | others))
+
+
+FOCUSED = {"focal_length": 0.1}
+
+
 @pytest.mark.parametrize(
     ("system", "more", "says"),
     [
@@ -128,6 +135,21 @@ def test_samples_of_a_phase_are_read_without_its_jumps():
         (wavefront(), {"focal_length": 0.1, "wavelength": 0.5e-6}, "the object's is 0.5876"),
         (wavefront(), {"focal_length": 0.1, "order": 0}, "order"),
         (wavefront(n=12), {"focal_length": 0.1}, "samples of the wavefront"),
+        (changed(wavefront(), data=np.zeros((9, 9), complex)), FOCUSED, "data is dark everywhere: must hold"),
+        (changed(wavefront(), data=np.zeros((0, 9))), FOCUSED, r"data has shape \(0, 9\): must be a plane"),
+        (changed(wavefront(), data="glass"), FOCUSED, "data: must be numbers, not 'glass'"),
+        (changed(wavefront(), dx=None), FOCUSED, "dx = None: must be a finite number"),
+        (changed(wavefront(), dx=0.0), FOCUSED, "dx = 0.0: must be a finite number"),
+        (changed(wavefront(), dx=-0.1), FOCUSED, "dx = -0.1: must be greater than 0"),
+        (changed(wavefront(), wavelength=None), FOCUSED, "wavelength = None: must be a finite number"),
+        (changed(traced(), pupil_y=np.ones(3)), {}, "pupil_y has 3 numbers: must have one for each ray, 533 as"),
+        (changed(traced(), opd=np.ones(3)), {}, "opd has 3 numbers: must have one for each ray"),
+        (changed(traced(), intensity=np.ones(3)), {}, "intensity has 3 numbers: must have one for each ray"),
+        (changed(traced(), intensity=0 * traced().opd), {}, "intensity: no ray has light"),
+        (changed(traced(), opd=math.nan * traced().opd), {}, "intensity: no ray has light and a finite place"),
+        (changed(traced(), opd="glass"), {}, "opd = 'glass': must be real numbers"),
+        (changed(traced(), radius=None), {}, "radius = None: must be a finite number"),
+        (changed(traced(), reference_center=(0.0, 0.0)), {}, r"reference_center = \(0.0, 0.0\): must be three"),
     ],
 )
 def test_what_cannot_be_read_is_said_in_a_line(system, more, says):

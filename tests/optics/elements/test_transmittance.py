@@ -77,6 +77,22 @@ def test_a_masks_share_has_its_derivative_each_time():
     assert found[1] == found[0]
 
 
+@pytest.mark.parametrize("of", ["waist", "samples", "radius"])
+def test_a_share_that_was_told_before_has_its_derivative_once_it_is_asked_for(of):
+    """By a plain number first, which must not be kept: ∂T/∂w against T = w²/2R² (1 - e^{-2R²/w²})."""
+    waist, radius = Float64(R / 2), Float64(R)
+    samples = TensorXf64(np.full((4, 4), 0.5))
+    mask = MaskMap(samples) if of == "samples" else GaussianMask(waist if of == "waist" else R / 2)
+    pupil = Pupil(radius if of == "radius" else R, thin_lens_focal_length=F, mask=mask)
+    known, asked = pupil.transmission, {"waist": waist, "samples": samples, "radius": radius}[of]
+    assert type(known) is float
+    dr.enable_grad(asked)
+    dr.backward(pupil.transmission)
+    by_waist = 2 / (R / 2) * (known - math.exp(-8))
+    expected = {"waist": by_waist, "samples": 1.0, "radius": -by_waist / 2}[of]
+    assert dr.grad(asked).numpy().sum() == pytest.approx(expected, rel=1e-6)
+
+
 def test_contrast_behind_a_gaussian_is_gaussian():
     """The OTF is the amplitude's autocorrelation, exp(-(λfF)²/2w²), and 1 at 0 whatever is let through."""
     waist = R / 4

@@ -32,6 +32,15 @@ def test_angles_and_light():
     assert found.wavelength == pytest.approx(550e-9)
 
 
+@pytest.mark.parametrize(("before", "behind"), [(1.0, 1.336), (1.336, 1.336), (1.33, 1.5)])
+def test_f_number_between_media_says_how_bright_the_image_is(before, behind):
+    """1/(2 (n/n₀) sin θ), paraxially: of a scene's radiance its image has π (n/n₀)² sin² θ (Born & Wolf, §4.8)."""
+    pupil = Pupil(10e-6, thin_lens_focal_length=F * behind / before, medium_n=behind, object_n=before)
+    eye = Eye(pupil, bands=1)
+    sine = math.sin(math.atan(10e-6 / eye.retina_distance))
+    assert eye.describe().f_number == pytest.approx(before / (2 * behind * sine), rel=2e-3)
+
+
 def test_diffraction_limit_is_the_apertures_width_in_wavelengths():
     """D/λ cycles per radian in small angles; exactly 2 sin θ f/λ on a flat retina."""
     found = lens(5e-6).describe()

@@ -132,3 +132,15 @@ class TestPinhole:
         dr.enable_grad(distance)
         with pytest.raises(ValueError, match=r"pinhole.*has no derivatives"):
             optics.psf(Pupil(20e-6), [WAVELENGTH], distance, source_angle=(0.1, 0.0), method="pinhole")
+
+    def test_a_masks_derivative_is_refused_as_well(self):
+        """It changes how much light there is in the cell, if not which cell."""
+        import drjit as dr
+
+        waist = Float64(10e-6)
+        pupil = Pupil(20e-6, mask=optics.GaussianMask(waist))
+        found = optics.psf(pupil, [WAVELENGTH], 240e-6, dx=2e-6, shape=(9, 9), method="pinhole")
+        assert found.power[0] == pytest.approx(pupil.transmission, rel=1e-6)
+        dr.enable_grad(waist)
+        with pytest.raises(ValueError, match=r"pinhole.*has no derivatives"):
+            optics.psf(pupil, [WAVELENGTH], 240e-6, dx=2e-6, shape=(9, 9), method="pinhole")

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from optics import Annulus, BSplineRelief, Circle, Grid, PointSource, Polygon, Pupil, Slit, Zernike
+from optics import Annulus, BSplineRelief, Circle, Grid, PointSource, Polygon, Pupil, Slit, Zernike, psf
 from optics.elements.beam import Beam
 from optics.methods import low_rank as low_rank_module
 from optics.methods.low_rank import low_rank
@@ -90,6 +90,13 @@ def test_sines_that_crowd_leave_the_pupil_to_an_even_grid():
     assert sine_samples(problem) is None
     (how,) = low_rank(problem)
     assert isinstance(how.pupil, GridSamples)
+
+
+def test_a_grid_that_no_memory_holds_is_not_made():
+    """A high mode goes on, and grows, in the soft edge beyond its circle; as rings of radii it is had all the same."""
+    bent_far = Pupil(25e-6, thin_lens_focal_length=240e-6, wavefront=Zernike({(28, 0): 0.06}))
+    assert sine_samples(Problem.of(Beam(bent_far, PointSource(), WAVE, 240e-6), Grid.square(65, 1e-6), 1e-2)) is None
+    assert psf(bent_far, [WAVE], 240e-6, dx=1e-6, shape=(65, 65), tolerance=1e-2).plan.method == "hankel"
 
 
 def test_every_sample_stands_for_its_area():

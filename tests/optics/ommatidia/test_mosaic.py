@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+import optics
 from optics import AppositionEye, FacetLens, Ommatidium, Pupil, Waveguide, hexagonal_directions
 
 LENS = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.0)
@@ -38,6 +39,29 @@ def test_contrast_falls_as_a_gaussian_of_the_acceptance_angle():
     beyond = 1.05 * math.radians(1) * 25e-6 / 500e-9
     assert FLY.contrast(beyond) < 5e-3
     assert FLY.contrast(0.5 * beyond) > 0.02
+
+
+@pytest.mark.parametrize("place", [(0.024, 0.0), (-0.024, 0.0), (0.0, 0.02), (0.0, -0.02), (0.02, 0.02)])
+def test_a_lopsided_facet_looks_where_an_eye_of_it_does(place):
+    """A prism and coma before a rhabdom: of a small light it sees as much as the receptor of an `Eye` that has the same
+    pupil and waveguide, whose scene is (right, down), but for tails of white's that the mosaic's window leaves out. On
+    the other side of the axis it is dark."""
+    bent = optics.Zernike({(1, 1): 0.12, (3, -1): 0.05})
+    lens = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.0, wavefront=bent)
+    guide, focal, side = Waveguide(1.4e-6), 50e-6, 61
+    fov = 2 * math.degrees(math.atan(1.5e-6 / focal))
+    eye = optics.Eye(lens, (1, 1), fov, 3e-6, 1, waveguide=guide, tolerance=5e-3, full_aperture=1e-4)
+    wavelength = float(eye.spectral_bands.wavelengths[0])
+
+    def light(x, y):
+        return np.exp(-((np.tan(x) - place[0]) ** 2 + (np.tan(y) - place[1]) ** 2) / 0.01**2)
+
+    at = np.arctan((np.arange(side) - side // 2) * 3e-6 / 9 / focal)
+    scenes = np.array([light(at[None, :], at[:, None]), np.ones((side, side))])
+    seen, white = (float(eye.see(scene[None], 9)[0, 0, 0]) for scene in scenes)
+    facet = AppositionEye(Ommatidium(lens, guide, eye.retina_distance), 0, 1.0)
+    assert facet.see(light, wavelength)[0] == pytest.approx(seen / white, rel=0.03, abs=1e-3)
+    assert (seen / white > 0.15) == (place[0] < 0), "the receptor looks to the left"
 
 
 @pytest.mark.parametrize(

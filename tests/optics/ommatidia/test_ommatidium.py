@@ -71,16 +71,18 @@ def test_every_mode_takes_what_the_formulas_say(diameter):
     np.testing.assert_allclose(found / found.max(), expected / expected.max(), atol=0.015)
 
 
+@pytest.mark.parametrize("wavefront", [None, optics.Zernike({(1, 1): 0.06, (3, -1): 0.08})], ids=["even", "lopsided"])
 @pytest.mark.parametrize("angle", [(0.0, 0.0), (0.02, -0.01)])
-def test_modes_take_the_overlap_with_the_field_in_the_focus(angle):
-    """The other way round: the field that the facet makes, summed with the mode over the sensor's plane."""
+def test_modes_take_the_overlap_with_the_field_in_the_focus(angle, wavefront):
+    """The other way round: the field that the facet makes, summed with the mode over the sensor's plane. From a point
+    on one side light travels to the other."""
     lens, guide = FacetLens(20e-6, 13e-6, -60e-6, 6e-6), Waveguide(1.8e-6, 1.37, 1.34)
-    eye = Ommatidium(lens, guide, lens.focal_length() + 3e-6)
+    eye = Ommatidium(lens.pupil(wavefront=wavefront), guide, lens.focal_length() + 3e-6)
     pupil, z, types = eye.pupil, lens.focal_length() + 3e-6, precision("float64")
     dx, n = 0.1e-6, 140
     at = (np.arange(n) - n / 2 + 0.5) * dx
     x, y = (axis.ravel() for axis in np.meshgrid(at, at))
-    beam = Beam(pupil, PointSource(math.inf, angle), WAVE, z)
+    beam = Beam(pupil, PointSource(math.inf, (-angle[0], -angle[1])), WAVE, z)
     field = (
         direct_sum(beam, (pupil.aperture, 15.0, 7.0, False), types.Float64(x), types.Float64(y), types).numpy().ravel()
     )
@@ -115,6 +117,23 @@ def test_hexagons_see_nearly_alike_all_around():
     assert along == pytest.approx(across, rel=0.02)
     turned = eye.sensitivity(0.01 * math.cos(math.pi / 3), 0.01 * math.sin(math.pi / 3), WAVE)
     assert turned == pytest.approx(float(eye.sensitivity(0.01, 0.0, WAVE)), rel=1e-4)
+
+
+@pytest.mark.parametrize("wavelength", [400e-9, 450e-9, 550e-9])
+def test_colours_have_foci_of_their_own_behind_glass_that_disperses(wavelength):
+    """A lens of the index at that wavelength alone, whose rhabdom has the same place behind its front: a thick lens'
+    principal plane moves as well. Without dispersion violet would be sharp."""
+    glass, shape = optics.RefractiveIndex.from_abbe(1.5, abbe_number=15.0), (25e-6, 24e-6, -40e-6, 20e-6)
+    guide, lens = Waveguide(1.6e-6), FacetLens(*shape, n=glass)
+    behind_front = lens.principal_planes()[1] + lens.focal_length()
+    alone = FacetLens(*shape, n=float(glass.at(wavelength)))
+    same = Ommatidium(alone, guide, behind_front - alone.principal_planes()[1])
+    angles, seen = np.radians(np.linspace(-2, 2, 9)), Ommatidium(lens, guide)
+    found = seen.mode_power(angles, 0.0, wavelength)
+    np.testing.assert_allclose(found, same.mode_power(angles, 0.0, wavelength), rtol=1e-9, atol=1e-12)
+    achromatic = Ommatidium(lens.pupil(), guide).mode_power(0.0, 0.0, wavelength).sum()
+    lost = 1 - seen.mode_power(0.0, 0.0, wavelength).sum() / achromatic
+    assert lost == pytest.approx(0, abs=1e-9) if wavelength == 550e-9 else lost > 0.1
 
 
 def test_superposition_narrows_what_one_facet_blurs():

@@ -75,8 +75,14 @@ def test_mtf_keeps_the_order_of_axes():
 
 @pytest.mark.parametrize("f_number", [2, 4, 16])
 def test_strehl_ratio_of_an_ideal_lens_is_one_at_any_aperture(f_number):
-    """The exact peak: Airy's πR²/(λf)² would be 4 % off at f/2."""
-    assert optics.strehl_ratio(ideal(f_number, 0.5e-6, 33))[0] == pytest.approx(1, abs=1e-4)
+    """The exact peak, which is [ln(1 + t)/t]² of Airy's πR²/(λf)², t = (R/f)²: .94 at f/2."""
+    result = ideal(f_number, 0.5e-6, 33)
+    assert optics.strehl_ratio(result)[0] == pytest.approx(1, abs=1e-4)
+    airy = result.pupil.area / (WAVELENGTH * FOCAL_LENGTH) ** 2
+    t = (result.pupil.radius / FOCAL_LENGTH) ** 2
+    assert result.psf.max() / airy == pytest.approx((np.log1p(t) / t) ** 2, rel=1e-3)
+    if f_number == 2:
+        assert result.psf.max() / airy == pytest.approx(0.941, abs=1e-3)
 
 
 def test_strehl_ratio_under_defocus():

@@ -1,0 +1,61 @@
+"""Which spatial frequencies samples over a square hold: what a grid must resolve, and what sends light off its rays."""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = ["band_of", "power_beyond", "reach_of"]
+
+CUBIC = 4  # coefficients along an axis of what slopes tell well: a B-spline's one patch
+
+
+def band_of(samples: np.ndarray, level: float) -> float:
+    """Frequency [cycles per half a side] above which there is less than `level`, from the samples' spectrum. A cubic
+    spline repeats content of frequency f around multiples of the sampling rate, weaker by the fourth power of the
+    frequencies' ratio."""
+    n = len(samples)
+    if n < 4:
+        return 1.0
+    window = np.hanning(n + 2)[1:-1]
+    residue = samples - _plane(samples)
+    spectrum = np.abs(np.fft.fft2(residue * window[:, None] * window)) / n
+    frequency = np.abs(np.fft.fftfreq(n, 2 / n))
+    radial = np.maximum(frequency[:, None], frequency[None, :])
+    order = np.argsort(radial, axis=None)[::-1]
+    power = np.cumsum((spectrum.ravel()[order] / n) ** 2)
+    reached = radial.ravel()[order][int(np.searchsorted(power, level**2).clip(max=power.size - 1))]
+    images = (np.sum((spectrum / n * radial**4) ** 2) / level**2) ** 0.125
+    return float(max(1.0, reached, images if images > n / 2 - reached else 0.0))
+
+
+def power_beyond(samples: np.ndarray) -> np.ndarray:
+    """(n,) mean squares of what samples hold at frequencies of k/4 cycles per half a side and more, along x or y, k
+    from 0 on; without the bicubic polynomial nearest to them, which bends light as its slopes tell and scatters none.
+
+    By cosines, whose even continuation has no jumps, so that ends are no detail.
+    """
+    from scipy.fft import dctn
+
+    n = len(samples)
+    if n <= CUBIC:
+        return np.zeros(n)
+    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, n), CUBIC))[0]
+    residue = samples - basis @ (basis.T @ samples @ basis) @ basis.T
+    power = np.square(dctn(residue, norm="ortho")) / n**2
+    farthest = np.maximum.outer(np.arange(n), np.arange(n))
+    found: np.ndarray = np.cumsum(np.bincount(farthest.ravel(), power.ravel(), n)[::-1])[::-1]
+    return found
+
+
+def reach_of(beyond: np.ndarray, level: float) -> float:
+    """Frequency [cycles per half a side] beyond which there is less than `level`, root mean square; see
+    `power_beyond`."""
+    more = np.flatnonzero(beyond > level**2)
+    return float(more[-1]) / 4 if more.size else 0.0
+
+
+def _plane(samples: np.ndarray) -> np.ndarray:
+    """Least-squares plane through the samples."""
+    position = np.linspace(-1, 1, len(samples))
+    slope = position / np.sum(position**2) / len(samples)
+    return samples.mean() + (slope @ samples.sum(axis=1)) * position[:, None] + (samples.sum(axis=0) @ slope) * position

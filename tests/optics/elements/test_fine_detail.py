@@ -1,0 +1,92 @@
+"""What sends light off its rays: frequencies of ripples and masks, and none of what slopes tell."""
+
+import math
+
+import numpy as np
+import pytest
+
+from optics import BSplineRelief, GaussianMask, HeightMap, MaskMap, Pupil, WavefrontMap, Zernike
+from optics.elements.fine_detail import power_beyond, reach_of
+from optics.elements.transmittance import Mask
+
+R, WAVE = 30e-6, 550e-9
+AT = (np.arange(96) + 0.5) * 2 / 96 - 1
+
+
+def ripple(cycles):
+    """cos(2πfx), of a mean square of 1/2."""
+    return np.broadcast_to(np.cos(2 * np.pi * cycles * AT), (96, 96))
+
+
+@pytest.mark.parametrize("cycles", [2.0, 7.0, 12.5])
+def test_a_ripple_is_found_where_it_is(cycles):
+    beyond = power_beyond(ripple(cycles))
+    assert reach_of(beyond, math.sqrt(0.49)) == pytest.approx(cycles, abs=0.25)
+    assert reach_of(beyond, math.sqrt(0.51)) == 0
+    assert reach_of(power_beyond(ripple(cycles).T), math.sqrt(0.49)) == pytest.approx(cycles, abs=0.25)
+
+
+def test_cubics_are_no_detail():
+    x, y = AT, AT[:, None]
+    assert power_beyond(1e6 * (1 + x**3) * (2 - y + y**3)).max() < 1e-12
+    assert power_beyond(np.ones((4, 4))).max() == 0
+    assert power_beyond((x**2 + y**2) ** 3).max() > 1e-4
+
+
+@pytest.mark.parametrize("phase", [0.2, 1.0])
+@pytest.mark.parametrize("of", ["height", "wavefront", "wide wavefront"])
+def test_ripples_in_a_phase_count_by_their_phase(of, phase):
+    """Amplitude φ [rad]: φ²/2 of the light goes to orders at the ripple's frequency, if that is little."""
+    waves = phase * WAVE / (2 * math.pi)
+    wide = 1.5 if of == "wide wavefront" else 1.0
+    pupil = {
+        "height": Pupil(R, HeightMap(waves / 0.5 * ripple(8.0))),
+        "wavefront": Pupil(R, wavefront=WavefrontMap(waves * ripple(8.0))),
+        "wide wavefront": Pupil(R, wavefront=WavefrontMap(waves * ripple(12.0), radius=1.5 * R)),
+    }[of]
+    assert pupil.scatter(WAVE, 0.45 * phase**2) * R == pytest.approx(8, abs=0.3 * wide)
+    assert pupil.scatter(WAVE, 0.55 * phase**2) < 1 / R
+
+
+def test_a_mask_counts_by_its_share_of_what_it_lets_through():
+    """(1 + cos)/2: a third of the light is in the orders, 1/8 of 3/8; also in the middle of a wider map."""
+    own, wide = MaskMap((1 + ripple(6.0)) / 2), MaskMap((1 + ripple(9.0)) / 2, reach=1.5 * R)
+    for mask in (own, wide):
+        assert Pupil(R, mask=mask).scatter(WAVE, 0.3) * R == pytest.approx(6, abs=0.3)
+        assert Pupil(R, mask=mask).scatter(WAVE, 0.37) * R < 1
+    assert Pupil(R, mask=MaskMap(np.full((9, 9), 0.3))).scatter(WAVE, 1e-6) == 0
+
+
+def test_a_gaussian_mask_spreads_as_a_beam_does():
+    """Beyond the frequency f goes exp(-2π²w²f²) of a laser's power."""
+    reach = Pupil(R, mask=GaussianMask(R / 10)).scatter(WAVE, 0.01)
+    assert math.exp(-2 * (math.pi * R / 10 * reach) ** 2) == pytest.approx(0.01)
+
+
+def test_several_share_what_may_be_lost():
+    """And each sends on what the others have sent."""
+    mask, wavefront = GaussianMask(R / 10), WavefrontMap(0.2 * WAVE / 2 / math.pi * ripple(8.0))
+    both = Pupil(R, mask=mask, wavefront=wavefront).scatter(WAVE, 0.02)
+    assert both == pytest.approx(
+        Pupil(R, mask=mask).scatter(WAVE, 0.01) + Pupil(R, wavefront=wavefront).scatter(WAVE, 0.01)
+    )
+
+
+def test_what_slopes_tell_scatters_nothing():
+    relief = BSplineRelief(1e-5 * np.random.default_rng(0).random((4, 4)))
+    lens = HeightMap(1e-4 * (AT**2 + AT[:, None] ** 2))
+    for pupil in (Pupil(R), Pupil(R, relief), Pupil(R, lens), Pupil(R, wavefront=Zernike({(4, 0): 1.0}))):
+        assert pupil.scatter(WAVE, 1e-6) == 0
+    assert Pupil(R, HeightMap(1e-6 * ripple(8.0)), n=1.0).scatter(WAVE, 1e-6) == 0
+
+
+def test_a_mask_of_ones_own_reaches_as_far_as_its_band():
+    class Cosine(Mask):
+        def amplitude(self, x, y, radius, types):
+            raise NotImplementedError
+
+        def bandwidth(self, level, radius):
+            return 5 / radius if level < 0.5 else 0.0
+
+    assert Cosine().detail(0.16, R) == 5 / R
+    assert Cosine().detail(0.36, R) == 0
