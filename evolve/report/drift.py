@@ -17,14 +17,14 @@ from evolve.search import successive_halving
 from evolve.search.null_model import Floats, last_generations, null_model, p_value
 from evolve.store.directory import Run, RunError
 
-__all__ = ["Drift", "Moved", "drift_of"]
+__all__ = ["Drift", "QuantityDrift", "drift_of"]
 
 SEARCHES = 200
 ALLOWED_TO_DIFFER = ("seed", "workers")
 
 
 @dataclass(frozen=True)
-class Moved:
+class QuantityDrift:
     """One quantity at the end of runs and of searches with random fitness, as means over candidates.
 
     runs: of each run · low, median, high: of the searches, whose middle 95 % lie between low and high
@@ -50,7 +50,7 @@ class Drift:
     of: int
     generations: range
     searches: int
-    moved: tuple[Moved, ...]
+    moved: tuple[QuantityDrift, ...]
 
     def as_plain_values(self) -> dict[str, Any]:
         """Such as JSON has."""
@@ -93,7 +93,7 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
         found, ends = [_end(run, quantity, last) for run in runs], model.ends(quantity, last)
         if all(map(math.isfinite, found)) and ends.size and np.ptp(ends) > 0:
             low, median, high = (float(q) for q in np.quantile(ends, [0.025, 0.5, 0.975]))
-            moved.append(Moved(quantity, tuple(found), low, median, high, p_value(found, ends)))
+            moved.append(QuantityDrift(quantity, tuple(found), low, median, high, p_value(found, ends)))
     return Drift(len(runs), last, searches, tuple(moved))
 
 
