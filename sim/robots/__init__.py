@@ -1,6 +1,7 @@
 """Eyes on any robot: models that are not one of our worlds.
 
 task                Task: what a robot has to do
+controls            which controls belong to which actuators
 variation           what differs between episodes: light, sizes, colours, materials, starts
 world_models        a model for each world, where these differ
 paint               colours that differ, for the kernel

@@ -15,6 +15,7 @@ from optics.numerics.arguments import did_you_mean, whole
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.eyes import Eyes
 from sim.render.fidelity import Fidelity
+from sim.robots.controls import actuator_names, controls_of
 from sim.robots.eye_kinds import kinds_of, several
 from sim.robots.mounts import Mount, fan
 from sim.scene import source
@@ -79,9 +80,8 @@ class Task:
         """Begin an episode: change what mj_resetData has left."""
 
     def act(self, data: mujoco.MjData, action: np.ndarray) -> None:
-        """Take an action in [-1, 1], (n_actions,); here: each of its actuators over the whole of its range."""
-        model, named = data.model, self.actuators
-        mine = slice(None) if named is None else [model.actuator(name).id for name in named]
+        """Take an action in [-1, 1], (n_actions,); here: each control of its actuators over the whole of its range."""
+        model, mine = data.model, controls_of(data.model, self.actuators)
         limited = model.actuator_ctrllimited[mine].astype(bool)
         low, high = np.where(limited[:, None], model.actuator_ctrlrange[mine], [-1.0, 1.0]).T
         data.ctrl[mine] = low + (high - low) * (action + 1) / 2
@@ -108,8 +108,8 @@ class Task:
         return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)
 
     def n_actions(self, model: mujoco.MjModel) -> int:
-        """Numbers in an action; here: as many as it has actuators."""
-        return int(model.nu) if self.actuators is None else len(self.actuators)
+        """Numbers in an action; here: as many controls as its actuators take, which is one each of most kinds."""
+        return len(controls_of(model, self.actuators))
 
 
 def compiled(task: Task, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
@@ -125,10 +125,12 @@ def compiled(task: Task, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
     whole(f"{name}: substeps", task.substeps, 1, MOST_STEPS)
     whole(f"{name}: episode_steps", task.episode_steps, 1, MOST_STEPS)
     model = source.load(task.model) if model is None else model
-    known = [model.actuator(i).name for i in range(model.nu)]
+    known = actuator_names(model)
     for actuator in task.actuators or ():
         if actuator not in known:
             raise ValueError(f"{name}: actuators: {actuator!r}: must be in the model{did_you_mean(actuator, known)}")
+        if not len(controls_of(model, [actuator])):
+            raise ValueError(f"{name}: actuators: {actuator!r} takes no control: must be one that can be driven")
     if task.n_actions(model) < 1:
         raise ValueError(f"{name}: its model has no actuators: n_actions and act must say what an action is")
     return model

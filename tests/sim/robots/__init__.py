@@ -9,6 +9,7 @@ eye_kinds: envs/test_eye_kinds.py
 mounts: test_mounts.py
 task: envs/test_task_vec_env.py, envs/test_encounter.py
 encounter: envs/test_encounter.py, envs/test_bad_encounters.py
+controls: test_controls.py
 variation: test_variation.py
 world_models: envs/test_differing_worlds.py
 paint: envs/test_differing_worlds.py
