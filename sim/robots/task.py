@@ -44,7 +44,8 @@ class Task:
         "GEOM.material", of two or more of the model's, by name: its texture, colour and glow; the geom has no rgba
         "JOINT.start", where a hinge [rad] or a slide [m] is at first; "BODY.start", between two points (x, y, z) [m],
         of a mocap body or one with a free joint
-        All but "light" and "color_temperature" are in each world's own `data.model`, or in its data
+        All but "light" and "color_temperature" are in each world's own `data.model`, or in its data. Worlds have
+        models of their own, too, where the first `reset` changes `data.model`; otherwise they share one
     auxiliary: of "depth", "ids" and "flow": what an observation holds of each receptor beside its signal: how far what
         its centre looks at is, which geom, and how it has moved since the last observation; see docs/tasks.md. Eyes
         that evolve have none
@@ -77,7 +78,7 @@ class Task:
     others: Sequence[Frozen] = ()
 
     def reset(self, data: mujoco.MjData, rng: np.random.Generator) -> None:
-        """Begin an episode: change what mj_resetData has left."""
+        """Begin an episode: change what mj_resetData has left. `data.model` may be changed, too, for the episode."""
 
     def act(self, data: mujoco.MjData, action: np.ndarray) -> None:
         """Take an action in [-1, 1], (n_actions,); here: each control of its actuators over the whole of its range."""

@@ -11,7 +11,8 @@ task: envs/test_task_vec_env.py, envs/test_encounter.py
 encounter: envs/test_encounter.py, envs/test_bad_encounters.py
 controls: test_controls.py
 variation: test_variation.py
-world_models: envs/test_differing_worlds.py
+world_models: envs/test_differing_worlds.py, envs/test_own_models.py
+model_settings: envs/test_own_models.py
 paint: envs/test_differing_worlds.py
 as_built: test_as_built.py
 appearances: envs/test_differing_materials.py
