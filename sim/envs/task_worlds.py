@@ -229,6 +229,8 @@ def _broken(data: mujoco.MjData) -> str | None:
             "physics is unstable: positions, speeds or accelerations are huge or not finite; a shorter timestep or "
             "the integrator implicitfast may help"
         )
+    if data.warning[mujoco.mjtWarning.mjWARN_BADCTRL].number:  # MuJoCo has taken all controls of the world for 0
+        return "controls are huge or not finite: what `act` writes must be numbers, of 1e10 at most"
     if not _has_place(data):
         return "physics is unstable: places of bodies are not finite; what `act` writes must be"
     return None
