@@ -50,7 +50,7 @@ class ModelRenderer:
         {"floor": ("sand", "grass")}: and names of the materials that one may have, in the place of other colours
     brightest: signal of a white surface that faced all directional lights at once
 
-    Warns (`sim.MirrorWarning`) once of what eyes do not see of the model.
+    Warns (`sim.MirrorWarning`) once of what eyes do not see of the model, and of lamps with lines in too few bands.
 
     Raises:
         ValueError: a bad argument, a mount on what the model does not have, an eye that looks aside of it, or is inside
@@ -80,7 +80,7 @@ class ModelRenderer:
             raise ValueError("mounts = []: must be one sim.Mount at least")
         wavelengths = self.eye.spectral_bands.wavelengths
         self._check_memory()
-        self._scene = ModelScene(self.model, wavelengths, groups, spectra, varied, light=fidelity.light)
+        self._scene = ModelScene(self.model, self.eye, groups, spectra, varied, light=fidelity.light)
         self._refuse_eyes_inside()
         sampling = eye_sampling(self.eye, fidelity.depth)
         at_edges = fidelity.samples == EDGES

@@ -21,7 +21,7 @@ eye_marks: test_eye_marks.py
 inside: test_mounts.py
 poses: test_model_renderer.py
 model_scene: test_model_renderer.py
-model_lights: test_model_renderer.py
+model_lights: test_model_renderer.py, test_model_lamps.py
 model_tracer: test_model_renderer.py, test_model_light.py
 primitives: test_movers.py
 solids: evolve/report/test_rerun_bodies.py
