@@ -18,7 +18,7 @@ import numpy as np
 from optics import Eye
 from optics.spectra.spectrum import Spectrum
 from sim.render.band_error import lights_in_bands
-from sim.robots.appearances import Appearance, Varied, appearances_of, varied_geoms
+from sim.robots.appearances import Appearance, Varied, appearances_of, in_white, varied_geoms
 from sim.robots.as_built import AsBuilt
 from sim.robots.model_lights import Lights, model_lights
 from sim.robots.movers import Movers, kind_of
@@ -75,12 +75,14 @@ class ModelScene:
             drawn = {geom: materials for geom, materials in differ.items() if materials}
             painted = [geom for geom in differ if geom not in drawn]
             looks = appearances_of(model, self.geoms, drawn)
-            self.glows = {look: glow for look in looks if (glow := self._glow(look)) is not None}
+            glows = ((look, self._glow(look, look.geom in painted)) for look in looks)
+            self.glows = {look: glow for look, glow in glows if glow is not None}
             matt = {look: self._matt(look, look.geom in painted) for look in looks}
             moving = [each for each in looks if _moves(model, each.geom) or each.geom in differ or each in self.glows]
             meshes = {look: self._mesh(look, matt[look]) for look in moving if kind_of(look.model, look.geom) is None}
             self.movers = Movers(model, moving, meshes)
-            self.paint = Paint(model, painted, self.movers.geoms, wavelengths)
+            glow = any(look.geom in painted for look in self.glows)
+            self.paint = Paint(model, painted, self.movers.geoms, wavelengths, glow)
             self.bsdfs = [matt[look] for look in self.movers.looks]
             found, left_out = model_lights(model, in_bands, wavelengths, light)
             self.lights = Lights(found)
@@ -99,10 +101,12 @@ class ModelScene:
             return bsdfs.matt_white(look.model, look.geom, to_uv)
         return bsdfs.matt(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
 
-    def _glow(self, look: Appearance) -> MitsubaObject | None:
-        """A BSDF whose reflectance is the radiance of what glows: the kernel asks for it as for the others."""
-        to_uv = shapes.uv_transform(look.model, look.geom)
-        radiance = lights.glow(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
+    def _glow(self, look: Appearance, white: bool) -> MitsubaObject | None:
+        """A BSDF whose reflectance is the radiance of what glows: the kernel asks for it as for the others, and
+        multiplies what is white by its world's colour."""
+        to_uv, geom = shapes.uv_transform(look.model, look.geom), look.geom
+        model = in_white(look.model, geom) if white else look.model
+        radiance = lights.glow(model, geom, to_uv, of_geom(model, geom, self.spectra))
         if radiance is None:
             return None
         return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": radiance}})

@@ -13,7 +13,7 @@ controls: test_controls.py
 variation: test_variation.py
 world_models: envs/test_differing_worlds.py, envs/test_own_models.py
 model_settings: envs/test_own_models.py
-paint: envs/test_differing_worlds.py
+paint: envs/test_differing_worlds.py, test_glow_colors.py
 as_built: test_as_built.py
 appearances: envs/test_differing_materials.py
 optic_flow: test_labels.py
