@@ -18,6 +18,7 @@ import numpy as np
 from optics.spectra.spectrum import Spectrum
 from sim.scene import bsdfs, cameras, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
+from sim.scene.places import Places
 from sim.scene.spectra import of_geom, resolve
 from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
@@ -85,12 +86,13 @@ class Mirror:
         self.geoms = np.array([g for g in visible if shapes.has_shape(model, g)], dtype=int)
         if not len(self.geoms):
             raise ValueError("mirror: the model has no visible geom of a kind that can be mirrored")
-        self._data = _reference_pose(model) if data is None else _checked(model, data)
+        data = _reference_pose(model) if data is None else _checked(model, data)
+        self._places = Places.of(data)
         self._parts = {int(g): shapes.parts(model, g) for g in self.geoms}
-        self._poses = {g: shapes.pose(self._data, g) for g in self._parts}
+        self._poses = {g: shapes.pose(data, g) for g in self._parts}
         self._bsdfs: dict[Any, MitsubaObject] = {}
         with in_variant(variant):
-            self._emitters, left_out = lights.emitters(model, self._data, self.spectra)
+            self._emitters, left_out = lights.emitters(model, data, self.spectra)
             self.scene = self._build()
             self._params = mi.traverse(self.scene)
             self._names = rays.names_of(self.scene)
@@ -99,13 +101,13 @@ class Mirror:
             warnings.warn(f"not mirrored: {'; '.join(left_out)}", MirrorWarning, stacklevel=3)
 
     def sync(self, data: mujoco.MjData) -> None:
-        """Move everything to where `data` has it (after mj_forward or mj_step). Only what moved is touched: a scene
-        in which nothing moved is not rebuilt.
+        """Move everything, cameras too, to where `data` has it now (after mj_forward or mj_step). Only what moved is
+        touched: a scene in which nothing moved is not rebuilt.
 
         Raises:
             ValueError: the data of another model, and for positions that are not finite.
         """
-        self._data = _checked(self.model, data)
+        self._places = Places.of(_checked(self.model, data))
         with in_variant(self.variant):
             for geom, parts in self._parts.items():
                 pose = shapes.pose(data, geom)
@@ -152,8 +154,8 @@ class Mirror:
             return taken.radiance(integrator, spp, np.asarray(wavelengths, float), seed, sampler)
 
     def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
-        """Where a camera of the model is now, and how it looks."""
-        return cameras.viewpoint(self.model, self._data, camera)
+        """Where a camera of the model was at the last `sync`, and how it looks."""
+        return cameras.viewpoint(self.model, self._places, camera)
 
     def render_ids(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
         """Geom id seen through the centre of each pixel, (y, x) int32, -1 for none."""
