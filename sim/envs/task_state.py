@@ -17,7 +17,13 @@ _ALL = mujoco.mjtState.mjSTATE_INTEGRATION
 
 def of_worlds(worlds: TaskWorlds) -> dict[str, np.ndarray]:
     """Physics, chance and steps of every world, and its model, if it has one of its own; each array's first axis is the
-    world."""
+    world.
+
+    Raises:
+        RuntimeError: bodies may sleep, which MuJoCo's state says nothing of.
+    """
+    if worlds.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
+        raise RuntimeError("get_state: the model has <flag sleep>, and who sleeps is in no state: must be disabled")
     size = mujoco.mj_stateSize(worlds.model, _ALL)
     physics = np.empty((len(worlds.datas), size))
     for row, data in zip(physics, worlds.datas, strict=True):
