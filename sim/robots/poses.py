@@ -68,8 +68,9 @@ class Poses:
     others: np.ndarray | None = None
 
     @classmethod
-    def of(cls, datas: Sequence[mujoco.MjData]) -> Poses:
-        """Of as many worlds as there are data."""
+    def of(cls, datas: Sequence[mujoco.MjData] | mujoco.MjData) -> Poses:
+        """Of as many worlds as there are data; one's of one."""
+        datas = [datas] if isinstance(datas, mujoco.MjData) else datas
         names = [f.name for f in fields(cls) if f.name not in OF_MODELS]
         stacked = {name: np.stack([getattr(data, name) for data in datas]) for name in names}
         found = {name: _square(array) if name.endswith("mat") else array for name, array in stacked.items()}

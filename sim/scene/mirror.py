@@ -143,15 +143,20 @@ class Mirror:
         spp: samples per pixel
         sampler: "independent", or "multijitter" for pictures: less noise
         Units: a white Lambertian that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
+
+        Raises:
+            ValueError: an unknown camera, less than one pixel or sample, wavelengths beyond 300 to 780 nm, and what
+                Mitsuba would take wrongly.
         """
         view = self.viewpoint(camera)
         rays.check_size(width, height, spp)
+        asked = rays.checked_wavelengths(wavelengths)
         with in_variant(self.variant):
             if any(e.name == lights.HEADLIGHT for e in self._emitters):
                 self._move_light(lights.HEADLIGHT, lights.aimed(view.position, -view.rotation[:, 2]))
                 self._params.update()
             taken = self._camera(view, width, height)
-            return taken.radiance(integrator, spp, np.asarray(wavelengths, float), seed, sampler)
+            return taken.radiance(integrator, spp, asked, seed, sampler)
 
     def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
         """Where a camera of the model was at the last `sync`, and how it looks."""

@@ -181,6 +181,9 @@ def test_bad_input_is_named():
         mirror.render_ids(Viewpoint(np.zeros(3), np.eye(3), 45.0), 0, 4)
     with pytest.raises(ValueError, match="light samples"):
         mirror.render(Viewpoint(np.zeros(3), np.eye(3), 45.0), 4, 4, {"type": "direct", "emitter_samples": 4})
+    for nowhere in ((450, 550, 650), (5e-7, 2e-7), (), 5e-7, (np.nan,)):
+        with pytest.raises(ValueError, match=r"wavelengths = .*: must be in metres, from 3e-07 to 7.8e-07"):
+            mirror.render(Viewpoint(np.zeros(3), np.eye(3), 45.0), 4, 4, wavelengths=nowhere)
     with pytest.raises(ValueError, match="no body 'arm'"):
         sim.mirror(model, bodies=["arm"])
     with pytest.raises(ValueError, match="llvm_ad_rgb"):
