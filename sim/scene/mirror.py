@@ -96,6 +96,7 @@ class Mirror:
             self.scene = self._build()
             self._params = mi.traverse(self.scene)
             self._names = rays.names_of(self.scene)
+        self._told_of_glass = False
         left_out = inventory.left_out(model, visible, groups) + left_out
         if left_out:
             warnings.warn(f"not mirrored: {'; '.join(left_out)}", MirrorWarning, stacklevel=3)
@@ -144,6 +145,8 @@ class Mirror:
         sampler: "independent", or "multijitter" for pictures: less noise
         Units: a white Lambertian that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
 
+        Warns once, by MirrorWarning, where "direct" would look through a transparent geom.
+
         Raises:
             ValueError: an unknown camera, less than one pixel or sample, wavelengths beyond 300 to 780 nm, and what
                 Mitsuba would take wrongly.
@@ -151,12 +154,23 @@ class Mirror:
         view = self.viewpoint(camera)
         rays.check_size(width, height, spp)
         asked = rays.checked_wavelengths(wavelengths)
+        if (integrator if isinstance(integrator, str) else integrator.get("type")) == "direct":
+            self._tell_of_glass()
         with in_variant(self.variant):
             if any(e.name == lights.HEADLIGHT for e in self._emitters):
                 self._move_light(lights.HEADLIGHT, lights.aimed(view.position, -view.rotation[:, 2]))
                 self._params.update()
             taken = self._camera(view, width, height)
             return taken.radiance(integrator, spp, asked, seed, sampler)
+
+    def _tell_of_glass(self) -> None:
+        """Mitsuba's `direct` takes a mask's share of light for its colour, and looks through it at emitters alone."""
+        glass = [int(g) for g in self.geoms if surfaces.rgba(self.model, int(g))[3] < 1]
+        if glass and not self._told_of_glass:
+            listed = inventory.listed_geoms(self.model, glass)
+            words = f"'direct' does not show what is behind the transparent {listed}: integrator='path' does"
+            warnings.warn(words, MirrorWarning, stacklevel=3)
+        self._told_of_glass = True
 
     def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
         """Where a camera of the model was at the last `sync`, and how it looks."""
