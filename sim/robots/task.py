@@ -59,6 +59,9 @@ class Task:
     Where the task evolves (`evolve run FILE.py:CLASS`), every animal has eyes of its own, where `place` puts them; a
     class without arguments is needed for that.
 
+    What fails in a method ends its world's episode; in `reset`, and in `feels` there, it is a RuntimeError for all,
+    since a world that cannot begin has no episode.
+
     Methods are called for one world at a time, with its mjData after mj_forward. One task serves all worlds: what an
     episode must remember belongs into mjData (`userdata`, say), not into the task.
     """
