@@ -18,10 +18,10 @@ import numpy as np
 from optics.spectra.spectrum import Spectrum
 from sim.scene import bsdfs, cameras, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
-from sim.scene.places import Places
 from sim.scene.spectra import of_geom, resolve
 from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
+from sim.scene.whereabouts import Whereabouts
 
 VISIBLE_GROUPS = (0, 1, 2)  # MuJoCo draws these unless told otherwise
 
@@ -87,7 +87,7 @@ class Mirror:
         if not len(self.geoms):
             raise ValueError("mirror: the model has no visible geom of a kind that can be mirrored")
         data = _reference_pose(model) if data is None else _checked(model, data)
-        self._places = Places.of(data)
+        self._places = Whereabouts.of(data)
         self._parts = {int(g): shapes.parts(model, g) for g in self.geoms}
         self._poses = {g: shapes.pose(data, g) for g in self._parts}
         self._bsdfs: dict[Any, MitsubaObject] = {}
@@ -108,7 +108,7 @@ class Mirror:
         Raises:
             ValueError: the data of another model, and for positions that are not finite.
         """
-        self._places = Places.of(_checked(self.model, data))
+        self._places = Whereabouts.of(_checked(self.model, data))
         with in_variant(self.variant):
             for geom, parts in self._parts.items():
                 pose = shapes.pose(data, geom)

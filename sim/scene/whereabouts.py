@@ -9,7 +9,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Places:
+class Whereabouts:
     """Copies of what mjData calls so: positions [m] (n, 3), directions (n, 3) and rotations (n, 9)."""
 
     geom_xpos: np.ndarray
@@ -20,6 +20,6 @@ class Places:
     light_xdir: np.ndarray
 
     @classmethod
-    def of(cls, data: mujoco.MjData) -> Places:
+    def of(cls, data: mujoco.MjData) -> Whereabouts:
         """As they are now."""
         return cls(**{field.name: getattr(data, field.name).copy() for field in fields(cls)})
