@@ -33,6 +33,7 @@ from sim.worlds.world import build_world
 if TYPE_CHECKING:
     from sim.envs.parallel_env import EncounterEnv
 
+AUTO = "auto"
 MOST = 1_000_000  # choice: of worlds and of frames, more than memory holds
 
 
@@ -45,7 +46,7 @@ def make_vec_env(
     memory: int = 1,
     mode: str = "training",
     rays_per_receptor: float | str | Fidelity = "auto",
-    fidelity: Fidelity | None = None,
+    fidelity: Fidelity | str | None = None,
     world_seed: int = 0,
     mazes: int = 1,
     course: str | Course = "short",
@@ -68,7 +69,8 @@ def make_vec_env(
     mode: "training", or "evaluation" (objects respawn; rewards weighted as fitness)
     rays_per_receptor: rays traced for each receptor, in direct light; "auto": as few as its noise allows, and light
         that was reflected twice where it counts: `sim.choose_fidelity(world, eyes, bands="own")`
-    fidelity: all of how finely it is rendered, in the place of rays_per_receptor (which takes one, too)
+    fidelity: all of how finely it is rendered, in the place of rays_per_receptor (which takes one, too); "auto": as
+        that has it
     world_seed, mazes, course: of the layout that all worlds share, see `sim.build_world`
     least_return: in training, an episode whose rewards add up to no more is truncated; None: none is
     episode_steps: actions after which an episode is truncated; None: as many as the task has
@@ -193,16 +195,19 @@ def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
             raise ValueError(f"{name} = {given[name]!r}: must be left out, a sim.Task says it itself")
 
 
-def _fidelity_of(rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | None, eyes: Eyes) -> Fidelity | None:
+def _fidelity_of(
+    rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | str | None, eyes: Eyes
+) -> Fidelity | None:
     """What was asked for by either name; None: to be chosen."""
-    if fidelity is not None and not isinstance(fidelity, Fidelity):
-        raise ValueError(f"fidelity = {shown(fidelity)}: must be a sim.Fidelity or None, see rays_per_receptor")
+    chosen = isinstance(fidelity, str) and fidelity == AUTO
+    if not (fidelity is None or chosen or isinstance(fidelity, Fidelity)):
+        raise ValueError(f"fidelity = {shown(fidelity)}: must be a sim.Fidelity, {AUTO!r} or None")
     asked = rays_per_receptor if isinstance(rays_per_receptor, Fidelity) else fidelity_asked(rays_per_receptor, eyes)
     if fidelity is None:
         return asked
     if asked is not None:
         raise ValueError(f"rays_per_receptor = {shown(rays_per_receptor)}: must be left out where a fidelity is given")
-    return fidelity
+    return fidelity if isinstance(fidelity, Fidelity) else None
 
 
 def _check(n_envs: int, seed: int | None, memory: int, mode: str, render_mode: str | None) -> None:

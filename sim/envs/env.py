@@ -7,6 +7,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from optics.numerics.arguments import shown
 from sim.envs.assembly import make_vec_env
 from sim.envs.follow_camera import RENDER_MODES
 from sim.envs.vec_env import EyesVecEnv
@@ -14,6 +15,8 @@ from sim.eyes.eyes import Eyes
 from sim.robots.encounter import Encounter
 from sim.robots.task import Task
 from sim.worlds.state import WorldState
+
+_OF_BATCHES = {"seed": "it goes to reset(seed=...)", "n_envs": "this is one world: make_vec_env has several"}
 
 
 class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
@@ -35,6 +38,9 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
             raise ValueError(
                 "task: several animals learn in a sim.Encounter: must be its `alone`, or make_parallel_env"
             )
+        for name, why in _OF_BATCHES.items():
+            if name in options:
+                raise ValueError(f"{name} = {shown(options[name])}: must be left out, {why}")
         self._batch = make_vec_env(task, eyes, n_envs=1, seed=None, render_mode=render_mode, **options)
         self.render_mode = render_mode
         self.observation_space = self._batch.observation_space

@@ -16,7 +16,14 @@ _ALL = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 def of_worlds(worlds: TaskWorlds) -> dict[str, np.ndarray]:
-    """Physics, chance and steps of every world; each array's first axis is the world."""
+    """Physics, chance and steps of every world, and its model, if it has one of its own; each array's first axis is the
+    world.
+
+    Raises:
+        RuntimeError: bodies may sleep, which MuJoCo's state says nothing of.
+    """
+    if worlds.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
+        raise RuntimeError("get_state: the model has <flag sleep>, and who sleeps is in no state: must be disabled")
     size = mujoco.mj_stateSize(worlds.model, _ALL)
     physics = np.empty((len(worlds.datas), size))
     for row, data in zip(physics, worlds.datas, strict=True):
@@ -24,7 +31,9 @@ def of_worlds(worlds: TaskWorlds) -> dict[str, np.ndarray]:
     chance = np.array([json.dumps(rng.bit_generator.state) for rng in worlds.rngs])
     felt = {_felt(worlds, k): array.copy() for k, array in enumerate(worlds.felt)}
     varied = {_varied(name): array.copy() for name, array in worlds.varied.items()}
-    return {"physics": physics, "chance": chance, "steps": worlds.steps.copy(), **felt, **varied}
+    held = [np.frombuffer(worlds.bodies.held(i), np.uint8) for i in range(len(worlds.datas)) if worlds.bodies.own]
+    models = {"models": np.stack(held)} if held else {}
+    return {"physics": physics, "chance": chance, "steps": worlds.steps.copy(), **models, **felt, **varied}
 
 
 def bring_back(worlds: TaskWorlds, state: Mapping[str, np.ndarray], chosen: np.ndarray) -> None:
@@ -33,6 +42,8 @@ def bring_back(worlds: TaskWorlds, state: Mapping[str, np.ndarray], chosen: np.n
         for name, values in worlds.varied.items():
             values[i] = state[_varied(name)][i]
         worlds.bodies.begin(i, {name: values[i] for name, values in worlds.varied.items()})
+        if worlds.bodies.own:
+            worlds.bodies.hold(i, np.asarray(state["models"][i], np.uint8).tobytes())
         data, model, row = worlds.datas[i], worlds.bodies.models[i], np.ascontiguousarray(state["physics"][i])
         mujoco.mj_resetData(model, data)
         mujoco.mj_setState(model, data, row, _ALL)

@@ -123,7 +123,7 @@ class TaskVecEnv(OneEnvironment):
         and on the actions alone. What a task keeps in itself is the task's own business.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: before the first reset, and where bodies may sleep.
         """
         self._require_begun()
         returns = self._returns.reshape(len(self._learners), -1).T
@@ -134,7 +134,7 @@ class TaskVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the state is of another task or number of worlds, or there are no such worlds.
-            RuntimeError: before the first reset.
+            RuntimeError: before the first reset, and where bodies may sleep.
         """
         task_state.checked(state, self.get_state())
         chosen = task_state.chosen_worlds(worlds, len(self._everyone))

@@ -41,7 +41,7 @@ class TaskWorlds:
     task: of the animal that learns, with its others; or an Encounter, where all learn
     episode_steps: actions, then an episode is truncated; None: as many as the task has
     learners: tasks of those who learn · frozen: the others · animals: tasks of all, those who learn first
-    model · bodies: models of every world, where sizes, colours or materials differ · datas: mjData of every world
+    model · bodies: models of every world, where they differ · datas: mjData of every world
     steps: actions taken in its episode, (n,) int
     variation: what differs between episodes; None: nothing
     varied: how it is now, by name: (n,) or (n, 3), numbers or names
@@ -56,6 +56,7 @@ class TaskWorlds:
         self.learners, self.frozen = cast(task)
         self.animals = (*self.learners, *(other.task for other in self.frozen))
         self._whose = ["" if len(self.animals) == 1 else f"{name_of(animal)}: " for animal in self.animals]
+        self._who = " and ".join(map(name_of, self.animals))
         self.model = compiled(self.animals[0])
         for animal in self.animals[1:]:
             compiled(animal, self.model)
@@ -70,7 +71,13 @@ class TaskWorlds:
         self.steps, self.felt = np.zeros(n, int), [np.zeros((n, 0), np.float32) for _ in self.animals]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self.seed(seed)
-        self.reset(np.arange(1))  # what an animal feels may want an episode
+        self._begin(0)  # what an animal feels may want an episode
+        if self.bodies.differs():
+            self.bodies.separate()
+            self.datas = [mujoco.MjData(model) for model in self.bodies.models]
+            self._begin(0)
+        if not self.bodies.own:
+            self.model = self.bodies.models[0]  # a copy: what is changed of it outside, is changed for all worlds
         self.felt = [np.repeat(felt[:1], n, axis=0) for felt in self.felt]
         self.seed(self.entropy)
 
@@ -95,34 +102,44 @@ class TaskWorlds:
         """Begin these worlds' episodes.
 
         Raises:
-            RuntimeError: a task's own reset fails; by its name, line and message.
+            RuntimeError: a task's own reset fails, by its name, line and message, or changes the model of all worlds.
         """
-        for i in worlds:
-            data, model = self.datas[i], self.bodies.models[i]
-            drawn = {} if self.variation is None else self.variation.draw(self.rngs[i])
-            for name, value in drawn.items():
-                self.varied[name][i] = value
-            self.bodies.begin(i, drawn)
-            mujoco.mj_resetData(model, data)
-            self.bodies.place(data, drawn)
-            try:
-                for animal in self.animals:
-                    animal.reset(data, self.rngs[i])
-                mujoco.mj_forward(model, data)
-                self._feel(i)
-            except Exception as error:
-                raise RuntimeError(_told(error)) from error
-            self.steps[i] = 0
+        with self.bodies.left_alone(self._who):
+            for i in worlds:
+                self._begin(i)
+
+    def _begin(self, world: int) -> None:
+        """Begin a world's episode."""
+        data, model = self.datas[world], self.bodies.models[world]
+        drawn = {} if self.variation is None else self.variation.draw(self.rngs[world])
+        for name, value in drawn.items():
+            self.varied[name][world] = value
+        self.bodies.begin(world, drawn)
+        mujoco.mj_resetData(model, data)
+        self.bodies.place(data, drawn)
+        try:
+            for animal in self.animals:
+                animal.reset(data, self.rngs[world])
+            mujoco.mj_forward(model, data)
+            self._feel(world)
+        except Exception as error:
+            raise RuntimeError(_told(error)) from error
+        self.steps[world] = 0
 
     def step(self, actions: Sequence[np.ndarray]) -> list[StepOfWorld]:
         """Every animal's actions (world, number) in every world; what comes of them for the first that learns in all
-        worlds, then for the next."""
-        failures = self._acted(actions)
-        moving = [data for data, failure in zip(self.datas, failures, strict=True) if failure is None]
-        for _ in (self._pool.map if self._pool else map)(self._moved, moving):
-            pass
-        self.steps += 1
-        judged = [self._judged(i, failure) for i, failure in enumerate(failures)]
+        worlds, then for the next.
+
+        Raises:
+            RuntimeError: a task changes the model of all worlds.
+        """
+        with self.bodies.left_alone(self._who):
+            failures = self._acted(actions)
+            moving = [data for data, failure in zip(self.datas, failures, strict=True) if failure is None]
+            for _ in (self._pool.map if self._pool else map)(self._moved, moving):
+                pass
+            self.steps += 1
+            judged = [self._judged(i, failure) for i, failure in enumerate(failures)]
         return [outcome for of_learner in zip(*judged, strict=True) for outcome in of_learner]
 
     def told(self, world: int) -> dict[str, Any]:
@@ -212,6 +229,8 @@ def _broken(data: mujoco.MjData) -> str | None:
             "physics is unstable: positions, speeds or accelerations are huge or not finite; a shorter timestep or "
             "the integrator implicitfast may help"
         )
+    if data.warning[mujoco.mjtWarning.mjWARN_BADCTRL].number:  # MuJoCo has taken all controls of the world for 0
+        return "controls are huge or not finite: what `act` writes must be numbers, of 1e10 at most"
     if not _has_place(data):
         return "physics is unstable: places of bodies are not finite; what `act` writes must be"
     return None

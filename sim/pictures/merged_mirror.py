@@ -62,14 +62,14 @@ class MergedMirror(Mirror):
         if name == lights.HEADLIGHT:
             return view.rotation[:, 2]
         (light,) = (emitter.light for emitter in self._emitters if emitter.name == name)
-        direction = -self._data.light_xdir[light]
+        direction = -self._places.light_xdir[light]
         return np.asarray(direction / np.linalg.norm(direction))
 
     def surrounds(self, point: np.ndarray) -> bool:
         """Whether a point may be inside of a geom: whether it is inside of one's bounding sphere or box."""
         sizes, bounded = self.model.geom_rbound[self.geoms], self.model.geom_rbound[self.geoms] > 0
-        offset = point - self._data.geom_xpos[self.geoms]
-        local = np.einsum("gij,gi->gj", self._data.geom_xmat[self.geoms].reshape(-1, 3, 3), offset)
+        offset = point - self._places.geom_xpos[self.geoms]
+        local = np.einsum("gij,gi->gj", self._places.geom_xmat[self.geoms].reshape(-1, 3, 3), offset)
         box = self.model.geom_aabb[self.geoms]
         inside = (np.abs(local - box[:, :3]) <= box[:, 3:] + self.near).all(axis=1)
         return bool((inside & bounded & (sizes > 0)).any())

@@ -7,6 +7,7 @@ pixel smooth the edge.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,8 +18,10 @@ from optics.spectra.spectrum import Spectrum
 from sim.pictures.camera_rays import CODES, SAMPLES, CameraRays, plane_coordinates
 from sim.pictures.lattice import Lattice
 from sim.pictures.merged_mirror import MergedMirror
+from sim.scene import inventory, surfaces
 from sim.scene.cameras import Viewpoint
 from sim.scene.color import encode_srgb
+from sim.scene.mirror import MirrorWarning
 from sim.scene.rays import check_size
 
 # Of 255. Steps between neighbours up to EDGE are not seen to be jagged; what differs by up to SAME is the same.
@@ -53,11 +56,16 @@ class QuickCamera:
     """Looks at any MuJoCo model as its mirror shows it in direct light (`sim.mirror`), without OpenGL.
 
     model, spectra: as `sim.mirror` has them
+
+    Warns (`sim.MirrorWarning`) of transparent geoms, which are dark and opaque here.
     """
 
     def __init__(self, model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None = None) -> None:
         self.mirror = MergedMirror(model, spectra)
         self._rays = CameraRays(self.mirror)
+        if glass := [int(g) for g in self.mirror.geoms if surfaces.rgba(model, int(g))[3] < 1]:
+            listed = inventory.listed_geoms(model, glass)
+            warnings.warn(f"quick pictures do not show what is behind the transparent {listed}", MirrorWarning, 2)
         self._lattices: dict[tuple[int, int], Lattice] = {}
 
     def picture(self, data: mujoco.MjData, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:

@@ -7,44 +7,57 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from optics import Eye, SpectralBands, Spectrum, receptors_of
 from optics.spectra.bands import daylight
 from sim.scene.mirror import MirrorWarning
+from sim.scene.spectra import Spectra
 from sim.worlds.world import World
 
-__all__ = ["band_error", "measured", "with_band_averaged_lights"]
+__all__ = ["band_error", "lights_in_bands", "measured", "with_band_averaged_lights"]
 
 FINE_BANDS = 64
 LEAST_MISS = 1e-3  # of white in daylight: what a type may catch too much or too little of a lamp without a word
 
 
 def with_band_averaged_lights(world: World, eye: Eye) -> World:
-    """The same world as this eye's bands have it: measured lights are, at the bands' centres, worth what each type of
-    receptor catches of them in white (`SpectralBands.of`), and not what their lines leave there by chance.
+    """The same world as this eye's bands have it, see `lights_in_bands`.
 
     Warns (`sim.MirrorWarning`) of lights of which so few bands give a type another catch.
     """
-    materials = {world.model.material(i).name for i in range(world.model.nmat)}
-    lights = {name: light for name, light in world.spectra.items() if name not in materials}
-    return replace(world, spectra={**world.spectra, **{n: _in_bands(n, s, eye) for n, s in lights.items()}})
+    spectra, off = lights_in_bands(world.model, world.spectra, eye)
+    for words in off:
+        warnings.warn(words, MirrorWarning, stacklevel=3)
+    return replace(world, spectra=spectra)
 
 
-def _in_bands(name: str, light: Spectrum, eye: Eye) -> Spectrum:
+def lights_in_bands(model: mujoco.MjModel, spectra: Spectra, eye: Eye) -> tuple[Spectra, list[str]]:
+    """Measured spectra as this eye's bands have them: lights are, at the bands' centres, worth what each type of
+    receptor catches of them in white (`SpectralBands.of`), and not what their lines leave there by chance; materials
+    are as they were. And, in words, lights of which so few bands give a type another catch."""
+    materials = {model.material(i).name for i in range(model.nmat)}
+    found, off = dict(spectra), []
+    for name, light in spectra.items():
+        if name not in materials:
+            found[name], words = _in_bands(name, light, eye)
+            off += words
+    return found, off
+
+
+def _in_bands(name: str, light: Spectrum, eye: Eye) -> tuple[Spectrum, list[str]]:
     bands = eye.spectral_bands
     found = bands.of(light, eye.receptors, nonnegative=True)
     fine = SpectralBands.uniform(FINE_BANDS, eye.receptors)
     caught, due = bands.weights @ found, fine.weights @ fine.of(light, eye.receptors)
     worst = int(np.argmax(np.abs(caught - due)))
-    if abs(caught[worst] - due[worst]) > LEAST_MISS:
-        warnings.warn(
-            f"{name!r} in {len(found)} bands: receptor type {worst} catches {caught[worst]:.2g} of it, should catch "
-            f"{due[worst]:.2g} (white in daylight: 1); more bands are nearer",
-            MirrorWarning,
-            stacklevel=5,
-        )
-    return Spectrum(tuple(bands.wavelengths * 1e9), tuple(found))
+    words = (
+        f"{name!r} in {len(found)} bands: receptor type {worst} catches {caught[worst]:.2g} of it, should catch "
+        f"{due[worst]:.2g} (white in daylight: 1); more bands are nearer"
+    )
+    off = abs(caught[worst] - due[worst]) > LEAST_MISS
+    return Spectrum(tuple(bands.wavelengths * 1e9), tuple(found)), [words] if off else []
 
 
 def measured(world: World) -> list[Spectrum]:

@@ -1,8 +1,10 @@
 """Eyes on any robot: models that are not one of our worlds.
 
 task                Task: what a robot has to do
+controls            which controls belong to which actuators
 variation           what differs between episodes: light, sizes, colours, materials, starts
-world_models        a model for each world, where these differ
+world_models        a model for each world, where these differ or a task changes it
+model_settings      what physics goes by of a model, to notice and to undo changes
 paint               colours that differ, for the kernel
 appearances         materials that differ: how a geom may look, of which a world has one
 encounter           Encounter: several tasks in one world; Frozen: an animal that does not learn

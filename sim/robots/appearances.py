@@ -60,6 +60,13 @@ def in_material(model: mujoco.MjModel, geom: int, material: int) -> Appearance:
     return Appearance(geom, changed, drawn=True)
 
 
+def in_white(model: mujoco.MjModel, geom: int) -> mujoco.MjModel:
+    """The model in which a geom is white, but for its texture."""
+    changed = copy.copy(model)
+    changed.geom_rgba[geom, :3] = 1
+    return changed
+
+
 def material_of(model: mujoco.MjModel, material: str, where: str) -> int:
     """Its id.
 

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from sim.robots.movers import Movers
-from sim.robots.poses import OF_MODELS, Poses, of_model
+from sim.robots.poses import HEADLIGHT, OF_MODELS, OTHERS, Poses, of_model
 from sim.scene import inventory, surfaces
 
 ROUNDING = 1e-6  # [m], of what is further away than 1 m relative, and of entries of rotations: some of float32's steps
@@ -90,6 +90,12 @@ class AsBuilt:
                     f"{self._named(kind, wrong[0])} has another {known_as} than in the renderer's model: it is shown "
                     "as it was when the renderer was made: make a new one"
                 )
+        if others := self._differing(poses, "others"):
+            named = (*OTHERS, *(f"vis.headlight.{name}" for name in HEADLIGHT))[others[0]]
+            raise ValueError(
+                f"{named} is another than in the renderer's model: it is shown as it was when the renderer was made: "
+                "make a new one"
+            )
         self._refuse_what_appears(poses)
         self._refuse_what_is_elsewhere(poses)
 

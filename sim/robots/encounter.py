@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from optics.numerics.arguments import did_you_mean, of_kind
+from sim.robots.controls import actuator_names
 from sim.robots.task import Task
 
 FRAMES_AXES = 5  # memory, eye, channel, height, width: of what eyes see in an observation, and of nothing else
@@ -147,16 +148,14 @@ def require_own_actuators(animals: Sequence[Task], model: mujoco.MjModel) -> Non
     Raises:
         ValueError: two animals drive the same one: the last would have its way.
     """
-    owner: dict[int, str] = {}
+    owner: dict[str, str] = {}
     for animal in animals:
         if type(animal).act is not Task.act:
             continue
-        named, name = animal.actuators, name_of(animal)
-        for i in range(model.nu) if named is None else (model.actuator(one).id for one in named):
-            if owner.setdefault(i, name) != name:
-                raise ValueError(
-                    f"{owner[i]} and {name}: actuators: both drive {model.actuator(i).name!r}: must name their own"
-                )
+        name, driven = name_of(animal), animal.actuators
+        for one in actuator_names(model) if driven is None else driven:
+            if owner.setdefault(one, name) != name:
+                raise ValueError(f"{owner[one]} and {name}: actuators: both drive {one!r}: must name their own")
 
 
 def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:

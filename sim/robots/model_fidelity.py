@@ -23,7 +23,7 @@ from sim.render.fidelity import EDGES, RAYS, Fidelity, Level
 from sim.render.fidelity_choice import FidelityWarning
 from sim.robots.appearances import Varied
 from sim.robots.edge_rays import edges_pay
-from sim.robots.model_renderer import ModelRenderer
+from sim.robots.model_renderer import ModelRenderer, Worlds
 from sim.robots.mounts import Mount
 from sim.robots.poses import Poses
 from sim.scene import source
@@ -52,7 +52,7 @@ def choose_model_fidelity(
     model: mujoco.MjModel | mujoco.MjSpec | str,
     eye: optics.Eye,
     mounts: Sequence[Mount],
-    poses: Poses | Sequence[mujoco.MjData],
+    poses: Worlds,
     tolerance: float | None = None,
     *,
     groups: Sequence[int] = VISIBLE_GROUPS,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import mujoco
 import numpy as np
@@ -32,6 +33,7 @@ from sim.scene.mirror import VISIBLE_GROUPS
 from sim.scene.variant import variant as in_variant
 
 MOST_ENVS = 2**31 - 1
+Worlds: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData  # where everything is in all of them
 SIXTEEN_RAYS = Fidelity(16, bands=4)
 
 
@@ -50,7 +52,7 @@ class ModelRenderer:
         {"floor": ("sand", "grass")}: and names of the materials that one may have, in the place of other colours
     brightest: signal of a white surface that faced all directional lights at once
 
-    Warns (`sim.MirrorWarning`) once of what eyes do not see of the model.
+    Warns (`sim.MirrorWarning`) once of what eyes do not see of the model, and of lamps with lines in too few bands.
 
     Raises:
         ValueError: a bad argument, a mount on what the model does not have, an eye that looks aside of it, or is inside
@@ -80,7 +82,7 @@ class ModelRenderer:
             raise ValueError("mounts = []: must be one sim.Mount at least")
         wavelengths = self.eye.spectral_bands.wavelengths
         self._check_memory()
-        self._scene = ModelScene(self.model, wavelengths, groups, spectra, varied, light=fidelity.light)
+        self._scene = ModelScene(self.model, self.eye, groups, spectra, varied, light=fidelity.light)
         self._refuse_eyes_inside()
         sampling = eye_sampling(self.eye, fidelity.depth)
         at_edges = fidelity.samples == EDGES
@@ -110,10 +112,11 @@ class ModelRenderer:
                 self._edges = EdgeRays(self._wavefront, sampling, rays, mixing @ basis.T, noticed)
         self._slot = FrameSlot()
 
-    def signals(self, poses: Poses | Sequence[mujoco.MjData], light: np.ndarray | None = None) -> np.ndarray:
+    def signals(self, poses: Worlds, light: np.ndarray | None = None) -> np.ndarray:
         """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32.
 
-        poses: of every world, after mj_forward or mj_step: its data, or arrays stacked over worlds
+        poses: of every world, after mj_forward or mj_step: its data, or arrays stacked over worlds; the data of an only
+            world need not be in a list
         light: what all lights of each world are multiplied by, (env, band); None: nothing
 
         Raises:
@@ -122,7 +125,7 @@ class ModelRenderer:
         """
         return self.begin(poses, light).wait()
 
-    def begin(self, poses: Poses | Sequence[mujoco.MjData], light: np.ndarray | None = None) -> PendingFrame:
+    def begin(self, poses: Worlds, light: np.ndarray | None = None) -> PendingFrame:
         """Begin to see; it runs beside whatever comes next, until the signals are waited for."""
         if light is None:
             return self._begin(poses, "light").then(self._signals)
@@ -141,25 +144,25 @@ class ModelRenderer:
         """`brightest` where all lights are multiplied by this, (band,)."""
         return float((self._sunlight @ light).max())
 
-    def receptor_radiance(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+    def receptor_radiance(self, poses: Worlds) -> np.ndarray:
         """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
         light = self._planes(self._begin(poses, "light").wait())
         found = self._radiance_sums(light).reshape(self.n_envs, len(self.mounts), -1, *self.eye.resolution)
         return np.moveaxis(found, 2, 0)
 
-    def depth(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+    def depth(self, poses: Worlds) -> np.ndarray:
         """How far what each receptor's centre looks at is, along the eye's axis [m], (env, eye, height, width) float32;
         infinite where there is nothing."""
         found = self._begin(poses, "depth").wait()
         return found.reshape(self.n_envs, len(self.mounts), *self.eye.resolution)
 
-    def ids(self, poses: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+    def ids(self, poses: Worlds) -> np.ndarray:
         """Which geom each receptor's centre looks at, (env, eye, height, width) int32; -1 where there is nothing."""
         found = self._begin(poses, "which").wait().astype(int)
         geoms = np.concatenate([self._scene.movers.geoms, self._scene.told_apart[1]])
         return geoms[found].astype(np.int32).reshape(self.n_envs, len(self.mounts), *self.eye.resolution)
 
-    def flow(self, poses: Poses | Sequence[mujoco.MjData], later: Poses | Sequence[mujoco.MjData]) -> np.ndarray:
+    def flow(self, poses: Worlds, later: Worlds) -> np.ndarray:
         """Optic flow from one moment to another: by how much what each receptor's centre looks at has moved on the
         retina, to the right and down [receptors], (env, eye, 2, height, width) float32; NaN where there is nothing, or
         where it is no longer before the eye."""
@@ -197,7 +200,7 @@ class ModelRenderer:
         kernels = self._wavefront.light, self._wavefront.depth, self._wavefront.which
         return sum(int(kernel.n_recordings) for kernel in kernels) + edges
 
-    def _begin(self, poses: Poses | Sequence[mujoco.MjData], what: str) -> PendingFrame:
+    def _begin(self, poses: Worlds, what: str) -> PendingFrame:
         placed = _placed(poses)
         self._check_poses(placed)
         pupils, rotations = self.eye_frames(placed)
@@ -267,5 +270,5 @@ class _Place:
         return origins + rotations @ self._origin, rotations @ self._rotation
 
 
-def _placed(poses: Poses | Sequence[mujoco.MjData]) -> Poses:
+def _placed(poses: Worlds) -> Poses:
     return poses if isinstance(poses, Poses) else Poses.of(poses)

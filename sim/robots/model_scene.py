@@ -15,8 +15,10 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
+from optics import Eye
 from optics.spectra.spectrum import Spectrum
-from sim.robots.appearances import Appearance, Varied, appearances_of, varied_geoms
+from sim.render.band_error import lights_in_bands
+from sim.robots.appearances import Appearance, Varied, appearances_of, in_white, varied_geoms
 from sim.robots.as_built import AsBuilt
 from sim.robots.model_lights import Lights, model_lights
 from sim.robots.movers import Movers, kind_of
@@ -25,7 +27,7 @@ from sim.scene import bsdfs, inventory, lights, shapes, sky, surfaces
 from sim.scene.merged_parts import PlacedPart, merged
 from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
 from sim.scene.rays import names_of
-from sim.scene.spectra import Spectra, of_geom, resolve
+from sim.scene.spectra import of_geom, resolve
 from sim.scene.variant import Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
 from sim.tracing.lighting import DIRECT
@@ -45,7 +47,8 @@ class ModelScene:
     as_built: what worlds are compared with
     bsdfs: of every mover, in their order; kept here, since a BSDFPtr does not keep its objects alive
 
-    Warns (`sim.MirrorWarning`) once of what has no counterpart.
+    Warns (`sim.MirrorWarning`) once of what has no counterpart, and of measured lights that the eye's bands are too few
+    for.
 
     Raises:
         ValueError: a model without visible geoms, and spectra or variation of what it does not have.
@@ -54,14 +57,15 @@ class ModelScene:
     def __init__(
         self,
         model: mujoco.MjModel,
-        wavelengths: np.ndarray,
+        eye: Eye,
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
         varied: Varied = (),
         light: str = DIRECT,
     ) -> None:
         self.model, self.variant = model, default_variant()
-        self.spectra: Spectra = resolve(model, spectra)
+        self.spectra, wavelengths = resolve(model, spectra), eye.spectral_bands.wavelengths
+        in_bands, off = lights_in_bands(model, self.spectra, eye)
         seen = surfaces.visible(model, groups)
         self.geoms = [g for g in seen if shapes.has_shape(model, g)]
         if not self.geoms:
@@ -71,14 +75,16 @@ class ModelScene:
             drawn = {geom: materials for geom, materials in differ.items() if materials}
             painted = [geom for geom in differ if geom not in drawn]
             looks = appearances_of(model, self.geoms, drawn)
-            self.glows = {look: glow for look in looks if (glow := self._glow(look)) is not None}
+            glows = ((look, self._glow(look, look.geom in painted)) for look in looks)
+            self.glows = {look: glow for look, glow in glows if glow is not None}
             matt = {look: self._matt(look, look.geom in painted) for look in looks}
             moving = [each for each in looks if _moves(model, each.geom) or each.geom in differ or each in self.glows]
             meshes = {look: self._mesh(look, matt[look]) for look in moving if kind_of(look.model, look.geom) is None}
             self.movers = Movers(model, moving, meshes)
-            self.paint = Paint(model, painted, self.movers.geoms, wavelengths)
+            glow = any(look.geom in painted for look in self.glows)
+            self.paint = Paint(model, painted, self.movers.geoms, wavelengths, glow)
             self.bsdfs = [matt[look] for look in self.movers.looks]
-            found, left_out = model_lights(model, self.spectra, wavelengths, light)
+            found, left_out = model_lights(model, in_bands, wavelengths, light)
             self.lights = Lights(found)
             self._matt_still = {look.geom: matt[look] for look in looks if look not in moving}
             self.scene = self._still()
@@ -86,8 +92,8 @@ class ModelScene:
         reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
         self.as_built = AsBuilt(model, self.geoms, [g for g in reachable if g not in seen], self.movers, differ)
         left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, looks, light)]
-        if left_out:
-            warnings.warn(f"eyes do not see: {'; '.join(left_out)}", MirrorWarning, stacklevel=_outside())
+        for words in (*([f"eyes do not see: {'; '.join(left_out)}"] if left_out else []), *off):
+            warnings.warn(words, MirrorWarning, stacklevel=_outside())
 
     def _matt(self, look: Appearance, white: bool) -> MitsubaObject:
         to_uv = shapes.uv_transform(look.model, look.geom)
@@ -95,10 +101,12 @@ class ModelScene:
             return bsdfs.matt_white(look.model, look.geom, to_uv)
         return bsdfs.matt(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
 
-    def _glow(self, look: Appearance) -> MitsubaObject | None:
-        """A BSDF whose reflectance is the radiance of what glows: the kernel asks for it as for the others."""
-        to_uv = shapes.uv_transform(look.model, look.geom)
-        radiance = lights.glow(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
+    def _glow(self, look: Appearance, white: bool) -> MitsubaObject | None:
+        """A BSDF whose reflectance is the radiance of what glows: the kernel asks for it as for the others, and
+        multiplies what is white by its world's colour."""
+        to_uv, geom = shapes.uv_transform(look.model, look.geom), look.geom
+        model = in_white(look.model, geom) if white else look.model
+        radiance = lights.glow(model, geom, to_uv, of_geom(model, geom, self.spectra))
         if radiance is None:
             return None
         return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": radiance}})

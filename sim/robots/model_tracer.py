@@ -34,7 +34,9 @@ class Rows:
 
 @dataclass(frozen=True)
 class _Met:
-    """What rays end at. si: to ask the BSDF by · colors: that multiply its reflectance, per chunk of bands
+    """What rays end at.
+
+    si: to ask the BSDF by · colors, glow: that multiply its reflectance and what it emits, per chunk of bands
     which: mover, as many as there are: none · seen: whether there is anything · active: rays that there are
     point, normal: in the world, towards where the ray comes from · t: distance [m] · direction: of the ray
     """
@@ -42,6 +44,7 @@ class _Met:
     si: Array
     bsdf: Array
     colors: list[Array]
+    glow: list[Array]
     which: Array
     seen: Array
     active: Array
@@ -127,11 +130,13 @@ class ModelTracer:
         si.wi = si.to_local(-ray.d)
         mine = dr.gather(mi.BSDFPtr, inputs["bsdfs"], dr.minimum(hit.which, len(inputs["bsdfs"]) - 1), on_mover)
         bsdf = dr.select(on_mover, mine, si.bsdf()) if self._any_still else mine
-        colors = [mi.Spectrum(1) for _ in self._bands]
-        which = dr.minimum(hit.which, len(movers))
-        if len(self._scene.paint):
-            colors = self._scene.paint.of(which, rows.paint, rows.first_paint, inputs, seen)
-        return _Met(si, bsdf, colors, which, seen, active, point, normal, hit.t, ray.d)
+        colors = glow = [mi.Spectrum(1) for _ in self._bands]
+        which, paint = dr.minimum(hit.which, len(movers)), self._scene.paint
+        if len(paint):
+            colors = paint.of(which, rows.paint, rows.first_paint, inputs, seen)
+        if paint.glow:
+            glow = paint.of(which, rows.paint, rows.first_paint, inputs, seen, glow=True)
+        return _Met(si, bsdf, colors, glow, which, seen, active, point, normal, hit.t, ray.d)
 
     def distance(self, still: MitsubaObject, ray: Array, rows: Rows, inputs: dict[str, Array]) -> Array:
         """How far what each ray meets is [m]."""
@@ -203,7 +208,7 @@ class ModelTracer:
             glow = dr.gather(mi.BSDFPtr, inputs["glows"], k, glows)
             for i, band in enumerate(self._bands):
                 met.si.wavelengths = band
-                found[i] += dr.select(glows, glow.eval_diffuse_reflectance(met.si, glows), 0)
+                found[i] += dr.select(glows, met.glow[i] * glow.eval_diffuse_reflectance(met.si, glows), 0)
         return found
 
     @staticmethod

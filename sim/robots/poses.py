@@ -19,7 +19,21 @@ OF_MODELS = (
     "light_diffuse",
     "light_active",
     "heights",
+    "others",
 )
+OTHERS = (  # what else looks go by
+    "geom_group",
+    "geom_type",
+    "geom_dataid",
+    "mat_texid",
+    "mat_texrepeat",
+    "mat_texuniform",
+    "light_type",
+    "light_attenuation",
+    "light_cutoff",
+    "light_exponent",
+)
+HEADLIGHT = ("active", "diffuse")
 
 
 @dataclass(frozen=True)
@@ -30,6 +44,7 @@ class Poses:
     geom_size (world, geom, 3), geom_rgba (world, geom, 4), geom_matid (world, geom), mat_rgba, mat_emission,
         light_diffuse, light_active: as each world's own mjModel has them; None: as the renderer's model
     heights: a checksum of each height field's, (world, hfield), since they are many
+    others: a checksum of each of OTHERS and of HEADLIGHT, (world, field)
     """
 
     geom_xpos: np.ndarray
@@ -50,10 +65,12 @@ class Poses:
     light_diffuse: np.ndarray | None = None
     light_active: np.ndarray | None = None
     heights: np.ndarray | None = None
+    others: np.ndarray | None = None
 
     @classmethod
-    def of(cls, datas: Sequence[mujoco.MjData]) -> Poses:
-        """Of as many worlds as there are data."""
+    def of(cls, datas: Sequence[mujoco.MjData] | mujoco.MjData) -> Poses:
+        """Of as many worlds as there are data; one's of one."""
+        datas = [datas] if isinstance(datas, mujoco.MjData) else datas
         names = [f.name for f in fields(cls) if f.name not in OF_MODELS]
         stacked = {name: np.stack([getattr(data, name) for data in datas]) for name in names}
         found = {name: _square(array) if name.endswith("mat") else array for name, array in stacked.items()}
@@ -87,11 +104,25 @@ def _of_models(models: Sequence[mujoco.MjModel], name: str) -> np.ndarray:
 
 def of_model(model: mujoco.MjModel, name: str) -> np.ndarray:
     """One of OF_MODELS as a model has it now."""
-    if name != "heights":
-        found: np.ndarray = getattr(model, name)
-        return found
+    if name == "heights":
+        return _heights(model)
+    if name == "others":
+        return _others(model)
+    found: np.ndarray = getattr(model, name)
+    return found
+
+
+def _heights(model: mujoco.MjModel) -> np.ndarray:
+    if not model.nhfield:
+        return np.zeros(0, np.uint32)
     sizes = zip(model.hfield_adr, model.hfield_nrow * model.hfield_ncol, strict=True)
     return np.array([crc32(model.hfield_data[start : start + size]) for start, size in sizes], np.uint32)
+
+
+def _others(model: mujoco.MjModel) -> np.ndarray:
+    headlight = model.vis.headlight
+    lamp = [crc32(np.asarray(getattr(headlight, name), np.float32).tobytes()) for name in HEADLIGHT]
+    return np.array([*(crc32(getattr(model, name)) for name in OTHERS), *lamp], np.uint32)
 
 
 def _square(rows: np.ndarray) -> np.ndarray:

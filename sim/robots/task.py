@@ -15,6 +15,7 @@ from optics.numerics.arguments import did_you_mean, whole
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.eyes import Eyes
 from sim.render.fidelity import Fidelity
+from sim.robots.controls import actuator_names, controls_of
 from sim.robots.eye_kinds import kinds_of, several
 from sim.robots.mounts import Mount, fan
 from sim.scene import source
@@ -43,7 +44,8 @@ class Task:
         "GEOM.material", of two or more of the model's, by name: its texture, colour and glow; the geom has no rgba
         "JOINT.start", where a hinge [rad] or a slide [m] is at first; "BODY.start", between two points (x, y, z) [m],
         of a mocap body or one with a free joint
-        All but "light" and "color_temperature" are in each world's own `data.model`, or in its data
+        All but "light" and "color_temperature" are in each world's own `data.model`, or in its data. Worlds have
+        models of their own, too, where the first `reset` changes `data.model`; otherwise they share one
     auxiliary: of "depth", "ids" and "flow": what an observation holds of each receptor beside its signal: how far what
         its centre looks at is, which geom, and how it has moved since the last observation; see docs/tasks.md. Eyes
         that evolve have none
@@ -56,6 +58,9 @@ class Task:
 
     Where the task evolves (`evolve run FILE.py:CLASS`), every animal has eyes of its own, where `place` puts them; a
     class without arguments is needed for that.
+
+    What fails in a method ends its world's episode; in `reset`, and in `feels` there, it is a RuntimeError for all,
+    since a world that cannot begin has no episode.
 
     Methods are called for one world at a time, with its mjData after mj_forward. One task serves all worlds: what an
     episode must remember belongs into mjData (`userdata`, say), not into the task.
@@ -76,12 +81,11 @@ class Task:
     others: Sequence[Frozen] = ()
 
     def reset(self, data: mujoco.MjData, rng: np.random.Generator) -> None:
-        """Begin an episode: change what mj_resetData has left."""
+        """Begin an episode: change what mj_resetData has left. `data.model` may be changed, too, for the episode."""
 
     def act(self, data: mujoco.MjData, action: np.ndarray) -> None:
-        """Take an action in [-1, 1], (n_actions,); here: each of its actuators over the whole of its range."""
-        model, named = data.model, self.actuators
-        mine = slice(None) if named is None else [model.actuator(name).id for name in named]
+        """Take an action in [-1, 1], (n_actions,); here: each control of its actuators over the whole of its range."""
+        model, mine = data.model, controls_of(data.model, self.actuators)
         limited = model.actuator_ctrllimited[mine].astype(bool)
         low, high = np.where(limited[:, None], model.actuator_ctrlrange[mine], [-1.0, 1.0]).T
         data.ctrl[mine] = low + (high - low) * (action + 1) / 2
@@ -108,8 +112,8 @@ class Task:
         return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)
 
     def n_actions(self, model: mujoco.MjModel) -> int:
-        """Numbers in an action; here: as many as it has actuators."""
-        return int(model.nu) if self.actuators is None else len(self.actuators)
+        """Numbers in an action; here: as many controls as its actuators take, which is one each of most kinds."""
+        return len(controls_of(model, self.actuators))
 
 
 def compiled(task: Task, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
@@ -125,10 +129,12 @@ def compiled(task: Task, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
     whole(f"{name}: substeps", task.substeps, 1, MOST_STEPS)
     whole(f"{name}: episode_steps", task.episode_steps, 1, MOST_STEPS)
     model = source.load(task.model) if model is None else model
-    known = [model.actuator(i).name for i in range(model.nu)]
+    known = actuator_names(model)
     for actuator in task.actuators or ():
         if actuator not in known:
             raise ValueError(f"{name}: actuators: {actuator!r}: must be in the model{did_you_mean(actuator, known)}")
+        if not len(controls_of(model, [actuator])):
+            raise ValueError(f"{name}: actuators: {actuator!r} takes no control: must be one that can be driven")
     if task.n_actions(model) < 1:
         raise ValueError(f"{name}: its model has no actuators: n_actions and act must say what an action is")
     return model

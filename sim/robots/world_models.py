@@ -1,4 +1,5 @@
-"""A model for each world, where sizes, colours and materials differ, and where things are when an episode begins.
+"""A model for each world, where sizes, colours and materials differ or a task changes it, and where things are when an
+episode begins.
 
 A size goes through MuJoCo's compiler, so that mass, inertia and all that follows from them are the compiler's own: what
 has a density weighs by its volume, what was given a mass keeps it. A world's model and data stay the same objects.
@@ -7,7 +8,8 @@ has a density weighs by its volume, what was given a mass keeps it. A world's mo
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ import numpy as np
 from optics.numerics.arguments import did_you_mean
 from sim.robots import variation as of_worlds
 from sim.robots.appearances import in_material, material_of
+from sim.robots.model_settings import ModelSettings
 from sim.robots.movers import kind_of as primitive_of
 from sim.robots.variation import COLOR, MATERIAL, OF_THINGS, SIZE, START, Variation
 from sim.scene import source, surfaces
@@ -30,8 +33,10 @@ _JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 class WorldModels:
     """Of `n` worlds of one model.
 
-    given: what the model was made of · model: what became of it
-    models: of each world; the same for all, where nothing of them differs
+    given: what the model was made of · model: what became of it; worlds have copies
+    models: of each world; one for all, unless they are `own`
+    own: whether each world has one for itself: an only world, and where something of them differs or a task changes
+        them (`separate`); then each episode begins with the model as it was compiled
     varied: names of the geoms whose size, colour or material differs, and of the materials that are drawn
 
     Raises:
@@ -50,29 +55,55 @@ class WorldModels:
             model.geom(g).name: tuple(self._materials[g][1]) if g in self._materials else ()
             for g in sorted({*self._sizes, *self._colors, *self._materials})
         }
-        self.models = [copy.copy(model) for _ in range(n)] if self.varied else [model] * n
-        if not self._sizes:
-            return
-        self._spec = _specification(given)
-        for geom, name in self._sizes.items():
-            drawn = self._materials.get(geom, ("", {}))[1].values()
-            looks = [in_material(model, geom, material).model for material in drawn] or [model]
-            if any(primitive_of(look, geom) is None for look in looks):
-                raise ValueError(
-                    f"vary: {name}: must be a sphere, capsule, cylinder, ellipsoid or box without a texture"
-                )
-        by_name = {geom.name: geom for geom in self._spec.geoms}
-        self._geoms = {geom: by_name[model.geom(geom).name] for geom in self._sizes}
-        self._natural = {geom: (np.array(mjs.size), np.array(mjs.fromto)) for geom, mjs in self._geoms.items()}
-        self._fields = _fields_of(model)
+        self.own, self._compiled = False, ModelSettings(model).held()
+        self.models = [copy.copy(model)] * n
+        self._settings = [ModelSettings(self.models[0])] * n
+        if self.varied or n == 1:
+            self.separate()
+        if self._sizes:
+            self._prepare_sizes(given)
+
+    def separate(self) -> None:
+        """A model for each world from now on, as it was compiled."""
+        self.own, self.models = True, [copy.copy(self.model) for _ in self.models]
+        self._settings = [ModelSettings(model) for model in self.models]
+
+    def held(self, world: int) -> bytes:
+        """All that physics goes by of a world's model now."""
+        return self._settings[world].held()
+
+    def hold(self, world: int, held: bytes) -> None:
+        """Inverse of `held`."""
+        self._settings[world].hold(held)
+
+    def differs(self) -> bool:
+        """Whether the model that worlds share is no longer as it was compiled."""
+        return not self.own and self.held(0) != self._compiled
+
+    @contextmanager
+    def left_alone(self, whose: str) -> Iterator[None]:
+        """While tasks do what they do; whose: what a message begins with.
+
+        Raises:
+            RuntimeError: the model that worlds share is no longer as before.
+        """
+        before = b"" if self.own else self.held(0)
+        yield
+        if not self.own and self.held(0) != before:
+            raise RuntimeError(
+                f"{whose}: data.model has another {self._settings[0].differing(before)} now, and all worlds share it: "
+                "must be changed by the first `reset`, too; then each world has a model of its own"
+            )
 
     def begin(self, world: int, drawn: Drawn) -> None:
-        """A world's sizes, colours and materials from now on.
+        """A world's sizes, colours and materials from now on; a model of its own is otherwise as it was compiled.
 
         Raises:
             ValueError: a material that is not one of its own.
         """
         mine = self.models[world]
+        if self.own and self.held(world) != self._compiled:
+            self.hold(world, self._compiled)
         if self._sizes:
             self._resize(mine, drawn)
         for geom, name in self._colors.items():
@@ -96,6 +127,20 @@ class WorldModels:
         if not np.array_equal(self.model.geom_rgba[geom], surfaces.UNSET_RGBA):
             raise ValueError(f"vary: {name}: the geom's own rgba takes the place of its materials': must have none")
         return {each: material_of(self.model, each, f"vary: {name}") for each in variation.ranges[name]}
+
+    def _prepare_sizes(self, given: Any) -> None:
+        model, self._spec = self.model, _specification(given)
+        for geom, name in self._sizes.items():
+            drawn = self._materials.get(geom, ("", {}))[1].values()
+            looks = [in_material(model, geom, material).model for material in drawn] or [model]
+            if any(primitive_of(look, geom) is None for look in looks):
+                raise ValueError(
+                    f"vary: {name}: must be a sphere, capsule, cylinder, ellipsoid or box without a texture"
+                )
+        by_name = {geom.name: geom for geom in self._spec.geoms}
+        self._geoms = {geom: by_name[model.geom(geom).name] for geom in self._sizes}
+        self._natural = {geom: (np.array(mjs.size), np.array(mjs.fromto)) for geom, mjs in self._geoms.items()}
+        self._fields = _fields_of(model)
 
     def _resize(self, mine: mujoco.MjModel, drawn: Drawn) -> None:
         for geom, mjs in self._geoms.items():

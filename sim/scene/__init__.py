@@ -12,6 +12,7 @@ bsdfs          materials -> BSDFs
 spectra        measured spectra in the place of colours
 lights         lights -> emitters, with daylight's spectrum
 sky            the skybox -> light from infinity
+whereabouts    where everything was at one moment
 cameras        cameras -> sensors
 rays           what a sensor sees of a scene
 inventory      what has no counterpart, in words

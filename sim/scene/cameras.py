@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from sim.scene.variant import MitsubaObject
+from sim.scene.whereabouts import Whereabouts
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Viewpoint:
         return np.stack([across, up, -np.ones((height, width))], axis=-1) @ self.rotation.T
 
 
-def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: str | int | Viewpoint) -> Viewpoint:
+def viewpoint(model: mujoco.MjModel, data: mujoco.MjData | Whereabouts, camera: str | int | Viewpoint) -> Viewpoint:
     """Where a camera of the model is.
 
     Raises:

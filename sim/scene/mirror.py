@@ -21,6 +21,7 @@ from sim.scene.cameras import Viewpoint
 from sim.scene.spectra import of_geom, resolve
 from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
+from sim.scene.whereabouts import Whereabouts
 
 VISIBLE_GROUPS = (0, 1, 2)  # MuJoCo draws these unless told otherwise
 
@@ -85,27 +86,29 @@ class Mirror:
         self.geoms = np.array([g for g in visible if shapes.has_shape(model, g)], dtype=int)
         if not len(self.geoms):
             raise ValueError("mirror: the model has no visible geom of a kind that can be mirrored")
-        self._data = _reference_pose(model) if data is None else _checked(model, data)
+        data = _reference_pose(model) if data is None else _checked(model, data)
+        self._places = Whereabouts.of(data)
         self._parts = {int(g): shapes.parts(model, g) for g in self.geoms}
-        self._poses = {g: shapes.pose(self._data, g) for g in self._parts}
+        self._poses = {g: shapes.pose(data, g) for g in self._parts}
         self._bsdfs: dict[Any, MitsubaObject] = {}
         with in_variant(variant):
-            self._emitters, left_out = lights.emitters(model, self._data, self.spectra)
+            self._emitters, left_out = lights.emitters(model, data, self.spectra)
             self.scene = self._build()
             self._params = mi.traverse(self.scene)
             self._names = rays.names_of(self.scene)
+        self._told_of_glass = False
         left_out = inventory.left_out(model, visible, groups) + left_out
         if left_out:
             warnings.warn(f"not mirrored: {'; '.join(left_out)}", MirrorWarning, stacklevel=3)
 
     def sync(self, data: mujoco.MjData) -> None:
-        """Move everything to where `data` has it (after mj_forward or mj_step). Only what moved is touched: a scene
-        in which nothing moved is not rebuilt.
+        """Move everything, cameras too, to where `data` has it now (after mj_forward or mj_step). Only what moved is
+        touched: a scene in which nothing moved is not rebuilt.
 
         Raises:
             ValueError: the data of another model, and for positions that are not finite.
         """
-        self._data = _checked(self.model, data)
+        self._places = Whereabouts.of(_checked(self.model, data))
         with in_variant(self.variant):
             for geom, parts in self._parts.items():
                 pose = shapes.pose(data, geom)
@@ -141,19 +144,37 @@ class Mirror:
         spp: samples per pixel
         sampler: "independent", or "multijitter" for pictures: less noise
         Units: a white Lambertian that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
+
+        Warns once, by MirrorWarning, where "direct" would look through a transparent geom.
+
+        Raises:
+            ValueError: an unknown camera, less than one pixel or sample, wavelengths beyond 300 to 780 nm, and what
+                Mitsuba would take wrongly.
         """
         view = self.viewpoint(camera)
         rays.check_size(width, height, spp)
+        asked = rays.checked_wavelengths(wavelengths)
+        if (integrator if isinstance(integrator, str) else integrator.get("type")) == "direct":
+            self._tell_of_glass()
         with in_variant(self.variant):
             if any(e.name == lights.HEADLIGHT for e in self._emitters):
                 self._move_light(lights.HEADLIGHT, lights.aimed(view.position, -view.rotation[:, 2]))
                 self._params.update()
             taken = self._camera(view, width, height)
-            return taken.radiance(integrator, spp, np.asarray(wavelengths, float), seed, sampler)
+            return taken.radiance(integrator, spp, asked, seed, sampler)
+
+    def _tell_of_glass(self) -> None:
+        """Mitsuba's `direct` takes a mask's share of light for its colour, and looks through it at emitters alone."""
+        glass = [int(g) for g in self.geoms if surfaces.rgba(self.model, int(g))[3] < 1]
+        if glass and not self._told_of_glass:
+            listed = inventory.listed_geoms(self.model, glass)
+            words = f"'direct' does not show what is behind the transparent {listed}: integrator='path' does"
+            warnings.warn(words, MirrorWarning, stacklevel=3)
+        self._told_of_glass = True
 
     def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
-        """Where a camera of the model is now, and how it looks."""
-        return cameras.viewpoint(self.model, self._data, camera)
+        """Where a camera of the model was at the last `sync`, and how it looks."""
+        return cameras.viewpoint(self.model, self._places, camera)
 
     def render_ids(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
         """Geom id seen through the centre of each pixel, (y, x) int32, -1 for none."""

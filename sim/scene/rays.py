@@ -15,10 +15,12 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from optics.spectra.spectrum import LIMITS_NM
 from sim.scene.variant import Description, MitsubaObject
 
 LANES = 4  # wavelengths in one mi.Spectrum
 WAVEFRONT = 1 << 21  # rays traced at once
+ROUNDING = 1e-12  # [m] of wavelengths
 NESTED = 64  # bodies in each other that a camera may be inside of
 
 
@@ -26,6 +28,19 @@ def check_size(width: int, height: int, spp: int) -> None:
     for name, value in (("width", width), ("height", height), ("spp", spp)):
         if value < 1:
             raise ValueError(f"{name} = {value}: must be at least 1")
+
+
+def checked_wavelengths(wavelengths: Any) -> np.ndarray:
+    """Wavelengths [m], (band,).
+
+    Raises:
+        ValueError: there are none, or some at which nothing shines, as those are in nanometres.
+    """
+    found = np.asarray(wavelengths, float)
+    low, high = (1e-9 * limit for limit in LIMITS_NM)
+    if found.ndim != 1 or not len(found) or not ((found > low - ROUNDING) & (found < high + ROUNDING)).all():
+        raise ValueError(f"wavelengths = {wavelengths!r:.80}: must be in metres, from {low:.3g} to {high:.3g}")
+    return found
 
 
 @dataclass(frozen=True)

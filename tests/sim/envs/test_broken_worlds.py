@@ -23,6 +23,14 @@ class Nowhere(Face):
             data.mocap_pos[0] = np.nan
 
 
+class Lost(Face):
+    """An action of 1 is divided by zero, one of 0.9 is huge; MuJoCo does nothing then, by any motor."""
+
+    def act(self, data, action):
+        super().act(data, action)
+        data.ctrl[0] = {1: np.nan, 0.9: 1e11}.get(round(float(action[0]), 6), data.ctrl[0])
+
+
 def moved_off(env):
     env.worlds.datas[1].qvel[:] = np.nan
 
@@ -32,6 +40,7 @@ def moved_off(env):
     [
         (Face, moved_off, "physics is unstable: positions, speeds"),
         (Unmended, moved_off, "physics is unstable: positions, speeds"),
+        (Lost, lambda env: None, "controls are huge or not finite: what `act` writes must be numbers"),
         (Nowhere, lambda env: None, "physics is unstable: places of bodies are not finite; what `act` writes must be"),
     ],
 )
@@ -65,6 +74,17 @@ def test_the_only_world_ends_so_too(action):
     assert (terminated, truncated) == (True, False)
     assert "failure" in info
     assert np.isfinite(observation["eyes"]).all()
+
+
+def test_huge_controls_end_an_episode_too():
+    task = Lost()
+    task.model = CART.replace(' ctrlrange="-2 2"', "")  # within a range MuJoCo would limit it
+    env = sim.make_vec_env(task, n_envs=2)
+    env.reset()
+    with pytest.warns(UserWarning, match="Lost: controls are huge"):
+        *_, done, infos = env.step(np.array([[0.9], [0.8]]))
+    assert done.tolist() == [True, False]
+    assert "failure" not in infos[1]
 
 
 def lost(encounter):

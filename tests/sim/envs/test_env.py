@@ -219,7 +219,10 @@ def test_renders_nothing_before_the_world_has_begun():
             {**FINE, "fidelity": sim.Fidelity(3, bands=2)},
             r"rays_per_receptor = Fidelity\(.*: must be left out where a ",
         ),
-        ({**FINE, "fidelity": "nonsense"}, "fidelity = 'nonsense': must be a sim.Fidelity or None"),
+        ({**FINE, "fidelity": "nonsense"}, "fidelity = 'nonsense': must be a sim.Fidelity, 'auto' or None"),
+        ({**FINE, "fidelity": "auto"}, "rays_per_receptor = .*: must be left out where a fidelity is given"),
+        ({"seed": 3}, r"seed = 3: must be left out, it goes to reset\(seed=...\)"),
+        ({"n_envs": 2}, "n_envs = 2: must be left out, this is one world: make_vec_env has several"),
         ({"world_seed": 1.5}, "world_seed = 1.5: must be a whole number"),
     ],
 )
@@ -267,6 +270,9 @@ def test_a_fidelity_by_either_name_is_the_same():
         renderer = sim.make_vec_env("detection", EYES, 1, **named).renderer
         assert renderer.fidelity == fidelity
         assert renderer.eyes.bands == 3
+    chosen = [sim.make_vec_env("detection", EYES, 1, **how).renderer.fidelity for how in ({}, {"fidelity": "auto"})]
+    assert chosen[0] == chosen[1]
+    assert chosen[0].levels
 
 
 def test_an_eyes_columns_of_receptors_are_drawn_where_they_look():

@@ -135,6 +135,16 @@ def test_before_the_first_reset_there_is_none():
         sim.make_vec_env(Face(), n_envs=1).get_state()
 
 
+def test_who_sleeps_is_in_no_state():
+    task = Pushed()
+    task.model = Pushed.model.replace('<option timestep=".02"/>', '<option><flag sleep="enable"/></option>')
+    sleepy = sim.make_vec_env(task, n_envs=1)
+    sleepy.reset()
+    for ask in (sleepy.get_state, lambda: sleepy.set_state({})):
+        with pytest.raises(RuntimeError, match="get_state: the model has <flag sleep>, and who sleeps"):
+            ask()
+
+
 def test_environments_are_not_pickled(env):
     with pytest.raises(TypeError, match="TaskVecEnv cannot be pickled or copied: it holds compiled kernels"):
         pickle.dumps(env)

@@ -1,6 +1,7 @@
 """docs/tasks.md says what the environments do."""
 
 import re
+import warnings
 from pathlib import Path
 
 import gymnasium
@@ -11,9 +12,14 @@ import sim
 from sim.envs.registration import IDS
 from sim.envs.simulation import EPISODE_STEPS, NO_ACTION, UNSTABLE
 from sim.tasks.reward import EVALUATION, TERMS, TRAINING
+from tests.sim.envs.test_task_vec_env import Face
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "tasks.md").read_text()
 EYES = sim.Eyes(n_eyes=3, resolution=(2, 4))
+
+
+class Dimmed(Face):
+    vary = {"light": (0.1, 1.0)}  # noqa: RUF012
 
 
 def table(heading):
@@ -73,6 +79,23 @@ def test_info_keys_are_those_of_the_table():
     assert any("given_up" in info for _ in range(64) for info in hasty.step(np.tile([1.0, 0.0], (2, 1)))[3])
     assert f"{EPISODE_STEPS} actions" in {row[0] for row in table("Endings")}
     assert all(f'"{reason}"' in PAGE for reason in (UNSTABLE, NO_ACTION))
+
+
+def test_tasks_of_ones_own_say_no_more_than_the_table_has():
+    documented = {row[0] for row in table("Info")}
+    elsewhere = {row[0] for row in table("Info") if row[2].endswith("not of a task of one's own")} | {"given_up"}
+    env = sim.make_vec_env(Dimmed(), n_envs=2)
+    env.reset()
+    assert elsewhere == {"position", "heading", "given_up"}
+    always = {"reward_terms", "is_success", "varied"}
+    assert all(set(info) == always for info in env.reset_infos)
+    seen = set()
+    for step in range(Dimmed.episode_steps):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            infos = env.step(np.array([[0.0], [np.nan if step == 3 else 0.0]]))[3]
+        seen |= set().union(*infos)
+    assert seen == documented - elsewhere
 
 
 def test_arguments_are_those_of_the_table():

@@ -12,7 +12,7 @@ sample_choice: test_sample_choice.py, test_fidelity.py
 random_views: test_fidelity.py
 fidelity_trials: test_fidelity.py, eyes/test_depth_layers.py
 prepared_scene: test_batched_renderer.py, test_fidelity.py
-band_error: test_band_error.py
+band_error: test_band_error.py, robots/test_model_lamps.py
 memory_budget: test_memory_budget.py, test_sample_choice.py
 frozen_kernels: test_frozen_kernels.py, test_batched_renderer.py
 receptor_noise: test_receptor_noise.py

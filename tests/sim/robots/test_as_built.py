@@ -11,8 +11,10 @@ from optics import Eye
 
 MODEL = mujoco.MjModel.from_xml_string("""
     <mujoco><visual><headlight active="0"/></visual><asset>
+      <texture name="tiles" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="8" height="8"/>
       <hfield name="hills" nrow="3" ncol="3" size="1 1 .5 .1"/>
       <hfield name="unseen" nrow="3" ncol="3" size="1 1 .5 .1"/>
+      <material name="tiles" texture="tiles"/>
       <material name="red" rgba=".8 .1 .1 1"/><material name="clear" rgba="1 1 1 0"/><material name="spare"/>
     </asset><worldbody>
       <light name="sun" type="directional" dir="0 0 -1"/><light name="off" type="directional" active="false"/>
@@ -60,6 +62,13 @@ def setting(field, value, kind=None, name=None):
 
 ANEW = "as .* when .* was made: make a new one"
 HANG = "stands still in the renderer's model and is elsewhere now: must hang on a joint or on a mocap body"
+OTHER = f"is another than in the renderer's model: .*{ANEW}"
+
+
+def headlight(active):
+    return lambda model: setattr(model.vis.headlight, "active", active)
+
+
 REFUSED = {
     "place": (setting("geom_pos", [2, 0, 1.5], "geom", "wall"), f"geom 'wall' {HANG}"),
     "turn": (setting("geom_quat", [0.9, 0, 0, 0.435889894], "geom", "wall"), f"geom 'wall' {HANG}"),
@@ -72,9 +81,17 @@ REFUSED = {
     "ghost": (setting("geom_rgba", 1, "geom", "ghost"), f"geom 'ghost' has an alpha of 0 in .* now: .*{ANEW}"),
     "pane": (setting("mat_rgba", 1, "material", "clear"), f"material 'clear' has another mat_rgba than in .*{ANEW}"),
     "other pane": (
-        setting("geom_matid", 0, "geom", "pane"),
+        setting("geom_matid", 1, "geom", "pane"),
         f"geom 'pane' has an alpha of 0 .* to be seen now: .*{ANEW}",
     ),
+    "headlight": (headlight(1), f"vis.headlight.active {OTHER}"),
+    "its colour": (lambda model: model.vis.headlight.diffuse.fill(0.1), f"vis.headlight.diffuse {OTHER}"),
+    "texture": (setting("mat_texid", -1, "material", "tiles"), f"mat_texid {OTHER}"),
+    "tiles": (setting("mat_texrepeat", 3, "material", "tiles"), f"mat_texrepeat {OTHER}"),
+    "group": (setting("geom_group", 4, "geom", "wall"), f"geom_group {OTHER}"),
+    "kind of lamp": (setting("light_type", mujoco.mjtLightType.mjLIGHT_POINT, "light", "sun"), f"light_type {OTHER}"),
+    "distance": (setting("light_attenuation", 0.5, "light", "sun"), f"light_attenuation {OTHER}"),
+    "cone": (setting("light_cutoff", 20, "light", "sun"), f"light_cutoff {OTHER}"),
     "size": (setting("geom_size", 0.3, "geom", "ball"), "geom 'ball' has another size than .* must be in `varied`"),
 }
 FOLLOWED = {

@@ -198,6 +198,14 @@ def test_bad_poses_are_named(model):
         renderer.signals([posed(model, 0), lost])
 
 
+def test_an_only_worlds_data_need_not_be_in_a_list(model):
+    renderer = sim.ModelRenderer(model, EYE, [sim.Mount("side")], 1, sim.Fidelity(1, bands=BANDS))
+    data = posed(model, 0.3)
+    for look in (renderer.signals, renderer.depth, renderer.ids, renderer.receptor_radiance):
+        np.testing.assert_array_equal(look(data), look([data]))
+    np.testing.assert_array_equal(renderer.flow(data, data), renderer.flow([data], [data]))
+
+
 def test_data_before_mj_forward_is_refused(model):
     """Everything would be at the origin, without size, and dark. The mirror says the same."""
     words = r"says nothing yet of where things are; call mujoco.mj_forward\(model, data\) first"

@@ -6,6 +6,7 @@ bombs: test_bombs.py
 inventory: test_mirror.py
 rays: test_mirror.py
 cameras: test_mirror.py
+whereabouts: test_mirror.py
 variant: test_mirror.py
 shapes: test_mirror.py, test_textures.py
 merged_parts: test_mirror.py

@@ -88,6 +88,33 @@ def test_sync_moves_geoms_camera_and_light():
     assert np.mean(before != after) > 0.05
 
 
+def test_between_two_syncs_everything_stays_where_it_was():
+    """A camera that rides on a body that falls, its headlight, and the world."""
+    model = mujoco.MjModel.from_xml_string("""
+        <mujoco><visual><headlight ambient="0 0 0"/></visual><worldbody>
+          <geom type="plane" size="5 5 .1"/><geom size=".3" pos="0 2 1" rgba=".9 .2 .1 1"/>
+          <body pos="0 -1 1.5"><freejoint/><geom size=".1"/>
+            <camera name="head" pos="0 .2 0" xyaxes="1 0 0 0 0 1"/></body></worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    mirrored = sim.mirror(model)
+    mirrored.sync(data)
+
+    def seen():
+        return mirrored.render("head", 16, 12, spp=2), mirrored.render_ids("head", 16, 12), mirrored.viewpoint("head")
+
+    before = seen()
+    data.qvel[3] = 2
+    mujoco.mj_step(model, data, 100)
+    after = seen()
+    for one, other in zip(before[:2], after[:2], strict=True):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(before[2].position, after[2].position)
+    mirrored.sync(data)
+    np.testing.assert_array_equal(mirrored.viewpoint("head").position, data.camera("head").xpos)
+    assert not np.array_equal(seen()[1], before[1])
+
+
 def test_what_cannot_be_mirrored_is_named_once():
     xml = """<mujoco><visual><headlight ambient="0.1 0.1 0.1" diffuse="0 0 0"/></visual><asset>
     <texture name="sky" type="skybox" builtin="flat" rgb1="1 1 1" width="8" height="48"/>
@@ -154,6 +181,9 @@ def test_bad_input_is_named():
         mirror.render_ids(Viewpoint(np.zeros(3), np.eye(3), 45.0), 0, 4)
     with pytest.raises(ValueError, match="light samples"):
         mirror.render(Viewpoint(np.zeros(3), np.eye(3), 45.0), 4, 4, {"type": "direct", "emitter_samples": 4})
+    for nowhere in ((450, 550, 650), (5e-7, 2e-7), (), 5e-7, (np.nan,)):
+        with pytest.raises(ValueError, match=r"wavelengths = .*: must be in metres, from 3e-07 to 7.8e-07"):
+            mirror.render(Viewpoint(np.zeros(3), np.eye(3), 45.0), 4, 4, wavelengths=nowhere)
     with pytest.raises(ValueError, match="no body 'arm'"):
         sim.mirror(model, bodies=["arm"])
     with pytest.raises(ValueError, match="llvm_ad_rgb"):

@@ -3,12 +3,15 @@
 Tried and seen to fail, one at a time: light reversed, π forgotten, colours not linearised.
 """
 
+import warnings
+
 import mujoco
 import numpy as np
 import pytest
 
 import sim
 from optics.spectra.bands import daylight
+from sim.pictures.quick_camera import QuickCamera
 from sim.scene.cameras import Viewpoint
 from sim.scene.color import decode_srgb
 from sim.scene.mirror import MirrorWarning
@@ -107,3 +110,24 @@ def test_emissive_material_glows():
         "<worldbody>", '<asset><material name="m" rgba="1 1 1 1" emission="0.7"/></asset><worldbody>'
     )
     np.testing.assert_allclose(radiance(xml), 0.7 * daylight(NM * 1e-9), rtol=1e-4)
+
+
+GLASS = """<mujoco><visual><headlight active="0"/></visual><worldbody>
+    <light type="directional" dir="0 0 -1" diffuse=".9 .9 .9"/><geom type="plane" size="3 3 .1" rgba="1 1 1 1"/>
+    <geom name="pane" type="plane" size=".2 .2 .05" pos="0 -1 2" rgba="0 0 0 .5"/></worldbody></mujoco>"""
+
+
+def test_who_looks_through_glass_is_told_where_it_is_not_seen_through():
+    """A black pane of alpha ½ before a white floor, lit beside it: half of the floor's light by "path", none of it by
+    "direct", and a word of that."""
+    view = Viewpoint.looking_at([0, -2, 4], [0, 0, 0.0], 2)
+    mirror, floor = sim.mirror(GLASS), 0.9
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        through = mirror.render(view, 2, 2, "path", spp=256, wavelengths=[560e-9])
+    np.testing.assert_allclose(through, floor / 2, rtol=0.1)
+    with pytest.warns(sim.MirrorWarning, match="'direct' does not show what is behind the transparent geom 'pane'"):
+        assert mirror.render(view, 2, 2, spp=4, wavelengths=[560e-9]).max() < 0.01
+    model = mujoco.MjModel.from_xml_string(GLASS)
+    with pytest.warns(sim.MirrorWarning, match="quick pictures do not show what is behind the transparent geom 'pane'"):
+        QuickCamera(model)
