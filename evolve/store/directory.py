@@ -21,7 +21,7 @@ from evolve.config.run_config import RunConfig
 from evolve.config.sources import parsed_toml
 from evolve.store.atomic_files import POLICIES, TRAININGS, UNFINISHED, sweep, write_whole
 from evolve.store.candidate import Candidate
-from evolve.store.lock import LONGEST, LockedError, RunLock
+from evolve.store.lock import LONGEST, RunLock
 from evolve.store.policies import lost
 from evolve.store.record import Record, RunError
 from evolve.store.regular_files import folder, opened, read, require_folder, require_regular
@@ -105,14 +105,15 @@ class Run:
         Raises:
             RunError: it cannot be written.
         """
-        path = next_directory(config.task_name, preset)
         while True:
+            path = next_directory(config.task_name, preset)
             try:
-                return cls.create(path, config, origin)
-            except (RunError, LockedError):
-                if (free := next_directory(config.task_name, preset)) == path:
-                    raise
-                path = free
+                path.mkdir(parents=True)  # whose it is
+            except FileExistsError:
+                continue
+            except OSError as error:
+                raise RunError(f"{path} cannot be written: {error.strerror}") from error
+            return cls.create(path, config, origin)
 
     def require_present_format(self) -> None:
         """Trainings can be carried on in the light in which they began, and in no other.
@@ -142,7 +143,11 @@ class Run:
         Raises:
             RunError: the record is damaged or cannot be written, or config.toml is no longer as it was opened.
         """
-        if from_text(read(self.path / CONFIG), str(self.path / CONFIG)) != self.config:
+        try:
+            text = read(self.path / CONFIG)
+        except OSError as error:
+            raise RunError(f"{self.path / CONFIG}: cannot be read: {error.strerror}") from error
+        if from_text(text, str(self.path / CONFIG)) != self.config:
             raise RunError(f"{self.path / CONFIG} has changed since the run was opened; open it again")
         self.record = Record.read(self.record.path, self.config)
         try:

@@ -260,8 +260,10 @@ class Pupil:
         """Spatial frequency [1/m] along x and y by which light leaves its rays, but for this share: by a relief's
         jumps, a mask, and ripples, which send none further than their slopes and own frequency do (Carson's rule)."""
         bends, found = self.bends(wavelength), 0.0
-        each = share / max(1, bends + (self.wavefront is not None) + (self.mask is not None))
-        turns, level = number(self.index_step(wavelength)) / wavelength, math.sqrt(each) / (2 * math.pi)  # waves
+        rough = sum(p is not None and p.scatters for p in (self.height if bends else None, self.wavefront))
+        each = share / max(1, rough + (self.mask is not None))
+        of_disk = each * self.aperture.area / math.pi  # samples are of all the disk, light is of the opening
+        turns, level = number(self.index_step(wavelength)) / wavelength, math.sqrt(of_disk) / (2 * math.pi)  # waves
         if bends and isinstance(self.height, PixelRelief):
             found += self.height.scatter(turns, self.aperture, each) / self.radius
         elif bends and turns != 0:
@@ -269,7 +271,8 @@ class Pupil:
         if self.wavefront is not None:
             own = self.radius if self.wavefront.radius is None else self.wavefront.radius
             found += self.wavefront.detail(level * wavelength, self.radius / own) / own
-        return found if self.mask is None else found + self.mask.detail(each, self.radius)
+        light = 0.0 if self.mask is None else of_disk * number(self.transmission)
+        return found if self.mask is None else found + self.mask.detail(light, self.radius)
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
         """Spatial frequency [1/m] above which relief and wavefront change the phase by less than `tolerance` rad,

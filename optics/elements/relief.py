@@ -29,6 +29,8 @@ FEWEST_FOR_JUMPS = 16  # choice: samples a side
 class Relief(ABC):
     """A height map [m]."""
 
+    scatters = True  # perhaps: light to where no slope of it points
+
     @abstractmethod
     def height(self, x: Array, y: Array, types: Precision) -> Array:
         """Height [m] at normalised positions: flat Dr.Jit float64 arrays in and out."""
@@ -38,8 +40,7 @@ class Relief(ABC):
         """Spatial frequency [cycles per aperture radius] above which the relief's content is below `level` [m]."""
 
     def detail(self, level: float) -> float:
-        """Spatial frequency [cycles per aperture radius] along x and y beyond which what slopes do not tell of the
-        relief is below `level` [m], root mean square."""
+        """The same along x and y of what slopes do not tell, root mean square."""
         return self.bandwidth(level)
 
     @property
@@ -87,6 +88,7 @@ class BSplineRelief(Relief):
         ValueError: not 4 x 4 finite numbers.
     """
 
+    scatters = False  # a polynomial
     control_points: np.ndarray | Array
 
     def __post_init__(self) -> None:
@@ -190,10 +192,9 @@ class HeightMap(Relief):
     @property
     def jump(self) -> float:
         """Of half the whole span or more from one of many samples to the next, as where a lens is wrapped."""
-        if len(self._heights) < FEWEST_FOR_JUMPS:
-            return 0.0
-        steepest = max(float(np.abs(np.diff(self._heights, axis=axis)).max()) for axis in (0, 1))
-        return steepest if steepest > self.span / 2 else 0.0
+        many = len(self._heights) >= FEWEST_FOR_JUMPS
+        steepest = max(np.abs(np.diff(self._heights, axis=axis)).max() for axis in (0, 1)) if many else 0.0
+        return float(steepest) if steepest > self.span / 2 else 0.0
 
     @cached_property
     def _margin(self) -> int:
@@ -279,10 +280,9 @@ def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
     n = len(samples)
     places = np.arange(-2, n + 2)
     if n < 4:
-        polynomial = np.polynomial.polynomial.polyfit(np.arange(n), samples, n - 1)
-        second = np.polynomial.polynomial.polyder(polynomial, 2)
-        value = np.polynomial.polynomial.polyval(places, polynomial).T
-        bend = np.polynomial.polynomial.polyval(places, second).T
+        fitted = np.polynomial.polynomial.polyfit(np.arange(n), samples, n - 1)
+        second = np.polynomial.polynomial.polyder(fitted, 2)
+        value, bend = (np.polynomial.polynomial.polyval(places, curve).T for curve in (fitted, second))
     else:
         spline = make_interp_spline(np.arange(n), samples, k=3)
         value, bend = spline(places), spline(places, nu=2)
@@ -296,5 +296,5 @@ def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
 @lru_cache(maxsize=16)
 def _power_beyond(relief: HeightMap, part: float) -> np.ndarray:
     """Of a square in the middle; see `fine_detail.power_beyond`."""
-    n = math.ceil(part * relief.knots)
-    return power_beyond(relief._heights if part == 1 else relief.on_grid(((np.arange(n) + 0.5) * 2 / n - 1) * part))
+    at = ((np.arange(n := math.ceil(part * relief.knots)) + 0.5) * 2 / n - 1) * part
+    return power_beyond(relief._heights if part == 1 else relief.on_grid(at))

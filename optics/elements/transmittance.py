@@ -17,7 +17,6 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 __all__ = ["GaussianMask", "Mask", "MaskMap"]
 
 OVERSHOOT = 0.02  # choice: by which the spline may leave [-1, 1]
-MEAN_OVER = 64  # choice: points across a pupil for the mean of what is let through
 FINER = 4  # choice: steps per sample at which that is looked at
 
 
@@ -32,10 +31,10 @@ class Mask(ABC):
     def bandwidth(self, level: float, radius: float) -> float:
         """Spatial frequency [1/m] above which its content is below `level`."""
 
-    def detail(self, share: float, radius: float) -> float:
-        """Spatial frequency [1/m] along x and y beyond which it sends no more than this share of the light that it lets
-        through a pupil of this radius [m]."""
-        return self.bandwidth(math.sqrt(share), radius)
+    def detail(self, light: float, radius: float) -> float:
+        """Spatial frequency [1/m] along x and y beyond which it sends no more than this light, as a mean over the disk
+        of a pupil of this radius [m]; 1 is all that falls onto it."""
+        return self.bandwidth(math.sqrt(light), radius)
 
     @property
     def rotationally_symmetric(self) -> bool:
@@ -77,9 +76,11 @@ class GaussianMask(Mask):
         """Its spectrum is exp(-π²w²f²)."""
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
 
-    def detail(self, share: float, radius: float) -> float:
+    def detail(self, light: float, radius: float) -> float:
         """Of the light exp(-2π²w²f²) goes beyond f."""
-        return math.sqrt(max(-math.log(share), 0.0) / 2) / (math.pi * number(self.waist))
+        waist = number(self.waist)
+        beam = (waist / radius) ** 2 / 2 * -math.expm1(-2 * (radius / waist) ** 2)
+        return math.sqrt(max(-math.log(light / beam), 0.0) / 2) / (math.pi * waist)
 
     @property
     def rotationally_symmetric(self) -> bool:
@@ -142,12 +143,9 @@ class MaskMap(Mask):
     def bandwidth(self, level: float, radius: float) -> float:
         return self._map.bandwidth(level) / (radius if self.reach is None else self.reach)
 
-    def detail(self, share: float, radius: float) -> float:
+    def detail(self, light: float, radius: float) -> float:
         part = 1.0 if self.reach is None else min(radius / self.reach, 1.0)
-        at = (np.arange(MEAN_OVER) + 0.5) * 2 / MEAN_OVER - 1
-        inside = np.hypot(at, at[:, None]) <= 1
-        passed = np.square(self._map.on_grid(at * part))[inside].mean()
-        return self._map.detail(math.sqrt(share * passed), part) / radius
+        return self._map.detail(math.sqrt(light), part) / radius
 
     @property
     def rotationally_symmetric(self) -> bool:

@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,8 +29,12 @@ UM = 1e-6
 
 class Aberration(ABC):
     """How far a wavefront that leaves the pupil is ahead [m], over a circle or square of `radius` [m] (None: the
-    pupil's)."""
+    pupil's).
 
+    scatters: whether it may send light where no slope of it points
+    """
+
+    scatters: ClassVar[bool] = True
     radius: float | None
 
     @abstractmethod
@@ -83,6 +87,9 @@ class Zernike(Aberration):
         ValueError: no such mode, its order is above 30, or a coefficient is no finite number.
     """
 
+    scatters: ClassVar[bool] = (
+        False  # a mode turns by n/2 cycles; its slopes, which grow with n² at the rim, tell of more
+    )
     coefficients_um: Any
     radius: float | None = None
     modes: dict[tuple[int, int], float] = field(init=False, repr=False)

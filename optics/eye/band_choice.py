@@ -26,6 +26,7 @@ def choose_bands(
     receptors: Any = "rgb",
     kernels: Callable[[np.ndarray], np.ndarray] | None = None,
     samples_per_receptor: int = 1,
+    white: float | None = None,
 ) -> SpectralBands:
     """The fewest bands, a power of two, that keep the predicted error of a receptor's signal within the tolerance,
     in units of white's signal. It is the sum of two:
@@ -33,7 +34,8 @@ def choose_bands(
     - reflectances (1 + cos(2π λ/Λ + φ))/2 of any phase φ, Λ the whole range: what the bands make of them against
       quadrature to 1 nm;
     - kernels(wavelengths) (wave, k, k), cells of 1/samples_per_receptor (None: the same for all wavelengths):
-      the worst scene's difference between white light's kernel from n and from 2n bands.
+      the worst scene's difference between white light's kernel from n and from 2n bands; white: what kernels would
+      leave of white's signal if they were as wide as all that light (None: what they do leave).
 
     Raises:
         AccuracyError: 32 bands do not.
@@ -50,8 +52,7 @@ def choose_bands(
         coarse = chosen.white_light(kernels(chosen.wavelengths)) if coarse is None else coarse
         fine = finer.white_light(kernels(finer.wavelengths))
         worst = worst_difference([(1, coarse), (-1, fine)], samples_per_receptor)
-        # Masks and waveguides leave less of white than 1.
-        total += worst / float(fine.sum(axis=(1, 2)).mean()) if worst > 0 else 0.0
+        total += worst / (white or float(fine.sum(axis=(1, 2)).mean())) if worst > 0 else 0.0
         if total <= tolerance:
             return chosen
         coarse = fine

@@ -211,8 +211,8 @@ class Eye:
         return Retina(self.retina_distance, self.spectral_bands.wavelengths, cell, self.tolerance, self.dtype)
 
     def _chosen_bands(self) -> SpectralBands:
-        cell = self.receptor_pitch / CELLS_FOR_BANDS
-        retina = Retina(self.retina_distance, np.empty(0), cell, self.tolerance, self.dtype)
+        large = self.receptor_pitch / CELLS_FOR_BANDS
+        retina = Retina(self.retina_distance, np.empty(0), large, self.tolerance, self.dtype)
         return bands_for(self, retina, tangents(self.eccentricity_deg))
 
     def sight(
@@ -236,21 +236,21 @@ class Eye:
 
         Raises:
             ValueError: names argument, value and valid range.
-            AccuracyError: see `optics.psf`, or the tolerance needs more kernels than any eye is given.
+            AccuracyError: see `optics.psf`, or the tolerance needs more kernels than any eye has.
         """
         within = self.tolerance if tolerance is None else in_range("tolerance", tolerance, 1e-6, 0.5)
         s = whole("samples_per_receptor", samples_per_receptor, 1, 64)
         from_cell = one_of("light_from", light_from, LIGHT_FROM) == LIGHT_FROM[0]
-        half = self.sensor_width / (2 * number(self.sensor_distance))
-        half_field = (half, half * self.resolution[0] / self.resolution[1])
-
-        aside, below = tangents(self.eccentricity_deg)
+        wide, counts = self.sensor_width / (2 * number(self.sensor_distance)), (depth_layers, field_zones)
+        (aside, below), high = tangents(self.eccentricity_deg), wide * self.resolution[0] / self.resolution[1]
 
         def kernel_at(distance: Scalar, right: float, down: float) -> Array:
-            place = aside + right * half_field[0], below + down * half_field[1]
+            place = aside + right * wide, below + down * high
             return with_centre(receptor_kernel(self, self._retina(s), distance, place, from_cell))
 
-        counts, white = (depth_layers, field_zones), number(self.white_signal) / number(self.aperture_throughput)
+        def white() -> float:
+            return number(self.white_signal) / number(self.aperture_throughput)
+
         return prepare(kernel_at, self.resolution, s, z, counts, within, averaged=self.waveguide is None, white=white)
 
     def see(

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from optics.eye.kernel_interpolation import Choice, NodeChoice, nodes
+from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import positive, shown, whole, without_derivative
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, plain
 from optics.numerics.interpolation import linear_weights
@@ -116,11 +117,11 @@ def prepare(
     tolerance: float,
     *,
     averaged: bool = True,
-    white: float = 1.0,
+    white: Callable[[], float] = lambda: 1.0,
 ) -> KernelBank:
     """Choose how many kernels, and make them. kernel_at(z, right, down): positions in the field from -1 to 1 at the
     retina's edges; counts of depth layers and of zones across the longer side, or "auto". averaged: whether a
-    receptor's signal is the mean over its cells; white: what they leave of white's."""
+    receptor's signal is the mean over its cells; white: says what they leave of white's."""
     s, depths = samples_per_receptor, _Range.of(z)
     layers, zones = (
         None if isinstance(count, str) and count == "auto" else whole(name, count, 1, MOST_NODES)
@@ -147,10 +148,23 @@ def _choices(
     stages: tuple[NodeChoice, NodeChoice], asked: tuple[Choice | None, Choice | None], tolerance: float
 ) -> tuple[Choice, Choice]:
     """Depth's and the field's. Where both are to be chosen, depth may err by half of the tolerance, and the field by
-    what is left: at a corner, between two depths, errors add up."""
-    depth = asked[0] or stages[0].choose(tolerance, tolerance / 2 if asked[1] is None else None)
-    wide = asked[1] or stages[1].choose(tolerance, tolerance - depth.predicted_error if depth.predicted_error else None)
-    return depth, wide
+    what is left: at a corner, between two depths, errors add up. Where that is too little for depth, the field's comes
+    first."""
+    along, across = stages
+    if asked[0] is not None or asked[1] is not None:
+        spent = None if asked[0] is None else asked[0].predicted_error
+        return asked[0] or along.choose(tolerance), asked[1] or across.choose(tolerance, _rest(tolerance, spent))
+    try:
+        depth = along.choose(tolerance, tolerance / 2)
+    except AccuracyError:
+        wide = across.choose(tolerance, tolerance / 2)
+        return along.choose(tolerance, _rest(tolerance, wide.predicted_error)), wide
+    return depth, across.choose(tolerance, _rest(tolerance, depth.predicted_error))
+
+
+def _rest(tolerance: float, spent: float | None) -> float | None:
+    """What is left of a tolerance; None: all of it."""
+    return tolerance - spent if spent else None
 
 
 def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:

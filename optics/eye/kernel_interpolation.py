@@ -64,15 +64,16 @@ def _places(axes: Iterable[np.ndarray]) -> list[Place]:
 class NodeChoice:
     """One stage: how many nodes along each of its axes.
 
-    kernel_at: the kernel at a place in [-1, 1]^axes. candidates: node counts to try, from the fewest on. white: what
-    kernels leave of the signal of white, by which errors are told: less than 1 behind masks, and of waveguides.
+    kernel_at: the kernel at a place in [-1, 1]^axes. candidates: node counts to try, from the fewest on. white: says
+    what kernels leave of the signal of white, by which errors are told: less than 1 behind masks, and of waveguides,
+    where it takes a kernel to know.
     """
 
     stage: str
     kernel_at: Callable[[Place], Array]
     candidates: Sequence[tuple[int, ...]]
     samples_per_receptor: int
-    white: float = 1.0
+    white: Callable[[], float] = lambda: 1.0
     known: dict[Place, np.ndarray] = field(default_factory=dict)
 
     def choose(self, tolerance: float, most: float | None = None) -> Choice:
@@ -81,13 +82,15 @@ class NodeChoice:
         Raises:
             AccuracyError: the last is not.
         """
-        error, own = math.inf, "" if most is None else f"{most:.2g} of "
+        error = math.inf
         for counts in self.candidates:
             error = CAUTION * self.error(counts)
             if error <= (tolerance if most is None else most):
-                return Choice(self.stage, counts, error, f"fewest within {own}the tolerance of {tolerance:g}")
+                share = "" if most is None else f", of which these may take {most:.2g}"
+                return Choice(self.stage, counts, error, f"fewest within the tolerance of {tolerance:g}{share}")
+        share = "" if most is None else f", of which {self.stage} may take {most:.2g}"
         raise AccuracyError(
-            f"tolerance = {tolerance:g}{f', {own}it for these' if own else ''}: "
+            f"tolerance = {tolerance:g}{share}: "
             f"{' x '.join(map(str, self.candidates[-1]))} {self.stage} nodes leave {error:.1e} of white's signal; "
             "widen the tolerance or give a number of nodes"
         )
@@ -101,7 +104,7 @@ class NodeChoice:
             shares = [math.prod(map(float, share)) for share in itertools.product(*by_axis)]
             between = [(s, self._kernel(node)) for s, node in zip(shares, coarse, strict=True) if s > 0]
             worst = max(worst, worst_difference([*between, (-1, self._kernel(place))], self.samples_per_receptor))
-        return worst / self.white if worst > 0 else 0.0
+        return worst / self.white() if worst > 0 else 0.0
 
     def _kernel(self, place: Place) -> np.ndarray:
         if place not in self.known:

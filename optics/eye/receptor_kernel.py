@@ -75,4 +75,6 @@ def bands_for(eye: EyeOfReceptors, retina: Retina, direction: tuple[float, float
         on = Retina(retina.distance, wavelengths, retina.cell, retina.tolerance, retina.dtype)
         return plain(receptor_kernel(eye, on, math.inf, direction, guided))
 
-    return choose_bands(eye.tolerance, eye.receptors, kernels, 1 if guided else CELLS_FOR_BANDS)
+    if guided:
+        return choose_bands(eye.tolerance, eye.receptors, kernels)
+    return choose_bands(eye.tolerance, eye.receptors, kernels, CELLS_FOR_BANDS, number(eye.pupil.transmission))

@@ -12,6 +12,7 @@ import numpy as np
 from sim.envs.task_worlds import TaskWorlds
 from sim.robots.encounter import name_of
 
+MODELS = "models"  # of worlds with models of their own
 _ALL = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
@@ -32,7 +33,7 @@ def of_worlds(worlds: TaskWorlds) -> dict[str, np.ndarray]:
     felt = {_felt(worlds, k): array.copy() for k, array in enumerate(worlds.felt)}
     varied = {_varied(name): array.copy() for name, array in worlds.varied.items()}
     held = [np.frombuffer(worlds.bodies.held(i), np.uint8) for i in range(len(worlds.datas)) if worlds.bodies.own]
-    models = {"models": np.stack(held)} if held else {}
+    models = {MODELS: np.stack(held)} if held else {}
     return {"physics": physics, "chance": chance, "steps": worlds.steps.copy(), **models, **felt, **varied}
 
 
@@ -42,8 +43,9 @@ def bring_back(worlds: TaskWorlds, state: Mapping[str, np.ndarray], chosen: np.n
         for name, values in worlds.varied.items():
             values[i] = state[_varied(name)][i]
         worlds.bodies.begin(i, {name: values[i] for name, values in worlds.varied.items()})
-        if worlds.bodies.own:
-            worlds.bodies.hold(i, np.asarray(state["models"][i], np.uint8).tobytes())
+        if MODELS in state:
+            worlds.bodies.own = True
+            worlds.bodies.hold(i, np.asarray(state[MODELS][i], np.uint8).tobytes())
         data, model, row = worlds.datas[i], worlds.bodies.models[i], np.ascontiguousarray(state["physics"][i])
         mujoco.mj_resetData(model, data)
         mujoco.mj_setState(model, data, row, _ALL)
@@ -65,14 +67,18 @@ def _varied(name: str) -> str:
 
 
 def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
-    """A state as `like`, of the same shapes.
+    """A state as `like`, of the same shapes. An only world's model may be its own in one of them: it was changed on the
+    way.
 
     Raises:
         ValueError: it has other entries, or an entry of another shape.
     """
-    if not isinstance(state, Mapping) or state.keys() != like.keys():
+    optional = {MODELS} if len(like["steps"]) == 1 else set()
+    if not isinstance(state, Mapping) or (state.keys() ^ like.keys()) - optional:
         raise ValueError(f"state: must be what get_state returns, with the entries {', '.join(like)}")
     for name, array in like.items():
+        if name not in state:
+            continue
         if np.shape(state[name]) != array.shape:
             raise ValueError(f"state: {name} has shape {np.shape(state[name])}: must be {array.shape}")
     return state

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import traceback
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -76,8 +77,10 @@ class TaskWorlds:
             self.bodies.separate()
             self.datas = [mujoco.MjData(model) for model in self.bodies.models]
             self._begin(0)
-        if not self.bodies.own:
-            self.model = self.bodies.models[0]  # a copy: what is changed of it outside, is changed for all worlds
+        # What eyes are made for: as the first `reset` leaves it, which may paint or light what stands still. Where
+        # worlds share it, it is theirs: what is changed of it outside, is changed for all of them.
+        if not self.bodies.varied:
+            self.model = copy.copy(self.bodies.models[0]) if self.bodies.own else self.bodies.models[0]
         self.felt = [np.repeat(felt[:1], n, axis=0) for felt in self.felt]
         self.seed(self.entropy)
 

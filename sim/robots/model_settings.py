@@ -1,7 +1,6 @@
 """What physics goes by of a model, as bytes: so that a change of it is noticed at every step, and can be undone.
 
-Left out is what is large and is not compared here: textures, meshes and heights, which eyes refuse to see changed, and
-names.
+Left out is what is large: textures, meshes and heights, of which a change stays; and names.
 """
 
 from __future__ import annotations

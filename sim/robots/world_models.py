@@ -35,8 +35,8 @@ class WorldModels:
 
     given: what the model was made of · model: what became of it; worlds have copies
     models: of each world; one for all, unless they are `own`
-    own: whether each world has one for itself: an only world, and where something of them differs or a task changes
-        them (`separate`); then each episode begins with the model as it was compiled
+    own: whether each world has one for itself: where something of them differs or a task changes them (`separate`);
+        then each episode begins with the model as it was compiled
     varied: names of the geoms whose size, colour or material differs, and of the materials that are drawn
 
     Raises:
@@ -58,7 +58,7 @@ class WorldModels:
         self.own, self._compiled = False, ModelSettings(model).held()
         self.models = [copy.copy(model)] * n
         self._settings = [ModelSettings(self.models[0])] * n
-        if self.varied or n == 1:
+        if self.varied:
             self.separate()
         if self._sizes:
             self._prepare_sizes(given)
@@ -82,14 +82,18 @@ class WorldModels:
 
     @contextmanager
     def left_alone(self, whose: str) -> Iterator[None]:
-        """While tasks do what they do; whose: what a message begins with.
+        """While tasks do what they do; whose: what a message begins with. An only world's model is its own as soon as a
+        task changes it.
 
         Raises:
-            RuntimeError: the model that worlds share is no longer as before.
+            RuntimeError: the model that several worlds share is no longer as before.
         """
         before = b"" if self.own else self.held(0)
         yield
-        if not self.own and self.held(0) != before:
+        if self.own or self.held(0) == before:
+            return
+        self.own = len(self.models) == 1
+        if not self.own:
             raise RuntimeError(
                 f"{whose}: data.model has another {self._settings[0].differing(before)} now, and all worlds share it: "
                 "must be changed by the first `reset`, too; then each world has a model of its own"

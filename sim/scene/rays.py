@@ -39,7 +39,8 @@ def checked_wavelengths(wavelengths: Any) -> np.ndarray:
     found = np.asarray(wavelengths, float)
     low, high = (1e-9 * limit for limit in LIMITS_NM)
     if found.ndim != 1 or not len(found) or not ((found > low - ROUNDING) & (found < high + ROUNDING)).all():
-        raise ValueError(f"wavelengths = {wavelengths!r:.80}: must be in metres, from {low:.3g} to {high:.3g}")
+        said = " ".join(repr(wavelengths).split())
+        raise ValueError(f"wavelengths = {said:.80}: must be in metres, from {low:.3g} to {high:.3g}")
     return found
 
 

@@ -1,5 +1,6 @@
 """Run directories: begun once, named when they cannot be used, repaired after a crash."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -75,21 +76,30 @@ def test_default_directory_is_the_first_that_is_free(tmp_path):
 
 
 def test_two_that_begin_at_once_have_a_directory_each(tmp_path, monkeypatch):
-    """The second comes while the first is between its choice of a name and its config, and the third later still."""
+    """Both have chosen the same name before either has made it."""
     monkeypatch.chdir(tmp_path)
-    made = []
+    chosen = iter([Path("runs/detection-quick-1"), Path("runs/detection-quick-1"), Path("runs/detection-quick-2")])
+    monkeypatch.setattr("evolve.store.directory.next_directory", lambda *_: next(chosen))
+    made = [Run.create_next(tiny(f"seed={seed}"), "quick") for seed in (1, 2)]
+    assert [run.path.as_posix() for run in made] == ["runs/detection-quick-1", "runs/detection-quick-2"]
+    assert [Run.open(run.path).config.seed for run in made] == [1, 2]
 
-    def meanwhile(*arguments):
-        monkeypatch.setattr("evolve.store.directory.record_start", record_start)
-        made.append(Run.create_next(tiny("seed=2"), "quick"))
-        record_start(*arguments)
 
-    monkeypatch.setattr("evolve.store.directory.record_start", meanwhile)
-    made.append(Run.create_next(CONFIG, "quick"))
-    assert [run.path.as_posix() for run in made] == ["runs/detection-quick-2", "runs/detection-quick-1"]
-    assert [Run.open(run.path).config.seed for run in made] == [2, CONFIG.seed]
-    monkeypatch.setattr("evolve.store.directory.next_directory", lambda *_: Path("runs/detection-quick-1"))
-    with pytest.raises(RunError, match="is not empty"):
+def test_where_no_run_can_be_written_one_directory_is_tried(tmp_path, monkeypatch):
+    """On a file system without locks, say."""
+
+    def none(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("fcntl.flock", none)
+    with pytest.raises(RunError, match="detection-quick-1 cannot be written: No locks available"):
+        Run.create_next(CONFIG, "quick")
+    assert len(list((tmp_path / "runs").iterdir())) == 1
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    (tmp_path / "elsewhere" / "runs").touch()
+    with pytest.raises(RunError, match="runs/detection-quick-1 cannot be written: Not a directory"):
         Run.create_next(CONFIG, "quick")
 
 

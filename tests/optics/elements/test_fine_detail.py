@@ -2,10 +2,22 @@
 
 import math
 
+import drjit as dr
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
-from optics import BSplineRelief, GaussianMask, HeightMap, MaskMap, Pupil, WavefrontMap, Zernike
+from optics import (
+    Annulus,
+    BSplineRelief,
+    GaussianMask,
+    HeightMap,
+    MaskMap,
+    PixelRelief,
+    Pupil,
+    WavefrontMap,
+    Zernike,
+)
 from optics.elements.fine_detail import power_beyond, reach_of
 from optics.elements.transmittance import Mask
 
@@ -90,3 +102,35 @@ def test_a_mask_of_ones_own_reaches_as_far_as_its_band():
 
     assert Cosine().detail(0.16, R) == 5 / R
     assert Cosine().detail(0.36, R) == 0
+
+
+def test_what_a_mask_scatters_is_a_share_of_what_comes_through_the_opening():
+    """Dimmed evenly it scatters as far, a mask of one's own, too; and a bright middle that a ring covers counts for
+    nothing: the ring's faint stripes are most of its light."""
+    dim, full = (MaskMap(level * (1 + ripple(8.0)) / 2) for level in (0.1, 1.0))
+    reaches = [Pupil(R, mask=mask).scatter(WAVE, 0.02) * R for mask in (dim, full)]
+    assert reaches[0] == pytest.approx(reaches[1])
+    assert reaches[1] > 7
+    assert Pupil(R, mask=Faint()).scatter(WAVE, 0.02) * R == 5
+    at = (np.arange(128) + 0.5) / 64 - 1
+    middle = np.hypot(at, at[:, None]) < 0.6
+    stripes = np.broadcast_to(0.02 * (1 + np.cos(2 * np.pi * 20 * at)), (128, 128))
+    mask = MaskMap(gaussian_filter(np.where(middle, 1.0, stripes), 4) * middle + stripes * ~middle)
+    assert Pupil(R, mask=mask, aperture=Annulus(0.8)).scatter(WAVE, 0.02) * R > 19
+
+
+class Faint(Mask):
+    """Stripes of five per radius, of amplitude .05."""
+
+    def amplitude(self, x, y, radius, types):
+        return 0.05 * (1 + dr.cos(10 * math.pi * x)) / 2
+
+    def bandwidth(self, level, radius):
+        return 5 / radius if level < 0.0125 else 0.0
+
+
+def test_parts_that_scatter_nothing_take_no_share():
+    pixels = PixelRelief(1e-7 * np.random.default_rng(0).random((16, 16)))
+    alone = Pupil(R, pixels).scatter(WAVE, 0.04)
+    assert 0 < alone < math.inf
+    assert Pupil(R, pixels, wavefront=Zernike({(2, 0): 0.01})).scatter(WAVE, 0.04) == alone

@@ -9,6 +9,7 @@ import pytest
 
 from optics import AccuracyError, Eye, MaskMap, Pupil, Waveguide
 from optics.eye.band_choice import choose_bands
+from optics.eye.kernel_bank import _choices, prepare
 from optics.eye.kernel_interpolation import NodeChoice, nodes, worst_difference
 from optics.numerics.autodiff import plain
 from optics.numerics.interpolation import linear_weights
@@ -84,7 +85,7 @@ def test_depth_and_field_share_a_tolerance():
     near, far, tolerance = 2e-3, 1.0, 0.065
     bank = eye.sight(S, [near, far], field_zones="auto", tolerance=tolerance, light_from="centres")
     assert sum(choice.predicted_error for choice in bank.choices) <= tolerance
-    assert "of the tolerance of 0.065" in str(bank)
+    assert "within the tolerance of 0.065, of which these may take" in str(bank)
     worst = 0.0
     for deep, right in itertools.product(np.linspace(-1, 1, 5), np.linspace(0.5, 1, 5)):
         aside = math.degrees(math.atan(right * math.tan(math.radians(22.5))))
@@ -97,7 +98,9 @@ def test_depth_and_field_share_a_tolerance():
 
 def test_a_share_of_the_tolerance_is_named_where_it_is_too_small():
     choice = NodeChoice("test", lambda at: np.full((1, 1, 1), at[0] ** 2), [(3,), (5,)], 1)
-    with pytest.raises(AccuracyError, match=r"tolerance = 0\.09, 0\.05 of it for these: 5 test nodes leave 8\.1e-02"):
+    with pytest.raises(
+        AccuracyError, match=r"tolerance = 0\.09, of which test may take 0\.05: 5 test nodes leave 8\.1e-02"
+    ):
         choice.choose(0.09, 0.05)
     assert choice.choose(0.09).counts == (5,)
 
@@ -106,3 +109,25 @@ def test_no_light_is_no_error():
     """Where white is 0, so are all errors."""
     dark = NodeChoice("test", lambda at: np.zeros((1, 3, 3)), [(1,)], 1, white=0.0)
     assert dark.choose(1e-6).predicted_error == 0
+
+
+def test_the_field_comes_first_where_half_is_too_little_for_depth():
+    along = NodeChoice("depth", lambda at: np.full((1, 1, 1), at[0] ** 2), [(5,)], 1)
+    even = NodeChoice("field", lambda at: np.ones((1, 1, 1)), [(1, 1)], 1)
+    depth, wide = _choices((along, even), (None, None), 0.1)
+    assert (depth.counts, wide.counts) == ((5,), (1, 1))
+    assert 0.05 < depth.predicted_error + wide.predicted_error <= 0.1
+    with pytest.raises(AccuracyError, match="5 depth nodes leave"):
+        _choices((along, even), (None, None), 0.08)
+
+
+def test_what_is_left_of_white_is_not_asked_where_no_error_is_told():
+    """Of a waveguide it takes a kernel to know."""
+
+    def nobody_asks():
+        raise AssertionError
+
+    def kernel_at(z, right, down):
+        return np.ones((1, 1, 1))
+
+    assert prepare(kernel_at, (3, 3), 1, math.inf, (1, 1), 0.01, white=nobody_asks).kernels

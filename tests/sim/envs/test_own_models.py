@@ -130,16 +130,47 @@ def test_what_comes_too_late_for_a_model_of_its_own_is_refused():
 
 
 def test_an_only_world_may_be_changed_at_any_time():
-    env = sim.make_vec_env(Late(), n_envs=1)
+    """Its model is its own from then on: the next episode begins as it was compiled, and states hold what was changed,
+    in this environment and in another one."""
+    env, other = (sim.make_vec_env(Late(), n_envs=1) for _ in range(2))
     env.reset()
+    other.reset()
+    before = env.get_state()
     env.step(np.ones((1, 1)))
     data = env.worlds.datas[0]
     assert data.model.geom_friction[0, 0] == 0.1
     state = env.get_state()
     env.reset()
     assert data.model.geom_friction[0, 0] == 1.0
-    env.set_state(state)
-    assert data.model.geom_friction[0, 0] == 0.1
+    for again in (env, other):
+        again.set_state(state)
+        assert again.worlds.datas[0].model.geom_friction[0, 0] == 0.1
+        again.set_state(before)
+        assert again.worlds.datas[0].model.geom_friction[0, 0] == 1.0
+
+
+class Painted(Face):
+    """Paints the ball and turns on the light once for all, and perhaps changes physics, too."""
+
+    heavy = False
+
+    def reset(self, data, rng):
+        super().reset(data, rng)
+        data.model.geom_rgba[data.model.body("ball").geomadr[0]] = [0.1, 0.9, 0.2, 1]
+        data.model.vis.headlight.active = 1
+        data.model.vis.headlight.diffuse[:] = 0.9
+        if self.heavy:
+            data.model.opt.gravity[2] = -rng.uniform(1, 20)
+
+
+@pytest.mark.parametrize("heavy", [False, True])
+def test_what_a_task_paints_once_for_all_is_seen_in_one_world_and_in_several(heavy):
+    task = Painted()
+    task.heavy = heavy
+    seen = [sim.make_vec_env(task, n_envs=n, seed=4).reset()["eyes"][0] for n in (1, 3)]
+    np.testing.assert_array_equal(*seen)
+    plain = sim.make_vec_env(Face(), n_envs=1, seed=4).reset()["eyes"][0]
+    assert np.abs(seen[0] - plain).max() > 0.1
 
 
 def test_who_changes_nothing_shares_one_model():
