@@ -105,15 +105,16 @@ class Run:
         Raises:
             RunError: it cannot be written.
         """
-        while True:
-            path = next_directory(config.task_name, preset)
+        path, tried = next_directory(config.task_name, preset), None
+        while path != tried:  # a name that is neither free nor taken is that of a link to nowhere
             try:
                 path.mkdir(parents=True)  # whose it is
+                break
             except FileExistsError:
-                continue
+                path, tried = next_directory(config.task_name, preset), path
             except OSError as error:
                 raise RunError(f"{path} cannot be written: {error.strerror}") from error
-            return cls.create(path, config, origin)
+        return cls.create(path, config, origin)
 
     def require_present_format(self) -> None:
         """Trainings can be carried on in the light in which they began, and in no other.

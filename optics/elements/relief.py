@@ -40,7 +40,7 @@ class Relief(ABC):
         """Spatial frequency [cycles per aperture radius] above which the relief's content is below `level` [m]."""
 
     def detail(self, level: float) -> float:
-        """The same along x and y of what slopes do not tell, root mean square."""
+        """Frequency [cycles per aperture radius] beyond which less than `level` [m] (rms) is untold by slopes."""
         return self.bandwidth(level)
 
     @property

@@ -103,6 +103,15 @@ def test_where_no_run_can_be_written_one_directory_is_tried(tmp_path, monkeypatc
         Run.create_next(CONFIG, "quick")
 
 
+@pytest.mark.parametrize("link", ["runs", "runs/detection-quick-1"])
+def test_a_link_to_nowhere_is_named_and_not_tried_for_ever(tmp_path, monkeypatch, link):
+    monkeypatch.chdir(tmp_path)
+    Path(link).parent.mkdir(exist_ok=True)
+    Path(link).symlink_to("nowhere")
+    with pytest.raises(RunError, match=f"{link} cannot be written: File exists"):
+        Run.create_next(CONFIG, "quick")
+
+
 def test_a_config_that_changed_since_the_run_was_opened_is_not_overlooked(run):
     path = run.path / "config.toml"
     path.write_text(path.read_text().replace("total_steps = 4096", "total_steps = 8192"))
