@@ -48,9 +48,10 @@ def page(store: Store) -> Page:
     return Page(
         name=NAME,
         command=(
-            "evolve run --preset lens --seed 0    # and 1 and 2\n"
-            "evolve run --preset lens --set genome.refractive_index.open=false --set genome.refractive_index.start=1"
-            " --seed 0    # and 1\n"
+            "SETTINGS='--set eye.noise_sigma=0.003 --set search.population=16 --set search.active=true'\n"
+            "evolve run --preset lens $SETTINGS --seed 0    # and 1 and 2\n"
+            "evolve run --preset lens $SETTINGS --set genome.refractive_index.open=false"
+            " --set genome.refractive_index.start=1 --seed 0    # and 1\n"
             "python -m experiments.bending_light --runs lens=DIR lens=DIR lens=DIR index1=DIR index1=DIR"
         ),
         values={
