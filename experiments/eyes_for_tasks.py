@@ -5,12 +5,13 @@ python -m experiments.eyes_for_tasks [--compute] [--workers N] [--docs DIR]
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,9 @@ SHAPES = ((10, 4, 135.0), (5, 8, 90.0), (2, 15, 45.0), (2, 15, 30.0), (1, 15, 0.
 COMPOUND, CAMERA = (10, 4), (2, 15)
 FEWEST_LIVES = 2  # of any eyes: of one there is no spread
 RESAMPLES = 10_000
+NORMAL = 1.96  # standard deviations to either side that hold 95 %
 Floats = NDArray[np.float64]
+Both: TypeAlias = tuple[Floats, Floats]  # of compound eyes and of cameras
 
 
 def designs() -> list[Design]:
@@ -52,8 +55,9 @@ def designs() -> list[Design]:
 class Crossing:
     """Fitness of cameras less that of compound eyes in each task, and the interaction of eye and task.
 
-    interaction: of the difference, in standard deviations of a task's fitness, in detection less in navigation
-    p: of as large an interaction where it does not matter who has which eyes (permutations within each task)
+    interaction: of the difference, in standard deviations of lives with one kind of eyes, in detection less in navigation
+    p: of as large an interaction where it does not matter who has which eyes (permutations within each task, in
+        standard deviations of all its lives: those are the same whoever has which)
     """
 
     differences: dict[str, Interval]
@@ -70,16 +74,12 @@ def crossing(rows: Sequence[Trained], chance: np.random.Generator) -> Crossing:
     fitness = {task: (_of(rows, task, COMPOUND), _of(rows, task, CAMERA)) for task in TASKS}
     if min(one.size for both in fitness.values() for one in both) < FEWEST_LIVES:
         raise ValueError(f"a crossing takes {FEWEST_LIVES} lives of each kind of eyes in each task, or more")
-    spread = {task: float(np.concatenate(both).std(ddof=1)) for task, both in fitness.items()}
     drawn = {task: resampled_difference(both[1], both[0], RESAMPLES, chance) for task, both in fitness.items()}
-    means = {task: float(camera.mean() - compound.mean()) for task, (compound, camera) in fitness.items()}
-    differences = {task: interval_of(means[task], drawn[task]) for task in TASKS}
-    apart = {task: (means[task] / spread[task], drawn[task] / spread[task]) for task in TASKS}
-    (there, many_there), (here, many_here) = apart["detection"], apart["navigation"]
-    permuted = {task: _permuted(*both, chance) / spread[task] for task, both in fitness.items()}
-    null = permuted["detection"] - permuted["navigation"]
-    p = (1 + int((np.abs(null) >= abs(there - here)).sum())) / (1 + null.size)
-    return Crossing(differences, interval_of(there - here, many_there - many_here), p)
+    dealt = {task: _permuted(*both, chance) for task, both in fitness.items()}
+    differences = {task: interval_of(float(_ahead(*fitness[task])), drawn[task]) for task in TASKS}
+    null = np.abs(_joint(dealt))
+    p = (1 + int((null >= abs(_joint(fitness))).sum())) / (1 + null.size)
+    return Crossing(differences, _interaction(fitness), p)
 
 
 def _of(rows: Sequence[Trained], task: str, eyes: tuple[int, int]) -> Floats:
@@ -88,10 +88,34 @@ def _of(rows: Sequence[Trained], task: str, eyes: tuple[int, int]) -> Floats:
     return np.array([row.fitness for row in mine])
 
 
-def _permuted(compound: Floats, camera: Floats, chance: np.random.Generator) -> Floats:
-    """The same over animals that have been dealt their eyes at random."""
+def _permuted(compound: Floats, camera: Floats, chance: np.random.Generator) -> Both:
+    """Animals that have been dealt their eyes at random, (RESAMPLES, lives) of each kind."""
     mixed = chance.permuted(np.tile(np.concatenate([compound, camera]), (RESAMPLES, 1)), axis=1)
-    return np.asarray(mixed[:, compound.size :].mean(axis=1) - mixed[:, : compound.size].mean(axis=1))
+    return mixed[:, : compound.size], mixed[:, compound.size :]
+
+
+def _interaction(fitness: Mapping[str, Both]) -> Interval:
+    """By how much cameras are ahead in detection, less in navigation, in standard deviations of lives with one kind of
+    eyes (Hedges and Olkin 1985, §5.B and E): a bootstrap of so few lives finds them too much alike."""
+    mean, variance = 0.0, 0.0
+    for sign, (compound, camera) in ((1, fitness["detection"]), (-1, fitness["navigation"])):
+        lives = compound.size + camera.size
+        squares = sum(float(((of - of.mean()) ** 2).sum()) for of in (compound, camera))
+        within = math.sqrt(squares / (lives - 2))
+        effect = (1 - 3 / (4 * lives - 9)) * float(_ahead(compound, camera)) / within
+        mean += sign * effect
+        variance += 1 / compound.size + 1 / camera.size + effect**2 / (2 * lives)
+    return Interval(mean, mean - NORMAL * math.sqrt(variance), mean + NORMAL * math.sqrt(variance))
+
+
+def _joint(fitness: Mapping[str, Both]) -> Floats:
+    """The interaction in standard deviations of all lives of a task, which are the same whoever has which eyes."""
+    apart = {task: _ahead(*both) / np.concatenate(both, axis=-1).std(axis=-1, ddof=1) for task, both in fitness.items()}
+    return np.asarray(apart["detection"] - apart["navigation"])
+
+
+def _ahead(compound: Floats, camera: Floats) -> Floats:
+    return np.asarray(camera.mean(axis=-1) - compound.mean(axis=-1))
 
 
 def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
@@ -193,7 +217,8 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
             )
             place.plot([x] * len(found), found, "o", color=COLORS[task], ms=4, label="one life" if x == 0 else None)
         place.set_xticks(range(len(SHAPES)), [_named(*shape).replace(" over ", "\n") for shape in SHAPES], fontsize=8)
-        place.set(title=f"{task}: {_best(rows, task)} fare best", ylabel="fitness")
+        place.set(ylabel="fitness")
+        place.set_title(f"in {task} fare best:\n{_best(rows, task)}", fontsize=11)
         place.axhline(0, color="#777777", lw=0.6)
         _draw_heads(place)
         place.legend(fontsize=8, frameon=False)
@@ -205,7 +230,7 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
         axes[0, 2].errorbar(list(crossings), y, error, color=COLORS[task], marker="o", capsize=3, label=task)
     axes[0, 2].axhline(0, color="#777777", lw=0.6)
     axes[0, 2].set(xscale="log", xlabel="noise σ of a receptor (less light: →)", ylabel="two of 15 less ten of 4")
-    axes[0, 2].set_title(_told_of_light(_of_lights(rows)))
+    axes[0, 2].set_title(_told_of_light(_of_lights(rows)), fontsize=11)
     axes[0, 2].legend(fontsize=8, frameon=False)
     save(figure, path)
 
@@ -220,14 +245,18 @@ def _told_of_light(crossings: Mapping[float, Crossing]) -> str:
         for one in dim
         for task in TASKS
     )
-    return "dim light turns the order" if turned else "dim light keeps the order"
+    return "less light turns the order" if turned else "less light does not turn the order"
 
 
 def _best(rows: Sequence[Trained], task: str) -> str:
-    """Of the eyes that have lived in bright light."""
+    """Of the eyes that have lived in bright light, and those that are nearer to them than a standard error."""
     lived = {shape: [row.fitness for row in _cell(rows, task, BRIGHT, shape)] for shape in SHAPES}
     means = {shape: float(np.mean(found)) for shape, found in lived.items() if found}
-    return _named(*max(means, key=lambda shape: means[shape])) if means else "none"
+    if not means:
+        return "none"
+    first = max(means, key=lambda shape: means[shape])
+    least = means[first] - np.std(lived[first]) / np.sqrt(len(lived[first]))
+    return " and ".join(_named(*shape) for shape, mean in means.items() if mean >= least)
 
 
 def _draw_heads(place: Any) -> None:
