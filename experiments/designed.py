@@ -123,7 +123,8 @@ def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, wo
             row = Trained.of(waiting[job.id], outcome)
             known[row.design] = row
             hours = sum(each.seconds for each in known.values()) / 3600
-            Origin.here(hours, "worker").write(path.with_suffix(".json"))
+            made = path.with_suffix(".json")
+            Origin.here(hours, "worker").after(made).write(made)
             write_rows([known[design] for design in designs if design in known], path)
             print(f"{len(known)} of {len(designs)}: {row}", flush=True)
     written = {row.design: row for row in read_rows(Trained, path)}

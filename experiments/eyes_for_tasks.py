@@ -55,7 +55,7 @@ def designs() -> list[Design]:
 class Crossing:
     """Fitness of cameras less that of compound eyes in each task, and the interaction of eye and task.
 
-    interaction: of the difference, in standard deviations of lives with one kind of eyes, in detection less in navigation
+    interaction: of the difference, in standard deviations of lives with one kind of eyes; in detection less navigation
     p: of as large an interaction where it does not matter who has which eyes (permutations within each task, in
         standard deviations of all its lives: those are the same whoever has which)
     """

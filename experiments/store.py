@@ -8,7 +8,7 @@ import json
 import os
 import platform
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
@@ -51,12 +51,14 @@ class Origin:
     machine   processor and cores
     versions  of what decides the numbers
     whose     "core" or "worker"
+    earlier   commits that made other rows before
     """
 
     hours: float
     machine: str
     versions: Mapping[str, str]
     whose: str = "core"
+    earlier: tuple[str, ...] = ()
 
     @classmethod
     def here(cls, hours: float, whose: str = "core") -> Origin:
@@ -66,7 +68,16 @@ class Origin:
     @classmethod
     def read(cls, path: Path) -> Origin:
         """As `write` left it."""
-        return cls(**json.loads(path.read_text(encoding="utf-8")))
+        found = json.loads(path.read_text(encoding="utf-8"))
+        return cls(**{**found, "earlier": tuple(found.get("earlier", ()))})
+
+    def after(self, path: Path) -> Origin:
+        """The same, with the commits of what the file says was made before."""
+        if not path.exists():
+            return self
+        former = Origin.read(path)
+        commits = dict.fromkeys([*former.earlier, former.versions["commit"], self.versions["commit"]])
+        return replace(self, earlier=tuple(commit for commit in commits if commit != self.versions["commit"]))
 
     def write(self, path: Path) -> None:
         """JSON, whole or not at all."""
@@ -79,10 +90,13 @@ class Origin:
         units = ((1, "hours"), (1 / 60, "minutes"), (0, "seconds"))
         least, unit = next((least, unit) for least, unit in units if self.hours >= least)
         took = f"{self.hours / (least or 1 / 3600):.2g} {self.whose} {unit}"
-        commit = self.versions["commit"]
-        changed = " with changes" if commit.endswith("+") else ""
+        commits = ", ".join(_short(commit) for commit in (*self.earlier, self.versions["commit"]))
         python = self.versions["python"]
-        return f"{took} on {self.machine}; rhabdom at {commit[:10]}{changed}, Python {python}, {packages}."
+        return f"{took} on {self.machine}; rhabdom at {commits}, Python {python}, {packages}."
+
+
+def _short(commit: str) -> str:
+    return f"{commit[:10]} with changes" if commit.endswith("+") else commit[:10]
 
 
 def _processor() -> str:

@@ -44,3 +44,11 @@ def test_origin_reads_back_and_names_what_counts(tmp_path):
 @pytest.mark.parametrize(("hours", "shown"), [(10.0, "10 core hours"), (0.5, "30 core m"), (0.005, "18 core seconds")])
 def test_time_is_told_in_a_fitting_unit(hours, shown):
     assert Origin(hours, "a machine", {"python": "3", "commit": "abc+"}).sentence().startswith(shown)
+
+
+def test_rows_of_several_versions_name_them_all(tmp_path):
+    path = tmp_path / "origin.json"
+    for commit in ("a" * 40, "b" * 40 + "+", "b" * 40 + "+", "c" * 40):
+        Origin(1.0, "a machine", {"python": "3", "commit": commit}).after(path).write(path)
+    said = Origin.read(path).sentence()
+    assert f"rhabdom at {'a' * 10}, {'b' * 10} with changes, {'c' * 10}, Python" in said
