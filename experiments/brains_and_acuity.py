@@ -67,10 +67,11 @@ def page(store: Store) -> Page:
     return Page(
         name=NAME,
         command=(
-            "evolve run --preset scaling\n"
-            "evolve run tracking --preset scaling\n"
-            "evolve run maze --preset scaling\n"
-            "python -m experiments.brains_and_acuity --runs detection=DIR navigation=DIR tracking=DIR"
+            "SETTINGS='--set genome.neurons.low=4 --set genome.neurons.high=128 --set learning.least_epochs=10'\n"
+            "evolve run --preset scaling $SETTINGS\n"
+            "evolve run tracking --preset scaling $SETTINGS\n"
+            "evolve run maze --preset scaling $SETTINGS --set learning.least_epochs=8\n"
+            "python -m experiments.brains_and_acuity --runs detection=DIR tracking=DIR navigation=DIR"
         ),
         values={
             "answer": store.answer,
@@ -158,7 +159,7 @@ def draw(store: Store, path: Path) -> None:
     for place in axes[1]:
         label(place.xaxis, place.get_xlim())
     figure.legend(handles=_key(), loc="outside lower center", ncols=3, frameon=False)
-    figure.suptitle("Finer eyes lower the ceiling of error; larger brains do not")
+    figure.suptitle("Finer eyes lower the ceiling of error in detection and tracking; larger brains do not")
     save(figure, path)
 
 

@@ -50,8 +50,9 @@ def page(store: Store) -> Page:
         name=NAME,
         command=(
             "evolve run --preset bifurcation-navigation --set search.active=true --seed 0    # and 1, 2\n"
-            "evolve run --preset bifurcation-detection --set search.active=true --seed 0\n"
-            "python -m experiments.goals_shape_eyes --runs navigation=DIR detection=DIR"
+            "evolve run --preset bifurcation-detection --set search.active=true --seed 0    # and 1, 2\n"
+            "python -m experiments.goals_shape_eyes --runs navigation=DIR navigation=DIR navigation=DIR"
+            " detection=DIR detection=DIR detection=DIR"
         ),
         values={
             "answer": store.answer,

@@ -40,8 +40,8 @@ def page(store: Store) -> Page:
         name=NAME,
         command=(
             "evolve run --preset pupil\n"
-            "evolve run --preset pupil --set eye.noise_sigma=0.003    # and others\n"
-            f"python -m experiments.{NAME} --runs 0.001=DIR 0.003=DIR"
+            "evolve run --preset pupil --set eye.noise_sigma=0.003    # and 0.0003\n"
+            f"python -m experiments.{NAME} --runs 0.0003=DIR 0.001=DIR 0.003=DIR"
         ),
         values={
             "answer": store.answer,
