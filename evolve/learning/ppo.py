@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -236,7 +237,7 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
         observation, reward, done, infos = worlds.step(action)
         returns[playing] += reward[playing]
         if ours:
-            events = np.array([np.sign(terms["goal"] + terms["adversary"]) for terms in map(terms_of, infos)])
+            events = np.array([_event(info) for info in infos])
             first_event = np.where(playing & (first_event == 0), events, first_event)
         else:
             done_at_end = np.where(playing, [bool(info["is_success"]) for info in infos], done_at_end)
@@ -244,3 +245,8 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
     if not math.isfinite(returns.sum()):
         raise TrainingDiverged("returns of the evaluation episodes not finite")
     return Episodes(returns, first_event > 0 if ours else done_at_end, first_event)
+
+
+def _event(info: dict[str, Any]) -> int:
+    """What an action reached first: one may reach a goal and an adversary."""
+    return -1 if info.get("adversary_first") else int(terms_of(info)["goal"] > 0)

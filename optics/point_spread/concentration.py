@@ -51,8 +51,8 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     with_error: whether to return (value, predicted error), each (wavelength,).
 
     Raises:
-        AccuracyError: the peak lies outside the window, or the samples are too coarse for it and finer ones cannot be
-            had; says which would do.
+        AccuracyError: the peak lies outside the window, or rays land outside, where it is brighter; or the samples are
+            too coarse for it and finer ones cannot be had; says which would do.
     """
     import drjit as dr
 
@@ -61,6 +61,8 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
         return a_mixture(result).strehl_ratio(with_error)
     types = precision("float64")
     peaks, errors = zip(*(_peak(result, index) for index in range(result.tensor.shape[0])), strict=True)
+    for index, found in enumerate(peaks):
+        _refuse_brighter_outside(result, index, number(found))
     peak = types.Float(peaks[0] if len(peaks) == 1 else dr.concat(list(peaks)))
     mixed = result.shares is not None and result.can_be_seen_anew
     waves = [request.beam.wavelength for request in result.requests] if mixed else result.wavelengths
@@ -152,6 +154,24 @@ def _check_inside(result: PSFResult, at: tuple[float, float]) -> None:
                 f"the light grows towards ({at[0]:.3g}, {at[1]:.3g}) m, beyond the window's rim: the Strehl ratio "
                 "needs a window that holds the peak; widen it or move its centre"
             )
+
+
+def _refuse_brighter_outside(result: PSFResult, index: int, peak: float) -> None:
+    """Of an image that lies beside the window, a side lobe within it would pass for the peak."""
+    rays = result.requests[index].problem.rays if result.can_be_seen_anew and not result.holds_cells else None
+    if rays is None or not len(rays):
+        return
+    at = float(np.median(rays.to_x)), float(np.median(rays.to_y))
+    beyond = [max(s[0] - place, place - s[-1]) for place, s in zip(at, (result.x, result.y), strict=True)]
+    if max(beyond) <= result.dx:
+        return
+    pitch = LOBES / result.highest_cutoff
+    there = result.through(Grid.square(NEIGHBOURHOOD, pitch).moved(at), "the Strehl ratio", slice(index, index + 1))
+    if float(there.psf.max()) > peak:
+        raise AccuracyError(
+            f"rays land around ({at[0]:.3g}, {at[1]:.3g}) m, outside of the window, and there it is brighter: the "
+            "Strehl ratio needs a window that holds the peak; widen it or move its centre"
+        )
 
 
 def _vertex(result: PSFResult, index: int) -> tuple[Array, float]:

@@ -36,6 +36,9 @@ FEW_WAVES = 3000.0  # choice: that float32 may carry
 FAR = 200.0  # choice: kz from which on the kernel's near term is nothing
 RIPPLE = 0.3  # choice: of the soft edge, of the tolerance; test_population.py
 SAMPLING = 0.2  # choice: of the tolerance, what the soft edge may make of it
+# Choice: light that passes, as a share of a mask's brightest beside the opening, that SAMPLING holds for;
+# test_population_members.py. Where masks are bright and the aperture is shut, less passes than the soft edge errs by.
+LEAST_LIGHT = 1e-3
 SPREAD = 1.1  # choice: error of the intensity per spread of the phase; test_population.py, test_population_members.py
 TURNS = 1.3  # choice: steps between numbers of samples: neighbours share a plan
 STACK = 2_000_000  # choice, by memory: pupil samples in a stack
@@ -71,8 +74,10 @@ def population_pictures(
         for start in range(0, len(group), size):
             part = group[start : start + size]
             stack = _Stack.of([members[index] for index in part])
-            images = _images(stack, samples, window) / np.float32(aperture.area)
+            masks = _masks(stack, samples)
+            images = _images(stack, samples, masks, window) / np.float32(aperture.area)
             errors = _model_errors(stack, images, window) + SAMPLING * tolerance
+            errors = np.where(_light(samples, masks) < LEAST_LIGHT, math.inf, errors)
             for index, image, error in zip(part, images, errors, strict=True):
                 if error <= tolerance:
                     yield index, image, _plan(members[index], samples, float(error), leaving[index])
@@ -182,7 +187,29 @@ def _sine(stack: _Stack, window: Grid, at: np.ndarray) -> np.ndarray:
     return found
 
 
-def _images(stack: _Stack, samples: _Samples, window: Grid) -> np.ndarray:
+def _masks(stack: _Stack, samples: _Samples) -> np.ndarray:
+    """Amplitudes that masks let through, (member or 1, y, x)."""
+    found = np.ones((1, *samples.soft.shape), np.float32)
+    if np.isfinite(stack.waist).any():
+        r2 = np.square(samples.at)[:, None] + np.square(samples.at)[None, :]
+        found = np.exp(-np.square(stack.radius / stack.waist) * r2)
+    for index, member in enumerate(stack.members):
+        amplitudes = member.mask(samples.at)
+        if amplitudes is not None:
+            found = np.array(np.broadcast_to(found, (len(stack.members), *samples.soft.shape)))
+            found[index] *= amplitudes
+    return found
+
+
+def _light(samples: _Samples, masks: np.ndarray) -> np.ndarray:
+    """What passes, as a share of the brightest that masks are beside the opening, (member or 1,)."""
+    power, inside = np.square(masks), np.square(samples.soft)
+    passed = (power * inside).sum(axis=(1, 2)) / inside.sum()
+    found: np.ndarray = passed / np.maximum((power * (samples.soft < 0.5)).max(axis=(1, 2)), 1e-30)
+    return found
+
+
+def _images(stack: _Stack, samples: _Samples, masks: np.ndarray, window: Grid) -> np.ndarray:
     """|U|²/R², (member, y, x)."""
     u = samples.at
     r2 = np.square(stack.radius) * (np.square(u)[:, None] + np.square(u)[None, :])
@@ -197,13 +224,7 @@ def _images(stack: _Stack, samples: _Samples, window: Grid) -> np.ndarray:
         waves += samples.splines @ stack.relief @ samples.splines.T
     if stack.order:
         waves += np.tensordot(stack.powers, _powers(samples.at.tobytes(), stack.order), 1).astype(np.float32)
-    size = samples.soft * (square_z / (r2 + square_z))
-    if np.isfinite(stack.waist).any():
-        size *= np.exp(-r2 / np.square(stack.waist))
-    for index, member in enumerate(stack.members):
-        amplitudes = member.mask(samples.at)
-        if amplitudes is not None:
-            size[index] *= amplitudes
+    size = samples.soft * masks * (square_z / (r2 + square_z))
     size *= np.float32(samples.pitch**2) * stack.radius / (stack.distance * stack.wavelength)
     field = _turned(size, waves)
     across = _fourier(stack, u, window, window.x)

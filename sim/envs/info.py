@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from sim.envs.simulation import Step
 from sim.worlds.state import WorldState
 
@@ -13,7 +15,7 @@ def infos_of(step: Step) -> list[dict[str, Any]]:
     places = (*step.state.position.T.tolist(), step.state.heading.tolist())
     # In one go, the names of sim.tasks.reward.TERMS written out: this is done for every world in every step, and takes
     # a third of the time that way.
-    return [
+    infos = [
         {
             "reward_terms": {"progress": progress, "goal": goal, "adversary": adversary, "contact": contact},
             "is_success": success,
@@ -24,6 +26,9 @@ def infos_of(step: Step) -> list[dict[str, Any]]:
             *step.terms.tolist(), step.success.tolist(), *places, strict=True
         )
     ]
+    for world in np.flatnonzero(step.adversary_first):
+        infos[world]["adversary_first"] = True
+    return infos
 
 
 def first_infos(state: WorldState) -> list[dict[str, Any]]:

@@ -56,6 +56,7 @@ class Step:
     state: after the action; where `failure` is set, the last good one
     terms: of the reward, in the order of TERMS (term, n)
     terminated, truncated, contact, success: (n,) bool; success: the goal was reached in this episode
+    adversary_first: the action reached an adversary, and before any goal, (n,) bool
     respawned: worlds in which an object was put elsewhere
     given_up: truncated because the rewards of the episode add up to too little, (n,) bool
     failure: world that could not go on -> why: "unstable physics" or "action is not finite"
@@ -67,6 +68,7 @@ class Step:
     truncated: np.ndarray
     contact: np.ndarray
     success: np.ndarray
+    adversary_first: np.ndarray
     respawned: np.ndarray
     given_up: np.ndarray
     failure: dict[int, str]
@@ -208,6 +210,7 @@ class Simulation:
             truncated=((final.steps >= self._steps) | given_up) & ~terminated,
             contact=motion.contact,
             success=final.goals_reached > 0,
+            adversary_first=outcome.adversary_first,
             respawned=elsewhere,
             given_up=given_up,
             failure=moved.failed,

@@ -59,8 +59,8 @@ class TaskWorlds:
         self._whose = ["" if len(self.animals) == 1 else f"{name_of(animal)}: " for animal in self.animals]
         self._who = " and ".join(map(name_of, self.animals))
         self.model = compiled(self.animals[0])
-        for animal in self.animals[1:]:
-            compiled(animal, self.model)
+        for number, animal in enumerate(self.animals[1:], 1):
+            compiled(animal, self.model, learns=number < len(self.learners))
         require_own_actuators(self.animals, self.model)
         self.spectra = of_world(self.animals, "spectra")
         self.episode_steps = self.animals[0].episode_steps if episode_steps is None else episode_steps
@@ -219,7 +219,8 @@ class TaskWorlds:
                 mujoco.mj_resetData(data.model, data)
                 mujoco.mj_forward(data.model, data)
             # Not truncated: nothing might have come after it that a learner could count with.
-            return [StepOfWorld(terminated=True, failure=failure) for _ in self.learners]
+            worth = [{"failure": animal.failure_reward} if animal.failure_reward else {} for animal in self.learners]
+            return [StepOfWorld(terms, terminated=True, failure=failure) for terms in worth]
         for outcome in outcomes:
             outcome.truncated = bool(over) and not outcome.terminated
         return outcomes

@@ -32,7 +32,7 @@ class Fidelity:
     """How finely a world is rendered for given eyes; printed, it is a table.
 
     rays_per_receptor: on average; behind a pupil it may be below 1, since receptors share rays and may share areas
-    bands: spectral bands
+    bands: spectral bands, in the place of the eye's own
     depth: distances for which the eye has a PSF
     light: what of it is followed: "direct"; "bounce", which adds light that is reflected twice; or, with areas, "all"
     samples: what eyes look along: "rays", or "areas", which cut each receptor's square into rays_per_receptor

@@ -27,26 +27,25 @@ from sim.robots.model_wavefront import ModelWavefront
 from sim.robots.mounts import Mount
 from sim.robots.optic_flow import flow_between, receptor_centres
 from sim.robots.poses import Poses
-from sim.robots.renderable import check_renderable
+from sim.robots.renderable import renderable
 from sim.scene import source
 from sim.scene.mirror import VISIBLE_GROUPS
 from sim.scene.variant import variant as in_variant
 
 MOST_ENVS = 2**31 - 1
 Worlds: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData  # where everything is in all of them
-SIXTEEN_RAYS = Fidelity(16, bands=4)
 
 
 class ModelRenderer:
     """Sees many worlds of one model with eyes of one kind, wherever they are mounted on it.
 
     model: an MjModel, or what compiles to one (`sim.mirror`)
-    eye: its optics and retina; with the fidelity's bands
+    eye: its optics and retina; its bands are the fidelity's
     mounts: where on the model the eyes are
     n_envs: number of worlds
-    fidelity: rays per receptor and bands: `Fidelity(16, bands=4)`, in the direct light of lamps; light="bounce" adds
-        light that is reflected twice, and what the sky and what glows send; samples="edges" for that many rays only
-        where a few of them differ, in direct light
+    fidelity: rays per receptor and bands; None: 16 rays in the direct light of lamps and the eye's own bands, 4 by
+        default. light="bounce" adds light that is reflected twice, and what the sky and what glows send;
+        samples="edges" for that many rays only where a few of them differ, in direct light
     groups, spectra: see `sim.mirror`
     varied: names of geoms whose size or colour may differ from world to world: as `poses` say, by the worlds' mjModels;
         {"floor": ("sand", "grass")}: and names of the materials that one may have, in the place of other colours
@@ -67,15 +66,15 @@ class ModelRenderer:
         eye: optics.Eye,
         mounts: Sequence[Mount],
         n_envs: int = 1,
-        fidelity: Fidelity = SIXTEEN_RAYS,
+        fidelity: Fidelity | None = None,
         *,
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
         varied: Varied = (),
     ) -> None:
         self.n_envs = whole("n_envs", n_envs, 1, MOST_ENVS)
-        check_renderable(fidelity, eye)
-        self.model, self.mounts, self.fidelity = source.load(model), mounts_of("mounts", mounts), fidelity
+        self.fidelity = fidelity = renderable(fidelity, eye)
+        self.model, self.mounts = source.load(model), mounts_of("mounts", mounts)
         self.eye = replace(eye, bands=fidelity.bands)
         self._places = [_Place(mount, self.model) for mount in self.mounts]
         if not self._places:

@@ -93,7 +93,8 @@ def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
 
 
 def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
-    """Eyes in a circle around a body's z axis that look outwards, left to right, as `Eyes` has them on our agent.
+    """Eyes in a circle around a body's z axis that look outwards, left to right, as `Eyes` has them on our agent: the
+    range is from the first to the last, and 360 (n - 1) / n closes a circle of n evenly.
 
     Raises:
         ValueError: less than one eye.

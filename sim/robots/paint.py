@@ -31,6 +31,7 @@ class Paint:
     ) -> None:
         self.geoms, self._spectra, self._bands = np.array(geoms, int), lighting.spectra(wavelengths), len(wavelengths)
         self._own = np.array([surfaces.rgba(model, g)[:3] for g in geoms]).reshape(-1, 3)
+        self._of_material = model.geom_matid[self.geoms][:, None] >= 0
         place = {geom: k for k, geom in enumerate(geoms)}
         self.inputs = {"painted": whole_numbers([*(place.get(int(g), len(geoms)) for g in movers), len(geoms)])}
         textures = [(g, surfaces.texture_id(model, g)) for g in geoms]
@@ -62,7 +63,7 @@ class Paint:
         if poses.geom_rgba is None:
             return self._own[None]
         here = poses.geom_rgba[:, self.geoms]
-        unset = (here == surfaces.UNSET_RGBA).all(axis=-1, keepdims=True)
+        unset = (here == surfaces.UNSET_RGBA).all(axis=-1, keepdims=True) & self._of_material
         return np.where(unset, self._own, here[..., :3])
 
     def of(

@@ -8,9 +8,11 @@ from sim.render.fidelity import AREAS, EDGES, Fidelity
 from sim.robots.edge_rays import FIRST
 from sim.tracing import lighting
 
+SIXTEEN = 16  # rays per receptor
 
-def check_renderable(fidelity: Fidelity, eye: optics.Eye) -> None:
-    """That rays through a model can see so.
+
+def renderable(fidelity: Fidelity | None, eye: optics.Eye) -> Fidelity:
+    """As asked, where rays through a model can see so; None: sixteen rays, in the eye's own bands.
 
     Raises:
         ValueError: areas, light that is reflected more often, rays at edges where they do not go, or an eye that looks
@@ -22,6 +24,8 @@ def check_renderable(fidelity: Fidelity, eye: optics.Eye) -> None:
             f"eye: eccentricity_deg = {shown(eye.eccentricity_deg)}: eyes in a world look along their Mount: turn that "
             "instead"
         )
+    if fidelity is None:
+        return Fidelity(SIXTEEN, eye.bands)
     of_kind("fidelity", fidelity, Fidelity, "Fidelity(16, bands=4)")
     if fidelity.light == lighting.ALL or fidelity.samples == AREAS:
         raise ValueError(
@@ -37,3 +41,4 @@ def check_renderable(fidelity: Fidelity, eye: optics.Eye) -> None:
         )
     if fidelity.samples == EDGES and eye.pupil is not None:
         raise ValueError("fidelity: samples = 'edges': is for perfect lenses; behind a pupil receptors share all rays")
+    return fidelity

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 import optics
-from optics.numerics.arguments import did_you_mean, whole
+from optics.numerics.arguments import did_you_mean, finite, whole
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.eyes import Eyes
 from sim.render.fidelity import Fidelity
@@ -52,6 +52,8 @@ class Task:
     camera: name of the camera that pictures for people are taken with; None: one that looks at the whole model
     actuators: names of those that an action drives; None: all
     name: what it is called among others; None: as its class
+    failure_reward: what a step is worth that breaks its world, as the reward's term "failure". Where rewards are costs,
+        0 is more than any episode: to break the world pays, unless this is less than an episode may cost
     others: animals in the same world that do not learn, see `sim.Frozen`; each has a body, actuators and eyes of its
         own in the one model. Then an episode begins with everybody's `reset`, in turn, and ends as soon as anybody's
         `terminated` says so: it is truncated for those whose own does not
@@ -78,6 +80,7 @@ class Task:
     camera: str | None = None
     actuators: Sequence[str] | None = None
     name: str | None = None
+    failure_reward: float = 0.0
     others: Sequence[Frozen] = ()
 
     def reset(self, data: mujoco.MjData, rng: np.random.Generator) -> None:
@@ -116,8 +119,9 @@ class Task:
         return len(controls_of(model, self.actuators))
 
 
-def compiled(task: Task, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
-    """The model of a task whose other settings are right; model: where it has been compiled already.
+def compiled(task: Task, model: mujoco.MjModel | None = None, learns: bool = True) -> mujoco.MjModel:
+    """The model of a task whose other settings are right; model: where it has been compiled already. learns: whether
+    its animal does, which wants rewards.
 
     Raises:
         ValueError: something is missing, or wrong.
@@ -125,7 +129,10 @@ def compiled(task: Task, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
     name = type(task).__name__
     if not hasattr(task, "model"):
         raise ValueError(f"{name}: model: must be set, to an MjModel, a path or MJCF text")
+    if learns and type(task).rewards is Task.rewards:
+        raise ValueError(f"{name}: rewards: must be defined, to return numbers by name, such as {{'progress': 0.1}}")
     kinds_of(task)
+    finite(f"{name}: failure_reward", task.failure_reward)
     whole(f"{name}: substeps", task.substeps, 1, MOST_STEPS)
     whole(f"{name}: episode_steps", task.episode_steps, 1, MOST_STEPS)
     model = source.load(task.model) if model is None else model

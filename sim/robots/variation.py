@@ -113,7 +113,8 @@ class Variation:
         return factors.astype(np.float32)
 
     def extremes(self, wavelengths: np.ndarray) -> np.ndarray:
-        """`light` at the ends of all its ranges, (case, band): no band is ever brighter or darker by a percent."""
+        """`light` at the ends of all its ranges, (case, band): where the brightest of all bands is. One band by itself
+        may be brighter in between, of warm and cold light by a third."""
         names = self.of_light
         ends = [self.ranges[name] for name in names]
         corners = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, len(names)) if names else None

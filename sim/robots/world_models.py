@@ -111,8 +111,7 @@ class WorldModels:
         if self._sizes:
             self._resize(mine, drawn)
         for geom, name in self._colors.items():
-            mine.geom_rgba[geom] = [*np.asarray(drawn[name]), surfaces.rgba(self.model, geom)[3]]
-
+            mine.geom_rgba[geom] = surfaces.set_rgba([*np.asarray(drawn[name]), surfaces.rgba(self.model, geom)[3]])
         for geom, (name, candidates) in self._materials.items():
             if (material := str(drawn[name])) not in candidates:
                 raise ValueError(f"{name} = {material!r}: must be one of {', '.join(candidates)}")

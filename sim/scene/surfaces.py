@@ -23,6 +23,14 @@ def geom_type(model: mujoco.MjModel, geom: int) -> mujoco.mjtGeom:
     return mujoco.mjtGeom(int(model.geom_type[geom]))
 
 
+def set_rgba(color: Sequence[float]) -> np.ndarray:
+    """The nearest colour (4,) that MuJoCo does not take for none, as it takes the grey UNSET_RGBA."""
+    found = np.array(color, np.float32)
+    if np.array_equal(found, UNSET_RGBA):
+        found[:3] = np.nextafter(found[:3], np.float32(1))  # all three: a grey reflects all bands alike
+    return found
+
+
 def rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
     """Display-referred colour (4,) of a geom, by MuJoCo's rule: its own unless unset, then its material's."""
     own = model.geom_rgba[geom]

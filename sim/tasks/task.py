@@ -27,13 +27,14 @@ HEADING_SPREAD = math.radians(20)  # [rad] either way, of headings along a cours
 class Outcome:
     """What one action led to, per world.
 
-    progress [m], in the task's sense (n,) · goal, adversary: reached (n,) bool · respawn: objects to put
-    elsewhere (n, k) bool · terminated (n,) bool
+    progress [m], in the task's sense (n,) · goal, adversary: reached (n,) bool · adversary_first: an adversary was
+    reached, and before any goal (n,) bool · respawn: objects to put elsewhere (n, k) bool · terminated (n,) bool
     """
 
     progress: np.ndarray
     goal: np.ndarray
     adversary: np.ndarray
+    adversary_first: np.ndarray
     respawn: np.ndarray
     terminated: np.ndarray
 
@@ -48,6 +49,7 @@ class Outcome:
             progress=np.where(worlds, self.progress, 0.0),
             goal=self.goal & worlds,
             adversary=self.adversary & worlds,
+            adversary_first=self.adversary_first & worlds,
             respawn=self.respawn & worlds[:, None],
             terminated=self.terminated & worlds,
         )
@@ -128,15 +130,17 @@ class FindGoal:
         first = first_reached(path, before.objects, after.objects)
         nothing = np.zeros(len(path), bool)
         if (first == never).all():
-            return Outcome(was - is_now, nothing, nothing, np.zeros(first.shape, bool), nothing)
+            return Outcome(was - is_now, nothing, nothing, nothing, np.zeros(first.shape, bool), nothing)
         goal_at, adversary_at = (of.min(axis=1, initial=never) for of in (first[:, :goals], first[:, goals:]))
         goal, adversary = goal_at < never, adversary_at < never
+        adversary_first = adversary & (adversary_at < goal_at)
         if ends:
-            goal, adversary = goal & (goal_at <= adversary_at), adversary & (adversary_at < goal_at)
+            goal, adversary = goal & ~adversary_first, adversary_first
         return Outcome(
             progress=was - is_now,
             goal=goal,
             adversary=adversary,
+            adversary_first=adversary_first,
             respawn=np.zeros(first.shape, bool) if ends else first < never,
             terminated=goal | adversary if ends else nothing,
         )
@@ -176,6 +180,7 @@ class FindWay:
             progress=is_now - was,
             goal=goal,
             adversary=np.zeros(before.n, bool),
+            adversary_first=np.zeros(before.n, bool),
             respawn=np.zeros((before.n, 0), bool),
             terminated=goal,
         )

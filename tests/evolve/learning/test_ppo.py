@@ -235,3 +235,25 @@ def test_a_training_leaves_nothing_behind_in_the_temporary_folder(tmp_path, monk
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     learn(LearningConfig(total_steps=512, n_envs=16, n_steps=32, batch_size=128))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_of_a_goal_and_an_adversary_in_one_action_the_first_counts():
+    """Of odd worlds the adversary; what is reached later, here the other, decides nothing."""
+
+    class Both(BrightSpot):
+        steps = 0
+
+        def step_wait(self):
+            observation, reward, done, infos = super().step_wait()
+            for world, info in enumerate(infos):
+                goal = self.steps == 0 or world % 2
+                info["reward_terms"] |= {"goal": 10.0 * goal, "adversary": -10.0 * (self.steps == 0 or not goal)}
+                info |= {"adversary_first": True} if self.steps == 0 and world % 2 else {}
+            self.steps += 1
+            return observation, reward, done, infos
+
+    worlds = Both(4)
+    policy = AdaptingPPO(worlds, SMALL, QUICK, 0).policy
+    found = play(policy, worlds, 0)
+    assert found.first_events.tolist() == [1, -1, 1, -1]
+    assert found.successes.tolist() == [True, False, True, False]

@@ -76,6 +76,20 @@ def test_the_only_world_ends_so_too(action):
     assert np.isfinite(observation["eyes"]).all()
 
 
+@pytest.mark.parametrize("worth", [0.0, -50.0])
+def test_a_broken_world_is_worth_what_the_task_says(worth):
+    """Of 0 a policy that breaks its world at once earns more than one that steers well, where rewards are costs."""
+    task = Nowhere()
+    task.failure_reward = worth
+    env = sim.make_vec_env(task, n_envs=2)
+    env.reset()
+    with pytest.warns(UserWarning, match="its episode ends here"):
+        _, reward, done, infos = env.step(np.array([[0.2], [1.0]]))
+    assert done.tolist() == [False, True]
+    assert reward[1] == worth == sum(infos[1]["reward_terms"].values())
+    assert "failure" not in infos[0]["reward_terms"]
+
+
 def test_huge_controls_end_an_episode_too():
     task = Lost()
     task.model = CART.replace(' ctrlrange="-2 2"', "")  # within a range MuJoCo would limit it

@@ -1,10 +1,13 @@
 """What a task changes in a world's model is that world's alone, lasts for the episode, and goes back with its state."""
 
+from typing import ClassVar
+
 import mujoco
 import numpy as np
 import pytest
 
 import sim
+from tests.sim.envs.test_differing_worlds import Room, room, with_ranges
 from tests.sim.envs.test_task_state import played, same
 from tests.sim.envs.test_task_vec_env import CART, Face
 
@@ -176,3 +179,34 @@ def test_what_a_task_paints_once_for_all_is_seen_in_one_world_and_in_several(hea
 def test_who_changes_nothing_shares_one_model():
     env = sim.make_vec_env(Face(), n_envs=3)
     assert len({id(data.model) for data in env.worlds.datas} | {id(env.worlds.model)}) == 1
+
+
+@pytest.mark.parametrize("floor", ['rgba="1 0 0 1"', 'material="green"'])
+def test_the_grey_that_mujoco_takes_for_no_colour_is_a_colour_where_it_is_drawn(floor):
+    """Else a material's geom keeps the material's colour, and one without is as it was in the model."""
+    text = room(floor=floor).replace("<asset>", '<asset><material name="green" rgba="0 1 0 1"/>')
+    seen = []
+    for grey in (0.5, 0.5 + 1e-6):
+        env = sim.make_vec_env(with_ranges({"floor.color": ((grey,) * 3, (grey,) * 3)}, text), n_envs=2)
+        seen.append(env.reset()["eyes"])
+    np.testing.assert_allclose(*seen, atol=1e-5)
+
+
+def test_who_changes_a_colour_to_that_grey_sees_it():
+    """Of a geom without a material it is MuJoCo's colour, too."""
+
+    class Grey(Room):
+        vary: ClassVar = {"floor.color": ((1, 0, 0), (1, 0, 0))}
+        model = room(floor='rgba="1 0 0 1"')
+        grey = 0.5
+
+        def reset(self, data, rng):
+            super().reset(data, rng)
+            data.model.geom("floor").rgba[:3] = self.grey
+
+    seen = []
+    for grey in (0.5, 0.5 + 1e-6):
+        task = Grey()
+        task.grey = grey
+        seen.append(sim.make_vec_env(task, n_envs=2).reset()["eyes"])
+    np.testing.assert_allclose(*seen, atol=1e-5)

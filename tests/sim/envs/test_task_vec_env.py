@@ -186,6 +186,13 @@ class NoModel(sim.Task):
     pass
 
 
+class NoRewards(sim.Task):
+    model, mounts = Face.model, Face.mounts
+
+    def reward(self, data):  # not the method's name
+        return {"progress": 0.1}
+
+
 class NoActuators(Face):
     model = '<mujoco><worldbody><body name="cart"><joint/><geom size=".1"/></body></worldbody></mujoco>'
 
@@ -207,6 +214,8 @@ class FailingReset(Face):
     ("task", "options", "error", "words"),
     [
         (NoModel, {}, ValueError, "NoModel: model: must be set"),
+        (NoRewards, {}, ValueError, "NoRewards: rewards: must be defined, to return numbers by name"),
+        (lambda: Face, {}, ValueError, r"task is the class Face: must be an animal of it, such as Face\(\)"),
         (NoActuators, {}, ValueError, "NoActuators: its model has no actuators"),
         (NoMounts, {}, ValueError, "mounts = .*must be one sim.Mount at least"),
         (NoSubsteps, {}, ValueError, "NoSubsteps: substeps = 0: must be a whole number"),

@@ -70,7 +70,7 @@ def test_info_keys_are_those_of_the_table():
             assert always <= set(info) <= set(documented)
             assert ended or set(info) == always
             seen |= set(info)
-    assert seen == set(documented) - {"given_up", "varied"}
+    assert seen == set(documented) - {"given_up", "varied", "adversary_first"}
     dusky = sim.make_vec_env("navigation", EYES, 2, 0, rays_per_receptor=1, vary={"light": (0.1, 1.0)})
     dusky.reset()
     assert all(set(info) == always | {"varied"} for info in dusky.reset_infos)
@@ -86,7 +86,7 @@ def test_tasks_of_ones_own_say_no_more_than_the_table_has():
     elsewhere = {row[0] for row in table("Info") if row[2].endswith("not of a task of one's own")} | {"given_up"}
     env = sim.make_vec_env(Dimmed(), n_envs=2)
     env.reset()
-    assert elsewhere == {"position", "heading", "given_up"}
+    assert elsewhere == {"position", "heading", "given_up", "adversary_first"}
     always = {"reward_terms", "is_success", "varied"}
     assert all(set(info) == always for info in env.reset_infos)
     seen = set()

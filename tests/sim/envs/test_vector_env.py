@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import sim
 from sim.envs.vector_env import EyesVectorEnv
+from tests.sim.envs.hunt import hunt
 from tests.sim.envs.test_task_vec_env import Face
 
 EYES = sim.Eyes(resolution=(2, 3), bands=2)
@@ -160,6 +161,11 @@ def test_tasks_of_ones_own_have_ids_too(task, told, steps):
 def test_bad_lengths_are_refused(make, said):
     with pytest.raises(ValueError, match=said):
         make()
+
+
+def test_several_animals_of_a_world_are_no_vector_of_worlds():
+    with pytest.raises(ValueError, match=r"several animals learn in a sim\.Encounter: must be its `alone`"):
+        EyesVectorEnv(4, task=hunt())
 
 
 def test_pictures_of_all_worlds():

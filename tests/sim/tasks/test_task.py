@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from sim.envs.info import infos_of
 from sim.envs.simulation import EPISODE_STEPS, MAX_TURN, Simulation
 from sim.tasks.placement import CLEARANCE, REACH, SEPARATION, Places
 from sim.tasks.reward import EVALUATION, TRAINING
@@ -218,3 +219,26 @@ def test_a_step_in_which_everybody_arrives_is_a_step_like_others(field, n):
     step = simulation.step(np.tile(AHEAD, (n, 1)))
     assert step.success.all()
     assert step.terminated.all()
+
+
+@pytest.mark.parametrize("adversary_first", [False, True])
+def test_one_action_may_reach_both_and_says_which_was_first(field, adversary_first):
+    """An action takes an agent up to 2 m; in evaluation both are paid for."""
+    simulation = Simulation(field, 1, 0, "evaluation", 1)
+    state = simulation.reset()
+    objects = state.objects.copy()
+    near, far = (1, 0) if adversary_first else (0, 1)
+    objects[0, near, :2], objects[0, far, :2], objects[0, 2, :2] = (0, 0), (2, 0), (-6, -6)
+    simulation._state = dataclasses.replace(
+        state,
+        objects=objects,
+        position=np.array([[-0.2, 0.5]]),
+        heading=np.zeros(1),
+        velocity=np.array([[9.0, 0.0]]),
+    )
+    step = simulation.step(AHEAD[None])
+    assert step.reward_terms["goal"] == 10
+    assert step.reward_terms["adversary"] == -10
+    assert step.adversary_first.tolist() == [adversary_first]
+    info = infos_of(step)[0]
+    assert info.get("adversary_first", False) is adversary_first
