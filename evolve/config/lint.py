@@ -103,6 +103,8 @@ def idle_settings(config: RunConfig) -> list[str]:
             notes.append(f"genome.{name}.opens_at has no effect: the gene is held; set genome.{name}.open = true")
     if search.rungs == 1 and search.promoted != SearchConfig.promoted:
         notes.append("search.promoted has no effect: search.rungs = 1")
+    if search.active and search.optimizer != "CMA":
+        notes.append(f"search.active has no effect: search.optimizer = {search.optimizer}")
     if not eye.optics:
         reliefs = ("relief_height", "relief_points", "relief_symmetric")
         given = [name for name in reliefs if getattr(eye, name) != getattr(EyeConfig, name)]

@@ -107,8 +107,20 @@ class HumanEye:
         Raises:
             ValueError: a number below 0, or none.
         """
-        nodal_distance = self.focal_length / medium("chromatic_eye").at(IN_FOCUS)
-        return _not_negative(cycles_per_degree) * (180 / math.pi) / nodal_distance
+        return _not_negative(cycles_per_degree) * (180 / math.pi) / self._nodal_distance
+
+    def sensor_width(self, fov_deg: float) -> float:
+        """Side of the patch of retina that sees a square field this wide [m], 2 (f/n) tan(fov/2): that of an
+        `optics.Eye` with this eye's pupil.
+
+        Raises:
+            ValueError: not in [1e-3, 170].
+        """
+        return 2 * self._nodal_distance * math.tan(math.radians(in_range("fov_deg", fov_deg, 1e-3, 170)) / 2)
+
+    @property
+    def _nodal_distance(self) -> float:
+        return self.focal_length / medium("chromatic_eye").at(IN_FOCUS)
 
     @property
     def _reported(self) -> Zernike:

@@ -76,7 +76,7 @@ class Pupil:
         if not isinstance(self.n, Dispersion):
             in_range("n", self.n, 1.0, 10.0, carried=True)
             object.__setattr__(self, "n", RefractiveIndex(self.n))
-        of_kind("aperture", self.aperture, Aperture, "Circle()")
+        of_kind("aperture", self.aperture, Aperture, "Circle(), or union(Disk(0.5, (0.4, 0.0)))")
         if self.mask is not None:
             self._check_reach("mask", of_kind("mask", self.mask, Mask, "GaussianMask(20e-6)").radius)
         if self.height is not None and not isinstance(self.height, Relief):

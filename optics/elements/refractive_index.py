@@ -172,4 +172,6 @@ def index_of(name: str, value: Any) -> Dispersion:
                 f"{name} asks for a derivative, which it does not carry to the picture: give plain numbers"
             )
         return value
+    if isinstance(value, str):
+        raise ValueError(f"{name} = {value!r}: must be a number, or a curve such as optics.medium({value!r})")
     return RefractiveIndex(in_range(name, value, 1.0, 10.0))

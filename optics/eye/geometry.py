@@ -37,7 +37,8 @@ def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) 
         positive("full_aperture", full_aperture)
     if pupil is None:
         return
-    of_kind("pupil", pupil, Pupil, "Pupil(25e-6), or None for the perfect lens")
+    its = " (it has one, its `pupil`)" if isinstance(getattr(pupil, "pupil", None), Pupil) else ""
+    of_kind("pupil", pupil, Pupil, f"Pupil(25e-6), or None for the perfect lens{its}")
     name, widest = ("sensor_width", width) if full_aperture is None else ("full_aperture", full_aperture)
     if 2 * number(pupil.aperture_radius) > widest * (1 + 1e-9):
         raise ValueError(

@@ -21,6 +21,7 @@ from optics.spectra.spectrum import daylight
 
 __all__ = ["DescribedEye", "Description", "describe", "noise_of"]
 
+LIMITS = ("diffraction", "sampling", "noise")  # of acuity
 FREQUENCIES = 513  # choice: between 0 and the cut-off, at which the MTF is held against the noise
 CELLS_ACROSS, MOST_CELLS = 8, 64  # choice: of a kernel, across a waveguide; along a receptor's side
 FINER = 16  # choice: steps per sample of the PSF, where a receptor's angular sensitivity is measured
@@ -76,7 +77,7 @@ class Description:
         weights [m].
     diffraction_cpd: cut-off of an aperture this wide, 2 sin θ/λ on the retina. sampling_cpd: Nyquist frequency of the
         receptors, 1/(2 Δφ). noise_cpd: where the contrast that the optics leave first sinks below the noise.
-    acuity_cpd: the least of the three; binding: which.
+    acuity_cpd: the least of the three, NaN where one is not known; binding: which, of those that are.
     strehl_ratio: of the band nearest `wavelength`; image_quality: see `optics.image_quality`.
     noise: standard deviation of a receptor that looks at white, of all sources, in units of the signal.
     photons: absorbed by it per integration time, mean of the channels (None: no photon budget).
@@ -105,8 +106,8 @@ class Description:
 
     @property
     def _limits(self) -> dict[str, float]:
-        limits = {"diffraction": self.diffraction_cpd, "sampling": self.sampling_cpd, "noise": self.noise_cpd}
-        return {name: limit for name, limit in limits.items() if not math.isnan(limit)}
+        limits = zip(LIMITS, (self.diffraction_cpd, self.sampling_cpd, self.noise_cpd), strict=True)
+        return {name: limit for name, limit in limits if not math.isnan(limit)}
 
     @property
     def binding(self) -> str:
@@ -114,16 +115,17 @@ class Description:
 
     @property
     def acuity_cpd(self) -> float:
-        return self._limits[self.binding]
+        return self._limits[self.binding] if len(self._limits) == len(LIMITS) else math.nan
 
     def __str__(self) -> str:
         shot = "" if self.photons is None else f", of {self.photons:.3g} photons per receptor"
+        bound = "at most " if math.isnan(self.acuity_cpd) else ""
         rows = {
             "aperture": f"a = {self.relative_aperture:.3g}, f/{self.f_number:.3g}, throughput {self.throughput:.3g}",
             "image": f"Strehl ratio {self.strehl_ratio:.3g}, quality {self.image_quality:.3g}",
             "noise": f"{self.noise:.2g} of {self.white_signal:.3g} for white{shot}",
             **{f"limit: {name}": f"{_cycles(limit)}{self._mark(name)}" for name, limit in self._limits.items()},
-            "acuity": f"{_cycles(self.acuity_cpd)}, {self.binding} binds",
+            "acuity": f"{bound}{_cycles(self._limits[self.binding])}, {self.binding} binds",
             "acceptance": f"{self.acceptance_angle_deg:.3g}°, {self._overlap:.3g} of the angle between receptors",
             "receptors": f"{self.interommatidial_angle_deg:.3g}° apart",
             "PSF": f"{self.plan.method}, {self.plan.samples[0]} x {self.plan.samples[1]} samples, "

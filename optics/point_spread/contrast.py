@@ -175,7 +175,7 @@ def image_quality(
     """
     import drjit as dr
 
-    positive("nyquist", nyquist)
+    positive("nyquist", nyquist, "1/m")
     in_range("throughput", throughput, 0, 1, carried=True)
     in_range("noise_sigma", noise_sigma, 0, 1e6)
     flag("with_error", with_error)

@@ -33,7 +33,8 @@ class Eyes:
     n_eyes: number of eyes, >= 1
     resolution: receptors of one eye (height, width), each >= 1
     fov_deg: horizontal field of view of one eye [deg], in [0.001, 170]
-    placement_range_deg: azimuth from the leftmost to the rightmost eye [deg], in [0, 360]
+    placement_range_deg: azimuth from the leftmost to the rightmost eye [deg], in [0, 360]: at 360 these two look the
+        same way
     optics: pupil of every eye; None is the perfect lens
     sensor_width: width of the retina [m]
     noise_sigma: standard deviation of a receptor's noise, in units of its signal

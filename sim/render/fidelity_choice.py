@@ -10,6 +10,7 @@ import math
 import warnings
 from dataclasses import replace
 
+from optics.numerics.arguments import of_kind
 from sim.eyes.allowed_error import allowed_error
 from sim.eyes.eyes import Eyes
 from sim.render import fidelity_stages as stages
@@ -42,6 +43,8 @@ def choose_fidelity(
     Raises:
         ValueError: a tolerance that is not positive, unknown bands, and what BatchedRenderer raises for such a world.
     """
+    of_kind("world", world, World, "sim.build_world('detection')")
+    of_kind("eyes", eyes, Eyes, "sim.Eyes(n_eyes=2)")
     if bands not in ("auto", "own"):
         raise ValueError(f"bands = {bands!r}: must be 'auto' or 'own'")
     allowed = allowed_error(eyes.eye(), tolerance)

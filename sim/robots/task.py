@@ -136,6 +136,11 @@ def compiled(task: Task, model: mujoco.MjModel | None = None, learns: bool = Tru
     whole(f"{name}: substeps", task.substeps, 1, MOST_STEPS)
     whole(f"{name}: episode_steps", task.episode_steps, 1, MOST_STEPS)
     model = source.load(task.model) if model is None else model
+    cameras = [model.camera(k).name for k in range(model.ncam)]
+    if task.camera is not None and task.camera not in cameras:
+        raise ValueError(
+            f"{name}: camera = {task.camera!r}: the model has no such camera{did_you_mean(task.camera, cameras)}"
+        )
     known = actuator_names(model)
     for actuator in task.actuators or ():
         if actuator not in known:

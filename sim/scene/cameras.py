@@ -7,6 +7,7 @@ to_world is the camera's rotation times diag(-1, 1, -1).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 
 import mitsuba as mi
 import mujoco
@@ -82,6 +83,6 @@ def _camera_id(model: mujoco.MjModel, camera: str | int) -> int:
     names = [model.camera(i).name for i in range(model.ncam)]
     if isinstance(camera, str) and camera in names:
         return names.index(camera)
-    if not isinstance(camera, str) and 0 <= camera < model.ncam:
+    if isinstance(camera, Integral) and 0 <= camera < model.ncam:
         return int(camera)
     raise ValueError(f"no camera {camera!r}; the model has {', '.join(map(repr, names)) or 'none'}")

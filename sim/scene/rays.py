@@ -16,7 +16,7 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from optics.spectra.spectrum import LIMITS_NM
-from sim.scene.variant import Description, MitsubaObject
+from sim.scene.variant import MitsubaObject
 
 LANES = 4  # wavelengths in one mi.Spectrum
 WAVEFRONT = 1 << 21  # rays traced at once
@@ -74,7 +74,7 @@ class Camera:
             another kind than a standard error tells; not in scalar variants, nor for spp that it would round
         """
         width, height = self.size
-        method = mi.load_dict(_description(integrator))
+        method = _integrator(integrator)
         samples_at_once = max(1, WAVEFRONT // (width * height))
         bands = []
         for start in range(0, len(wavelengths), LANES):
@@ -175,12 +175,18 @@ def names_of(scene: MitsubaObject) -> dict[int, str]:
     return {} if _is_scalar() else {_registry_id(shape): shape.id() for shape in scene.shapes()}
 
 
-def _description(integrator: str | Mapping[str, Any]) -> Description:
+def _integrator(integrator: str | Mapping[str, Any]) -> MitsubaObject:
     description = {"type": integrator} if isinstance(integrator, str) else dict(integrator)
     if description["type"] == "direct" and {"emitter_samples", "shading_samples"} & description.keys():
         # Mitsuba 3.9.1 adds these samples up instead of averaging them where the light is a point or a direction.
         raise ValueError('integrator "direct": its light samples cannot be set; take more spp')
-    return description
+    try:
+        return mi.load_dict(description)
+    except RuntimeError as error:
+        why = " ".join(str(error).split())
+        raise ValueError(
+            f"integrator = {integrator!r}: must be what Mitsuba has, such as 'path'; it says: {why}"
+        ) from None
 
 
 def _sampler(kind: str, n: int) -> MitsubaObject:

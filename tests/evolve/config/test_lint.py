@@ -68,6 +68,10 @@ def test_settings_that_nothing_reads_are_named():
     assert notes(held, "genome.layers.open=true") == []
     assert notes("search.promoted=0.3") == ["search.promoted has no effect: search.rungs = 1"]
     assert notes("search.promoted=0.3", "search.rungs=2") == []
+    assert notes("search.active=true") == []
+    assert notes("search.active=true", "search.optimizer=mutation") == [
+        "search.active has no effect: search.optimizer = mutation"
+    ]
     assert notes("eye.optics=false", "eye.relief_height=2e-6") == [
         "eye.relief_height has no effect: eye.optics = false"
     ]

@@ -127,3 +127,15 @@ def test_derivatives_are_refused():
     dr.enable_grad(value)
     with pytest.raises(ValueError, match="wavefront asks for a derivative"):
         HumanEye(wavefront=Zernike({(2, 0): value}))
+
+
+def test_an_eye_of_its_retina_is_as_long_as_it_is():
+    """And sees as many degrees as it should: the image of a point 0.4° aside lies f tan(0.4°)/n from the axis."""
+    human = HumanEye(1e-3, wavefront=None)
+    width = human.sensor_width(1.0)
+    eye = optics.Eye(pupil=human.pupil, full_aperture=8e-3, fov_deg=1.0, sensor_width=width, resolution=(15, 15))
+    assert eye.retina_distance == pytest.approx(human.focal_length, rel=1e-3)  # decision 052: indices of other bands
+    angle = math.radians(0.4)
+    seen = optics.psf(human.pupil, [570e-9], human.focal_length, source_angle=(angle, 0.0), dx=1e-6, shape=(257, 257))
+    brightest = float(seen.x[seen.psf[0].max(axis=0).argmax()])
+    assert brightest / width == pytest.approx(math.tan(angle) / (2 * math.tan(math.radians(0.5))), abs=seen.dx / width)

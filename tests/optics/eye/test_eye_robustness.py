@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from optics import AccuracyError, Eye, PhotonBudget, Pupil
+from optics import AccuracyError, Eye, HumanEye, PhotonBudget, Pupil
 from optics.eye import receptive_field
 from optics.eye.band_choice import choose_bands
 
@@ -62,8 +62,9 @@ def test_any_lens_is_described_or_refused(a, defocus, fov_deg, sigma):
     except ValueError as error:
         refused(error)
         return
-    assert 0 <= found.acuity_cpd <= found.diffraction_cpd
     unknown = {line.split(":")[0] for line in found.unknown}
+    assert ("limit by noise" in unknown) == math.isnan(found.acuity_cpd)
+    assert math.isnan(found.acuity_cpd) or 0 <= found.acuity_cpd <= found.diffraction_cpd
     assert ("image quality" in unknown) == math.isnan(found.image_quality)
     assert "image quality" in unknown or 0 <= found.image_quality <= 1.001 * found.throughput
     assert "Strehl ratio" in unknown or 0 < found.strehl_ratio < 1.1
@@ -115,6 +116,8 @@ def test_any_light_or_a_refusal(tolerance, illuminance, time, efficiency):
 def test_what_is_of_another_kind_is_named():
     with pytest.raises(ValueError, match="photon_budget = 1000"):
         Eye(photon_budget=1000)
+    with pytest.raises(ValueError, match=r"must be a kind of Pupil, .* \(it has one, its `pupil`\)"):
+        Eye(pupil=HumanEye())
     with pytest.raises(ValueError, match="pupil = 'lens': must be a kind of Pupil"):
         Eye(pupil="lens")
     with pytest.raises(ValueError, match="rng = 0: must be a kind of Generator"):

@@ -159,7 +159,8 @@ def test_what_the_light_cannot_tell_is_one_named_line(monkeypatch):
     described = lens().describe()
     assert math.isnan(described.image_quality)
     assert described.binding in ("diffraction", "sampling")
-    assert described.acuity_cpd == lens().describe().sampling_cpd
+    assert math.isnan(described.acuity_cpd), "whatever the unknown limit is, it may be the least"
+    assert "at most 0.158 cycles/degree, sampling binds" in str(described)
     assert [line.split(":")[0] for line in described.unknown] == ["image quality", "limit by noise"]
     assert "not known (1)       image quality: tolerance = 0.02" in str(described)
     monkeypatch.undo()

@@ -193,6 +193,10 @@ class NoRewards(sim.Task):
         return {"progress": 0.1}
 
 
+class NoCamera(Face):
+    camera = "fromt"
+
+
 class NoActuators(Face):
     model = '<mujoco><worldbody><body name="cart"><joint/><geom size=".1"/></body></worldbody></mujoco>'
 
@@ -216,6 +220,7 @@ class FailingReset(Face):
         (NoModel, {}, ValueError, "NoModel: model: must be set"),
         (NoRewards, {}, ValueError, "NoRewards: rewards: must be defined, to return numbers by name"),
         (lambda: Face, {}, ValueError, r"task is the class Face: must be an animal of it, such as Face\(\)"),
+        (NoCamera, {}, ValueError, "NoCamera: camera = 'fromt': the model has no such camera"),
         (NoActuators, {}, ValueError, "NoActuators: its model has no actuators"),
         (NoMounts, {}, ValueError, "mounts = .*must be one sim.Mount at least"),
         (NoSubsteps, {}, ValueError, "NoSubsteps: substeps = 0: must be a whole number"),

@@ -175,6 +175,11 @@ def test_invisible_geoms_and_other_bodies_are_left_out():
 def test_bad_input_is_named():
     model = mujoco.MjModel.from_xml_string(xml_of(LIGHT, WHITE))
     mirror = sim.mirror(model)
+    with pytest.raises(ValueError, match="no camera None; the model has"):
+        mirror.render(None, 4, 4)
+    for strange in ("pathtracer", {"type": "path", "max_dept": 3}):
+        with pytest.raises(ValueError, match=r"integrator = .*: must be what Mitsuba has, such as 'path'; it says: "):
+            mirror.render(Viewpoint(np.zeros(3), np.eye(3), 45.0), 4, 4, integrator=strange)
     with pytest.raises(ValueError, match="no camera 'eye_9'"):
         mirror.render("eye_9", 4, 4)
     with pytest.raises(ValueError, match="width = 0"):
