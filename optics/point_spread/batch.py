@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from optics.numerics.arguments import (
     positive,
     shown,
     vacuum_wavelength,
+    whole,
     without_derivative,
 )
 from optics.numerics.autodiff import Array, Scalar, number
@@ -27,7 +28,8 @@ from optics.numerics.precision import Precision, padded_for_packets, precision
 from optics.point_spread.pictures import pictures
 from optics.point_spread.population import population_pictures
 from optics.point_spread.population_members import Member
-from optics.point_spread.request import Setup
+from optics.point_spread.psf_result import PSFResult
+from optics.point_spread.request import Request, Setup
 
 __all__ = ["PSFBatch", "psf_batch"]
 
@@ -36,12 +38,46 @@ __all__ = ["PSFBatch", "psf_batch"]
 class PSFBatch:
     """tensor: PSFs [1/m²] in Dr.Jit, (eye, depth, wavelength, y, x), with derivatives; psf: the same in NumPy.
 
-    plans: of the same order, flat. See PSFResult.
+    plans: of the same order, flat, and members, of which they are pictures. setup: how all were asked for.
+    See PSFResult.
     """
 
     tensor: Array
     dx: float
     plans: tuple[Plan, ...]
+    members: tuple[Member, ...]
+    setup: Setup
+
+    @property
+    def x(self) -> np.ndarray:
+        """Of the columns [m]."""
+        return self.setup.window.x
+
+    @property
+    def y(self) -> np.ndarray:
+        """Of the rows [m]."""
+        return self.setup.window.y
+
+    def result(self, eye: int, depth: int = 0) -> PSFResult:
+        """One eye's PSFs at one depth, as `optics.psf` would give them: for `optics.strehl_ratio` and other measures.
+
+        Raises:
+            ValueError: there is no such eye or depth.
+        """
+        eyes, depths, waves = self.tensor.shape[:3]
+        place = whole("eye", eye, 0, eyes - 1) * depths + whole("depth", depth, 0, depths - 1)
+        mine = slice(place * waves, (place + 1) * waves)
+        members = self.members[mine]
+        return PSFResult(
+            self.tensor[eye, depth],
+            self.dx,
+            np.array([member.wavelength for member in members]),
+            members[0].distance,
+            members[0].pupil,
+            self.plans[mine],
+            self.setup.window.centre,
+            tuple(_request(member, self.setup) for member in members),
+        )
 
     @cached_property
     def psf(self) -> np.ndarray:
@@ -89,15 +125,18 @@ def psf_batch(
     by_one_plan = population_pictures(members, window, tolerance) if plain else ()
     known = {index: (image, plan) for index, image, plan in by_one_plan}
     rest = [index for index in range(len(members)) if index not in known]
-    requests = []
-    for member in (members[index] for index in rest):
-        setup = Setup(member.distance, PointSource(member.source), window, tolerance, method, dtype)
-        requests.append(setup.request(member.pupil, member.wavelength))
-    whole, plans = _joined(
+    setup = Setup(members[0].distance, PointSource(members[0].source), window, tolerance, method, dtype)
+    requests = [_request(members[index], setup) for index in rest]
+    flat, plans = _joined(
         known, {index: picture[:2] for index, picture in zip(rest, pictures(requests), strict=True)}, precision(dtype)
     )
     sizes = len(pupils), len(source_distances), len(wavelengths), *window.shape
-    return PSFBatch(precision(dtype).Tensor(whole, sizes), window.dx, tuple(plans))
+    return PSFBatch(precision(dtype).Tensor(flat, sizes), window.dx, tuple(plans), tuple(members), setup)
+
+
+def _request(member: Member, setup: Setup) -> Request:
+    own = replace(setup, sensor_distance=member.distance, source=PointSource(member.source))
+    return own.request(member.pupil, member.wavelength)
 
 
 def _members(

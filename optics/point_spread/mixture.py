@@ -30,7 +30,8 @@ class Mixture(Protocol):
 def a_mixture(result: Any) -> Mixture:
     """ValueError where there is nothing to measure: a batch, or numbers."""
     if not hasattr(result, "strehl_ratio"):
-        raise ValueError(f"result is a {type(result).__name__}: must be a PSFResult or a WhitePSF")
+        batch = ", as its `result(eye)` is" if hasattr(result, "result") else ""
+        raise ValueError(f"result is a {type(result).__name__}: must be a PSFResult{batch}, or a WhitePSF")
     found: Mixture = result
     return found
 

@@ -52,3 +52,20 @@ def test_must_not_be_empty(name):
     arguments = {"pupils": pupils(), "wavelengths": WAVELENGTHS, "source_distances": DEPTHS, name: ()}
     with pytest.raises(ValueError, match=f"{name} = .*: must be a sequence of at least one"):
         optics.psf_batch(**arguments, **VIEW)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
+def test_each_has_the_measures_of_one(tolerance):
+    """Whether one plan has made them or each its own."""
+    view = {**VIEW, "shape": (65, 65), "tolerance": tolerance}
+    batch = optics.psf_batch(pupils(), WAVELENGTHS, 150e-6, DEPTHS, **view)
+    for i, pupil in enumerate(pupils()):
+        for j, depth in enumerate(DEPTHS):
+            mine, one = batch.result(i, j), optics.psf(pupil, WAVELENGTHS, 150e-6, depth, **view)
+            np.testing.assert_array_equal(mine.psf, batch.psf[i, j])
+            np.testing.assert_array_equal(mine.x, batch.x)
+            strehl, error = optics.strehl_ratio(mine, with_error=True)
+            np.testing.assert_array_less(np.abs(strehl - optics.strehl_ratio(one)), error + tolerance)
+            assert mine.can_be_seen_anew
+    with pytest.raises(ValueError, match=r"eye = 2: must be a whole number in \[0, 1\]"):
+        batch.result(2)

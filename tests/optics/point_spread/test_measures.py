@@ -216,8 +216,11 @@ def test_a_perfect_lens_is_perfect_however_wide(steepness):
     "measure", [optics.mtf, optics.strehl_ratio, lambda seen: optics.encircled_energy(seen, 1e-6)], ids=["m", "s", "e"]
 )
 def test_a_batch_is_no_picture(measure):
-    with pytest.raises(ValueError, match="result is a ndarray: must be a PSFResult or a WhitePSF"):
+    with pytest.raises(ValueError, match="result is a ndarray: must be a PSFResult, or a WhitePSF"):
         measure(np.ones((1, 9, 9)))
+    batch = optics.psf_batch([optics.Pupil(1e-5, thin_lens_focal_length=1e-4)], shape=(33, 33))
+    with pytest.raises(ValueError, match=r"is a PSFBatch: must be a PSFResult, as its `result\(eye\)` is, or a WhiteP"):
+        measure(batch)
 
 
 def test_a_mean_of_a_mean_is_the_mean():
