@@ -48,6 +48,11 @@ class PSFBatch:
     members: tuple[Member, ...]
     setup: Setup
 
+    def __repr__(self) -> str:
+        size = " x ".join(map(str, self.tensor.shape))
+        error = f"predicted error {self.plan.predicted_error:.1e} at most"
+        return f"<PSFBatch of {size} samples {self.dx:.3g} m apart, {error}>"
+
     @property
     def x(self) -> np.ndarray:
         """Of the columns [m]."""

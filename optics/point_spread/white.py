@@ -52,6 +52,21 @@ class WhitePSF:
         errors = ", ".join(f"{error:.1e}" for error in self.predicted_error)
         return f"<WhitePSF of {len(self.weights)} types from {self.waves!r}, predicted errors {errors}>"
 
+    @property
+    def x(self) -> np.ndarray:
+        """Of the columns [m]."""
+        return self.waves.x
+
+    @property
+    def y(self) -> np.ndarray:
+        """Of the rows [m]."""
+        return self.waves.y
+
+    @property
+    def dx(self) -> float:
+        """Pitch [m]."""
+        return self.waves.dx
+
     @cached_property
     def tensor(self) -> Array:
         """(type, y, x) in Dr.Jit, with derivatives."""

@@ -45,13 +45,30 @@ ONE = np.ones(1)  # the weight of what counts whole
 
 @dataclass(frozen=True, eq=False)
 class PropagationResult:
-    """u: complex field (…, y, x) at pitch dx [m], centre sample n//2. plan: how it was computed, and how well."""
+    """u: complex field (…, y, x) at pitch dx [m], centre sample n//2. plan: how it was computed, and how well. window:
+    its samples, also `x` and `y` [m]."""
 
     u: np.ndarray
     dx: float
     plan: Plan
+    window: Grid
     _source: np.ndarray = field(repr=False)  # (plane, y, x)
     _sampling: TransformSampling = field(repr=False)
+
+    def __repr__(self) -> str:
+        size = " x ".join(map(str, self.u.shape))
+        error = f"predicted error {self.plan.predicted_error:.1e}"
+        return f"<PropagationResult of {size} samples {self.dx:.3g} m apart, {self.plan.method}, {error}>"
+
+    @property
+    def x(self) -> np.ndarray:
+        """Of the columns [m]."""
+        return self.window.x
+
+    @property
+    def y(self) -> np.ndarray:
+        """Of the rows [m]."""
+        return self.window.y
 
     @cached_property
     def evanescent_power(self) -> float:
@@ -114,7 +131,8 @@ def propagate(
             f"tolerance = {tolerance:g}: too much of the light leaves so flat, or so little of it meets the window, "
             f"that the error reaches {error:.1g}; ask for that, or for a larger out_shape"
         )
-    return PropagationResult(out, window.dx, _plan(how, error, _untold(planes, tolerance), dtype), sources, how)
+    plan = _plan(how, error, _untold(planes, tolerance), dtype)
+    return PropagationResult(out, window.dx, plan, window, sources, how)
 
 
 def _field(u: np.ndarray) -> np.ndarray:

@@ -56,12 +56,29 @@ class SystemStep:
 
 @dataclass(frozen=True, eq=False)
 class StackResult:
-    """u: complex field (y, x) at pitch dx [m], centre sample n//2. predicted_error: relative L2 of its intensity."""
+    """u: complex field (y, x) at pitch dx [m], centre sample n//2. predicted_error: relative L2 of its intensity.
+    window: its samples, also `x` and `y` [m]."""
 
     u: np.ndarray
     dx: float
     steps: tuple[SystemStep, ...]
     predicted_error: float
+    window: Grid
+
+    def __repr__(self) -> str:
+        size = " x ".join(map(str, self.u.shape))
+        error = f"predicted error {self.predicted_error:.1e}"
+        return f"<StackResult of {size} samples {self.dx:.3g} m apart, {len(self.steps)} steps, {error}>"
+
+    @property
+    def x(self) -> np.ndarray:
+        """Of the columns [m]."""
+        return self.window.x
+
+    @property
+    def y(self) -> np.ndarray:
+        """Of the rows [m]."""
+        return self.window.y
 
 
 def propagate_through(
@@ -124,7 +141,7 @@ def propagate_through(
     assert field is not None
     error, power = _error(steps, tolerance, settings), brightest**2
     told = (replace(one, power_in=one.power_in * power, power_out=one.power_out * power) for one in steps)
-    return StackResult(field.u * field.u.dtype.type(brightest), window.dx, tuple(told), error)
+    return StackResult(field.u * field.u.dtype.type(brightest), window.dx, tuple(told), error, window)
 
 
 def _start(

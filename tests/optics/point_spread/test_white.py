@@ -201,4 +201,12 @@ def test_results_are_printed_in_a_line():
     assert repr(white).startswith(f"<WhitePSF of 3 types from {waves}")
     assert repr(focus).startswith("<VectorFocus 9 x 11 samples 2e-06 m apart, predicted error ")
     assert repr(white.mtf(tolerance=0.3)).startswith("<MTF of 3 wavelengths or types, to ")
-    assert max(map(len, map(repr, (white, focus)))) < 240
+    batch = optics.psf_batch([optics.Pupil(1e-5, thin_lens_focal_length=1e-4)], shape=(33, 31))
+    field = optics.propagate(np.ones((9, 11)), dx=1e-6, wavelength=550e-9, distance=1e-5, tolerance=0.4)
+    assert repr(batch).startswith("<PSFBatch of 1 x 1 x 1 x 33 x 31 samples 2.5e-07 m apart, predicted error ")
+    assert repr(field).startswith("<PropagationResult of 9 x 11 samples 1e-06 m apart, angular_spectrum, predicted ")
+    for result in (white, batch, field):
+        picture = field.u if result is field else result.psf
+        assert (result.y.size, result.x.size) == picture.shape[-2:]
+        assert result.x[result.x.size // 2] == 0
+    assert max(map(len, map(repr, (white, focus, batch, field)))) < 240
