@@ -112,6 +112,7 @@ def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, wo
     """
     designs = list(designs)
     known = {row.design: row for row in read_rows(Trained, path)}
+    goes_on = bool(known)
     waiting = dict(enumerate(design for design in designs if design not in known))
     team = LocalExecutor(evaluate_candidate, workers, prepare_device)
     with tempfile.TemporaryDirectory() as folder, team as executor:
@@ -123,8 +124,8 @@ def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, wo
             row = Trained.of(waiting[job.id], outcome)
             known[row.design] = row
             hours = sum(each.seconds for each in known.values()) / 3600
-            made = path.with_suffix(".json")
-            Origin.here(hours, "worker").after(made).write(made)
+            made, here = path.with_suffix(".json"), Origin.here(hours, "worker")
+            (here.after(made) if goes_on else here).write(made)
             write_rows([known[design] for design in designs if design in known], path)
             print(f"{len(known)} of {len(designs)}: {row}", flush=True)
     written = {row.design: row for row in read_rows(Trained, path)}

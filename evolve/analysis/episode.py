@@ -41,6 +41,7 @@ class Episode:
     position (t, 2) [m], heading (t,) [rad], objects (t, object, 3) [m]   before the action
     action (t, 2)             as Gymnasium's action in [-1, 1]
     reward (t,), reward_terms name -> (t,), contact (t,) bool   after it
+    adversary_first (t,) bool   whether it reached an adversary, and before any goal; None of an earlier version
     signals: what the receptors reported, noise included, (t, eye, channel, height, width)
     perfect_signals: the same receptors behind a perfect lens, without noise
     wavelengths_nm: of the bands, (band,)
@@ -66,6 +67,7 @@ class Episode:
     radiance_frames: np.ndarray
     radiance: np.ndarray
     world: WorldConfig = field(default_factory=WorldConfig)
+    adversary_first: np.ndarray | None = None
 
     def __len__(self) -> int:
         """Actions taken."""
@@ -211,14 +213,16 @@ def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any], f
         observation, reward, dones, infos = worlds.step(action)
         done = bool(dones[0])
         felt = infos[0]["terminal_observation"]["contact"] if done else observation["contact"][0]
-        rows.append((action[0], reward[0], infos[0]["reward_terms"], felt[0] > 0, seen))
-    action, reward, terms, contact, signals = zip(*rows, strict=True)
+        first = bool(infos[0].get("adversary_first"))
+        rows.append((action[0], reward[0], infos[0]["reward_terms"], felt[0] > 0, seen, first))
+    action, reward, terms, contact, signals, adversary_first = zip(*rows, strict=True)
     columns = {
         "action": np.array(action),
         "reward": np.array(reward),
         "reward_terms": {name: np.array([of_step[name] for of_step in terms]) for name in terms[0]},
         "contact": np.array(contact),
         "signals": np.array(signals),
+        "adversary_first": np.array(adversary_first),
     }
     return concatenate(states), columns, light
 

@@ -102,5 +102,6 @@ def episode_table(episode: AnyEpisode) -> str:
 
 def solved(episode: Episode) -> bool:
     """Whether the goal was reached, and before any adversary."""
-    events = episode.reward_terms["goal"] + episode.reward_terms["adversary"]
-    return bool(events[events != 0][:1].sum() > 0)
+    goal, adversary = (episode.reward_terms[name] != 0 for name in ("goal", "adversary"))
+    first = goal if episode.adversary_first is None else goal & ~episode.adversary_first
+    return bool(first[goal | adversary][:1].any())

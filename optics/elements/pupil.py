@@ -12,7 +12,7 @@ import numpy as np
 from optics.apertures.aperture import EDGE_REACH, Aperture
 from optics.apertures.circular import Circle
 from optics.elements.pixel_relief import PixelRelief
-from optics.elements.refractive_index import Dispersion, RefractiveIndex, index_of
+from optics.elements.refractive_index import Dispersion, RefractiveIndex, index_of, refuse_name
 from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
 from optics.elements.transmittance import Mask
@@ -74,6 +74,7 @@ class Pupil:
         if self.object_n is not None:
             index_of("object_n", self.object_n)
         if not isinstance(self.n, Dispersion):
+            refuse_name("n", self.n)
             in_range("n", self.n, 1.0, 10.0, carried=True)
             object.__setattr__(self, "n", RefractiveIndex(self.n))
         of_kind("aperture", self.aperture, Aperture, "Circle(), or union(Disk(0.5, (0.4, 0.0)))")

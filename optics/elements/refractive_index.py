@@ -172,6 +172,11 @@ def index_of(name: str, value: Any) -> Dispersion:
                 f"{name} asks for a derivative, which it does not carry to the picture: give plain numbers"
             )
         return value
-    if isinstance(value, str):
-        raise ValueError(f"{name} = {value!r}: must be a number, or a curve such as optics.medium({value!r})")
+    refuse_name(name, value)
     return RefractiveIndex(in_range(name, value, 1.0, 10.0))
+
+
+def refuse_name(name: str, value: Any) -> None:
+    """ValueError if a material's name is given in its place."""
+    if isinstance(value, str):
+        raise ValueError(f"{name} = {value!r}: must be a number, or a curve such as optics.medium('water')")

@@ -13,6 +13,7 @@ from optics.elements.wavefront_slopes import Slopes
 
 __all__ = ["MARGIN", "Rays", "brightness", "disk_area", "mismatch"]
 
+CELLS = 32  # choice: a side of all places where rays land
 ACROSS = 65  # choice: rays along a diameter, at most
 # Choice. Of predicted model errors, which come from a few rays: test_fresnel.py and test_geometric.py hold what is
 # predicted with it above what is found on random pupils.
@@ -71,6 +72,13 @@ class Rays:
     def image_area(self) -> float:
         """Area [m²] of the disk with the same mean square distance from its centre as the rays' ends."""
         return disk_area(self.to_x, self.to_y)
+
+    def densest(self) -> list[tuple[float, float]]:
+        """Where (x, y) of the plane most of them land: their median, and the fullest of CELLS x CELLS cells."""
+        counts, x, y = np.histogram2d(self.to_x, self.to_y, CELLS)
+        i, j = np.unravel_index(counts.argmax(), counts.shape)
+        middle = float(x[i] + x[i + 1]) / 2, float(y[j] + y[j + 1]) / 2
+        return [(float(np.median(self.to_x)), float(np.median(self.to_y))), middle]
 
     def some(self, most: int) -> Rays:
         """`most` of the rays or all, evenly: steps of the golden section fall into step with no row."""

@@ -70,7 +70,8 @@ class PSFBatch:
             ValueError: there is no such eye or depth.
         """
         eyes, depths, waves = self.tensor.shape[:3]
-        place = whole("eye", eye, 0, eyes - 1) * depths + whole("depth", depth, 0, depths - 1)
+        eye, depth = whole("eye", eye, 0, eyes - 1), whole("depth", depth, 0, depths - 1)
+        place = eye * depths + depth
         mine = slice(place * waves, (place + 1) * waves)
         members = self.members[mine]
         return PSFResult(

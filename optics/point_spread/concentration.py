@@ -62,7 +62,7 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     types = precision("float64")
     peaks, errors = zip(*(_peak(result, index) for index in range(result.tensor.shape[0])), strict=True)
     for index, found in enumerate(peaks):
-        _refuse_brighter_outside(result, index, number(found))
+        _refuse_brighter_outside(result, index, number(found) * (1 + errors[index]))
     peak = types.Float(peaks[0] if len(peaks) == 1 else dr.concat(list(peaks)))
     mixed = result.shares is not None and result.can_be_seen_anew
     waves = [request.beam.wavelength for request in result.requests] if mixed else result.wavelengths
@@ -161,17 +161,18 @@ def _refuse_brighter_outside(result: PSFResult, index: int, peak: float) -> None
     rays = result.requests[index].problem.rays if result.can_be_seen_anew and not result.holds_cells else None
     if rays is None or not len(rays):
         return
-    at = float(np.median(rays.to_x)), float(np.median(rays.to_y))
-    beyond = [max(s[0] - place, place - s[-1]) for place, s in zip(at, (result.x, result.y), strict=True)]
-    if max(beyond) <= result.dx:
-        return
     pitch = LOBES / result.highest_cutoff
-    there = result.through(Grid.square(NEIGHBOURHOOD, pitch).moved(at), "the Strehl ratio", slice(index, index + 1))
-    if float(there.psf.max()) > peak:
-        raise AccuracyError(
-            f"rays land around ({at[0]:.3g}, {at[1]:.3g}) m, outside of the window, and there it is brighter: the "
-            "Strehl ratio needs a window that holds the peak; widen it or move its centre"
-        )
+    for at in rays.densest():
+        beyond = [max(s[0] - place, place - s[-1]) for place, s in zip(at, (result.x, result.y), strict=True)]
+        if max(beyond) <= result.dx:
+            continue
+        window = Grid.square(NEIGHBOURHOOD, pitch).moved(at)
+        there = result.through(window, "the Strehl ratio", slice(index, index + 1))
+        if float(there.psf.max()) > peak * (1 + there.plan.predicted_error):
+            raise AccuracyError(
+                f"rays land around ({at[0]:.3g}, {at[1]:.3g}) m, outside of the window, and there it is brighter: the "
+                "Strehl ratio needs a window that holds the peak; widen it or move its centre"
+            )
 
 
 def _vertex(result: PSFResult, index: int) -> tuple[Array, float]:

@@ -89,7 +89,7 @@ def make_vec_env(
     if episode_steps is not None:
         _require_whole("episode_steps", episode_steps, 1)
     if isinstance(task, type) and issubclass(task, Task):
-        raise ValueError(f"task is the class {task.__name__}: must be an animal of it, such as {task.__name__}()")
+        raise ValueError(f"task is the class {task.__name__}: must be an instance, such as {task.__name__}()")
     if isinstance(task, Task | Encounter):
         _refuse_for_tasks(locals())
         _check(n_envs, seed, memory, mode, render_mode)

@@ -36,7 +36,9 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
 
     def __init__(self, num_envs: int = 1, *, task: str | Task, eyes: Eyes | None = None, **options: Any) -> None:
         if isinstance(task, Encounter):
-            raise ValueError("task: several animals learn in a sim.Encounter: must be its `alone`, or make_vec_env")
+            raise ValueError(
+                "task: several animals learn in a sim.Encounter: give what its `alone` returns, or use sim.make_vec_env"
+            )
         self._batch = make_vec_env(task, eyes, n_envs=num_envs, seed=None, **options)
         self.num_envs, self.render_mode = num_envs, self._batch.render_mode
         self.single_observation_space = self._batch.observation_space

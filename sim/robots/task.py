@@ -129,7 +129,7 @@ def compiled(task: Task, model: mujoco.MjModel | None = None, learns: bool = Tru
     name = type(task).__name__
     if not hasattr(task, "model"):
         raise ValueError(f"{name}: model: must be set, to an MjModel, a path or MJCF text")
-    if learns and type(task).rewards is Task.rewards:
+    if learns and getattr(task.rewards, "__func__", None) is Task.rewards:
         raise ValueError(f"{name}: rewards: must be defined, to return numbers by name, such as {{'progress': 0.1}}")
     kinds_of(task)
     finite(f"{name}: failure_reward", task.failure_reward)
@@ -138,9 +138,8 @@ def compiled(task: Task, model: mujoco.MjModel | None = None, learns: bool = Tru
     model = source.load(task.model) if model is None else model
     cameras = [model.camera(k).name for k in range(model.ncam)]
     if task.camera is not None and task.camera not in cameras:
-        raise ValueError(
-            f"{name}: camera = {task.camera!r}: the model has no such camera{did_you_mean(task.camera, cameras)}"
-        )
+        listed = ", ".join(map(repr, cameras)) or "none"
+        raise ValueError(f"{name}: no camera {task.camera!r}; the model has {listed}")
     known = actuator_names(model)
     for actuator in task.actuators or ():
         if actuator not in known:

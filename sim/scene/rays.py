@@ -176,17 +176,20 @@ def names_of(scene: MitsubaObject) -> dict[int, str]:
 
 
 def _integrator(integrator: str | Mapping[str, Any]) -> MitsubaObject:
+    if not isinstance(integrator, str) and not (isinstance(integrator, Mapping) and "type" in integrator):
+        raise ValueError(f"integrator = {integrator!r}: must be a name, or a description such as {{'type': 'path'}}")
     description = {"type": integrator} if isinstance(integrator, str) else dict(integrator)
     if description["type"] == "direct" and {"emitter_samples", "shading_samples"} & description.keys():
         # Mitsuba 3.9.1 adds these samples up instead of averaging them where the light is a point or a direction.
         raise ValueError('integrator "direct": its light samples cannot be set; take more spp')
     try:
-        return mi.load_dict(description)
+        found = mi.load_dict(description)
+        why = "" if isinstance(found, mi.Integrator) else "that is no integrator"
     except RuntimeError as error:
         why = " ".join(str(error).split())
-        raise ValueError(
-            f"integrator = {integrator!r}: must be what Mitsuba has, such as 'path'; it says: {why}"
-        ) from None
+    if why:
+        raise ValueError(f"integrator = {integrator!r}: must be one of Mitsuba's, such as 'path'; it says: {why}")
+    return found
 
 
 def _sampler(kind: str, n: int) -> MitsubaObject:

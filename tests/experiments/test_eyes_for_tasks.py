@@ -7,7 +7,7 @@ import pytest
 
 from experiments import eyes_for_tasks
 from experiments.designed import Design, Trained, crossed, train_all
-from experiments.eyes_for_tasks import BRIGHT, SEEDS, SHAPES, TASKS, crossing, designs, page
+from experiments.eyes_for_tasks import BRIGHT, SEEDS, SHAPES, TASKS, _interaction, crossing, designs, page
 from experiments.store import Origin, read_rows
 
 TINY = (
@@ -57,6 +57,20 @@ def test_an_interaction_is_found_and_measured():
     assert found.interaction.low < 4 / 0.3 < found.interaction.high
     assert found.interaction.low > 2 * 2.06, "more than a unit that holds the difference itself lets come out"
     assert found.p < 1e-3
+
+
+@pytest.mark.parametrize(("lives", "held"), [(6, 0.93), (3, 0.88)])
+def test_intervals_of_the_interaction_hold_it_as_often_as_the_page_says(lives, held):
+    """Of 2000 imitated experiments, to three standard errors of a binomial; twice as many lives with cameras."""
+    chance, found = np.random.default_rng(0), []
+    for _ in range(2000):
+        fitness = {
+            t: (chance.normal(size=lives), chance.normal(s, size=2 * lives))
+            for t, s in (("detection", 6), ("navigation", -6))
+        }
+        one = _interaction(fitness)
+        found.append(one.low < 12 < one.high)
+    assert abs(np.mean(found) - held) < 0.01 + 3 * np.sqrt(held * (1 - held) / 2000)
 
 
 def test_no_interaction_where_eyes_matter_alike():

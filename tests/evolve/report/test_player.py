@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from evolve.learning.policy import load_policy
 from evolve.report.ground_plan import GroundPlan
 from evolve.report.picture import display
 from evolve.report.player import write_player
+from evolve.report.replay import solved
 from tests.evolve.learning.test_task_module import small, written
 from tests.evolve.report.reported import Page, film_of, picture
 
@@ -109,3 +111,20 @@ def test_ground_plan_of_the_maze_leaves_free_cells_free(episode):
     x0, y0, x1, y1 = stage.bounds
     walls = 4 * stage.walls[:, 2:].prod(axis=1).sum()
     assert 0.3 < walls / ((x1 - x0) * (y1 - y0)) < 0.7
+
+
+@pytest.mark.parametrize(
+    ("goal", "adversary", "after", "expected"),
+    [
+        ([0, 10, 0], [0, 0, -10], [False] * 3, True),
+        ([0, 0, 10], [0, -10, 0], [False, True, False], False),
+        ([0, 10, 10], [0, -10, 0], [False, True, False], False),
+        ([0, 10, 0], [0, -10, -10], [False, False, True], True),
+        ([0, 10, 0], [0, -10, -10], None, True),
+        ([0, 0, 0], [0, 0, 0], [False] * 3, False),
+    ],
+)
+def test_an_episode_is_solved_if_the_first_thing_reached_is_a_goal(goal, adversary, after, expected):
+    """Also where one action reaches both."""
+    told = {"reward_terms": {"goal": np.array(goal), "adversary": np.array(adversary)}}
+    assert solved(SimpleNamespace(**told, adversary_first=None if after is None else np.array(after))) is expected

@@ -61,7 +61,7 @@ def test_each_has_the_measures_of_one(tolerance):
     batch = optics.psf_batch(pupils(), WAVELENGTHS, 150e-6, DEPTHS, **view)
     for i, pupil in enumerate(pupils()):
         for j, depth in enumerate(DEPTHS):
-            mine, one = batch.result(i, j), optics.psf(pupil, WAVELENGTHS, 150e-6, depth, **view)
+            mine, one = batch.result(np.int64(i), np.int64(j)), optics.psf(pupil, WAVELENGTHS, 150e-6, depth, **view)
             np.testing.assert_array_equal(mine.psf, batch.psf[i, j])
             np.testing.assert_array_equal(mine.x, batch.x)
             strehl, error = optics.strehl_ratio(mine, with_error=True)

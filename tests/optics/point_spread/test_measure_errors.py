@@ -178,3 +178,15 @@ def test_a_side_lobe_does_not_pass_for_an_image_beside_the_window(pupil, angle, 
     centre = float(np.median(rays.to_x)), float(np.median(rays.to_y))
     moved = optics.psf(pupil, source_angle=(angle, 0.0), centre=centre, **window)
     assert optics.strehl_ratio(moved)[0] > 0.95
+
+
+def test_of_two_images_the_brighter_may_be_beside_the_window():
+    """Behind a rounded ridge rays land to either side, and at the axis, where their median is, is little light."""
+    ridge = np.linspace(-1, 1, 129)
+    heights = 6e-6 * np.sqrt(ridge[None, :] ** 2 + 0.05**2) * np.ones((129, 1))
+    pupil = optics.Pupil(25e-6, optics.HeightMap(heights), thin_lens_focal_length=240e-6)
+    wide = optics.psf(pupil, sensor_distance=240e-6, dx=0.4e-6, shape=(151, 151), tolerance=1e-2)
+    assert optics.strehl_ratio(wide)[0] > 0.15
+    narrow = optics.psf(pupil, sensor_distance=240e-6, dx=0.2e-6, shape=(65, 65), tolerance=1e-2)
+    with pytest.raises(optics.AccuracyError, match=r"outside of the window, and there it is brighter"):
+        optics.strehl_ratio(narrow)

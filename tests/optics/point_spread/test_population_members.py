@@ -134,7 +134,8 @@ def test_what_all_of_a_pupil_has_in_common_changes_nothing(common):
 
 
 @pytest.mark.parametrize(
-    ("inner", "waist", "tolerance"), [(0.8, 0.25, 1e-2), (0.7, 0.25, 1e-2), (0.6, 0.2, 5e-2), (0.5, 0.3, 1e-2)]
+    ("inner", "waist", "tolerance"),
+    [(0.8, 0.25, 1e-2), (0.7, 0.25, 1e-2), (0.6, 0.2, 5e-2), (0.5, 0.35, 5e-2), (0.3, 0.25, 1e-2)],
 )
 def test_masks_that_are_bright_where_the_aperture_is_shut_are_left_to_others(inner, waist, tolerance):
     """What passes is less than the soft edge errs by, which is told of a bright pupil: errors were 1.2e-2 to 2.6e-1."""
@@ -146,6 +147,19 @@ def test_masks_that_are_bright_where_the_aperture_is_shut_are_left_to_others(inn
         pupil, [LAMBDA], Z, dx=0.5e-6, shape=(33, 33), tolerance=1e-6, method="exact", dtype="float64"
     ).psf[0]
     assert relative_l2(batch.psf[0, 0, 0], exact) < batch.plan.predicted_error < tolerance
+
+
+@pytest.mark.parametrize(("inner", "waist", "tolerance"), [(0.3, 0.3, 1e-2), (0.5, 0.4, 5e-2), (0.4, 0.35, 2e-2)])
+def test_of_somewhat_dimmer_ones_errors_are_told(inner, waist, tolerance):
+    """Just above the light below which they are left to others."""
+    pupil = optics.Pupil(
+        12e-6, aperture=optics.Annulus(inner), mask=optics.GaussianMask(waist * 12e-6), thin_lens_focal_length=Z
+    )
+    [(_, image, plan)] = population_pictures([Member(pupil, LAMBDA, Z, math.inf)], Grid.square(33, 0.5e-6), tolerance)
+    exact = optics.psf(
+        pupil, [LAMBDA], Z, dx=0.5e-6, shape=(33, 33), tolerance=1e-6, method="exact", dtype="float64"
+    ).psf[0]
+    assert relative_l2(image, exact) < plan.predicted_error < tolerance
 
 
 def test_dim_masks_are_no_reason_to_leave():

@@ -219,8 +219,8 @@ class FailingReset(Face):
     [
         (NoModel, {}, ValueError, "NoModel: model: must be set"),
         (NoRewards, {}, ValueError, "NoRewards: rewards: must be defined, to return numbers by name"),
-        (lambda: Face, {}, ValueError, r"task is the class Face: must be an animal of it, such as Face\(\)"),
-        (NoCamera, {}, ValueError, "NoCamera: camera = 'fromt': the model has no such camera"),
+        (lambda: Face, {}, ValueError, r"task is the class Face: must be an instance, such as Face\(\)"),
+        (NoCamera, {}, ValueError, "NoCamera: no camera 'fromt'; the model has"),
         (NoActuators, {}, ValueError, "NoActuators: its model has no actuators"),
         (NoMounts, {}, ValueError, "mounts = .*must be one sim.Mount at least"),
         (NoSubsteps, {}, ValueError, "NoSubsteps: substeps = 0: must be a whole number"),

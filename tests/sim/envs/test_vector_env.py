@@ -164,7 +164,7 @@ def test_bad_lengths_are_refused(make, said):
 
 
 def test_several_animals_of_a_world_are_no_vector_of_worlds():
-    with pytest.raises(ValueError, match=r"several animals learn in a sim\.Encounter: must be its `alone`"):
+    with pytest.raises(ValueError, match=r"several animals learn in a sim\.Encounter: give what its `alone` returns"):
         EyesVectorEnv(4, task=hunt())
 
 

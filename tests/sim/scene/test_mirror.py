@@ -177,8 +177,11 @@ def test_bad_input_is_named():
     mirror = sim.mirror(model)
     with pytest.raises(ValueError, match="no camera None; the model has"):
         mirror.render(None, 4, 4)
-    for strange in ("pathtracer", {"type": "path", "max_dept": 3}):
-        with pytest.raises(ValueError, match=r"integrator = .*: must be what Mitsuba has, such as 'path'; it says: "):
+    for strange in ("pathtracer", "diffuse", {"type": "path", "max_dept": 3}):
+        with pytest.raises(ValueError, match=r"integrator = .*: must be one of Mitsuba's, such as 'path'; it says: "):
+            mirror.render(Viewpoint(np.zeros(3), np.eye(3), 45.0), 4, 4, integrator=strange)
+    for strange in (None, {"spp": 3}):
+        with pytest.raises(ValueError, match=r"integrator = .*: must be a name, or a description such as"):
             mirror.render(Viewpoint(np.zeros(3), np.eye(3), 45.0), 4, 4, integrator=strange)
     with pytest.raises(ValueError, match="no camera 'eye_9'"):
         mirror.render("eye_9", 4, 4)
