@@ -38,7 +38,7 @@ RIPPLE = 0.3  # choice: of the soft edge, of the tolerance; test_population.py
 SAMPLING = 0.2  # choice: of the tolerance, what the soft edge may make of it
 # Choice: light that passes, as a share of a mask's brightest beside the opening, that SAMPLING holds for;
 # test_population_members.py. Where masks are bright and the aperture is shut, less passes than the soft edge errs by.
-LEAST_LIGHT = 3e-3
+LEAST_LIGHT = 1e-2
 SPREAD = 1.1  # choice: error of the intensity per spread of the phase; test_population.py, test_population_members.py
 TURNS = 1.3  # choice: steps between numbers of samples: neighbours share a plan
 STACK = 2_000_000  # choice, by memory: pupil samples in a stack

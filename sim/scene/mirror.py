@@ -154,7 +154,7 @@ class Mirror:
         view = self.viewpoint(camera)
         rays.check_size(width, height, spp)
         asked = rays.checked_wavelengths(wavelengths)
-        if (integrator if isinstance(integrator, str) else integrator.get("type")) == "direct":
+        if rays.described(integrator)["type"] == "direct":
             self._tell_of_glass()
         with in_variant(self.variant):
             if any(e.name == lights.HEADLIGHT for e in self._emitters):

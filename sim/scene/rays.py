@@ -16,7 +16,7 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from optics.spectra.spectrum import LIMITS_NM
-from sim.scene.variant import MitsubaObject
+from sim.scene.variant import Description, MitsubaObject
 
 LANES = 4  # wavelengths in one mi.Spectrum
 WAVEFRONT = 1 << 21  # rays traced at once
@@ -175,10 +175,15 @@ def names_of(scene: MitsubaObject) -> dict[int, str]:
     return {} if _is_scalar() else {_registry_id(shape): shape.id() for shape in scene.shapes()}
 
 
-def _integrator(integrator: str | Mapping[str, Any]) -> MitsubaObject:
+def described(integrator: str | Mapping[str, Any]) -> Description:
+    """A name's description. Raises ValueError: it is neither."""
     if not isinstance(integrator, str) and not (isinstance(integrator, Mapping) and "type" in integrator):
         raise ValueError(f"integrator = {integrator!r}: must be a name, or a description such as {{'type': 'path'}}")
-    description = {"type": integrator} if isinstance(integrator, str) else dict(integrator)
+    return {"type": integrator} if isinstance(integrator, str) else dict(integrator)
+
+
+def _integrator(integrator: str | Mapping[str, Any]) -> MitsubaObject:
+    description = described(integrator)
     if description["type"] == "direct" and {"emitter_samples", "shading_samples"} & description.keys():
         # Mitsuba 3.9.1 adds these samples up instead of averaging them where the light is a point or a direction.
         raise ValueError('integrator "direct": its light samples cannot be set; take more spp')
