@@ -21,7 +21,10 @@ from experiments.store import Origin, read_rows, write_rows
 RESULTS = Path(__file__).parents[2] / "docs/results"
 RECORDS = sorted((RESULTS / "records").iterdir())
 PAGES = {
-    "bending_light": {"lens": ("lens-0", "lens-1", "lens-2"), "index1": ("index1-0", "index1-1")},
+    "bending_light": {
+        "lens": ("lens-003-0", "lens-003-1", "lens-003-2"),
+        "index1": ("index1-003-0", "index1-003-1"),
+    },
     "brains_and_acuity": {
         "detection": ("scaling-detection",),
         "tracking": ("scaling-tracking",),
