@@ -139,7 +139,8 @@ def draw(store: Store, path: Path) -> None:
         place.set_xlabel("generation")
     axes[-1, -1].set_axis_off()
     for group, color in store.colors.items():
-        axes[-1, -1].plot([], [], color=color, lw=2, label=group)
+        control = "" if group in lenses(store) else ": no lens is possible"
+        axes[-1, -1].plot([], [], color=color, lw=2, label=f"{group}{control}")
     axes[-1, -1].fill_between([], [], [], color="#777777", alpha=0.2, label="null model")
     axes[-1, -1].plot([], [], color="#777777", ls="--", label="best hole for stripes")
     axes[-1, -1].plot([], [], color="#777777", ls=":", label="from here glass may change")

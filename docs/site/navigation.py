@@ -55,4 +55,4 @@ def _title(page: Path) -> str:
     if heading is None:
         return page.stem
     number, colon, words = heading[1].partition(": ")
-    return number + colon + re.split(r"[:,?.;]", words)[0]
+    return number + colon + re.split(r"[:,?.;](?:\s|$)", words)[0]  # "Dr.Jit" is one word
