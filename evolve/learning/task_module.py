@@ -10,7 +10,7 @@ from types import ModuleType
 from evolve.config.checks import ConfigError
 from evolve.config.own_task import OwnTask
 from sim.envs.task_fidelity import with_settled_others
-from sim.robots.task import Task, compiled
+from sim.robots.task import Task, compiled, require_rewards
 
 __all__ = ["executed_task"]
 
@@ -30,6 +30,7 @@ def executed_task(own: OwnTask) -> Task:
     try:
         task = cls()
         compiled(task)
+        require_rewards(task)
         return with_settled_others(task)
     except (Exception, SystemExit) as error:
         raise ConfigError(f"{own.label}: {_told(error, own)}", "task") from error

@@ -12,13 +12,13 @@ import numpy as np
 from optics.apertures.aperture import EDGE_REACH, Aperture
 from optics.apertures.circular import Circle
 from optics.elements.pixel_relief import PixelRelief
-from optics.elements.refractive_index import Dispersion, RefractiveIndex, index_of, refuse_name
+from optics.elements.refractive_index import Dispersion, index_of, material
 from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
 from optics.elements.transmittance import Mask
 from optics.elements.wavefront import Aberration
 from optics.elements.wavefront_slopes import Slopes, _derivative
-from optics.numerics.arguments import finite, in_range, of_kind, positive, reals
+from optics.numerics.arguments import finite, of_kind, positive, reals
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
@@ -73,10 +73,7 @@ class Pupil:
         index_of("medium_n", self.medium_n)
         if self.object_n is not None:
             index_of("object_n", self.object_n)
-        if not isinstance(self.n, Dispersion):
-            refuse_name("n", self.n)
-            in_range("n", self.n, 1.0, 10.0, carried=True)
-            object.__setattr__(self, "n", RefractiveIndex(self.n))
+        object.__setattr__(self, "n", material("n", self.n))
         of_kind("aperture", self.aperture, Aperture, "Circle(), or union(Disk(0.5, (0.4, 0.0)))")
         if self.mask is not None:
             self._check_reach("mask", of_kind("mask", self.mask, Mask, "GaussianMask(20e-6)").radius)

@@ -10,7 +10,7 @@ from typing import Any
 from optics.numerics.arguments import finite, in_range, one_of, positive, shown, vacuum_wavelength, without_derivative
 from optics.numerics.autodiff import Scalar, is_differentiable, number
 
-__all__ = ["MEDIA", "Cornu", "Dispersion", "RefractiveIndex", "Sellmeier", "index_of", "medium"]
+__all__ = ["MEDIA", "Cornu", "Dispersion", "RefractiveIndex", "Sellmeier", "index_of", "material", "medium"]
 
 LARGEST = 10.0
 # Fraunhofer lines of the Abbe number V_d = (n_d - 1) / (n_F - n_C) [m].
@@ -172,11 +172,19 @@ def index_of(name: str, value: Any) -> Dispersion:
                 f"{name} asks for a derivative, which it does not carry to the picture: give plain numbers"
             )
         return value
-    refuse_name(name, value)
+    _refuse_name(name, value)
     return RefractiveIndex(in_range(name, value, 1.0, 10.0))
 
 
-def refuse_name(name: str, value: Any) -> None:
-    """ValueError if a material's name is given in its place."""
+def material(name: str, value: Any) -> Dispersion:
+    """The same, of numbers that may carry derivatives. Errors: as `index_of`."""
+    if isinstance(value, Dispersion):
+        return value
+    _refuse_name(name, value)
+    in_range(name, value, 1.0, 10.0, carried=True)
+    return RefractiveIndex(value)
+
+
+def _refuse_name(name: str, value: Any) -> None:
     if isinstance(value, str):
         raise ValueError(f"{name} = {value!r}: must be a number, or a curve such as optics.medium('water')")

@@ -12,7 +12,7 @@ from sim.envs.task_senses import Seen, Senses
 from sim.envs.task_worlds import StepOfWorld, TaskWorlds
 from sim.robots.encounter import Encounter, Frozen, name_of
 from sim.robots.poses import Poses
-from sim.robots.task import Task
+from sim.robots.task import Task, require_rewards
 
 NOWHERE = np.empty(0, int)
 
@@ -28,6 +28,8 @@ class TaskAnimals:
         self, task: Task | Encounter, n: int, seed: int | None, memory: int, episode_steps: int | None = None
     ) -> None:
         self.worlds = TaskWorlds(task, n, seed, min(dr.thread_count(), n), episode_steps)
+        for learner in self.worlds.learners:
+            require_rewards(learner)
         number = len(self.worlds.learners)
         self.learners = [Senses(self.worlds, k, memory) for k in range(number)]
         self._frozen = [

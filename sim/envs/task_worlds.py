@@ -59,8 +59,8 @@ class TaskWorlds:
         self._whose = ["" if len(self.animals) == 1 else f"{name_of(animal)}: " for animal in self.animals]
         self._who = " and ".join(map(name_of, self.animals))
         self.model = compiled(self.animals[0])
-        for number, animal in enumerate(self.animals[1:], 1):
-            compiled(animal, self.model, learns=number < len(self.learners))
+        for animal in self.animals[1:]:
+            compiled(animal, self.model)
         require_own_actuators(self.animals, self.model)
         self.spectra = of_world(self.animals, "spectra")
         self.episode_steps = self.animals[0].episode_steps if episode_steps is None else episode_steps

@@ -119,9 +119,15 @@ class Task:
         return len(controls_of(model, self.actuators))
 
 
-def compiled(task: Task, model: mujoco.MjModel | None = None, learns: bool = True) -> mujoco.MjModel:
-    """The model of a task whose other settings are right; model: where it has been compiled already. learns: whether
-    its animal does, which wants rewards.
+def require_rewards(task: Task) -> None:
+    """ValueError unless whoever learns it is paid."""
+    if getattr(task.rewards, "__func__", None) is Task.rewards:
+        name = type(task).__name__
+        raise ValueError(f"{name}: rewards: must be defined, to return numbers by name, such as {{'progress': 0.1}}")
+
+
+def compiled(task: Task, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
+    """The model of a task whose other settings are right; model: where it has been compiled already.
 
     Raises:
         ValueError: something is missing, or wrong.
@@ -129,8 +135,6 @@ def compiled(task: Task, model: mujoco.MjModel | None = None, learns: bool = Tru
     name = type(task).__name__
     if not hasattr(task, "model"):
         raise ValueError(f"{name}: model: must be set, to an MjModel, a path or MJCF text")
-    if learns and getattr(task.rewards, "__func__", None) is Task.rewards:
-        raise ValueError(f"{name}: rewards: must be defined, to return numbers by name, such as {{'progress': 0.1}}")
     kinds_of(task)
     finite(f"{name}: failure_reward", task.failure_reward)
     whole(f"{name}: substeps", task.substeps, 1, MOST_STEPS)

@@ -176,7 +176,11 @@ def names_of(scene: MitsubaObject) -> dict[int, str]:
 
 
 def described(integrator: str | Mapping[str, Any]) -> Description:
-    """A name's description. Raises ValueError: it is neither."""
+    """A name's description.
+
+    Raises:
+        ValueError: it is neither.
+    """
     if not isinstance(integrator, str) and not (isinstance(integrator, Mapping) and "type" in integrator):
         raise ValueError(f"integrator = {integrator!r}: must be a name, or a description such as {{'type': 'path'}}")
     return {"type": integrator} if isinstance(integrator, str) else dict(integrator)
