@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
+from typing import Protocol
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from optics.numerics.arguments import LARGEST, SMALLEST, point_2d, positive, sha
 from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["Grid", "sample_positions"]
+__all__ = ["Grid", "OnWindow", "sample_positions"]
 
 
 def sample_positions(n: int, dx: float) -> np.ndarray:
@@ -99,3 +100,24 @@ class Grid:
         if self.centre == (0.0, 0.0):
             return x, y
         return x + opaque(precision, self.centre[0]), y + opaque(precision, self.centre[1])
+
+
+class HasWindow(Protocol):
+    """What lies on a grid."""
+
+    @property
+    def window(self) -> Grid: ...
+
+
+class OnWindow:
+    """Where the samples of what has a `window` are."""
+
+    @property
+    def x(self: HasWindow) -> np.ndarray:
+        """Of the columns [m]."""
+        return self.window.x
+
+    @property
+    def y(self: HasWindow) -> np.ndarray:
+        """Of the rows [m]."""
+        return self.window.y

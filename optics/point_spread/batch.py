@@ -23,7 +23,7 @@ from optics.numerics.arguments import (
     without_derivative,
 )
 from optics.numerics.autodiff import Array, Scalar, number
-from optics.numerics.grid import Grid
+from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import Precision, padded_for_packets, precision
 from optics.point_spread.pictures import pictures
 from optics.point_spread.population import population_pictures
@@ -35,7 +35,7 @@ __all__ = ["PSFBatch", "psf_batch"]
 
 
 @dataclass(frozen=True, eq=False)
-class PSFBatch:
+class PSFBatch(OnWindow):
     """tensor: PSFs [1/m²] in Dr.Jit, (eye, depth, wavelength, y, x), with derivatives; psf: the same in NumPy.
 
     plans: of the same order, flat, and members, of which they are pictures. setup: how all were asked for.
@@ -54,14 +54,8 @@ class PSFBatch:
         return f"<PSFBatch of {size} samples {self.dx:.3g} m apart, {error}>"
 
     @property
-    def x(self) -> np.ndarray:
-        """Of the columns [m]."""
-        return self.setup.window.x
-
-    @property
-    def y(self) -> np.ndarray:
-        """Of the rows [m]."""
-        return self.setup.window.y
+    def window(self) -> Grid:
+        return self.setup.window
 
     def result(self, eye: int, depth: int = 0) -> PSFResult:
         """One eye's PSFs at one depth, as `optics.psf` would give them: for `optics.strehl_ratio` and other measures.

@@ -20,7 +20,7 @@ from optics.methods.problem import Problem
 from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.arguments import reals, shown
 from optics.numerics.autodiff import Array, Scalar, number, to_user
-from optics.numerics.grid import Grid
+from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import precision
 from optics.point_spread.mixture import mixed
 from optics.point_spread.pictures import pictures
@@ -37,7 +37,7 @@ OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are
 
 
 @dataclass(frozen=True, eq=False)
-class PSFResult:
+class PSFResult(OnWindow):
     """PSF on a grid of sensor positions, sample n//2 at `centre` (x, y) [m], row and y growing together.
 
     tensor: the PSF as a Dr.Jit tensor (wavelength, y, x) that carries the derivatives of what it was made from.
@@ -86,14 +86,6 @@ class PSFResult:
     @property
     def window(self) -> Grid:
         return Grid(self.tensor.shape[1:], self.dx, self.centre)
-
-    @property
-    def x(self) -> np.ndarray:
-        return self.window.x
-
-    @property
-    def y(self) -> np.ndarray:
-        return self.window.y
 
     @property
     def power(self) -> np.ndarray | Array:

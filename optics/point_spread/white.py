@@ -14,6 +14,7 @@ from optics.elements.pupil import Pupil
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import flag, in_range, reals, shown, whole
 from optics.numerics.autodiff import Array, plain, to_user
+from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import padded_for_packets, precision
 from optics.point_spread.concentration import encircled_energy, strehl_ratio
 from optics.point_spread.contrast import combined_mtf
@@ -34,7 +35,7 @@ OF_PICTURES = 0.5  # choice: of the tolerance; the rest is the spectrum's
 
 
 @dataclass(frozen=True, eq=False)
-class WhitePSF:
+class WhitePSF(OnWindow):
     """PSF of each type of receptor, Σ_λ w(λ) PSF_λ with weights that sum to 1.
 
     waves: the PSFs (wavelength, y, x) it is made of. weights: (type, wavelength); between wavelengths PSFs are cubic
@@ -53,14 +54,8 @@ class WhitePSF:
         return f"<WhitePSF of {len(self.weights)} types from {self.waves!r}, predicted errors {errors}>"
 
     @property
-    def x(self) -> np.ndarray:
-        """Of the columns [m]."""
-        return self.waves.x
-
-    @property
-    def y(self) -> np.ndarray:
-        """Of the rows [m]."""
-        return self.waves.y
+    def window(self) -> Grid:
+        return self.waves.window
 
     @property
     def dx(self) -> float:

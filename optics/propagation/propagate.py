@@ -22,7 +22,7 @@ import numpy as np
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
 from optics.numerics.arguments import complexes, finite, in_range, shown, vacuum_wavelength, without_derivative
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum, predicted_seconds
-from optics.numerics.grid import Grid
+from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import Precision, precision
 from optics.propagation.sampling import TransformSampling, blur_left, blurred_back, most_spare, sampling
 from optics.propagation.transfer_function import EVERYTHING, Passage, TransferFunction, evanescent
@@ -44,7 +44,7 @@ ONE = np.ones(1)  # the weight of what counts whole
 
 
 @dataclass(frozen=True, eq=False)
-class PropagationResult:
+class PropagationResult(OnWindow):
     """u: complex field (…, y, x) at pitch dx [m], centre sample n//2. plan: how it was computed, and how well. window:
     its samples, also `x` and `y` [m]."""
 
@@ -59,16 +59,6 @@ class PropagationResult:
         size = " x ".join(map(str, self.u.shape))
         error = f"predicted error {self.plan.predicted_error:.1e}"
         return f"<PropagationResult of {size} samples {self.dx:.3g} m apart, {self.plan.method}, {error}>"
-
-    @property
-    def x(self) -> np.ndarray:
-        """Of the columns [m]."""
-        return self.window.x
-
-    @property
-    def y(self) -> np.ndarray:
-        """Of the rows [m]."""
-        return self.window.y
 
     @cached_property
     def evanescent_power(self) -> float:

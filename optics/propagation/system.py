@@ -14,7 +14,7 @@ from optics.elements.refractive_index import Dispersion
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
 from optics.numerics.arguments import complexes, in_range, of_kind, positive, shape_2d, shown, vacuum_wavelength
-from optics.numerics.grid import Grid
+from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import precision
 from optics.propagation.planes import PlaneField, PupilSampling, StepSettings, Stop
 
@@ -55,7 +55,7 @@ class SystemStep:
 
 
 @dataclass(frozen=True, eq=False)
-class StackResult:
+class StackResult(OnWindow):
     """u: complex field (y, x) at pitch dx [m], centre sample n//2. predicted_error: relative L2 of its intensity.
     window: its samples, also `x` and `y` [m]."""
 
@@ -69,16 +69,6 @@ class StackResult:
         size = " x ".join(map(str, self.u.shape))
         error = f"predicted error {self.predicted_error:.1e}"
         return f"<StackResult of {size} samples {self.dx:.3g} m apart, {len(self.steps)} steps, {error}>"
-
-    @property
-    def x(self) -> np.ndarray:
-        """Of the columns [m]."""
-        return self.window.x
-
-    @property
-    def y(self) -> np.ndarray:
-        """Of the rows [m]."""
-        return self.window.y
 
 
 def propagate_through(
