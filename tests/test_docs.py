@@ -64,6 +64,11 @@ def test_site_is_whole_and_needs_no_network(site):
         assert "](" not in prose, f"{page.name}: a link that was not understood"
 
 
+def test_menus_have_whole_first_clauses(site):
+    """Of "Every picture by Dr.Jit, the first one too" the dot ends none."""
+    assert re.search(r">\s*050: Every picture by Dr\.Jit\s*<", (site / "decisions" / "index.html").read_text())
+
+
 @pytest.mark.parametrize("package", ["optics", "sim", "evolve"])
 def test_reference_has_every_public_name(package, site):
     page = (site / "reference" / f"{package}.html").read_text()

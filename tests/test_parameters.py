@@ -5,7 +5,7 @@ A field or gene that is missing here fails the test, so whoever adds one says wh
 """
 
 from argparse import Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -26,8 +26,8 @@ from evolve.learning.fitness import evaluate
 from evolve.learning.worlds import own_task_for
 from evolve.search.loop import evolve as carry
 from evolve.store.directory import Run
-from evolve.store.evaluation import Evaluation
 from optics.numerics import backend
+from tests.closed_form import ClosedForm
 
 # One training of two updates and one evaluation episode, through a perfect lens: about a second.
 SMALL = (
@@ -101,7 +101,7 @@ def history(config, animal):
     """Candidates of the whole run, each with its training's seed; evaluated in closed form."""
     with TemporaryDirectory() as folder:
         run = Run.create(Path(folder) / "run", config)
-        carry(run, _ClosedForm(), mock.Mock())
+        carry(run, ClosedForm(), mock.Mock())
         return [(candidate.genome, candidate.phenotype, candidate.seed) for candidate in run.candidates]
 
 
@@ -109,7 +109,7 @@ def budget_stages(config, animal):
     """After which budget stages candidates are evaluated, and how far each is trained."""
     with TemporaryDirectory() as folder:
         run = Run.create(Path(folder) / "run", config)
-        carry(run, _ClosedForm(), mock.Mock())
+        carry(run, ClosedForm(), mock.Mock())
         return [(candidate.id, candidate.rung, candidate.steps) for candidate in run.in_order_of_finish]
 
 
@@ -121,16 +121,6 @@ def hired(config, animal):
             Run.create(Path(folder) / "run", config), Namespace(json=False, executor="local", tensorboard=False), None
         )
         return executor.call_args.args[1]
-
-
-class _ClosedForm:
-    """An executor that knows every candidate's fitness."""
-
-    def run(self, jobs, progress) -> Iterator:
-        while jobs:
-            job = jobs.popleft()
-            steps = job.stage.ends[-1] if job.stage else job.config.learning.total_steps
-            yield job, Evaluation(fitness=-abs(job.phenotype.fov_deg - 70), steps=steps)
 
 
 # --- what moves what

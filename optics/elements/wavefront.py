@@ -87,9 +87,8 @@ class Zernike(Aberration):
         ValueError: no such mode, its order is above 30, or a coefficient is no finite number.
     """
 
-    scatters: ClassVar[bool] = (
-        False  # a mode turns by n/2 cycles; its slopes, which grow with n² at the rim, tell of more
-    )
+    # A mode turns by n/2 cycles; its slopes, which grow with n² at the rim, tell of more.
+    scatters: ClassVar[bool] = False
     coefficients_um: Any
     radius: float | None = None
     modes: dict[tuple[int, int], float] = field(init=False, repr=False)

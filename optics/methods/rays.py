@@ -74,10 +74,11 @@ class Rays:
         return disk_area(self.to_x, self.to_y)
 
     def densest(self) -> list[tuple[float, float]]:
-        """Where (x, y) of the plane most of them land: their median, and the fullest of CELLS x CELLS cells."""
+        """Where (x, y) of the plane most land: their median, and the mean of those in the fullest of CELLS² cells."""
         counts, x, y = np.histogram2d(self.to_x, self.to_y, CELLS)
         i, j = np.unravel_index(counts.argmax(), counts.shape)
-        middle = float(x[i] + x[i + 1]) / 2, float(y[j] + y[j + 1]) / 2
+        within = (self.to_x >= x[i]) & (self.to_x <= x[i + 1]) & (self.to_y >= y[j]) & (self.to_y <= y[j + 1])
+        middle = float(self.to_x[within].mean()), float(self.to_y[within].mean())
         return [(float(np.median(self.to_x)), float(np.median(self.to_y))), middle]
 
     def some(self, most: int) -> Rays:

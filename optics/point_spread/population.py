@@ -193,20 +193,17 @@ def _masks(stack: _Stack, samples: _Samples) -> np.ndarray:
     if np.isfinite(stack.waist).any():
         r2 = np.square(samples.at)[:, None] + np.square(samples.at)[None, :]
         found = np.exp(-np.square(stack.radius / stack.waist) * r2)
-    for index, member in enumerate(stack.members):
-        amplitudes = member.mask(samples.at)
-        if amplitudes is not None:
-            found = np.array(np.broadcast_to(found, (len(stack.members), *samples.soft.shape)))
-            found[index] *= amplitudes
+    maps = [member.mask(samples.at) for member in stack.members]
+    if any(amplitudes is not None for amplitudes in maps):
+        found = found * np.stack([np.ones_like(samples.soft) if own is None else own for own in maps], dtype=np.float32)
     return found
 
 
 def _light(samples: _Samples, masks: np.ndarray) -> np.ndarray:
     """What passes, as a share of the brightest that masks are beside the opening, (member or 1,)."""
-    power, inside = np.square(masks), np.square(samples.soft)
-    passed = (power * inside).sum(axis=(1, 2)) / inside.sum()
-    found: np.ndarray = passed / np.maximum((power * (samples.soft < 0.5)).max(axis=(1, 2)), 1e-30)
-    return found
+    power, soft = np.square(masks).reshape(len(masks), -1), samples.soft.ravel()
+    passed, brightest = power @ np.square(soft) / np.square(soft).sum(), power[:, soft < 0.5].max(axis=1)
+    return np.asarray(passed / np.maximum(brightest, 1e-30))
 
 
 def _images(stack: _Stack, samples: _Samples, masks: np.ndarray, window: Grid) -> np.ndarray:

@@ -61,7 +61,8 @@ def test_an_interaction_is_found_and_measured():
 
 @pytest.mark.parametrize(("lives", "held"), [(6, 0.93), (3, 0.88)])
 def test_intervals_of_the_interaction_hold_it_as_often_as_the_page_says(lives, held):
-    """Of 2000 imitated experiments, to three standard errors of a binomial; twice as many lives with cameras."""
+    """Of 2000 imitated experiments, to what the page rounds and three standard errors of a binomial; twice as many
+    lives with cameras."""
     chance, found = np.random.default_rng(0), []
     for _ in range(2000):
         fitness = {
@@ -106,6 +107,20 @@ def test_what_has_been_trained_is_not_trained_again(tmp_path, capsys):
     assert both[0] == first[0]
     assert capsys.readouterr().out.count("of 2") == 1, "only the second was trained"
     assert Origin.read(path.with_suffix(".json")).whose == "worker"
+
+
+@pytest.mark.parametrize(("kept", "earlier"), [(True, ("a" * 40,)), (False, ())])
+def test_rows_that_are_kept_keep_the_version_that_made_them(tmp_path, kept, earlier):
+    path = tmp_path / "lives.csv"
+    asked = crossed([ANIMAL, replace(ANIMAL, n_eyes=1)], ("navigation",), (0.01,), (0,))
+    train_all(asked[:1], TINY, path, workers=1)
+    made = path.with_suffix(".json")
+    former = Origin.read(made)
+    replace(former, versions={**former.versions, "commit": "a" * 40}).write(made)
+    if not kept:
+        path.unlink()
+    train_all(asked, TINY, path, workers=1)
+    assert Origin.read(made).earlier == earlier
 
 
 def test_the_page_is_made_from_the_stored_rows(tmp_path):

@@ -163,3 +163,11 @@ def test_longitudinal_chromatic_aberration_of_the_human_eye():
 def test_bad_input_names_itself(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+@pytest.mark.parametrize("name", ["n", "medium_n", "object_n"])
+def test_a_materials_name_is_no_index(name):
+    with pytest.raises(
+        ValueError, match=rf"{name} = 'water': must be a number, or a curve such as optics.medium\('water"
+    ):
+        Pupil(R, **{name: "water"})

@@ -190,3 +190,11 @@ def test_of_two_images_the_brighter_may_be_beside_the_window():
     narrow = optics.psf(pupil, sensor_distance=240e-6, dx=0.2e-6, shape=(65, 65), tolerance=1e-2)
     with pytest.raises(optics.AccuracyError, match=r"outside of the window, and there it is brighter"):
         optics.strehl_ratio(narrow)
+
+
+def test_rays_that_land_in_one_point_land_there():
+    """And not half a cell of an empty range beside it."""
+    seen = optics.psf(optics.Pupil(30e-6, thin_lens_focal_length=240e-6))
+    rays = seen.requests[0].problem.rays
+    together = replace(rays, to_x=np.full(len(rays), 2e-6), to_y=np.full(len(rays), -1e-6))
+    np.testing.assert_allclose(together.densest(), [(2e-6, -1e-6)] * 2, rtol=1e-12)

@@ -189,6 +189,9 @@ def test_a_window_off_the_axis_shows_what_a_larger_one_does():
     part = optics.propagate(u, out_shape=(9, 11), out_centre=(-13e-6, 7e-6), **asked)
     expected = whole.u[50 + 7 - 4 : 50 + 7 + 5, 50 - 13 - 5 : 50 - 13 + 6]
     assert np.linalg.norm(part.u - expected) < 1e-4 * np.linalg.norm(expected)
+    assert (part.x[5], part.y[4]) == (-13e-6, 7e-6)
+    np.testing.assert_allclose(part.x, whole.x[50 - 13 - 5 : 50 - 13 + 6], atol=1e-12)
+    np.testing.assert_allclose(part.y, whole.y[50 + 7 - 4 : 50 + 7 + 5], atol=1e-12)
 
 
 def test_darkness_around_the_light_costs_nothing():

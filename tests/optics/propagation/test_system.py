@@ -185,6 +185,8 @@ def test_behind_a_disk_light_on_the_axis_is_two_waves_to_the_last_digits(toleran
     s = np.hypot(z, radius)
     assert seen.u[4, 4] == pytest.approx(np.exp(1j * k * z) - z / s * np.exp(1j * k * s), rel=10 * tolerance)
     assert seen.predicted_error <= tolerance
+    assert (seen.x.size, seen.x[seen.x.size // 2], seen.y[0]) == (9, 0, -4 * seen.dx)
+    assert repr(seen).startswith("<StackResult of 9 x 9 samples ")
 
 
 def test_free_space_has_a_length():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sim
-from tests.sim.envs.test_differing_worlds import Room, room, with_ranges
+from tests.sim.envs.rooms import Room, room, with_ranges
 from tests.sim.envs.test_task_state import played, same
 from tests.sim.envs.test_task_vec_env import CART, Face
 

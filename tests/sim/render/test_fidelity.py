@@ -217,3 +217,15 @@ def test_it_says_why():
 def test_bad_arguments_are_named(call, named):
     with pytest.raises(ValueError, match=named):
         call(sim.build_world("detection"))
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (("detection", sim.Eyes()), "world = 'detection': must be a kind of World, such as sim.build_world"),
+        ((sim.build_world("detection"), None), "eyes = None: must be a kind of Eyes"),
+    ],
+)
+def test_what_is_no_world_and_no_eyes_is_named(asked, said):
+    with pytest.raises(ValueError, match=said):
+        sim.choose_fidelity(*asked)
