@@ -35,6 +35,18 @@ SEEDS, SEEDS_IN_DIM_LIGHT = range(6), range(3)
 # Eyes, receptors across each, and the arc over which they are spread: from a compound eye to a camera.
 SHAPES = ((10, 4, 135.0), (5, 8, 90.0), (2, 15, 45.0), (2, 15, 30.0), (1, 15, 0.0))
 COMPOUND, CAMERA = (10, 4), (2, 15)
+# Controls in navigation: eyes, receptors (up, across) and arc. A row of square receptors is the lower the finer it is;
+# most of these eyes are 45 degrees high instead, as the published ones are at any resolution.
+CONTROLS = (
+    (10, 4, 4, 135.0),
+    (5, 8, 8, 90.0),
+    (2, 15, 15, 45.0),
+    (2, 15, 15, 30.0),
+    (1, 15, 15, 0.0),
+    (2, 5, 15, 45.0),
+    (10, 1, 4, 45.0),
+    (2, 1, 3, 45.0),
+)
 FEWEST_LIVES = 2  # of any eyes: of one there is no spread
 RESAMPLES = 10_000
 ROUNDING = 1e-9
@@ -44,11 +56,12 @@ Both: TypeAlias = tuple[Floats, Floats]  # of compound eyes and of cameras
 
 
 def designs() -> list[Design]:
-    """All trainings: every animal in both tasks in bright light, then in less."""
+    """All trainings: every animal in both tasks in bright light, then in less, then the controls in navigation."""
     animals = [Design(TASKS[0], n, w, w, arc, BRIGHT, 0) for n, w, arc in SHAPES]
     return [
         *crossed(animals, TASKS, (BRIGHT,), SEEDS),
         *crossed(animals, TASKS, DIM, SEEDS_IN_DIM_LIGHT),
+        *(Design("navigation", n, h, w, arc, BRIGHT, seed) for seed in SEEDS for n, h, w, arc in CONTROLS),
     ]
 
 
