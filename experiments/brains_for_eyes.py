@@ -16,6 +16,7 @@ from evolve.analysis.statistics import acuity_cpd
 from experiments import designed
 from experiments.brains_and_acuity import label
 from experiments.designed import Design, Trained
+from experiments.means import mean_of
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.powers import PowerLaw, power_law
 from experiments.store import Origin
@@ -36,6 +37,8 @@ SETTINGS = (
     *("learning.total_steps=500000", "learning.eval_interval=500000", "learning.least_epochs=10"),
     "evaluation.episodes=320",
 )
+# Navigators' rows are the lower the finer they are; the control's eyes are as wide and 45 degrees high.
+CONTROL_WIDTHS, CONTROL_BRAIN, CONTROL_SEEDS = (4, 8, 16), 64, range(2)
 GAIN = 0.5  # choice: of the coarsest eyes' errors, below which finer eyes pay
 SHADES = ("#c6dbef", "#9ecae1", "#6baed6", "#2171b5", "#08306b")  # of brains, small to large
 Errors = dict[tuple[int, int], float]  # by width and brain
@@ -43,8 +46,14 @@ Definition = Callable[[Sequence[Trained]], Errors]
 
 
 def designs() -> list[Design]:
-    """All trainings, one life of every animal first."""
-    return [
+    """All trainings, one life of every animal first, then the control."""
+    n_eyes, arc = EYES["navigation"]
+    control = [
+        Design("navigation", n_eyes, w, w, arc, SIGMA, seed, neurons=CONTROL_BRAIN)
+        for seed in CONTROL_SEEDS
+        for w in CONTROL_WIDTHS
+    ]
+    return control + [
         Design(task, n_eyes, 1 if task == "navigation" else w, w, arc, SIGMA, seed, neurons=brain)
         for seed in SEEDS
         for task, (n_eyes, arc) in EYES.items()
@@ -134,7 +143,13 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
 
 
 def _of(rows: Iterable[Trained], task: str) -> list[Trained]:
-    return [row for row in rows if row.task == task]
+    """Rows of the experiment as it was designed: without the control."""
+    return [row for row in rows if row.task == task and (task != "navigation" or row.height == 1)]
+
+
+def control_of(rows: Iterable[Trained]) -> list[Trained]:
+    """Navigators whose eyes are 45 degrees high at any width."""
+    return [row for row in rows if row.task == "navigation" and row.height == row.width > 1]
 
 
 def _tasks(rows: Iterable[Trained]) -> list[str]:
@@ -149,6 +164,9 @@ def _errors_table(rows: Sequence[Trained]) -> str:
         for brain in BRAINS:
             shown = [f"{errors[w, brain]:.3f}" if (w, brain) in errors else "-" for w in WIDTHS]
             lines.append([task, str(brain), *shown])
+    control = missed(control_of(rows))
+    shown = [f"{control[w, CONTROL_BRAIN]:.3f}" if (w, CONTROL_BRAIN) in control else "-" for w in WIDTHS]
+    lines.append(["control: navigation, square eyes", str(CONTROL_BRAIN), *shown])
     return markdown_table(["task", "units", *(f"{w} across" for w in WIDTHS)], lines)
 
 
@@ -157,11 +175,22 @@ def _exponents(rows: Sequence[Trained]) -> str:
     lines = []
     for task in _tasks(rows):
         for name, definition in DEFINITIONS.items():
-            best, both = frontier(_of(rows, task), definition), over_both(_of(rows, task), definition)
+            mine = _of(rows, task)
+            best, both = frontier(mine, definition), over_both(mine, definition)
             found = ["-", "-", "-"] if both is None else [*map(str, both.exponents), f"{both.explained:.2f}"]
-            lines.append([task, name, "-" if best is None else str(best.exponents[0]), *found, f"{PUBLISHED[task]:g}"])
+            first = ["-" if best is None else str(best.exponents[0]), _over_runs(mine, definition)]
+            lines.append([task, name, *first, *found, f"{PUBLISHED[task]:g}"])
     of_all = ("of acuity", "of units", "variance explained")
-    return markdown_table(["task", "error", "of acuity, best brains", *of_all, "published, of a product"], lines)
+    return markdown_table(
+        ["task", "error", "of acuity, best brains", "over training runs", *of_all, "published"], lines
+    )
+
+
+def _over_runs(rows: Sequence[Trained], definition: Definition) -> str:
+    """The best brains' exponent of acuity, fitted to each seed's training runs alone: mean and Student's interval."""
+    laws = [frontier([row for row in rows if row.seed == seed], definition) for seed in sorted({r.seed for r in rows})]
+    found = np.array([law.exponents[0].mean for law in laws if law is not None])
+    return str(mean_of(found)) if found.size > 1 else "-"
 
 
 def draw(rows: Sequence[Trained], path: Path) -> None:
@@ -176,11 +205,15 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
             ends = [errors[w, brain] for w in widths]
             place.loglog([acuity[w] for w in widths], ends, "o-", color=shade, ms=4, lw=1)
         _draw_frontier(place, mine)
+        if task == "navigation" and (control := control_of(rows)):
+            errors = missed(control)
+            ends = [(acuity[w], error) for (w, _), error in sorted(errors.items())]
+            place.loglog(*zip(*ends, strict=True), "s--", color="#009E73", ms=5, lw=1)
         place.set(title=_of_task(task, mine), xlabel="acuity [cycles/°]")
         label(place.xaxis, place.get_xlim())
         label(place.yaxis, place.get_ylim())
     axes[0, 0].set_ylabel("share of episodes missed")
-    figure.legend(handles=_key(), loc="outside lower center", ncols=6, frameon=False)
+    figure.legend(handles=_key(), loc="outside lower center", ncols=7, frameon=False)
     figure.suptitle(_message(rows))
     save(figure, path)
 
@@ -227,7 +260,9 @@ def _key() -> list[Any]:
         Line2D([], [], color=shade, marker="o", ms=4, label=f"{brain} unit{'s' * (brain > 1)}")
         for brain, shade in zip(BRAINS, SHADES, strict=True)
     ]
-    return [*brains, Line2D([], [], color="#D55E00", ls="--", label="power law of the best")]
+    law = Line2D([], [], color="#D55E00", ls="--", label="power law of the best")
+    square = f"control: square eyes, {CONTROL_BRAIN} units"
+    return [*brains, law, Line2D([], [], color="#009E73", marker="s", ls="--", label=square)]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -9,16 +9,20 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from evolve.search.null_model import SEVERAL
 from experiments import evolved
-from experiments.candidates import Row
+from experiments.candidates import Row, full_return
+from experiments.designed import Trained
 from experiments.drift import SEEDS, shade
 from experiments.evolved import Store, conduct_table, null_model, null_table
+from experiments.eye_shapes import eyes_of
 from experiments.means import LAST, last_mean, last_values, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
+from experiments.store import read_rows
 
 __all__ = ["contrast", "page"]
 
@@ -38,6 +42,18 @@ QUANTITIES: dict[str, Callable[[Row], float]] = {
 }
 COLUMNS = 4  # of panels
 CONTRASTED = ("navigation", "detection")
+# Of navigation: nothing fares better than straight from start to goal.
+CEILINGS: dict[str, Callable[[], float]] = {
+    "fitness": lambda: full_return("navigation"),
+    "success rate": lambda: 1.0,
+}
+# Published eyes, 10 of 4 x 4 around the head and 2 of 15 x 15 ahead, trained as they are by experiments.eyes_for_tasks.
+CONTROL = Path(__file__).parents[1] / "docs/results/data/eyes_for_tasks.csv"
+CONTROL_EYES = ((10, 4, 135.0), (2, 15, 45.0))
+QUANTITIES_OF_TRAININGS: dict[str, Callable[[Trained], float]] = {
+    "fitness": lambda row: row.fitness,
+    "success rate": lambda row: row.success_rate,
+}
 PUBLISHED = {
     "navigation": ("-0.92", "10", "4", "1", "135", "", "", "", ""),
     "detection": ("2.01", "2", "15", "15", "forward", "", "", "", ""),
@@ -142,7 +158,7 @@ def message(store: Store) -> str:
         group: [float(v.mean()) for v in last_values(store.group(group), QUANTITIES[TOGETHER])] for group in CONTRASTED
     }
     if all(ends.values()) and max(ends["navigation"]) < min(ends["detection"]):
-        return "From one photoreceptor, the way makes many simple eyes, and telling apart fewer and finer ones"
+        return "Detection makes fine eyes; navigation makes coarse ones, where fine eyes are low (control: lower row)"
     return "What each task makes of one photoreceptor, generation by generation"
 
 
@@ -154,10 +170,11 @@ def draw(store: Store, path: Path) -> None:
 
     moved = {name: value for name, value in QUANTITIES.items() if len({value(row) for row in store.rows}) > 1}
     lines_of_panels = math.ceil(len(moved) / COLUMNS)
-    figure, axes = new_figure(13, 0.8 + 2.4 * lines_of_panels, columns=COLUMNS, rows=lines_of_panels, sharex=True)
-    for place in axes.flat[len(moved) :]:
+    figure, axes = new_figure(13, 4.2 + 2.4 * lines_of_panels, columns=COLUMNS, rows=lines_of_panels + 1, sharex="row")
+    for place in axes[:-1].flat[len(moved) :]:
         place.set_axis_off()
-    for place, (name, value) in zip(axes.flat, moved.items(), strict=False):
+    _draw_control(axes[-1])
+    for place, (name, value) in zip(axes[:-1].flat, moved.items(), strict=False):
         for i, group in enumerate(store.groups):
             rows, color = store.group(group), COLORS.get(group, "#777777")
             shade(place, store.drift_of(group, name), color)
@@ -168,18 +185,48 @@ def draw(store: Store, path: Path) -> None:
                 end = max(row.generation for row in rows) + 1 + 0.5 * i
                 place.plot([end, end], [found.low, found.high], color=color, lw=2.5, alpha=0.5)
                 place.plot(end, found.mean, "o", color=color, ms=4)
+        if name in CEILINGS:
+            place.axhline(CEILINGS[name](), color=COLORS["navigation"], lw=0.8, ls="--")
         place.set_title(name, fontsize=10)
         place.xaxis.set_major_locator(MaxNLocator(integer=True))
-    for place in axes[-1]:
+    for place in axes[-2]:
         place.set_xlabel("generation")
     lines = [Line2D([], [], color=COLORS.get(group, "#777777"), label=group) for group in store.groups]
     lines.append(
         Line2D([], [], color="#444444", marker="o", ms=4, lw=0, label=f"mean of the last {LAST} generations, 95 %")
     )
-    lines.append(Patch(color="#777777", alpha=0.25, label="null model: selection by luck"))
+    lines.append(Patch(color="#777777", alpha=0.25, label="null model: random fitness"))
+    lines.append(Line2D([], [], color=COLORS["navigation"], ls="--", lw=0.8, label="navigation's ceiling"))
     figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), frameon=False)
     figure.suptitle(message(store))
     save(figure, path)
+
+
+def _draw_control(axes: Any) -> None:
+    """Published and other eyes in both tasks, as they are and not evolved: fitness and success of each training."""
+    rows = read_rows(Trained, CONTROL)
+    panels = [(task, what) for task in CONTRASTED for what in CEILINGS]
+    for place, (task, what) in zip(axes, panels, strict=True):
+        for high, fill, label in (
+            (True, COLORS[task], "square eyes, 45° high"),
+            (False, "none", "one row of receptors"),
+        ):
+            if task == "detection" and not high:
+                continue
+            for x, (n, w, arc) in enumerate(CONTROL_EYES):
+                found = eyes_of(rows, task, (n, w if high else 1, w, arc))
+                aside = x + (0.12 if high else -0.12) * (task == "navigation")
+                values = [QUANTITIES_OF_TRAININGS[what](row) for row in found]
+                named = label if x == 0 else None
+                place.plot([aside] * len(values), values, "o", ms=4, mec=COLORS[task], mfc=fill, alpha=0.8, label=named)
+        names = [f"{n} of {w}\nover {arc:g}°" for n, w, arc in CONTROL_EYES]
+        place.set_xticks(range(len(CONTROL_EYES)), names, fontsize=8)
+        if task == "navigation":
+            place.axhline(CEILINGS[what](), color=COLORS[task], lw=0.8, ls="--")
+        place.set_ylim(bottom=0)
+        place.set_xlim(-0.5, len(CONTROL_EYES) - 0.5)
+        place.set_title(f"control, {task}: {what}", fontsize=10)
+        place.legend(fontsize=7, frameon=False, loc="center left")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -8,38 +8,51 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t
 
 from evolve.search.null_model import LAST
 from experiments.candidates import Row
 
-__all__ = ["LAST", "Interval", "interval_of", "last_mean", "last_values", "of_generation", "resampled_difference"]
+__all__ = ["LAST", "Interval", "difference", "last_mean", "last_values", "mean_of", "of_generation"]
 
 Floats = NDArray[np.float64]
-RESAMPLES = 4000
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean and its 95 % bootstrap interval."""
+    """A mean and its 95 % interval; `low` and `high` are NaN where there is none."""
 
     mean: float
     low: float
     high: float
 
     def __str__(self) -> str:
-        return f"{self.mean:.3g} [{self.low:.3g}, {self.high:.3g}]"
+        return f"{self.mean:.3g}" + (f" [{self.low:.3g}, {self.high:.3g}]" if math.isfinite(self.low) else "")
 
 
-def resampled_difference(of: Floats, less: Floats, resamples: int, chance: np.random.Generator) -> Floats:
-    """Mean of one sample less that of another, each drawn anew with replacement, (resamples,)."""
-    drawn = [one[chance.integers(one.size, size=(resamples, one.size))].mean(axis=1) for one in (less, of)]
-    return np.asarray(drawn[1] - drawn[0])
+def mean_of(values: Floats) -> Interval:
+    """Mean of independent values and Student's 95 % interval of it; one value alone has no interval."""
+    n = values.size
+    half = t.ppf(0.975, n - 1) * values.std(ddof=1) / math.sqrt(n) if n > 1 else math.nan
+    return Interval(float(values.mean()), float(values.mean() - half), float(values.mean() + half))
 
 
-def interval_of(mean: float, drawn: Floats) -> Interval:
-    """95 % of what was drawn, around a mean."""
-    low, high = np.quantile(drawn, [0.025, 0.975])
-    return Interval(mean, float(low), float(high))
+def difference(of: Floats, less: Floats) -> Interval:
+    """Difference of two samples' means with Welch's 95 % interval, which lets their variances differ (Welch 1947).
+
+    Raises:
+        ValueError: a sample of fewer than two values.
+    """
+    if min(of.size, less.size) < 2:
+        raise ValueError("an interval of a difference needs two values or more in each sample")
+    mean = float(of.mean() - less.mean())
+    parts = [one.var(ddof=1) / one.size for one in (of, less)]
+    variance = sum(parts)
+    if variance == 0:
+        return Interval(mean, mean, mean)
+    freedom = variance**2 / sum(part**2 / (one.size - 1) for part, one in zip(parts, (of, less), strict=True))
+    half = t.ppf(0.975, freedom) * math.sqrt(variance)
+    return Interval(mean, float(mean - half), float(mean + half))
 
 
 def of_generation(rows: Iterable[Row], value: Callable[[Row], float]) -> tuple[Floats, Floats]:
@@ -52,21 +65,14 @@ def of_generation(rows: Iterable[Row], value: Callable[[Row], float]) -> tuple[F
     return np.array(generations, float), np.array([np.mean(found[g]) for g in generations])
 
 
-def last_mean(rows: Sequence[Row], value: Callable[[Row], float], seed: int = 0) -> Interval | None:
-    """Mean over the seeds of the mean over each seed's last LAST generations, with a bootstrap over seeds and, within
-    each, candidates (Davison and Hinkley 1997, §3.8); None where there is no finite value.
+def last_mean(rows: Sequence[Row], value: Callable[[Row], float]) -> Interval | None:
+    """Mean over the seeds of the mean over each seed's last LAST generations, with Student's interval over the seeds;
+    None where there is no finite value.
 
-    Few seeds make it narrow: of two, a quarter of all resamples hold one alone, whichever it is.
+    Candidates of one search descend from one another and are not independent, so each seed counts once.
     """
-    groups = list(last_values(rows, value))
-    if not groups:
-        return None
-    chance, shape = np.random.default_rng(seed), (RESAMPLES, len(groups))
-    # Of each seed a mean for every place that it may be drawn for: a seed drawn twice has its candidates drawn twice.
-    drawn = np.stack([v[chance.integers(v.size, size=(*shape, v.size))].mean(axis=-1) for v in groups])
-    means = np.take_along_axis(drawn, chance.integers(len(groups), size=(1, *shape)), axis=0)[0].mean(axis=1)
-    low, high = np.quantile(means, [0.025, 0.975])
-    return Interval(float(np.mean([values.mean() for values in groups])), float(low), float(high))
+    means = [values.mean() for values in last_values(rows, value)]
+    return mean_of(np.array(means)) if means else None
 
 
 def last_values(rows: Sequence[Row], value: Callable[[Row], float]) -> Iterator[Floats]:

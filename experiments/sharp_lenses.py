@@ -19,7 +19,7 @@ from evolve.config.run_config import EyeConfig
 from experiments import designed
 from experiments.best_pupil import contrast_of, measures
 from experiments.designed import Design, Trained
-from experiments.means import Interval, interval_of, resampled_difference
+from experiments.means import Interval, difference
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.store import Origin
 
@@ -34,7 +34,6 @@ SETTINGS = ("learning.total_steps=130000", "learning.eval_interval=65000")  # as
 SHARP = 0.3  # Strehl ratio
 NEARLY = 0.1  # contrast that a lens is short of the best one's, at most, to be nearly as good
 COLOR = "#0072B2"
-RESAMPLES = 10_000
 
 
 @dataclass(frozen=True)
@@ -71,9 +70,9 @@ def _powers(rows: Sequence[Trained], aperture: float) -> list[float]:
     return sorted({row.glass_power for row in rows if row.relative_aperture == aperture and not row.failed})
 
 
-def worth(rows: Sequence[Trained], aperture: float, seed: int = 0) -> Interval | None:
+def worth(rows: Sequence[Trained], aperture: float) -> Interval | None:
     """Mean fitness behind sharp lenses, less that behind lenses that are not, but have nearly the contrast of the best,
-    with a bootstrap over lives; None where there are none of either."""
+    with Welch's interval over lives; None where there are fewer than two of either."""
     lenses = {power: lens_of(aperture, power) for power in _powers(rows, aperture)}
     best = max((lens.contrast for lens in lenses.values()), default=math.nan)
     good = {power: lens for power, lens in lenses.items() if lens.contrast >= (1 - NEARLY) * best}
@@ -81,10 +80,7 @@ def worth(rows: Sequence[Trained], aperture: float, seed: int = 0) -> Interval |
         np.array([r.fitness for p, lens in good.items() if kind(lens) for r in _lives(rows, aperture, p)])
         for kind in (_is_sharp, lambda lens: not _is_sharp(lens))
     )
-    if not (sharp.size and nearly.size):
-        return None
-    drawn = resampled_difference(sharp, nearly, RESAMPLES, np.random.default_rng(seed))
-    return interval_of(float(sharp.mean() - nearly.mean()), drawn)
+    return difference(sharp, nearly) if min(sharp.size, nearly.size) > 1 else None
 
 
 def _is_sharp(lens: Lens) -> bool:
@@ -106,7 +102,6 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
             "nearly": f"{100 * NEARLY:g} %",
             "steps": f"{max(row.steps for row in rows):,}",
             "lives": f"{min(lives)}" if min(lives) == max(lives) else f"{min(lives)} or {max(lives)}",
-            "resamples": f"{RESAMPLES:,}",
         },
         figures=[Figure(NAME, lambda path: draw(rows, path))],
         origin=origin,

@@ -208,7 +208,7 @@ def _require_genes(source: Source, eye: EyeConfig, own: bool) -> None:
     """Genes that are named one by one must be genes of such eyes."""
     for name in with_relief(source.tree, eye).get("genome", {}):
         if name in (SIDE, *SIDES) and name not in eye.genes:
-            raise ConfigError(no_such_side(name, eye, not source.name), f"genome.{name}", "eye.square")
+            raise ConfigError(no_such_side(name, eye), f"genome.{name}", "eye.square")
         if name == RHABDOM and name not in eye.genes:
             raise ConfigError(
                 f"genome.{name}: only eyes with rhabdoms have this gene; set eye.rhabdoms = true",

@@ -12,8 +12,11 @@ __all__ = ["no_such_side", "with_square_eyes"]
 
 
 def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
-    """`source`, whose settings of height and width, if they are the same, are those of a square eye's gene."""
+    """`source`, whose settings of height and width, if they are the same, are those of a square eye's gene. What a task
+    says of a row of receptors does not hold for square eyes, if a user asks for them."""
     genes = source.tree.get("genome", {})
+    if eye.square and not source.name:
+        return replace(source, tree={**source.tree, "genome": {k: v for k, v in genes.items() if k not in SIDES}})
     height, width = (genes.get(name) for name in SIDES)
     if not eye.square or height is None or height != width or SIDE in genes:
         return source
@@ -21,10 +24,8 @@ def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
     return replace(source, tree={**source.tree, "genome": {**rest, SIDE: height}})
 
 
-def no_such_side(name: str, eye: EyeConfig, of_task: bool) -> str:
-    """Why these eyes have no such gene; `of_task`: though the task says what it is."""
-    if of_task:
-        return f"eye.square = true: the task sets genome.{name}, so its eyes are not square; must be false"
+def no_such_side(name: str, eye: EyeConfig) -> str:
+    """Why these eyes have no such gene."""
     if eye.square:
         return f"genome.{name}: square eyes have the gene {SIDE} for both sides; set it, or eye.square = false"
     return f"genome.{name}: only square eyes have this gene, others have {' and '.join(SIDES)}; set eye.square = true"

@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments import eyes_for_tasks
+from experiments import crossing as crossing_module
+from experiments.crossing import _interaction, crossing
 from experiments.designed import Design, Trained, crossed, train_all
-from experiments.eyes_for_tasks import BRIGHT, SEEDS, SHAPES, TASKS, _interaction, crossing, designs, page
+from experiments.eye_shapes import BRIGHT, CONTROLS, DIM, SEEDS, SHAPES, TASKS, designs, with_rows, with_squares
+from experiments.eyes_for_tasks import controls_table, crossings_table, page
+from experiments.eyes_for_tasks_figure import light_message
 from experiments.store import Origin, read_rows
 
 TINY = (
@@ -24,7 +27,7 @@ def lived(design, fitness):
 def rows(effect, spread=1.0, noises=(BRIGHT,), seed=0):
     """Lives whose fitness in detection is `effect` higher for cameras, and in navigation as much lower."""
     chance, found = np.random.default_rng(seed), []
-    for design in designs():
+    for design in with_rows(designs()):
         if design.noise_sigma in noises:
             camera = design.width == 15
             sign = 1 if design.task == "detection" else -1
@@ -35,10 +38,32 @@ def rows(effect, spread=1.0, noises=(BRIGHT,), seed=0):
 def test_every_animal_lives_in_both_tasks_and_in_every_light():
     asked = designs()
     assert len(set(asked)) == len(asked)
-    bright = [design for design in asked if design.noise_sigma == BRIGHT]
+    bright = [design for design in with_rows(asked) if design.noise_sigma == BRIGHT]
     assert len(bright) == len(SHAPES) * len(TASKS) * len(SEEDS)
-    assert {design.height for design in asked if design.task == "navigation"} == {1}
+    assert {design.height for design in with_rows(asked) if design.task == "navigation"} == {1}
     assert all(design.height == design.width for design in asked if design.task == "detection")
+
+
+def test_controls_hold_the_height_and_are_not_mixed_with_rows():
+    """Square eyes of every shape in both tasks, as often in each; a row of the same width is no control."""
+    square = with_squares(designs())
+    counts = [[sum(d.task == t and (d.n_eyes, d.width) == s[:2] for d in square) for s in SHAPES] for t in TASKS]
+    assert counts[0] == counts[1], "navigation and detection"
+    assert len(designs()) == len(with_rows(designs())) + len(CONTROLS) * len(SEEDS)
+
+
+def test_a_difference_of_rows_alone_is_not_one_of_squares():
+    """Navigators whose rows fail and whose square eyes do not: the confounded crossing finds a difference, the primary
+    one does not."""
+    chance = np.random.default_rng(0)
+    every = [lived(d, (20 if d.height == 1 and d.width == 15 else 120) + chance.normal()) for d in designs()]
+    confounded = crossing([row for row in with_rows(every) if row.noise_sigma == BRIGHT], np.random.default_rng(0))
+    primary = crossing(with_squares(every), np.random.default_rng(0))
+    assert confounded.differences["navigation"].high < -90
+    assert abs(primary.differences["navigation"].mean) < 2
+    table = controls_table(every)
+    assert "| 2 of 15 x 15 over 45° | 45 | 3 | 6 | 120 " in table
+    assert "| 2 of 1 x 15 over 45° | 3 | 3 | 6 |" in table
 
 
 def test_an_animal_is_what_its_design_says():
@@ -89,7 +114,7 @@ def test_p_is_uniform_where_nothing_matters():
     """Of 200 experiments without any effect as many have p < 0.1 as should (three standard errors of a binomial)."""
     from unittest import mock
 
-    with mock.patch.object(eyes_for_tasks, "RESAMPLES", 200):
+    with mock.patch.object(crossing_module, "RESAMPLES", 200):
         found = [crossing(rows(0.0, seed=seed), np.random.default_rng(seed)).p for seed in range(200)]
     assert abs(np.mean(np.array(found) < 0.1) - 0.1) < 3 * np.sqrt(0.1 * 0.9 / 200)
 
@@ -124,7 +149,7 @@ def test_rows_that_are_kept_keep_the_version_that_made_them(tmp_path, kept, earl
 
 
 def test_the_page_is_made_from_the_stored_rows(tmp_path):
-    every = rows(2.0, noises=(BRIGHT, *eyes_for_tasks.DIM))
+    every = rows(2.0, noises=(BRIGHT, *DIM))
     made = page(every, Origin.here(1.0, "worker"), "Yes.")
     assert "Yes." in made.markdown
     assert "| 10 of 4 over 135° |" in made.markdown
@@ -157,7 +182,7 @@ def test_without_two_lives_of_each_there_is_no_crossing():
     few = [row for row in few if not (row.width == 15 and row.task == "detection")]
     with pytest.raises(ValueError, match="a crossing takes 2 lives of each kind of eyes in each task"):
         crossing(few, np.random.default_rng(0))
-    assert "| σ = 0.01 | - | - | - | - |" in eyes_for_tasks._crossings(few)
+    assert "| σ = 0.01, navigators with rows | - | - | - | - |" in crossings_table(few)
 
 
 @pytest.mark.parametrize(("effect", "message"), [(1.5, "does not turn the order"), (-1.5, "light turns the order")])
@@ -167,4 +192,4 @@ def test_the_figure_says_whether_less_light_turns_the_answer(effect, message):
         sigma: crossing([row for row in found if row.noise_sigma == sigma], np.random.default_rng(0))
         for sigma in (BRIGHT, 0.05)
     }
-    assert message in eyes_for_tasks._told_of_light(lights)
+    assert message in light_message(lights)

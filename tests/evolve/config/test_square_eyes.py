@@ -54,12 +54,26 @@ def test_clusters_open_the_genes_that_there_are():
     [
         ("detection", (SQUARE, "genome.resolution_height.open=true"), "square eyes have the gene resolution for both"),
         ("detection", ("genome.resolution.open=true",), "only square eyes have this gene"),
-        ("navigation", (SQUARE,), r"eye\.square = true: the task sets genome\.resolution_height"),
+        ("navigation", (SQUARE, "genome.resolution_height.open=true"), "square eyes have the gene resolution for both"),
     ],
 )  # fmt: skip
 def test_genes_that_such_eyes_have_not_are_refused(task, settings, named):
-    """A navigator's height is held at 1: of its eyes only the width counts, and they are not square."""
     with pytest.raises(ConfigError, match=named) as caught:
         assemble(task, assignments=settings)
     assert "\n" not in str(caught.value)
     assert "--set" in str(caught.value)
+
+
+@pytest.mark.parametrize("task", ["navigation", "maze"])
+def test_a_user_may_give_navigators_square_eyes(task):
+    """The task holds their height at one receptor; square eyes, which a user asks for, keep their height in degrees at
+    any resolution."""
+    row, square = assemble(task), assemble(task, assignments=[SQUARE])
+    assert develop(Genotype(row.genome).start, row).resolution == (1, 1)
+    assert not row.genome["resolution_height"].open
+    random = np.random.default_rng(0)
+    genes = len(Genotype(square.genome).open_genes)
+    seen = {develop(random.random(genes), square).resolution for _ in range(300)}
+    assert seen == {(n, n) for n in range(1, 17)}
+    assert from_text(to_toml(square)) == square
+    assert from_text(to_toml(row)) == row
