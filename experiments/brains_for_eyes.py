@@ -53,13 +53,14 @@ def designs() -> list[Design]:
         for seed in CONTROL_SEEDS
         for w in CONTROL_WIDTHS
     ]
-    return control + [
+    crossed = [
         Design(task, n_eyes, 1 if task == "navigation" else w, w, arc, SIGMA, seed, neurons=brain)
         for seed in SEEDS
         for task, (n_eyes, arc) in EYES.items()
         for w in WIDTHS
         for brain in BRAINS
     ]
+    return crossed + control
 
 
 def _lives(rows: Iterable[Trained], value: Callable[[Trained], float]) -> dict[tuple[int, int], list[float]]:
