@@ -25,7 +25,7 @@ from sim.worlds.world import World
 
 __all__ = ["designed", "draw", "draw_head"]
 
-PURPOSE = {"navigation": "to find the way", "detection": "to tell a goal from its double"}
+PURPOSE = {"navigation": "navigation, eyes of one row", "detection": "detection, square eyes"}
 RAYS = 256  # per receptor, of the pictures
 REACH = 2.4  # head radii that fields of view are drawn
 RECEPTOR_DEG = 3.0  # of the head that a receptor takes, as in the presets "bifurcation-..."
