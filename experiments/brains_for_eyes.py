@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,7 +21,19 @@ from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.powers import PowerLaw, power_law
 from experiments.store import Origin
 
-__all__ = ["DEFINITIONS", "best_brains", "designs", "frontier", "missed", "needed", "over_both", "page", "shortfall"]
+__all__ = [
+    "DEFINITIONS",
+    "best_brains",
+    "control_of",
+    "designed_for",
+    "designs",
+    "frontier",
+    "missed",
+    "needed",
+    "over_both",
+    "page",
+    "shortfall",
+]
 
 NAME = "brains_for_eyes"
 WIDTHS = (1, 2, 4, 8, 16, 24)
@@ -41,6 +53,7 @@ SETTINGS = (
 CONTROL_WIDTHS, CONTROL_BRAIN, CONTROL_SEEDS = (4, 8, 16), 64, range(2)
 GAIN = 0.5  # choice: of the coarsest eyes' errors, below which finer eyes pay
 SHADES = ("#c6dbef", "#9ecae1", "#6baed6", "#2171b5", "#08306b")  # of brains, small to large
+D = TypeVar("D", bound=Design)
 Errors = dict[tuple[int, int], float]  # by width and brain
 Definition = Callable[[Sequence[Trained]], Errors]
 
@@ -136,32 +149,32 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
             "episodes": str(min(row.episodes for row in rows)),
             "errors": _errors_table(rows),
             "exponents": _exponents(rows),
-            "lives": ", ".join(f"{len(_of(rows, task))} in {task}" for task in _tasks(rows)),
+            "lives": ", ".join(f"{len(designed_for(rows, task))} in {task}" for task in _tasks(rows)),
         },
         figures=[Figure(NAME, lambda path: draw(rows, path))],
         origin=origin,
     )
 
 
-def _of(rows: Iterable[Trained], task: str) -> list[Trained]:
+def designed_for(rows: Iterable[D], task: str) -> list[D]:
     """Rows of the experiment as it was designed: without the control."""
     return [row for row in rows if row.task == task and (task != "navigation" or row.height == 1)]
 
 
-def control_of(rows: Iterable[Trained]) -> list[Trained]:
+def control_of(rows: Iterable[D]) -> list[D]:
     """Navigators whose eyes are 45 degrees high at any width."""
     return [row for row in rows if row.task == "navigation" and row.height == row.width > 1]
 
 
 def _tasks(rows: Iterable[Trained]) -> list[str]:
-    return [task for task in EYES if _of(rows, task)]
+    return [task for task in EYES if designed_for(rows, task)]
 
 
 def _errors_table(rows: Sequence[Trained]) -> str:
     """A row per task and brain, a column per width."""
     lines = []
     for task in _tasks(rows):
-        errors = missed(_of(rows, task))
+        errors = missed(designed_for(rows, task))
         for brain in BRAINS:
             shown = [f"{errors[w, brain]:.3f}" if (w, brain) in errors else "-" for w in WIDTHS]
             lines.append([task, str(brain), *shown])
@@ -176,7 +189,7 @@ def _exponents(rows: Sequence[Trained]) -> str:
     lines = []
     for task in _tasks(rows):
         for name, definition in DEFINITIONS.items():
-            mine = _of(rows, task)
+            mine = designed_for(rows, task)
             best, both = frontier(mine, definition), over_both(mine, definition)
             found = ["-", "-", "-"] if both is None else [*map(str, both.exponents), f"{both.explained:.2f}"]
             first = ["-" if best is None else str(best.exponents[0]), _over_runs(mine, definition)]
@@ -199,7 +212,7 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
     tasks = _tasks(rows)
     figure, axes = new_figure(3.6 * len(tasks) + 0.5, 4.2, columns=len(tasks), sharey=True)
     for place, task in zip(axes[0], tasks, strict=True):
-        mine = _of(rows, task)
+        mine = designed_for(rows, task)
         errors, acuity = missed(mine), _acuities(mine)
         for brain, shade in zip(BRAINS, SHADES, strict=True):
             widths = [w for w in WIDTHS if (w, brain) in errors]
@@ -239,7 +252,7 @@ def _of_task(task: str, rows: Sequence[Trained]) -> str:
 
 def _message(rows: Sequence[Trained]) -> str:
     least = min(row.neurons for row in rows)
-    brains = {task: needed(_of(rows, task)) for task in _tasks(rows)}
+    brains = {task: needed(designed_for(rows, task)) for task in _tasks(rows)}
     in_vain = [task for task, brain in brains.items() if brain is None]
     if len(in_vain) == len(brains) or least in brains.values():
         return "What acuity is worth to brains of each size"

@@ -12,6 +12,8 @@ from experiments.brains_for_eyes import (
     WIDTHS,
     _message,
     best_brains,
+    control_of,
+    designed_for,
     designs,
     frontier,
     main,
@@ -37,11 +39,14 @@ def of_law(law):
 
 
 def test_every_brain_has_every_eye_in_every_task():
-    asked = designs()
+    every = designs()
+    asked = [design for task in EYES for design in designed_for(every, task)]
+    assert len(every) == len(asked) + len(control_of(every))
     assert len(asked) == len(set(asked)) == len(EYES) * len(WIDTHS) * len(BRAINS) * len(SEEDS)
     assert {design.height for design in asked if design.task == "navigation"} == {1}
     assert all(design.height == design.width for design in asked if design.task != "navigation")
-    assert {design.seed for design in asked[: len(asked) // len(SEEDS)]} == {SEEDS[0]}, "one life of each first"
+    assert {design.seed for design in every[: len(asked) // len(SEEDS)]} == {SEEDS[0]}, "one life of each first"
+    assert all(design.height == design.width for design in control_of(every))
     assert asked[0].animal.encoder == math.ceil(asked[0].neurons / 4)
 
 
