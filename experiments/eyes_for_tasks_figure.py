@@ -50,7 +50,11 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
             full_return("navigation"), color="#444444", lw=0.9, ls="--", label="ceiling: straight to the goal"
         )
         place.set_ylim(top=140)
-        place.legend(fontsize=8, framealpha=0.9, loc="lower right" if place is axes[1, 1] else "center right")
+        place.legend(
+            fontsize=8,
+            framealpha=0.9,
+            loc="center right" if place is axes[0, 0] else "lower left" if place is axes[1, 0] else "lower right",
+        )
     axes[0, 1].legend(fontsize=8, frameon=False)
     figure.suptitle("Fine eyes fail at navigation if they are low, and not if they are 45° high")
     save(figure, path)
