@@ -50,7 +50,8 @@ SETTINGS = (
     "evaluation.episodes=320",
 )
 # Navigators' rows are the lower the finer they are; the control's eyes are as wide and 45 degrees high.
-CONTROL_WIDTHS, CONTROL_BRAIN, CONTROL_SEEDS = (4, 8, 16), 64, range(2)
+CONTROL_WIDTHS, CONTROL_BRAIN, CONTROL_SEEDS = (4, 8), 64, range(1)
+IN_VAIN = {"navigation": "one row, the finer the lower"}
 GAIN = 0.5  # choice: of the coarsest eyes' errors, below which finer eyes pay
 SHADES = ("#c6dbef", "#9ecae1", "#6baed6", "#2171b5", "#08306b")  # of brains, small to large
 D = TypeVar("D", bound=Design)
@@ -247,7 +248,11 @@ def needed(rows: Sequence[Trained]) -> int | None:
 
 def _of_task(task: str, rows: Sequence[Trained]) -> str:
     brain = needed(rows)
-    return f"{task}: acuity pays for no brain" if brain is None else f"{task}: acuity pays from {brain} units on"
+    return (
+        f"{task}: {IN_VAIN.get(task, 'acuity pays for no brain')}"
+        if brain is None
+        else f"{task}: acuity pays from {brain} units on"
+    )
 
 
 def _message(rows: Sequence[Trained]) -> str:
@@ -256,7 +261,8 @@ def _message(rows: Sequence[Trained]) -> str:
     in_vain = [task for task, brain in brains.items() if brain is None]
     if len(in_vain) == len(brains) or least in brains.values():
         return "What acuity is worth to brains of each size"
-    besides = f", and in {' and '.join(in_vain)} not at all" if in_vain else ""
+    besides = f"; not in {' and '.join(in_vain)}" if in_vain else ""
+    besides += ", where finer eyes are lower" if "navigation" in in_vain else ""
     return f"Fine eyes pay only for brains that are large enough{besides}"
 
 

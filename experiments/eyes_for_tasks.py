@@ -50,7 +50,7 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
             "success": _table(designed_rows, lambda row: row.success_rate),
             "crossings": crossings_table(rows),
             "controls": controls_table(rows),
-            "ceiling": f"{full_return('navigation'):.0f}",
+            "ceiling": f"{full_return('navigation'):.1f}",
             "resamples": f"{RESAMPLES:,}",
         },
         figures=[Figure(NAME, lambda path: eyes_for_tasks_figure.draw(rows, path))],

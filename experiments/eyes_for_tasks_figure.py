@@ -42,7 +42,7 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
     _draw_lights(axes[0, 2], first)
     squares = [(n, w, w, arc) for n, w, arc in SHAPES]
     _draw_fitness(axes[1, 0], rows, "navigation", squares)
-    axes[1, 0].set_title("control, navigation:\nsquare eyes, 45° high, as published", fontsize=11)
+    axes[1, 0].set_title("control, navigation: square eyes, 45° high\n(published default)", fontsize=11)
     _draw_heights(axes[1, 1], rows)
     _draw_difference(axes[1, 2], rows)
     for place in (axes[0, 0], axes[1, 0], axes[1, 1]):

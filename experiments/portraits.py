@@ -34,7 +34,7 @@ COLORS = {"navigation": "#D55E00", "detection": "#0072B2"}
 
 
 def designed() -> dict[str, sim.Eyes]:
-    """Those that fare best in `experiments.eyes_for_tasks`."""
+    """The two published kinds of eyes; a navigator's are rows, as in `experiments.eyes_for_tasks`."""
     return {
         "navigation": sim.Eyes(n_eyes=10, resolution=(1, 4), fov_deg=45, placement_range_deg=135),
         "detection": sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_deg=45),

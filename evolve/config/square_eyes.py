@@ -12,12 +12,17 @@ __all__ = ["no_such_side", "with_square_eyes"]
 
 
 def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
-    """`source`, whose settings of height and width, if they are the same, are those of a square eye's gene. What a task
-    says of a row of receptors does not hold for square eyes, if a user asks for them."""
+    """`source`, whose settings of height and width, if they are the same, are those of a square eye's gene.
+
+    A task or a preset may be written for one row of receptors. If a user asks for square eyes instead, the task's
+    height does not hold, and the preset's width is that of the square.
+    """
     genes = source.tree.get("genome", {})
     if eye.square and not source.name:
         return replace(source, tree={**source.tree, "genome": {k: v for k, v in genes.items() if k not in SIDES}})
     height, width = (genes.get(name) for name in SIDES)
+    if eye.square and source.name.startswith("preset ") and height is None and width is not None and SIDE not in genes:
+        height = width
     if not eye.square or height is None or height != width or SIDE in genes:
         return source
     rest = {name: use for name, use in genes.items() if name not in SIDES}

@@ -80,7 +80,11 @@ def test_a_brain_whose_coarsest_eyes_fail_by_themselves_gains_nothing():
     ("least", "navigates", "message"),
     [
         (16, 16, "Fine eyes pay only for brains that are large enough"),
-        (16, 1000, "Fine eyes pay only for brains that are large enough, and in navigation not at all"),
+        (
+            16,
+            1000,
+            "Fine eyes pay only for brains that are large enough; not in navigation, where finer eyes are lower",
+        ),
         (1, 1000, "What acuity is worth to brains of each size"),
         (1000, 1000, "What acuity is worth to brains of each size"),
     ],

@@ -77,3 +77,11 @@ def test_a_user_may_give_navigators_square_eyes(task):
     assert seen == {(n, n) for n in range(1, 17)}
     assert from_text(to_toml(square)) == square
     assert from_text(to_toml(row)) == row
+
+
+def test_a_preset_for_rows_gives_squares_of_the_same_width():
+    square = assemble(preset="bifurcation-navigation", assignments=[SQUARE]).genome["resolution"]
+    detection = assemble(preset="bifurcation-detection").genome["resolution"]
+    assert square == detection, "the two tasks then differ in their eyes' shape no longer"
+    with pytest.raises(ConfigError, match="square eyes have the gene resolution"):
+        assemble("navigation", assignments=[SQUARE, "genome.resolution_width.high=8"])
