@@ -226,7 +226,7 @@ def _draw_control(axes: Any) -> None:
         place.set_ylim(bottom=0)
         place.set_xlim(-0.5, len(CONTROL_EYES) - 0.5)
         place.set_title(f"control, {task}: {what}", fontsize=10)
-        place.legend(fontsize=7, frameon=False, loc="center left")
+        place.legend(fontsize=7, frameon=False, loc="center left" if task == "navigation" else "lower right")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
