@@ -10,7 +10,9 @@ from experiments.brains_for_eyes import (
     EYES,
     SEEDS,
     WIDTHS,
+    _errors_table,
     _message,
+    _over_runs,
     best_brains,
     control_of,
     designed_for,
@@ -97,6 +99,23 @@ def test_the_figure_says_what_the_lives_do(least, navigates, message):
         if each.task == "navigation"
     ]
     assert _message([*detect, *navigate]) == message
+
+
+def test_the_control_has_a_row_of_its_own():
+    every = [lived(each, 1 - (0.25 if each in control_of([each]) else 0.5)) for each in designs()]
+    *_, last = _errors_table(every).splitlines()
+    assert last.startswith("| control: navigation, square eyes | 64 | - | - | 0.250 | 0.250 | -")
+    assert "0.250" not in "".join(_errors_table(every).splitlines()[:-1])
+
+
+def test_an_exponent_over_training_runs_is_as_uncertain_as_seeds_differ():
+    """Three seeds whose laws have exponents 0.9, 1 and 1.1: the mean is 1, and Student's interval ± 4.303 0.1 / √3."""
+    rows = [
+        lived(each, 1 - 0.01 / (each.width / 90) ** (1 + 0.1 * (each.seed - 1)))
+        for each in designs()
+        if each.task == "detection"
+    ]
+    assert _over_runs(rows, missed) == "1 [0.752, 1.25]"
 
 
 def test_one_brain_that_gains_below_others_that_do_not_is_chance():

@@ -20,7 +20,7 @@ from experiments import bending_light, brains_and_acuity, goals_shape_eyes, lear
 from experiments.candidates import Row, full_return, parameters, rows_of
 from experiments.evolved import Conduct, Store, main
 from experiments.glass import relief_of
-from experiments.means import difference, last_mean, mean_of
+from experiments.means import last_mean
 from experiments.store import Origin, write_rows
 from optics import Pupil
 from optics.numerics import backend
@@ -104,23 +104,6 @@ def test_seeds_that_differ_make_the_interval_wide():
     assert (found.low, found.high) == pytest.approx((2 - 12.706, 2 + 12.706), abs=1e-3)
     alone = last_mean(rows[:50], lambda row: row.fitness)
     assert (alone.mean, str(alone)) == (1.0, "1"), "one seed has no interval"
-
-
-@pytest.mark.parametrize("seeds", [2, 3, 6])
-def test_intervals_over_seeds_hold_the_mean_in_95_of_100(seeds):
-    """Of 4000 imitated experiments, to three standard errors of a binomial; a bootstrap over three seeds holds it in
-    about 70 of 100."""
-    chance = np.random.default_rng(seeds)
-    held = [one.low < 0 < one.high for one in (mean_of(chance.normal(size=seeds)) for _ in range(4000))]
-    assert abs(np.mean(held) - 0.95) < 3 * np.sqrt(0.95 * 0.05 / 4000)
-
-
-def test_intervals_of_differences_hold_them_where_spreads_differ():
-    chance = np.random.default_rng(0)
-    drawn = (difference(3 * chance.normal(size=6), chance.normal(size=12)) for _ in range(4000))
-    assert abs(np.mean([one.low < 0 < one.high for one in drawn]) - 0.95) < 0.015, "Welch's interval is approximate"
-    with pytest.raises(ValueError, match="two values or more"):
-        difference(np.ones(1), np.ones(3))
 
 
 def with_error(wanted, size):

@@ -10,7 +10,7 @@ from experiments.crossing import _interaction, crossing
 from experiments.designed import Design, Trained, crossed, train_all
 from experiments.eye_shapes import BRIGHT, CONTROLS, DIM, SEEDS, SHAPES, TASKS, designs, with_rows, with_squares
 from experiments.eyes_for_tasks import controls_table, crossings_table, page
-from experiments.eyes_for_tasks_figure import light_message
+from experiments.eyes_for_tasks_figure import height_message, light_message
 from experiments.store import Origin, read_rows
 
 TINY = (
@@ -61,9 +61,14 @@ def test_a_difference_of_rows_alone_is_not_one_of_squares():
     primary = crossing(with_squares(every), np.random.default_rng(0))
     assert confounded.differences["navigation"].high < -90
     assert abs(primary.differences["navigation"].mean) < 2
-    table = controls_table(every)
-    assert "| 2 of 15 x 15 over 45° | 45 | 3 | 6 | 1" in table, "a mean near 120"
-    assert "| 2 of 1 x 15 over 45° | 3 | 3 | 6 |" in table
+    assert "low, and not" in height_message(every)
+    worse = [replace(row, fitness=row.fitness - 100 * (row.height == row.width == 15)) for row in every]
+    assert "at any height" in height_message(worse)
+    lines = {line.split(" | ")[0]: line.split(" | ")[1:] for line in controls_table(every).splitlines()}
+    square, row = lines["| 2 of 15 x 15 over 45°"], lines["| 2 of 1 x 15 over 45°"]
+    assert (square[:3], row[:3]) == (["45", "3", "6"], ["3", "3", "6"])
+    assert float(square[3].split()[0]) == pytest.approx(120, abs=2), "five standard errors of six runs"
+    assert float(row[3].split()[0]) == pytest.approx(20, abs=2)
 
 
 def test_an_animal_is_what_its_design_says():
