@@ -9,6 +9,8 @@ import pytest
 # the interpreter, and a green run ends in a page of "nanobind: leaked". The test that needs it starts a process.
 sys.modules["OpenImageIO"] = None  # type: ignore[assignment]
 
+pytest_plugins = ["pytester", "tests.cpu_times", "tests.sharing", "tests.slow_part"]
+
 
 def pytest_configure() -> None:
     """Workers beside each other have a thread each: Dr.Jit's second one spins while it waits, at the others' cost."""

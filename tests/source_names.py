@@ -17,11 +17,11 @@ import builtins
 import re
 from collections import defaultdict
 from functools import lru_cache
-from pathlib import Path
 
 from evolve.config.assemble import GENE_FIELDS, SETTINGS
+from tests.sources import ROOT
+from tests.sources import tree as parsed
 
-ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("optics", "sim", "evolve", "validation", "experiments", "tests")
 FOLDERS = (*PACKAGES, "docs", "examples")
 GENERATED = ("validation/figures",)
@@ -35,6 +35,11 @@ PATH = re.compile(r"(?<![\w./<-])[\w.*-]+(?:/[\w.*-]+)+")
 OURS = re.compile(rf"(?<![\w./-])(?:{'|'.join(PACKAGES)})(?:\.[A-Za-z_]\w*)+")
 DOTTED = re.compile(r"(?<![\w./\"'-])([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)(\(?)")
 CODE_WORD = re.compile(r"\w+_\w+|[A-Z]\w*[a-z]\w*")
+WORDS_IN = {
+    kind: [field for field in ("id", "attr", "arg", "name", "module", "asname") if field in kind._fields]
+    for kind in vars(ast).values()
+    if isinstance(kind, type) and issubclass(kind, ast.AST)
+}
 FILE = re.compile(r"[\w-]+\.(?:csv|exr|html|json|jsonl|md|npz|png|rrd|safetensors|toml|yml)")
 
 
@@ -112,7 +117,7 @@ def modules() -> dict[str, ast.Module]:
     found = {package: ast.Module([], []) for package in PACKAGES}
     for path in python_files():
         module = path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
-        found[module] = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+        found[module] = parsed(ROOT / path)
     return found
 
 
@@ -130,14 +135,26 @@ def names_of(module: str) -> set[str]:
 
 
 @lru_cache
-def classes() -> dict[str, list[ast.ClassDef]]:
-    """Name -> the classes that bear it."""
-    found = defaultdict(list)
-    for tree in modules().values():
+def classes_and_words() -> tuple[dict[str, list[ast.ClassDef]], set[str]]:
+    """From one walk through all sources: name -> the classes that bear it; and the words of all that is not a test."""
+    classes, words = defaultdict(list), set()
+    for module, tree in modules().items():
+        is_test = module.split(".")[0] == "tests"
         for node in ast.walk(tree):
-            if isinstance(node, ast.ClassDef):
-                found[node.name].append(node)
-    return dict(found)
+            kind = type(node)
+            if kind is ast.ClassDef:
+                classes[node.name].append(node)
+            if is_test:
+                continue
+            for field in WORDS_IN.get(kind, ()):
+                words.add(getattr(node, field) or "")
+            if kind is ast.Constant and isinstance(node.value, str) and len(node.value) < 40:
+                words.add(node.value)
+    return dict(classes), words
+
+
+def classes() -> dict[str, list[ast.ClassDef]]:
+    return classes_and_words()[0]
 
 
 @lru_cache
@@ -170,12 +187,5 @@ def words() -> set[str]:
     """Every name, argument and attribute, and every string that may be a key, in all that is not a test."""
     found = set(dir(builtins)) | set(SETTINGS) | {setting.split(".")[-1] for setting in SETTINGS} | set(GENE_FIELDS)
     found |= set(re.findall(r"[A-Z]+(?:_[A-Z]+)+", (ROOT / "with-env").read_text(encoding="utf-8")))
-    for module, tree in modules().items():
-        if module.split(".")[0] == "tests":
-            continue
-        for node in ast.walk(tree):
-            for field in ("id", "attr", "arg", "name", "module", "asname"):
-                found.add(getattr(node, field, None) or "")
-            if isinstance(node, ast.Constant) and isinstance(node.value, str) and len(node.value) < 40:
-                found.add(node.value)
+    found |= classes_and_words()[1]
     return found | {part for name in found for part in name.split(".") if name.replace(".", "").isidentifier()}

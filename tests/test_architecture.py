@@ -3,13 +3,10 @@
 import ast
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
-ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("rhabdom", "optics", "sim", "evolve")
-SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+from tests.sources import PACKAGES, ROOT, SOURCES, tree
 
 
 def test_contracts_hold():
@@ -20,10 +17,10 @@ def test_contracts_hold():
 
 def imported_at(path: Path) -> dict[str, bool]:
     """Top-level packages that a file imports -> whether it does so when it is itself imported."""
-    tree = ast.parse(path.read_text())
-    nested = {id(node) for f in ast.walk(tree) if isinstance(f, ast.FunctionDef | ast.Lambda) for node in ast.walk(f)}
+    module = tree(path)
+    nested = {id(node) for f in ast.walk(module) if isinstance(f, ast.FunctionDef | ast.Lambda) for node in ast.walk(f)}
     found: dict[str, bool] = {}
-    for node in ast.walk(tree):
+    for node in ast.walk(module):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -36,10 +33,9 @@ def imported_at(path: Path) -> dict[str, bool]:
     return found
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_importing_a_package_loads_nothing_heavy(package):
+def test_importing_the_packages_loads_nothing_heavy():
     heavy = ("torch", "mitsuba", "drjit", "mujoco", "nevergrad", "stable_baselines3", "colour", "matplotlib", "scipy")
-    code = f"import sys, {package}; print([name for name in {heavy!r} if name in sys.modules])"
+    code = f"import sys, {', '.join(PACKAGES)}; print([name for name in {heavy!r} if name in sys.modules])"
     child = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert child.stdout.strip() == "[]"
 
@@ -75,31 +71,42 @@ def test_packages_are_folders_with_names():
         assert sum(folder.parent.name == package for folder in FOLDERS) <= 10
 
 
-@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.relative_to(ROOT).as_posix())
-def test_a_folder_lists_its_modules(folder):
-    """Its `__init__` is a table of contents."""
+def faults_by_folder(faults: Callable[[Path], set[str]]) -> dict[str, set[str]]:
+    """Folders with faults, and these."""
+    return {folder.relative_to(ROOT).as_posix(): found for folder in FOLDERS if (found := faults(folder))}
+
+
+def test_folders_list_their_modules():
+    """The `__init__` of a folder is a table of contents."""
+    assert faults_by_folder(unlisted) == {}
+
+
+def unlisted(folder: Path) -> set[str]:
+    """Modules and folders that the table of contents lacks."""
     listed = {line.split()[0].split(".")[0] for line in table(folder / "__init__.py")}
     there = {path.stem for path in folder.glob("*.py")} | {path.parent.name for path in folder.glob("*/__init__.py")}
-    assert listed >= there - {"__init__"}, there - listed
+    return there - {"__init__"} - listed
 
 
-@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.relative_to(ROOT).as_posix())
-def test_tests_mirror_the_folder_and_say_what_covers_what(folder):
+def test_tests_mirror_the_folders_and_say_what_covers_what():
     """In `tests`, the folder's `__init__` names for each module the files that fail where it is wrong."""
+    assert faults_by_folder(uncovered) == {}
+
+
+def uncovered(folder: Path) -> set[str]:
+    """Modules without a line in the folder of tests, and files named there that do not exist."""
     here = ROOT / "tests" / folder.relative_to(ROOT)
     covered = dict(line.split(": ", 1) for line in table(here / "__init__.py") if ": " in line)
     modules = {path.relative_to(folder).with_suffix("") for path in folder.rglob("*.py")}
     wanted = {".".join(path.parts) for path in modules if path.name != "__init__"}
-    assert wanted <= covered.keys(), wanted - covered.keys()
     places = (here, here.parent, ROOT / "tests")
     named = {file for files in covered.values() for file in files.split(", ")}
-    missing = {file for file in named if not any((place / file).is_file() for place in places)}
-    assert not missing
+    return (wanted - covered.keys()) | {file for file in named if not any((place / file).is_file() for place in places)}
 
 
 def table(init: Path) -> list[str]:
     """What a folder's docstring has below its first line, a line each."""
-    text = ast.get_docstring(ast.parse(init.read_text())) or ""
+    text = ast.get_docstring(tree(init)) or ""
     return [line for line in text.split("\n")[1:] if line and not line.startswith(" ")]
 
 

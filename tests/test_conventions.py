@@ -8,9 +8,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("rhabdom", "optics", "sim", "evolve")
-SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+from tests.sources import ROOT, SOURCES, tree
 
 # A row explains arguments or fields: "name: meaning", "one, another: meaning".
 ROW = re.compile(r"^(?P<names>[a-z_]\w*(?:, [a-z_]\w*)*): \S")
@@ -30,10 +28,9 @@ class Documented:
     text: str
 
 
-def documented(path: Path, source: str | None = None) -> list[Documented]:
-    tree = ast.parse(source or path.read_text())
+def documented(path: Path, module: ast.Module) -> list[Documented]:
     found = []
-    for node in ast.walk(tree):
+    for node in ast.walk(module):
         if isinstance(node, Definition) and (text := ast.get_docstring(node)):
             found.append(Documented(f"{path}:{node.lineno} {node.name}", node, text))
     return found
@@ -55,10 +52,9 @@ def faults(thing: Documented) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_docstrings_have_one_form(path):
-    found = {thing.where: wrong for thing in documented(path) if (wrong := faults(thing))}
-    assert not found
+def test_docstrings_have_one_form():
+    things = [thing for path in SOURCES for thing in documented(path, tree(path))]
+    assert {thing.where: wrong for thing in things if (wrong := faults(thing))} == {}
 
 
 @pytest.mark.parametrize(
@@ -72,17 +68,17 @@ def test_docstrings_have_one_form(path):
     ids=["column", "prose", "no first line", "no error"],
 )
 def test_other_forms_are_noticed(docstring):
-    [thing] = documented(Path("some.py"), f'def some(radius):\n    """{docstring}"""\n')
+    [thing] = documented(Path("some.py"), ast.parse(f'def some(radius):\n    """{docstring}"""\n'))
     assert faults(thing)
 
 
 # --- messages
 
 
-def messages(tree: ast.AST) -> list[str]:
+def messages(module: ast.AST) -> list[str]:
     """What raised errors say, {} in the place of values."""
     found = []
-    for node in ast.walk(tree):
+    for node in ast.walk(module):
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
             first = node.exc.args[0]
             if isinstance(first, ast.Constant) and isinstance(first.value, str):
@@ -97,14 +93,14 @@ def ill_formed(message: str) -> bool:
     return "\n" in message or bool(re.search(r"^[^:;]*\bmust\b", message))
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_messages_have_one_form(path):
-    assert [message for message in messages(ast.parse(path.read_text())) if ill_formed(message)] == []
+def test_messages_have_one_form():
+    said = {path.relative_to(ROOT).as_posix(): messages(tree(path)) for path in SOURCES}
+    assert [(path, message) for path, found in said.items() for message in found if ill_formed(message)] == []
 
 
 def test_other_messages_are_noticed():
-    tree = ast.parse('raise ValueError(f"n = {n}, must be 1")\nraise ValueError("n = 0: must be 1")')
-    assert [ill_formed(message) for message in messages(tree)] == [True, False]
+    module = ast.parse('raise ValueError(f"n = {n}, must be 1")\nraise ValueError("n = 0: must be 1")')
+    assert [ill_formed(message) for message in messages(module)] == [True, False]
 
 
 # --- names
@@ -112,9 +108,7 @@ def test_other_messages_are_noticed():
 
 def exported(path: Path) -> set[str]:
     """Classes and functions that other modules may use."""
-    return {
-        node.name for node in ast.parse(path.read_text()).body if isinstance(node, Definition) and node.name[0] != "_"
-    }
+    return {node.name for node in tree(path).body if isinstance(node, Definition) and node.name[0] != "_"}
 
 
 def test_no_two_names_of_different_packages_are_alike():

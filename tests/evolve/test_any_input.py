@@ -1,6 +1,6 @@
 """Whatever is asked of `evolve`'s public functions: an animal that can be built, or one line. Nothing else.
 
-EVOLVE_EXAMPLES=20 python -m pytest tests/evolve/test_any_input.py     tries twenty times as many inputs
+EVOLVE_EXAMPLES=20 python -m pytest --all tests/evolve/test_any_input.py     tries twenty times as many inputs
 """
 
 import json
@@ -8,7 +8,7 @@ import math
 import os
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from evolve.config.assemble import assemble, from_text, to_toml
@@ -18,6 +18,7 @@ from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import Phenotype, develop
 from evolve.store.candidate import Candidate
 from tests.evolve.store.records import CONFIG, candidate
+from tests.slow_part import sweep
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=4),
@@ -35,8 +36,7 @@ KEYS = sorted(
 
 
 def examples(count):
-    count *= int(os.environ.get("EVOLVE_EXAMPLES", "1"))
-    return settings(max_examples=count, deadline=None, derandomize=True)
+    return sweep(count * int(os.environ.get("EVOLVE_EXAMPLES", "1")))
 
 
 def one_line(error):

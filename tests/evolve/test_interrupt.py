@@ -7,6 +7,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 # As pip writes the script `evolve`, with a line that says when its first ones have run.
 SCRIPT = """
@@ -33,6 +35,7 @@ def interrupted_after(seconds, arguments):
     return child.returncode, told
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_it_loads(tmp_path):
     """While its own modules are loaded, arguments are read, and the heavy libraries are loaded: the latter some of the
     time only, as everything else is done within milliseconds."""

@@ -33,6 +33,7 @@ def test_optimum_is_that_of_the_parabola():
     assert best(rows, "hole", 0.01, "bits") == 0.5, "at the end of what was tried"
 
 
+@pytest.mark.slow
 def test_with_little_noise_the_best_hole_is_rayleighs_pinhole():
     """The criterion differs from his (he judged by eye, at one wavelength), hence 15 %; geometry alone would close the
     pupil, diffraction alone open it."""
@@ -42,6 +43,7 @@ def test_with_little_noise_the_best_hole_is_rayleighs_pinhole():
     assert best(rows, "lens", 0.001, "contrast") == pytest.approx(0.2), "a lens gains by every opening"
 
 
+@pytest.mark.slow
 def test_stripes_are_seen_best_where_a_disk_of_blur_takes_least():
     """Behind a hole light falls on a disk as wide as the hole: T MTF = a² 2 J1(x) / x with x = π a L f is greatest at
     J0's first zero. Of a hole of three Fresnel zones the disk is brighter in its middle, hence 8 %; one of less than

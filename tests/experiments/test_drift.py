@@ -25,6 +25,7 @@ def few_searches(monkeypatch):
 ROW = Row(*("a", 0, 0, 0, 0, 0, 1.0, 0.5, 4, 2, 60.0, 45.0, 8, 8, 0.1, 5, 64, 1000))
 
 
+@pytest.mark.slow
 def test_random_fitness_moves_genes_that_are_open_and_no_others():
     config = assemble(
         "navigation", "bifurcation-navigation", assignments=("search.generations=6", "genome.fov_deg.open=true")
@@ -44,6 +45,7 @@ def test_random_fitness_moves_genes_that_are_open_and_no_others():
     assert str(held[-1]) == "held at 1"
 
 
+@pytest.mark.slow
 def test_every_phase_has_an_end():
     """Of its own generations alone: three of one, though there are only two before the second begins."""
     config = assemble(preset="lens", assignments=("genome.doe.opens_at=2", "genome.refractive_index.opens_at=2"))
@@ -92,8 +94,9 @@ def test_ties_are_ties_although_ends_have_six_digits():
     assert third.p(1 / 3) == 1.0
 
 
-def test_ends_are_means_over_candidates_as_those_of_runs_are():
+def test_ends_are_means_over_candidates_as_those_of_runs_are(monkeypatch):
     """A quantity that few candidates have: generations count by how many have it, as in `last_values`."""
+    monkeypatch.setattr("experiments.drift.SEEDS", 3)
     config = assemble("detection", "bifurcation-detection", assignments=("search.generations=3",))
     some = {"several": lambda row: row.placement_range_deg if row.n_eyes > 1 else float("nan")}
     [end] = [one for one in drifted(config, "detection", some, 3) if one.ends]

@@ -77,6 +77,7 @@ def test_candidates_with_more_receptors_have_more_parameters(tmp_path):
     assert 0 < small < large
 
 
+@pytest.mark.slow
 def test_the_best_of_each_generation_is_looked_through(tmp_path):
     backend.require()
     small = ("genome.resolution_height.start=4", "genome.resolution_width.start=4", "genome.n_eyes.start=1")
@@ -166,6 +167,7 @@ def test_runs_of_one_group_differ_in_their_seeds_alone(tmp_path, capsys):
     assert "has other settings than the last run of group 'detection'" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_answer_does_not_outlive_its_numbers(tmp_path):
     run_of(tmp_path / "a", "bifurcation-detection", SMALL, (1.0, 2.0))
     run_of(tmp_path / "b", "bifurcation-detection", SMALL, (1.0, 3.0))
@@ -245,6 +247,7 @@ def test_reliefs_of_any_number_of_genes_are_drawn(tmp_path, side):
     bending_light.draw_reliefs(store, tmp_path / "reliefs.png")
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("experiment", [goals_shape_eyes, bending_light, brains_and_acuity, learning_through_holes])
 def test_pages_come_from_their_stores(experiment, tmp_path, capsys):
     chance = np.random.default_rng(0)

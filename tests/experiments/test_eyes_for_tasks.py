@@ -124,6 +124,7 @@ def test_p_is_uniform_where_nothing_matters():
     assert abs(np.mean(np.array(found) < 0.1) - 0.1) < 3 * np.sqrt(0.1 * 0.9 / 200)
 
 
+@pytest.mark.slow
 def test_what_has_been_trained_is_not_trained_again(tmp_path, capsys):
     path = tmp_path / "lives.csv"
     asked = crossed([ANIMAL, replace(ANIMAL, n_eyes=1)], ("navigation",), (0.01,), (0,))
@@ -139,6 +140,7 @@ def test_what_has_been_trained_is_not_trained_again(tmp_path, capsys):
     assert Origin.read(path.with_suffix(".json")).whose == "worker"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kept", "earlier"), [(True, ("a" * 40,)), (False, ())])
 def test_rows_that_are_kept_keep_the_version_that_made_them(tmp_path, kept, earlier):
     path = tmp_path / "lives.csv"

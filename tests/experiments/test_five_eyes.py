@@ -6,6 +6,8 @@ import pytest
 import experiments.five_eyes as five
 from optics.numerics import backend
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def seen():

@@ -41,6 +41,7 @@ def test_a_landscape_is_found_again(lives):
     assert Check.of(shuffled, found).correlation < 0.3
 
 
+@pytest.mark.slow
 def test_lives_differ_by_chance_alone():
     animals = [Design("detection", 2, 15, 15, 45.0, 0.003, 0, relative_aperture=0.45, glass_power=1.0).animal] * 4000
     drawn = TRUE.lived(animals, EyeConfig(), np.random.default_rng(0))
@@ -60,6 +61,7 @@ def test_lives_of_a_record_are_those_of_its_phases():
     assert any(abs(life.blur / (life.aperture * 15 / math.sqrt(8)) - 1) > 0.3 for life in after)
 
 
+@pytest.mark.slow
 def test_searches_climb_what_there_is_to_climb(monkeypatch):
     """Where nobody differs, nothing is found; where light and sharpness pay, wider pupils with glass near focus."""
     monkeypatch.setitem(imitated_lenses.CASES, "short", ("search.generations=24",))
@@ -72,6 +74,7 @@ def test_searches_climb_what_there_is_to_climb(monkeypatch):
     assert found.strehl > lost.strehl or math.isnan(lost.strehl)
 
 
+@pytest.mark.slow
 def test_page(tmp_path, lives):
     rows = [searched("3 genes, 18 generations", seed, TRUE) for seed in (0, 1)]
     land = fitted(lives)

@@ -9,6 +9,7 @@ EXPERIMENTS = 4000
 BINOMIAL = 3 * np.sqrt(0.95 * 0.05 / EXPERIMENTS)  # three standard errors of a share of 0.95
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seeds", [2, 3, 6])
 def test_intervals_over_seeds_hold_the_mean_in_95_of_100(seeds):
     samples = np.random.default_rng(seeds).normal(size=(EXPERIMENTS, seeds))

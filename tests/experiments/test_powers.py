@@ -17,6 +17,7 @@ def test_exact_powers_are_found():
     assert law.error(a, b) == pytest.approx(0.3 * a**-0.4 * b**0.2)
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say():
     """Of 100 laws of 40 candidates, 95 in theory; a bootstrap of pairs is a little too narrow. 3.3 standard deviations
     of a count below 93."""
@@ -29,6 +30,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     assert 85 <= held <= 99
 
 
+@pytest.mark.slow
 def test_spread_is_what_is_not_explained():
     """Half of the variance is the size's, half is not."""
     chance = np.random.default_rng(2)

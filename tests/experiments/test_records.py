@@ -17,6 +17,7 @@ from experiments.candidates import Row, complete, rows_of
 from experiments.designed import Trained
 from experiments.evolved import stored
 from experiments.store import Origin, read_rows, write_rows
+from tests.slow_part import slow
 
 RESULTS = Path(__file__).parents[2] / "docs/results"
 RECORDS = sorted((RESULTS / "records").iterdir())
@@ -63,6 +64,7 @@ class Nobody:
         return iter(())
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("record", RECORDS, ids=lambda path: path.name)
 def test_search_still_proposes_what_is_on_record(record, tmp_path):
     """So that a record goes on where it ends: the loop asks for the first animal that is missing, and for no other."""
@@ -80,6 +82,7 @@ def test_search_still_proposes_what_is_on_record(record, tmp_path):
         evolve(Run.open(run.path), Nobody(), Nobody())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_pages_hold_what_is_on_record(page, tmp_path, monkeypatch):
     """Optical measures of each run's last generation alone: one eye takes seconds."""
@@ -115,7 +118,7 @@ def test_pages_of_designed_trainings_say_what_their_stores_say(page):
     assert made.markdown == (RESULTS / f"{page}.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", [slow(page) if page == "seeing_ultraviolet" else page for page in PAGES])
 def test_pages_say_what_their_stores_say(page):
     experiment = importlib.import_module(f"experiments.{page}")
     assert experiment.page(stored(RESULTS / "data" / page)).markdown == (RESULTS / f"{page}.md").read_text()

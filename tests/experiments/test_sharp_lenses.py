@@ -41,6 +41,7 @@ def test_glass_has_the_power_that_its_design_says():
         paraboloid(3.0, 0.5, 45.0, 1.9, EyeConfig())
 
 
+@pytest.mark.slow
 def test_lenses_are_sharpest_in_focus():
     for aperture in APERTURES:
         strehl = [lens_of(aperture, p).strehl for p in POWERS]
@@ -61,6 +62,7 @@ def test_what_sharpness_is_worth():
     assert "what sharpness adds is lost" in _message(unpaid)
 
 
+@pytest.mark.slow
 def test_lenses_far_from_focus_do_not_count():
     rows = lives(lambda _, power: 100 if abs(power - 1) < 0.25 else -1000)
     assert all(abs(worth(rows, aperture).mean) < 1 for aperture in APERTURES)

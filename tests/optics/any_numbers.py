@@ -3,16 +3,15 @@
 import math
 import os
 
-from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
-SLOW = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]
+from tests.slow_part import FAST_EXAMPLES, sweep
+
 WAVELENGTHS = (300e-9, 900e-9)
 
 
-def examples(count):
-    count *= int(os.environ.get("OPTICS_EXAMPLES", "1"))
-    return settings(max_examples=count, deadline=None, derandomize=True, suppress_health_check=SLOW)
+def examples(count, fast=FAST_EXAMPLES):
+    return sweep(count * int(os.environ.get("OPTICS_EXAMPLES", "1")), fast)
 
 
 def logarithmic(low, high):

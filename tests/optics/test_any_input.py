@@ -1,6 +1,6 @@
 """Whatever is asked of `psf`: a finite answer within its predicted error, or one line. Nothing else.
 
-OPTICS_EXAMPLES=20 python -m pytest tests/optics/test_any_input.py     tries twenty times as many inputs
+OPTICS_EXAMPLES=20 python -m pytest --all tests/optics/test_any_input.py     tries twenty times as many inputs
 """
 
 import math
@@ -161,7 +161,7 @@ def test_any_psf_is_within_its_predicted_error(request_):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@examples(10)
+@examples(10, fast=2)
 @given(requests(radius=(3e-7, 2e-5)))
 def test_any_method_answers_or_says_why(method, request_):
     pupil, asked = request_

@@ -1,6 +1,6 @@
 """Whatever is asked of `propagate`: a finite answer within its predicted error, or one line. Nothing else.
 
-OPTICS_EXAMPLES=20 python -m pytest tests/optics/test_any_propagation.py     tries twenty times as many inputs
+OPTICS_EXAMPLES=20 python -m pytest --all tests/optics/test_any_propagation.py     tries twenty times as many inputs
 """
 
 import math

@@ -7,6 +7,7 @@ import pytest
 
 import optics
 from tests.odd_arguments import complaints
+from tests.slow_part import slow
 
 LENS = optics.Pupil(20e-6, thin_lens_focal_length=240e-6)
 WIDE = optics.Pupil(100e-6, thin_lens_focal_length=240e-6)
@@ -152,7 +153,7 @@ FIELDS = {
 CALLS = SHAPES | ELEMENTS | SPECTRA | EYES | PICTURES | MEASURES | FIELDS
 
 
-@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize("name", [slow(name) if name in ("propagate", "vector_focus") else name for name in CALLS])
 def test_any_argument(name):
     assert complaints(getattr(optics, name), CALLS[name]) == {}
 

@@ -7,6 +7,7 @@ import pytest
 
 import optics
 from tests.odd_arguments import complaints
+from tests.slow_part import slow
 
 GREEN = {"wavelength": 500e-9}
 ANGLES = {"angle_x": np.array([0.0, 0.01]), "angle_y": np.array([0.0, 0.01])} | GREEN
@@ -109,7 +110,7 @@ CALLS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.parametrize("name", [slow(name) if name == "AppositionEye.contrast" else name for name in CALLS])
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # NaN in, NaN out
 def test_any_argument(name):
     assert complaints(*CALLS[name]()) == {}

@@ -48,6 +48,7 @@ def test_gradients_equal_central_differences(shape):
     assert float(n.grad) == pytest.approx(float(difference / 2e-5), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_lens_is_learnt_by_adam():
     """From a weak lens to the focus: an image loss in torch, the optics in Dr.Jit."""
     weak = 0.5 * BSplineRelief.paraboloid(0.0, 1 / (0.5 * 150e-6), 12e-6).control_points

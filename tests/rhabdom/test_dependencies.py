@@ -9,8 +9,11 @@ import tomllib
 from importlib import metadata
 from pathlib import Path
 
+import pytest
+
 from evolve.cli import doctor
 from evolve.store import versions
+from tests.sources import tree
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -27,7 +30,7 @@ def imported(*packages: str) -> set[str]:
     found = set()
     for package in packages:
         for path in (ROOT / package).rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for node in ast.walk(tree(path)):
                 if isinstance(node, ast.Import):
                     found |= {alias.name.split(".")[0] for alias in node.names}
                 elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -49,6 +52,7 @@ def test_the_doctor_asks_for_what_is_demanded_and_no_more():
     assert set(versions.PACKAGES) <= set(doctor.PACKAGES) | {"cma"}
 
 
+@pytest.mark.slow
 def test_optics_alone_runs_its_tutorial_on_three_packages():
     """All else is refused, as on a machine that has nothing else; but what these three import for themselves."""
     page = (ROOT / "docs/tutorial/optics.md").read_text()
@@ -87,6 +91,7 @@ def gpl() -> set[str]:
     return names
 
 
+@pytest.mark.slow
 def test_no_gpl_module_is_ever_imported(tmp_path):
     """Every module of ours, a search by each kind of optimizer; nevergrad's requirement shows what would be found."""
     assert "directsearch" in gpl()

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 ELSEWHERE = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
 PYTHON = f"python{sys.version_info.major}.{sys.version_info.minor}"

@@ -113,6 +113,7 @@ def test_candidates_that_are_not_there_are_named(run, tmp_path):
         policy.write_bytes(whole)
 
 
+@pytest.mark.slow
 def test_an_agent_can_be_taken_out_of_its_run(run):
     """As the tutorial says, through the package's own names."""
     opened = evolve.Run.open(run.path)
@@ -150,6 +151,7 @@ def test_policies_of_another_animal_or_damaged_are_named(run):
         policy.write_bytes(whole)
 
 
+@pytest.mark.slow
 def test_perfect_eyes_are_shown_the_same_light():
     """On the course a tenth of the light has been reflected more than once: a dusk eye sees it, and so do its
     pictures."""

@@ -86,12 +86,14 @@ def test_the_fine_picture_is_the_same_scene(episode):
     np.testing.assert_allclose(coarse, episode.perfect_signals[episode.radiance_frames], atol=0.08)
 
 
+@pytest.mark.slow
 def test_the_same_again(path, episode):
     again = record(Run.open(path, NAMED), radiance_every=8)
     np.testing.assert_equal(vars(again.scene), vars(episode.scene))
     np.testing.assert_equal(vars(replace(again, scene=episode.scene)), vars(episode))
 
 
+@pytest.mark.slow
 def test_replay_report_and_exr_show_it(path, call, tmp_path):
     code, out, _ = call("replay", path, "--task", NAMED, "--gif", "--json", "--out", tmp_path / "replay.html")
     assert code == 0
@@ -148,6 +150,7 @@ def test_another_task_is_refused(path, call, tmp_path):
     assert "has changed since the run began" in complaint
 
 
+@pytest.mark.slow
 def test_light_that_varies_is_in_what_is_recorded(tmp_path):
     """Dim light, and reddish: the scene as it is recorded is as dim, and the eyes report what is recorded."""
     films = []

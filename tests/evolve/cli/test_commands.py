@@ -48,6 +48,7 @@ def test_run_in_use_is_refused_by_process(call, tmp_path):
     assert standing["process"].startswith(str(os.getpid()))
 
 
+@pytest.mark.slow
 def test_machine_without_llvm_is_told_the_remedy_before_anything_is_written(tmp_path):
     environment = {**os.environ, "DRJIT_LIBLLVM_PATH": "/absent/libLLVM.so"}
     command = [sys.executable, "-m", "evolve", "run", "detection", "--out", str(tmp_path / "run")]

@@ -56,6 +56,7 @@ def test_its_eyes_have_evolved(shipped):
     assert shipped.best.success_rate > 0.6
 
 
+@pytest.mark.slow
 def test_demo_replays_reports_and_exports_it(call, tmp_path, monkeypatch):
     opened = []
     monkeypatch.setattr(products.webbrowser, "open", opened.append)

@@ -7,6 +7,7 @@ import pytest
 from evolve.cli import doctor
 from evolve.cli.main import main
 from optics.numerics import backend
+from tests.slow_part import slow
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,7 @@ def test_missing_package_is_not_good(monkeypatch):
     assert not findings["good"]
 
 
-@pytest.mark.parametrize(("platform", "supported"), [("linux", True), ("darwin", True), ("win32", False)])
+@pytest.mark.parametrize(("platform", "supported"), [slow("linux", True), slow("darwin", True), ("win32", False)])
 def test_systems_are_named(monkeypatch, platform, supported):
     said = doctor.unsupported(platform)
     assert (said is None) is supported

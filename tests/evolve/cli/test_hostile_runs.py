@@ -8,6 +8,7 @@ from evolve.store.directory import Run
 from tests.evolve.closed_form import tiny
 from tests.evolve.hostile_records import VALUES, line
 from tests.evolve.store.records import candidate
+from tests.slow_part import slow
 
 COMMANDS = ("status", "compare", "report", "replay", "resume", "export")
 CONFIGS = {
@@ -40,12 +41,13 @@ def refused(call, command, path, complaint):
     assert err.replace("\n", "").isprintable()
 
 
+@pytest.mark.parametrize("commands", [COMMANDS[:1], slow(COMMANDS[1:])], ids=[COMMANDS[0], "the others"])
 @pytest.mark.parametrize("damage", VALUES)
-def test_damaged_records_are_named_by_every_command(call, run, damage):
+def test_damaged_records_are_named_by_every_command(call, run, damage, commands):
     with (run.path / "candidates.jsonl").open("a") as file:
         file.write(line(*VALUES[damage]))
     before = {path: path.read_bytes() for path in run.path.rglob("*") if path.is_file()}
-    for command in COMMANDS:
+    for command in commands:
         refused(call, command, run.path, "candidates.jsonl, line 2: is damaged: ")
     assert {path: path.read_bytes() for path in run.path.rglob("*") if path.is_file()} == before
 

@@ -76,6 +76,7 @@ def test_failure_texts_and_names_of_directories_do_not_steer_the_terminal(call, 
     assert err.replace("\n", "").isprintable()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [(), ("--json",)], ids=["text", "json"])
 @pytest.mark.parametrize("closed", [("stdout",), ("stdout", "stderr")], ids=["head -1", "2>&1 head -1"])
 def test_a_run_goes_on_when_nobody_reads_any_more(tmp_path, options, closed):
@@ -110,6 +111,7 @@ def test_terminal_without_greek_letters_gets_the_genes():
     assert b"sigma = " in child.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("evaluate", ["deletes_the_run", "deletes_the_run_at_last"])
 def test_a_run_that_is_deleted_stays_deleted_and_says_so(tmp_path, evaluate):
     child = begin(tmp_path, evaluate, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -120,6 +122,7 @@ def test_a_run_that_is_deleted_stays_deleted_and_says_so(tmp_path, evaluate):
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_a_run_that_was_begun_anew_gets_nothing_from_the_former_one(tmp_path):
     """Both records are empty, and the new one may even be the same inode."""
     child = begin(tmp_path, "begins_another_run", stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -18,6 +18,7 @@ from optics.numerics import backend
 from tests.evolve.small_run import PHENOTYPE, small_config
 
 
+@pytest.mark.slow
 def test_animal_that_cannot_be_evaluated_is_named():
     """A retina far behind a rough relief of two millimetres: light spreads farther than optics follows it."""
     backend.require()
@@ -36,6 +37,7 @@ def test_a_life_that_fails_says_why(monkeypatch):
         _short_life(small_config(), PHENOTYPE, 0)
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_is_told_in_one_line(monkeypatch):
     monkeypatch.setattr(evolve.cli.pace, "_short_life", dies)
     monkeypatch.setattr(evolve.cli.pace, "prepare_device", None)
@@ -47,6 +49,7 @@ def dies(*_):
     os._exit(9)
 
 
+@pytest.mark.slow
 def test_pace_is_measured_with_the_real_thing(tmp_path, short_episodes):
     backend.require()
     config = small_config()

@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from evolve.config.assemble import assemble
@@ -13,6 +13,7 @@ from evolve.config.run_config import ConfigError
 from evolve.genome.anatomy import fitted
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop, repaired
+from tests.slow_part import sweep
 
 CROWDED = assemble(
     "detection",
@@ -37,7 +38,7 @@ def genome(**values):
     return vector
 
 
-@settings(max_examples=300, deadline=None)
+@sweep(300, fast=20)
 @given(st.lists(st.floats(0, 1), min_size=GENOTYPE.dimension, max_size=GENOTYPE.dimension))
 def test_no_animal_has_eyes_or_receptors_that_overlap(vector):
     animal = develop(np.array(vector), CROWDED)
@@ -92,7 +93,7 @@ def alike(asked, fit):
     return math.log((asked[0] - 0.5) / (fit[0] - 0.5)) ** 2 + math.log(asked[1] / fit[1]) ** 2
 
 
-@settings(max_examples=300, deadline=None)
+@sweep(300, fast=20)
 @given(st.integers(3, 24), st.integers(2, 24), st.floats(0, 180), st.sampled_from([60.0, 140.0, 180.0]), st.booleans())
 def test_wide_eyes_give_way_as_little_as_will_do(eyes, receptors, range_deg, widest, bounded):
     """Held against all pairs that fit, from the lowest up."""

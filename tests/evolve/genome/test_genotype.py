@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import sim
@@ -14,6 +14,7 @@ from evolve.genome.genes import ALL_GENES, APERTURE_SHAPES, LAMBDA_MAX
 from evolve.genome.genotype import CLUSTERS, GENES, Genotype, group_members
 from evolve.genome.phenotype import Phenotype, develop
 from optics import BSplineRelief
+from tests.slow_part import sweep
 
 CONFIG = assemble("detection")
 GENOTYPE = Genotype(CONFIG.genome)
@@ -24,7 +25,7 @@ def test_start_is_one_eye_with_one_photoreceptor_behind_45_degrees():
     assert (animal.n_eyes, animal.resolution, animal.fov_deg) == (1, (1, 1), 45.0)
 
 
-@settings(max_examples=200, deadline=None)
+@sweep(200, fast=50)
 @given(st.lists(st.floats(-0.5, 1.5), min_size=GENOTYPE.dimension, max_size=GENOTYPE.dimension))
 def test_every_genome_decodes_into_the_genes_ranges(genome):
     for name, value in GENOTYPE.decode(np.array(genome)).items():

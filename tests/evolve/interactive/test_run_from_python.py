@@ -113,6 +113,7 @@ def test_what_cannot_be_used_is_refused_before_anything_is_written(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_a_script_needs_no_guard(tmp_path):
     """Workers do not run the script again, which would begin another run in each of them."""
     script = tmp_path / "script.py"
@@ -157,6 +158,7 @@ def test_notebooks_are_the_tutorials(maker, name):
         assert (NOTEBOOKS / target.partition("#")[0]).exists(), target
 
 
+@pytest.mark.slow
 def test_a_notebook_runs_as_jupyter_runs_it(tmp_path, monkeypatch):
     """The one whose cells show tables and figures; they print what the page shows."""
     monkeypatch.setenv("PYTHONPATH", str(ROOT))

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import pytest
 import torch
 
 from evolve.learning.adam import EPSILON, Adam
@@ -29,6 +30,7 @@ def test_steps_are_those_of_torchs_adam():
     assert (ours - trained(torch.optim.Adam, eps=1e-2)).abs().max() > 1e-4
 
 
+@pytest.mark.slow
 def test_a_policy_is_built_without_torchs_compiler():
     """torch._dynamo takes seconds to import; every worker process would pay for it."""
     code = (

@@ -70,6 +70,7 @@ def test_a_frozen_animal_is_the_runs_best(folder):
         run.frozen(sim.Task(), 7)
 
 
+@pytest.mark.slow
 def test_the_other_evolves_before_it(folder):
     """The hunter's life is another before prey that stands still, and the same twice."""
     config, animal = lived(f"{folder / 'hunter.py'}:Hunter")

@@ -77,6 +77,7 @@ def test_same_seed_same_life(outcome, tmp_path):
     assert other.returns != evaluation.returns
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("most", "expected"), [(4096.0, None), (3.0, 3.0)])
 @pytest.mark.parametrize("resolution", [(3, 4), (1, 1)])
 def test_training_looks_less_closely_than_evaluation(resolution, most, expected, tmp_path, monkeypatch):
@@ -117,6 +118,7 @@ def test_a_training_that_diverges_is_a_failure_with_a_reason(tmp_path, monkeypat
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_unseen_mazes_are_seen_by_the_evaluation_alone(tmp_path):
     """The same training, other episodes after it; with more mazes, another training."""
     outcomes = {}

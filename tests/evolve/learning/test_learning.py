@@ -6,6 +6,7 @@ reach objects at all.
 """
 
 import numpy as np
+import pytest
 import torch
 from torch import nn
 
@@ -67,6 +68,7 @@ def accuracy_of_telling_goal_from_adversary(resolution, seed):
         return float(((answer(unseen) > 0) == (goal[unseen] > 0.5)).float().mean())
 
 
+@pytest.mark.slow
 def test_many_receptors_tell_goal_from_adversary_and_one_does_not():
     """Measured over two seeds: above .99 and .53-.55; chance is .5. With units of tanh it was .93-.97."""
     sharp = accuracy_of_telling_goal_from_adversary((15, 15), seed=0)
@@ -75,6 +77,7 @@ def test_many_receptors_tell_goal_from_adversary_and_one_does_not():
     assert single < 0.65, (sharp, single)
 
 
+@pytest.mark.slow
 def test_ppo_learns_to_reach_objects():
     """Untrained, an agent stays at a wall, which costs 1 per action. Measured over two seeds: return -2.2 and -2.5
     after, goal first .36 and .42 (chance of an agent that reaches some object: 1/3)."""

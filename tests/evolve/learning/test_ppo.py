@@ -22,6 +22,7 @@ def learn(config=QUICK, seed=0, worlds=None, progress=None, **eyes):
     return train(both, SMALL, config, seed, progress)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("memory", [1, 4])
 def test_learns_to_reach_what_it_sees(memory):
     """Measured over three seeds: 1.0 after 8000 steps with sight, 0.0 without."""
@@ -30,6 +31,7 @@ def test_learns_to_reach_what_it_sees(memory):
     assert play(training.policy, BrightSpot(64, memory=memory), 99).successes.mean() > 0.9
 
 
+@pytest.mark.slow
 def test_the_blind_do_not():
     assert play(learn(blind=True).policy, BrightSpot(64, blind=True), 99).successes.mean() < 0.2
 
@@ -95,6 +97,7 @@ class Dear(BrightSpot):
         return observation, 1000 * reward, done, infos
 
 
+@pytest.mark.slow
 def test_the_unit_of_rewards_does_not_matter():
     training = learn(worlds=Dear(16))
     assert play(training.policy, BrightSpot(64), 99).successes.mean() > 0.9
@@ -114,7 +117,7 @@ class Poor(BrightSpot):
 def test_the_unit_stays_where_nothing_is_paid_and_is_that_of_the_first_rewards():
     """Returns are then what the critic says, discounted: a unit that followed them would halve with each rollout."""
     model = AdaptingPPO(Poor(16), SMALL, QUICK, 0)
-    model.learn(20 * 512)
+    model.learn(6 * 512)
     assert model.env.unit == 1
     late = Poor(16)
     late.first = 3 * 512
@@ -157,6 +160,7 @@ def test_learners_pay_their_share_of_contact(ramp, cost):
     assert np.median(-model.rollout_buffer.rewards) == pytest.approx(cost, rel=1e-6)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("pieces", [(2560,), (512, 2048), (512,) * 5])
 def test_learning_slows_down_with_steps_in_whatever_pieces(pieces):
     """It stays as it is for 640 steps. Passes times rate then fall as one over the steps: by passes when the rate has
@@ -179,6 +183,7 @@ def test_learning_slows_down_with_steps_in_whatever_pieces(pieces):
     assert max(rates) <= 4e-3
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(("neurons", "rate"), [(16, 4e-3), (64, 4e-3), (144, 4e-3 * 2 / 3), (256, 2e-3)])
 def test_large_brains_take_smaller_steps(neurons, rate):
     config = LearningConfig(n_envs=16, n_steps=32, batch_size=128, learning_rate=4e-3)

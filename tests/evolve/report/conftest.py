@@ -18,8 +18,15 @@ def episode(run):
 
 
 @pytest.fixture(scope="package")
-def content(run, episode):
-    return render(run, episode).decode()
+def rendered(run, episode):
+    """The page, and what was reported while it was made."""
+    told = []
+    return render(run, episode, lambda what, share: told.append((what, share))).decode(), told
+
+
+@pytest.fixture(scope="package")
+def content(rendered):
+    return rendered[0]
 
 
 @pytest.fixture(scope="package")

@@ -14,6 +14,7 @@ from evolve.report.views import through
 from optics.spectra.bands import daylight
 
 
+@pytest.mark.slow
 def test_noise_free_view_is_what_the_animal_sees(run):
     """Convolution of the fine picture against rays drawn from the receptive fields: two ways to the same signals."""
     calm = replace(run.config, eye=replace(run.config.eye, noise_sigma=0.0, rays_per_receptor=64))
@@ -73,6 +74,7 @@ def test_height_map_lies_the_right_way_up():
     assert heights[-1].mean() > 100 * max(heights[0].mean(), 1e-12)
 
 
+@pytest.mark.slow
 def test_the_mtf_is_drawn_beside_its_limit_up_to_the_cutoff(run, monkeypatch):
     drawn = []
     monkeypatch.setattr(eye_figures, "inline", lambda figure, *_: drawn.append(figure.axes[0]) or html("picture"))

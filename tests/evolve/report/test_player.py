@@ -82,6 +82,7 @@ def test_long_films_of_many_receptors_are_thinned(episode, tmp_path):
     assert len(film["position"]) == len(film["total"]) == len(film["times"])
 
 
+@pytest.mark.slow
 def test_a_task_may_name_no_reward(tmp_path):
     """One of somebody's own; what it earned is then nothing, at every moment."""
     config, animal = small("genome.placement_range_deg.start=40", named=written(tmp_path, NEAR, "{}"))

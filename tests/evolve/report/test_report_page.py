@@ -96,6 +96,7 @@ def test_references_inside_figures_lead_somewhere(content, page):
     assert targets <= set(page.ids)
 
 
+@pytest.mark.slow
 def test_same_run_same_bytes_other_data_other_page(run, episode, content, tmp_path):
     assert render(run, episode).decode() == content
     other = shutil.copytree(run.path, tmp_path / run.path.name)
@@ -106,6 +107,7 @@ def test_same_run_same_bytes_other_data_other_page(run, episode, content, tmp_pa
     assert [row[2] for row in Page(changed).rows["all-candidates"][1:]][-1] == "8.50"
 
 
+@pytest.mark.slow
 def test_write_records_and_names_the_file(run):
     path = write(run)
     assert path == run.path / "report.html"
@@ -189,10 +191,9 @@ def test_a_population_is_drawn_as_its_median_between_its_tenth_and_its_ninetieth
     assert {tuple(corner) for corner in band.get_paths()[0].vertices} >= {(0, 1), (2, 3), (0, 4), (2, 6)}
 
 
-def test_who_waits_is_told_what_is_made_and_how_much_has_been(run, episode):
+def test_who_waits_is_told_what_is_made_and_how_much_has_been(rendered):
     """Every section once, and each champion whose view is computed."""
-    told = []
-    render(run, episode, lambda what, share: told.append((what, share)))
+    _, told = rendered
     shares = [share for _, share in told]
     assert shares[0] == 0
     assert shares == sorted(shares)

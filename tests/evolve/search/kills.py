@@ -1,6 +1,6 @@
 """kill -9 at random moments of a run, again and again, until it is finished; the same run, killed by nobody, beside it.
 
-    RHABDOM_KILLS=500 python -m pytest tests/evolve/search/test_kill.py
+    RHABDOM_KILLS=500 python -m pytest --all tests/evolve/search/test_kill.py
 
 Each child is forked from a process that has loaded everything, so that a kill costs milliseconds and can hit any line
 of search, record and lock. What is evaluated is known in closed form and takes a millisecond.

@@ -103,6 +103,7 @@ def carried(path, config, executor):
     return Run.open(path), onlooker
 
 
+@pytest.mark.slow
 def test_history_is_the_local_one(tmp_path, cluster):
     config = tiny()
     far, onlooker = carried(tmp_path / "dask", config, cluster.executor("bowl"))
@@ -115,6 +116,7 @@ def test_history_is_the_local_one(tmp_path, cluster):
         assert far.policy_path(candidate.id).read_bytes() == f"policy {candidate.seed}".encode()
 
 
+@pytest.mark.slow
 def test_history_of_successive_halving_is_the_local_one(tmp_path, cluster, monkeypatch):
     """Trainings go from worker to worker, and a worker has no files of another's."""
     monkeypatch.setenv("RHABDOM_TEST", str(tmp_path))
@@ -130,6 +132,7 @@ def test_history_of_successive_halving_is_the_local_one(tmp_path, cluster, monke
     assert set(cluster.calls().values()) == {1, 2, 3}, "nobody begins a stage twice"
 
 
+@pytest.mark.slow
 def test_failures_and_infinities_come_through(tmp_path, cluster):
     with cluster.executor("fails_for_some") as executor:
         found = {job.id: outcome for job, outcome in executor.run(jobs(tmp_path))}
@@ -139,6 +142,7 @@ def test_failures_and_infinities_come_through(tmp_path, cluster):
     assert executor.count == 2
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_no_animals_failure(tmp_path, cluster):
     with (
         cluster.executor("disk_full") as executor,
@@ -147,6 +151,7 @@ def test_a_full_disk_is_no_animals_failure(tmp_path, cluster):
         list(executor.run(jobs(tmp_path)))
 
 
+@pytest.mark.slow
 def test_settings_that_cannot_be_used_are_no_animals_failure(tmp_path, cluster):
     with (
         cluster.executor("cannot_begin") as executor,
@@ -155,6 +160,7 @@ def test_settings_that_cannot_be_used_are_no_animals_failure(tmp_path, cluster):
         list(executor.run(jobs(tmp_path)))
 
 
+@pytest.mark.slow
 def test_worker_killed_in_mid_candidate_is_replaced_and_its_candidate_evaluated_again(tmp_path, cluster):
     cluster.calls()
     with cluster.executor("killed_once") as executor:
@@ -164,6 +170,7 @@ def test_worker_killed_in_mid_candidate_is_replaced_and_its_candidate_evaluated_
     assert all(outcome.failure is None for outcome in found.values())
 
 
+@pytest.mark.slow
 def test_candidate_that_kills_its_worker_thrice_has_failed(tmp_path, cluster):
     cluster.calls()
     with cluster.executor("killed_always") as executor:
@@ -173,6 +180,7 @@ def test_candidate_that_kills_its_worker_thrice_has_failed(tmp_path, cluster):
     assert found[0].failure is None
 
 
+@pytest.mark.slow
 def test_what_is_added_meanwhile_is_evaluated_too(tmp_path, cluster):
     all_jobs = jobs(tmp_path, 5)
     queue, found = deque(all_jobs[:2]), []
@@ -184,6 +192,7 @@ def test_what_is_added_meanwhile_is_evaluated_too(tmp_path, cluster):
     assert sorted(found) == list(range(5))
 
 
+@pytest.mark.slow
 def test_candidate_that_nobody_wants_any_more_is_given_up(tmp_path, cluster):
     """As after Ctrl-C: it would go on for half a minute."""
     told, beats = [], cluster.folder / "beats.log"
@@ -205,6 +214,7 @@ def test_candidate_that_nobody_wants_any_more_is_given_up(tmp_path, cluster):
         assert time.monotonic() < deadline, "it goes on"
 
 
+@pytest.mark.slow
 def test_worker_with_other_software_is_refused(tmp_path, cluster, monkeypatch):
     monkeypatch.setattr(dask_worker, "_software", lambda: {"torch": "0.4", "numpy": ""})
     with (
@@ -220,6 +230,7 @@ def test_nobody_there_is_said_in_one_line(tmp_path):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_scheduler_that_comes_back_is_asked_again(tmp_path):
     cluster = Cluster(tmp_path)
     cluster.start(workers=1)
@@ -243,6 +254,7 @@ def test_scheduler_that_comes_back_is_asked_again(tmp_path):
     assert history(Run.open(run.path)) == history(local)
 
 
+@pytest.mark.slow
 def test_behind_certificates_the_history_is_the_same_and_strangers_stay_outside(tmp_path):
     """Whoever holds no certificate that the scheduler knows gets no answer: no encryption, or another's."""
     own, another = certificates(tmp_path), certificates(tmp_path, "another")
@@ -266,6 +278,7 @@ def test_behind_certificates_the_history_is_the_same_and_strangers_stay_outside(
     assert history(far) == history(local)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_gone_for_good_ends_the_run(tmp_path):
     """A closed connection is made anew, for as long as patience lasts."""
     executor = DaskExecutor("tcp://127.0.0.1:9", patience_s=0.5)

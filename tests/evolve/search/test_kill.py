@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.slow_part import slow
+
 ROOT = Path(__file__).parents[3]
 KILLS = int(os.environ.get("RHABDOM_KILLS", "50"))
 TRAINING_KILLS = int(os.environ.get("RHABDOM_TRAINING_KILLS", "3"))
@@ -58,6 +60,7 @@ def tensors(policy):
     return content[8 + int.from_bytes(content[:8], "little") :]
 
 
+@pytest.mark.slow
 def test_killed_run_resumes_to_the_history_of_an_uninterrupted_one(tmp_path):
     config = tmp_path / "small.toml"
     config.write_text(SMALL)
@@ -87,7 +90,9 @@ def test_killed_run_resumes_to_the_history_of_an_uninterrupted_one(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("script", "kills"), [("kills.py", KILLS), ("training_kills.py", TRAINING_KILLS)], ids=["search", "training"]
+    ("script", "kills"),
+    [("kills.py", 5), slow("kills.py", KILLS), slow("training_kills.py", TRAINING_KILLS)],
+    ids=["search", "search again and again", "training"],
 )
 def test_kills_at_random_moments_change_nothing(tmp_path, script, kills):
     """In a process of its own, because it forks; its seed is printed, for those who want to see a failure again."""

@@ -56,6 +56,7 @@ def test_run_holds_every_candidate_with_its_seed(whole):
     assert calls(whole.path) == dict.fromkeys(range(12), 1)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("until", [1, 4, 6])
 def test_interrupted_run_continues_to_the_same_history(tmp_path, whole, until):
     path = tmp_path / "run"
@@ -107,6 +108,7 @@ def steady(tmp_path_factory):
     return carry(tmp_path_factory.mktemp("steady") / "run", tiny(*STEADY))[0]
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("until", [1, 4, 7])
 @pytest.mark.parametrize("optimizer", ["CMA", "mutation", "DE"])
 def test_interrupted_steady_state_continues_to_the_same_history(tmp_path, optimizer, until):
@@ -155,6 +157,7 @@ class Imagined:
         return self.busy / (self.workers * self.now)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("workers", [8, 16])
 def test_steady_state_keeps_workers_busy_that_would_wait_for_a_generation(tmp_path, workers):
     """Sixteen workers for a generation of sixteen: all wait for the slowest. docs/cluster.md has the numbers."""

@@ -44,6 +44,7 @@ def test_genomes_stay_in_the_unit_cube(optimizer):
     assert asked.max() <= 1
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("frozen", [(), ("genome.morphological.open=false",)], ids=["many genes", "few genes"])
 def test_first_generation_spreads_by_sigma_around_the_start(frozen):
     """nevergrad scales the step in bounded spaces, by dimension; ours must not depend on that."""
@@ -63,6 +64,7 @@ def test_search_converges():
     assert distance[-1] < 0.05 * distance[0]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("genes", ["morphological", "neural"])
 def test_search_converges_where_the_best_lies_at_the_end_of_all_ranges(genes, seed):

@@ -86,18 +86,19 @@ def test_the_better_go_on_and_the_search_is_told_how_far_each_came(tmp_path, mon
     assert not list((run.path / "trainings").iterdir()), "a generation that is done leaves no trainings behind"
 
 
-def test_interrupted_anywhere_it_goes_on_to_the_same_history(tmp_path, monkeypatch):
-    (tmp_path / "a").mkdir()
-    whole, _ = carry(tmp_path / "a" / "run", tiny(*HALVING), monkeypatch)
-    for until in (3, 9, 12, 13, 20, 26):
-        folder = tmp_path / str(until)
-        folder.mkdir()
-        with pytest.raises(KeyboardInterrupt):
-            carry(folder / "run", tiny(*HALVING), monkeypatch, until=until)
-        kept = (folder / "run" / "candidates.jsonl").read_bytes()
-        run, _ = carry(folder / "run", None, monkeypatch)
-        assert (folder / "run" / "candidates.jsonl").read_bytes().startswith(kept)
-        assert lines(run) == lines(whole)
+@pytest.mark.fast_cases(1)
+@pytest.mark.parametrize("until", [9, 3, 12, 13, 20, 26])
+def test_interrupted_anywhere_it_goes_on_to_the_same_history(tmp_path, monkeypatch, until):
+    for folder in ("whole", "interrupted"):
+        (tmp_path / folder).mkdir()
+    whole, _ = carry(tmp_path / "whole" / "run", tiny(*HALVING), monkeypatch)
+    path = tmp_path / "interrupted" / "run"
+    with pytest.raises(KeyboardInterrupt):
+        carry(path, tiny(*HALVING), monkeypatch, until=until)
+    kept = (path / "candidates.jsonl").read_bytes()
+    run, _ = carry(path, None, monkeypatch)
+    assert (path / "candidates.jsonl").read_bytes().startswith(kept)
+    assert lines(run) == lines(whole)
 
 
 def test_who_is_killed_after_the_last_line_leaves_no_trainings_behind(tmp_path, monkeypatch, call):
@@ -147,6 +148,7 @@ def test_progress_of_a_stage_that_fails_never_runs_backwards(tmp_path, monkeypat
     assert counting.paces == sorted(counting.paces)
 
 
+@pytest.mark.slow
 def test_a_lost_checkpoint_is_trained_again(tmp_path, monkeypatch):
     (tmp_path / "a").mkdir()
     whole, _ = carry(tmp_path / "a" / "run", tiny(*HALVING), monkeypatch)

@@ -1,6 +1,6 @@
 """kill -9 at random moments of real PPO trainings, in stages and whole, against the same runs, killed by nobody.
 
-    RHABDOM_TRAINING_KILLS=100 python -m pytest tests/evolve/search/test_kill.py -k training
+    RHABDOM_TRAINING_KILLS=100 python -m pytest --all tests/evolve/search/test_kill.py -k training
 
 As `kills`, but each candidate learns: children are forked from a process that has loaded the libraries, and has not yet
 started a thread of theirs.

@@ -61,6 +61,7 @@ def grid_spectrum(soft, fx, fy, rate):
     return np.einsum("fy,yx,fx->f", waves_y, sampled, waves_x) / rate**2
 
 
+@pytest.mark.fast_cases(12)
 @shapes
 @pytest.mark.parametrize(("ripple", "passband"), [(1e-3, 6.0), (1e-6, 2.0), (1e-8, 15.0), (1e-10, 4.0)])
 def test_spectrum_is_the_closed_form_then_nothing(shape, ripple, passband):
@@ -108,6 +109,7 @@ def test_one_or_zero_beyond_the_reach(shape):
     assert error[distance < soft.reach / 4].max() > 0.1
 
 
+@pytest.mark.fast_cases(14)
 @shapes
 @pytest.mark.parametrize(
     ("cycles", "digits"), [(0.3, 12), (0.5, 12), (3.0, 3), (3.0, 6), (3.0, 10), (25.0, 4), (25.0, 9)]
@@ -124,6 +126,7 @@ def test_nodes_integrate_plane_waves(shape, cycles, digits):
     assert nodes.weight.sum() == pytest.approx(shape.area, rel=10.0**-digits)
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("name", ["circle", "annulus", "hexagon", "U", "slit"])
 @pytest.mark.parametrize(("cycles", "digits"), [(10.0, 6), (40.0, 9)])
 def test_nodes_are_not_wasted(name, cycles, digits):

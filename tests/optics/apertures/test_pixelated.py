@@ -33,6 +33,7 @@ def exact(opening):
     return np.sum(nodes.weight * wave(nodes.x, nodes.y))
 
 
+@pytest.mark.fast_cases(10)
 @pytest.mark.parametrize("count", [1, 2, 5, 16, 33])
 @pytest.mark.parametrize("digits", [3.0, 6.0, 10.0])
 def test_nodes_are_as_good_as_they_are_asked_to_be(opening, exact, count, digits):
@@ -42,6 +43,7 @@ def test_nodes_are_as_good_as_they_are_asked_to_be(opening, exact, count, digits
     assert np.all(opening.contains(nodes.x, nodes.y))
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize("count", [16, 33])
 @pytest.mark.parametrize("digits", [3.0, 6.0, 10.0])
 def test_rows_and_columns_of_nodes_are_as_good(opening, exact, count, digits):
@@ -62,6 +64,7 @@ def test_pixels_cannot_be_left_out_or_taken_whole():
     assert np.sum(PixelatedAperture(circle, count).nodes(0.0, 6.0).weight) == pytest.approx(circle.area, rel=1e-7)
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("count", [5, 16])
 def test_no_panel_crosses_a_border_between_pixels(opening, count):
     """A function that jumps there, another number in every pixel, is integrated like each pixel by itself."""
@@ -109,6 +112,7 @@ def test_edges_that_slant_have_nodes_for_what_they_slide_by(opening, count, cycl
     assert abs(turning(PixelatedAperture(opening, count).nodes(cycles, 5.0)) - exact) < 1e-5 * opening.area
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("inner", [0.5 + 1e-6, 0.501, 0.53])
 @pytest.mark.parametrize("count", [3, 4, 7, 8])
 def test_a_border_that_nearly_touches_a_circle_does_no_harm(inner, count):

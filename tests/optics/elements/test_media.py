@@ -122,6 +122,7 @@ def best_distance(eye, wavelength, near):
     return minimize_scalar(blur, bounds=(0.96 * near, 1.04 * near), method="bounded", options={"xatol": near * 1e-6}).x
 
 
+@pytest.mark.slow
 def test_longitudinal_chromatic_aberration_of_the_human_eye():
     """One refracting surface of 5.55 mm between air and Thibos' medium: its focus over the spectrum against the curve
     that Thibos et al. (1992, eq. 5) fit to their observers, Rx = 1.68524 - 0.63346/(λ - 0.21410) [D], λ in µm."""

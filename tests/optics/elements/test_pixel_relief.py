@@ -36,7 +36,8 @@ class TestGratings:
             peaks.append(window.psf.max())
         return peaks[1] / peaks[0]
 
-    @pytest.mark.parametrize(("levels", "order"), [(2, 1), (2, -1), (2, 3), (4, 1), (4, -3), (8, 1), (8, -7)])
+    @pytest.mark.fast_cases(3)
+    @pytest.mark.parametrize(("levels", "order"), [(2, 1), (4, 1), (2, -1), (2, 3), (4, -3), (8, 1), (8, -7)])
     def test_efficiency_of_a_staircase(self, levels, order):
         """sinc²(m/N), 0.405, 0.811, 0.950 in the first order (Swanson 1989). Off the axis the lens focuses a little
         nearer, and less light goes aslant: 1 % in the seventh order."""
@@ -65,6 +66,7 @@ class TestLenses:
         pupil = Pupil(self.RADIUS, PixelRelief(heights))
         return optics.strehl_ratio(optics.psf(pupil, [WAVELENGTH], self.FOCAL_LENGTH, shape=(65, 65), **options))[0]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("levels", [2, 4, 8])
     def test_a_lens_of_levels_focuses_as_a_grating_of_as_many(self, levels):
         """sinc²(1/N), beside the lens of as many pixels of any height (pixels by themselves cost 2 %). Of two levels
@@ -77,9 +79,10 @@ class TestLenses:
 
     def test_whole_waves_change_nothing(self):
         """A wrapped lens is the lens: the pixels of a Fresnel lens, at its wavelength."""
-        whole = self.lens(48)
+        whole = self.lens(24)
         assert self.strehl(whole % WAVE) == pytest.approx(self.strehl(whole), rel=1e-5)
 
+    @pytest.mark.slow
     def test_finer_pixels_become_the_smooth_relief(self):
         """Each pixel's phase is off by its slope times the place in it, in the mean by the square of its width."""
         counts, off = (64, 128, 256), []
@@ -107,6 +110,7 @@ class TestMethods:
         options = {"dx": 0.5e-6, "shape": (41, 37), "tolerance": tolerance, "dtype": dtype, **options}
         return optics.psf(pupil, [WAVELENGTH], 150e-6, method=method, **options)
 
+    @pytest.mark.fast_cases(4)
     @pytest.mark.parametrize("opening", OPENINGS)
     @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-8])
     def test_all_keep_the_tolerance(self, opening, tolerance):
@@ -153,6 +157,7 @@ class TestMethods:
         with pytest.raises(AccuracyError, match=r"pixelated relief.*method='auto' or one of low_rank, angular"):
             self.seen(method, Circle())
 
+    @pytest.mark.fast_cases(4)
     @pytest.mark.parametrize("method", METHODS)
     @pytest.mark.parametrize("name", ["radius", "n", "distance"])
     def test_derivatives(self, method, name):
@@ -177,6 +182,7 @@ class TestMethods:
         dr.forward(x)
         assert dr.grad(out).numpy()[0] == pytest.approx((high - low) / (2 * step), rel=1e-4)
 
+    @pytest.mark.fast_cases(2)
     @pytest.mark.parametrize("method", METHODS)
     def test_derivatives_by_the_pixels(self, method):
         import drjit as dr
@@ -244,6 +250,7 @@ class TestScatter:
         in_the_opening[0, 0] = 1e-6
         assert Pupil(1e-3, PixelRelief(in_the_opening), aperture=Slit(0.2, 0.2)).scatter(WAVELENGTH, 0.01) == 0
 
+    @pytest.mark.slow
     def test_light_that_goes_everywhere_is_seen_too(self):
         """Of noise in glass, as far as the eye's rim: its cells together have what a wide window holds of the light."""
         noise = PixelRelief(np.random.default_rng(0).random((32, 32)) * 1e-6)

@@ -113,6 +113,7 @@ def test_samples_of_a_gaussian_are_one():
     assert relative_l2(sampled, known) < 1e-4
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("aperture", [TELESCOPE, optics.Circle(), Rings([0.2, 0.5, 0.7, 1.0])], ids=repr)
 @pytest.mark.parametrize("method", ["low_rank", "far_field", "angular_spectrum", "split_angular_spectrum"])
 def test_methods_agree(aperture, method):
@@ -147,6 +148,7 @@ def test_a_zone_plate_has_a_focus():
     assert abs(field) ** 2 == pytest.approx(len(path) ** 2, rel=0.05)
 
 
+@pytest.mark.slow
 def test_pixels_and_masks_go_together():
     steps = optics.PixelRelief(np.random.default_rng(0).random((5, 5)) * 0.5e-6)
     pupil = Pupil(R, steps, mask=MaskMap(smooth()), aperture=TELESCOPE)

@@ -39,6 +39,7 @@ def integral_error(samples, size, from_cell):
     return np.linalg.norm(found - exact) / np.linalg.norm(exact)
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("from_cell", [False, True])
 @pytest.mark.parametrize("cycles", [0.1, 0.5, 0.95, 1.0, 1.5, 1.95, 2.0, 3.0])
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-5])
@@ -47,7 +48,8 @@ def test_error_is_within_a_third_of_the_tolerance(tolerance, cycles, from_cell):
     assert integral_error(samples_per_cycle(tolerance, cycles), cycles, from_cell) < tolerance / 3
 
 
-@pytest.mark.parametrize(("cycles", "fewer"), [(0.1, 0.25), (0.5, 0.5)])
+@pytest.mark.fast_cases(1)
+@pytest.mark.parametrize(("cycles", "fewer"), [(0.5, 0.5), (0.1, 0.25)])
 def test_samples_that_larger_cells_need_are_too_few_for_smaller_ones(cycles, fewer):
     """The rule is no luxury: with as many as larger cells get, a third of a hundredth is exceeded."""
     assert integral_error(samples_per_cycle(1e-2, cycles) - fewer, cycles, False) > 1e-2 / 3

@@ -137,6 +137,7 @@ class TestKernel:
             assert mean == pytest.approx(spread, abs=0.3 * cell)
             assert np.abs(np.cumsum(wave) - np.cumsum(ray)).max() < 0.05  # Kolmogorov's distance
 
+    @pytest.mark.fast_cases(2)
     @pytest.mark.parametrize("seed", range(4))
     def test_cells_hold_the_integral_of_a_finer_psf(self, seed):
         import optics

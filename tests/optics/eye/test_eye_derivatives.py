@@ -51,6 +51,7 @@ def difference(name):
     return (8 * (at[2] - at[1]) - (at[3] - at[0])) / (12 * STEP)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("name", START)
 def test_see_follows_central_differences(name):
     import drjit as dr
@@ -86,6 +87,7 @@ def test_kernel_follows_central_differences():
     assert np.linalg.norm(found - expected) < 1e-4 * np.linalg.norm(expected)
 
 
+@pytest.mark.slow
 def test_image_quality_follows_the_aperture_through_the_throughput():
     """At a noise floor, a wider pupil is brighter: quality's derivative holds the one of a² too."""
     import drjit as dr

@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from optics import AccuracyError, Eye, HumanEye, PhotonBudget, Pupil
 from optics.eye import receptive_field
 from optics.eye.band_choice import choose_bands
+from tests.slow_part import sweep
 
-QUIETLY = settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 ODD = [0, -1, 0.5, math.nan, math.inf, -math.inf, 1e-300, 1e300, "auto", "much", None, (1, 2), [], b"x"]
 # The first few are what people mean.
 numbers = st.one_of(st.floats(0.01, 50), st.integers(1, 20), st.sampled_from(ODD))
@@ -26,7 +26,7 @@ def refused(error):
     return True
 
 
-@QUIETLY
+@sweep(40)
 @given(
     resolution=st.one_of(st.tuples(st.integers(1, 12), st.integers(1, 12)), numbers),
     fov_deg=numbers,
@@ -52,7 +52,7 @@ def test_any_eye_sees_or_is_refused(**arguments):
     assert str(table)
 
 
-@settings(QUIETLY, max_examples=10)
+@sweep(10, fast=2)
 @given(a=st.floats(0.02, 1), defocus=st.floats(0.3, 3), fov_deg=st.floats(5, 100), sigma=st.floats(0, 1))
 def test_any_lens_is_described_or_refused(a, defocus, fov_deg, sigma):
     distance = Eye(fov_deg=fov_deg).sensor_distance
@@ -71,7 +71,7 @@ def test_any_lens_is_described_or_refused(a, defocus, fov_deg, sigma):
     assert found.acceptance_angle_deg > 0.9 * found.interommatidial_angle_deg
 
 
-@QUIETLY
+@sweep(40)
 @given(
     z=st.one_of(st.lists(st.floats(1e-4, 10), max_size=5), numbers),
     depth_layers=numbers,
@@ -88,7 +88,7 @@ def test_any_perfect_sight_or_a_refusal(z, depth_layers, field_zones, tolerance)
     assert len(str(sight).splitlines()) == 2
 
 
-@QUIETLY
+@sweep(40)
 @given(samples=numbers, z=numbers, right=numbers, up=numbers)
 def test_any_kernel_or_a_refusal(samples, z, right, up):
     lens = Pupil(2e-6, thin_lens_focal_length=Eye().sensor_distance)
@@ -101,7 +101,7 @@ def test_any_kernel_or_a_refusal(samples, z, right, up):
     assert 0 < kernel.sum() < 1.02
 
 
-@QUIETLY
+@sweep(40)
 @given(tolerance=numbers, illuminance=numbers, time=numbers, efficiency=numbers)
 def test_any_light_or_a_refusal(tolerance, illuminance, time, efficiency):
     try:

@@ -28,6 +28,7 @@ def seen_by(ommatidium, eye, cells, side):
     return np.einsum("yaxb,a,b->yx", taken.reshape(side, 4, side, 4), weight, weight) / 4 / cells**2
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("cells", [4, 5])
 @pytest.mark.parametrize("diameter", [1.4e-6, 2.4e-6])
 def test_an_eye_of_one_receptor_is_an_ommatidium(cells, diameter):
@@ -70,6 +71,7 @@ def test_errors_fall_with_the_tolerance():
     assert errors[1] < errors[0] / 2
 
 
+@pytest.mark.slow
 def test_a_wide_guide_integrates_intensity_over_its_section():
     """Dozens of modes: the kernel is the PSF over the disk, which white fills. Evanescent fields, V times shorter than
     the radius, also take light around it."""

@@ -124,6 +124,7 @@ class TestField:
             image = sine / math.sqrt(1 - sine**2)
             assert shift((degrees, 0)) == pytest.approx(-(image + tangent) / cell, abs=1.0)
 
+    @pytest.mark.slow
     def test_error_falls_with_the_zones(self):
         eye = self.WIDE
         radiance = flat_scene(np.random.default_rng(3), eye, margin=0)

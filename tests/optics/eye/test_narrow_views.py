@@ -34,6 +34,7 @@ def test_cells_hold_the_light_that_the_direct_sum_sends_there(seed):
         assert kernel.flat[at] == pytest.approx(there.psf.sum() * dx**2, rel=1e-2)
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     "aperture", [optics.Circle(), optics.Slit(0.05, 1.0), optics.Annulus(0.95)], ids=["circle", "slit", "ring"]
 )

@@ -34,6 +34,7 @@ EYES = {
 }
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("name", EYES)
 def test_kernels_lose_no_more_than_the_tolerance_of_what_is_let_through(name):
     """By energy: all that a mask lets through lands somewhere. When windows were made for rays and edges alone, a third
@@ -43,6 +44,7 @@ def test_kernels_lose_no_more_than_the_tolerance_of_what_is_let_through(name):
     assert -2e-3 < lost < eye.tolerance
 
 
+@pytest.mark.slow
 def test_waveguides_see_a_masks_orders():
     """What a kernel loses, Parseval's theorem tells: see `test_guided_field.py`. At a tolerance of .05 it was 34 %."""
     focal, width = 50e-6, 27e-6

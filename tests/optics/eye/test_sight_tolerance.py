@@ -78,6 +78,7 @@ def test_dim_kernels_need_as_many_bands():
     assert len(dim.wavelengths) == len(bright.wavelengths) > len(choose_bands(0.1).wavelengths)
 
 
+@pytest.mark.slow
 def test_depth_and_field_share_a_tolerance():
     """At a corner, between two layers, both err. When each had all of the tolerance, one layer and five zones were
     taken of this, which err by .068."""

@@ -32,6 +32,7 @@ def test_angles_and_light():
     assert found.wavelength == pytest.approx(550e-9)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("before", "behind"), [(1.0, 1.336), (1.336, 1.336), (1.33, 1.5)])
 def test_f_number_between_media_says_how_bright_the_image_is(before, behind):
     """1/(2 (n/n₀) sin θ), paraxially: of a scene's radiance its image has π (n/n₀)² sin² θ (Born & Wolf, §4.8)."""
@@ -54,6 +55,7 @@ def test_sampling_limit_is_half_a_cycle_per_receptor():
     assert twice.sampling_cpd == pytest.approx(2 * found.sampling_cpd)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("sigma", [0.1, 0.4])
 def test_noise_limit_inverts_the_circular_mtf(sigma):
     """σ / a² = MTF(f). The lens is slow, so that its PSF's window is many fringes wide and the MTF finely sampled."""

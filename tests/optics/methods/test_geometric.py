@@ -80,6 +80,7 @@ def test_predicted_error_bounds_the_actual_one(method):
     assert np.all(seen >= actual / 3)
 
 
+@pytest.mark.slow
 def test_auto_takes_rays_only_within_the_tolerance():
     wide = {"dx": 40e-6, "shape": (129, 129)}
     coarse = optics.plan(Pupil(2e-3), WAVELENGTH, 2e-3, **wide, tolerance=0.5)
@@ -91,6 +92,7 @@ def test_auto_takes_rays_only_within_the_tolerance():
         optics.plan(hexagon, WAVELENGTH, 2e-3, **wide, tolerance=1e-2)
 
 
+@pytest.mark.slow
 def test_rays_have_no_derivatives_on_a_gpu(monkeypatch):
     """As if this were one: who asks for rays is told so, and "auto" takes waves."""
     import drjit as dr

@@ -31,6 +31,7 @@ def errors(tolerance, count=8):
     return np.array(found)
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("tolerance", [1e-1, 1e-2, 1e-3, 1e-5])
 def test_sampling_takes_no_more_than_half_the_tolerance(tolerance):
     """That is what a plan promises; rays' amplitudes err by less than the rim's, which the rank was chosen by."""
@@ -42,6 +43,7 @@ def test_a_rank_chosen_for_far_more_error_breaks_the_promise(monkeypatch):
     assert errors(1e-3).max() > 1e-3 / 2
 
 
+@pytest.mark.fast_cases(5)
 @pytest.mark.parametrize("relief", [None, PixelRelief(1e-6 * np.random.default_rng(1).random((5, 5)))])
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (9e-6, -4e-6)])
 @pytest.mark.parametrize("shape", [(1, 1), (1, 8), (9, 1), (33, 65), (16, 17), (17, 16)])

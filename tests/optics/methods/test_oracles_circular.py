@@ -53,6 +53,7 @@ class TestExactIntegral:
         field = 1 - z / slant - 2j * math.pi / WAVELENGTH * z * math.log(slant / z)
         assert result.psf[0, 0, 0] == pytest.approx(abs(field) ** 2 / result.pupil.area, rel=1e-8)
 
+    @pytest.mark.fast_cases(1)
     @pytest.mark.parametrize(("dtype", "tolerance"), [("float32", 1e-4), ("float64", 1e-7)])
     def test_aperture_in_the_near_field(self, dtype, tolerance):
         """Radius 50 µm at 200 µm, ±60 µm: Fresnel number 23, light and shadow in one window."""
@@ -152,6 +153,7 @@ class TestParaxialLimits:
         assert errors[0] < 2.5e-3
         assert reference.order_of_convergence(self.APERTURES, errors) == pytest.approx(2, abs=0.1)
 
+    @pytest.mark.fast_cases(1)
     @pytest.mark.parametrize("waves", [-0.5, 0.7])
     def test_lommel(self, waves):
         def paraxial(r, radius, f, z):

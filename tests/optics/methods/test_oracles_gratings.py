@@ -46,6 +46,7 @@ class TestFieldOrders:
         ),
     }
 
+    @pytest.mark.fast_cases(4)
     @pytest.mark.parametrize("name", CASES)
     def test_every_order_has_its_share(self, name):
         """16 samples per period: order m of a step is off by 1 - sinc²(m/16), 4 % of it at m = 2."""
@@ -72,6 +73,7 @@ class TestReliefs:
         result = optics.psf(pupil, [wavelength], self.Z, dx=dx, shape=shape, tolerance=1e-2, dtype="float64")
         return result.psf[0, 0, 1 + int(np.sign(order))]
 
+    @pytest.mark.fast_cases(1)
     @pytest.mark.parametrize("depth", [0.3, 0.766])
     def test_sinusoidal_relief(self, depth):
         """A smooth relief is its samples' spline. Order 0 vanishes at J0's zero, 0.766 waves."""
@@ -85,6 +87,7 @@ class TestReliefs:
             assert self.peak(height, order) / flat == pytest.approx(law, abs=0.01)
         assert self.peak(height, 0, n=1.0) == pytest.approx(flat, rel=1e-6)
 
+    @pytest.mark.slow
     def test_binary_relief_starves_order_zero(self):
         """Half a wave of glass at half the duty: 0 and 40.5 %; the spline rounds the steps, which converges."""
         errors, samples = [], (128, 256)

@@ -30,6 +30,7 @@ def in_focus(sine):
     return math.sqrt(polarised), math.sqrt(np.sum(rho * off**2) / np.sum(rho * mean**2))
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("sine", [0.01, *(sine for sine, _ in IN_FOCUS[1:])])
 def test_a_round_pupil_in_focus_errs_as_tabulated(sine):
     polarised, unpolarised = in_focus(sine)
@@ -37,6 +38,7 @@ def test_a_round_pupil_in_focus_errs_as_tabulated(sine):
     assert unpolarised < polarised < 1.25 * unpolarised
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("sine", [0.1, 0.3])
 def test_unpolarised_light_errs_by_what_curvature_it_has(sine):
     """Of second order it is -∇²I/4k², here of Airy's disk and without any vector."""
@@ -139,11 +141,13 @@ def ratios():
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_plans_say_no_less_than_scalar_theory_errs_by(ratios):
     assert np.mean(ratios <= 1) >= 0.99
     assert ratios.max() < 1.5
 
 
+@pytest.mark.slow
 def test_nor_much_more(ratios):
     worst = ratios.max(axis=1)
     assert np.median(worst) > 1 / 2.5

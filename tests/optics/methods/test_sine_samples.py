@@ -36,6 +36,7 @@ def bent(radius, distance, aperture, seed):
     )
 
 
+@pytest.mark.fast_cases(5)
 @pytest.mark.parametrize("name", APERTURES)
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-7])
 @pytest.mark.parametrize("place", [0.0, 0.7])
@@ -50,6 +51,7 @@ def test_half_the_tolerance_holds_for_every_aperture_on_and_off_the_axis(name, t
         assert error(beam, window, tolerance) < tolerance / 2
 
 
+@pytest.mark.slow
 def test_many_zones_take_no_more_samples_than_their_aberrations():
     """About the focus of a lens of Fresnel number N: the samples are those of Zernike's waves and of the window,
     whatever N, and the picture that of the direct sum."""

@@ -12,6 +12,7 @@ import optics
 from optics.numerics import device
 from optics.numerics.backend import BackendError
 from optics.numerics.precision import precision
+from tests.slow_part import slow
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -83,7 +84,7 @@ def test_the_gpu_computes_the_same(code, tolerance):
     assert np.abs(cpu - gpu).max() < tolerance * np.abs(cpu).max()
 
 
-@pytest.mark.parametrize("code", [PSF, SIGNALS], ids=["optics", "sim"])
+@pytest.mark.parametrize("code", [PSF, slow(SIGNALS)], ids=["optics", "sim"])
 def test_what_the_gpu_is_asked_for_runs_on_the_processor(code):
     """The same scripts, so that they are known to work where no GPU is."""
     assert on("cpu", code).max() > 0

@@ -38,6 +38,7 @@ def test_a_window_far_off_the_axis_needs_no_line():
     assert relative_l2(result.psf[0], exact) < 1e-3
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(("radius", "distance"), [(1e-7, 1e-9), (1e-7, 1e-7), (1e-9, 1e-9), (3e-5, 1e-6)])
 def test_planes_nearer_than_the_pupil_is_wide(radius, distance):
     """There the kernel's poles need more nodes than its phase: the axis against Osterberg and Smith's closed form."""
@@ -59,6 +60,7 @@ def test_a_profile_costs_no_more_than_its_wave_turns():
 HOLE = {"radius": 1e-3, "distance": 1e-6 / (1000 * 550e-9)}  # of Fresnel number 1,000: rays are as steep as 1/2
 
 
+@pytest.mark.slow
 def test_a_hole_of_a_thousand_zones():
     """Its whole shadow on few samples, against the direct sum at some of them; and on the axis against Osterberg and
     Smith's closed form."""

@@ -50,6 +50,7 @@ def test_acceptance_angle_of_a_fly_is_that_of_the_formulas():
     assert math.degrees(1.03 * WAVE / D) < 1.2
 
 
+@pytest.mark.slow
 def test_wide_slow_lenses_are_the_formulas_limit():
     """They leave out that the focal plane is no wave front, e^{iknx²/2f}, and oblique rays. A pupil 16 times as wide at
     f/8, and a rhabdom of the same V that is 4 times as wide, have the same picture and a sixteenth of the angles."""
@@ -62,6 +63,7 @@ def test_wide_slow_lenses_are_the_formulas_limit():
     assert found == pytest.approx(width(angles, formulas(mode, angles)), rel=3e-4)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("diameter", [1.4e-6, 2.2e-6])
 def test_every_mode_takes_what_the_formulas_say(diameter):
     """Along x, where sine modes are dark, and relative to the first mode's peak."""
@@ -71,6 +73,7 @@ def test_every_mode_takes_what_the_formulas_say(diameter):
     np.testing.assert_allclose(found / found.max(), expected / expected.max(), atol=0.015)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("wavefront", [None, optics.Zernike({(1, 1): 0.06, (3, -1): 0.08})], ids=["even", "lopsided"])
 @pytest.mark.parametrize("angle", [(0.0, 0.0), (0.02, -0.01)])
 def test_modes_take_the_overlap_with_the_field_in_the_focus(angle, wavefront):
@@ -90,6 +93,7 @@ def test_modes_take_the_overlap_with_the_field_in_the_focus(angle, wavefront):
     np.testing.assert_allclose(eye.mode_power(*angle, WAVE), expected, atol=2e-4)
 
 
+@pytest.mark.slow
 def test_a_wide_guide_takes_what_falls_on_it():
     """Dozens of modes are as good as none: the light within the core, and little of what falls beside it."""
     eye = Ommatidium(LENS, Waveguide(4e-6, 1.42, 1.34))

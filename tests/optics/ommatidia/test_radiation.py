@@ -36,6 +36,7 @@ def integral(modes, x, y, end):
     return field @ kernel.T
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("diameter", "radius", "end", "within"),
     [

@@ -54,6 +54,7 @@ def test_must_not_be_empty(name):
         optics.psf_batch(**arguments, **VIEW)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
 def test_each_has_the_measures_of_one(tolerance):
     """Whether one plan has made them or each its own."""

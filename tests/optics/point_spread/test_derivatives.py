@@ -7,6 +7,7 @@ import optics
 from optics import BSplineRelief, Pupil
 from optics.numerics.device import device
 from optics.numerics.precision import precision
+from tests.slow_part import slow
 
 WAVELENGTH, SHAPE = 550e-9, (17, 15)
 # Whole waves of defocus, an index step and a source nearby: every parameter moves the picture.
@@ -90,6 +91,7 @@ def assert_derivatives(function, values, name, rel=1e-4):
 HEIGHTS = np.random.default_rng(2).random((4, 4)) * 2e-6
 
 
+@pytest.mark.fast_cases(8)
 @pytest.mark.parametrize("name", sorted(PARAMETERS))
 @pytest.mark.parametrize("method", METHODS)
 def test_psf_of_a_relief(method, name):
@@ -104,7 +106,7 @@ def test_psf_of_a_symmetric_pupil(method, name):
     assert_derivatives(lambda values: total(values, None, method), PARAMETERS, name)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [slow(method) if method == "geometric" else method for method in METHODS])
 def test_psf_by_control_points(method):
     import drjit as dr
 
@@ -144,6 +146,7 @@ QUALITIES = {
 }
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("name", ["radius", "distance", "n"])
 @pytest.mark.parametrize("quality", sorted(QUALITIES))
 def test_quality(quality, name):

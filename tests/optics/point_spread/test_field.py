@@ -46,6 +46,7 @@ def written_out(pupil, x, y):
 METHODS = ("low_rank", "angular_spectrum", "split_angular_spectrum", "rayleigh_sommerfeld")
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize(
     ("name", "method"), [*itertools.product(PUPILS, METHODS), ("lens", "hankel"), ("ring", "hankel")]
 )
@@ -66,6 +67,7 @@ def test_symmetric_fields_along_a_line_are_those_of_the_plane():
     assert np.linalg.norm(line.field - plane.field) < 2e-6 * np.linalg.norm(plane.field)
 
 
+@pytest.mark.slow
 def test_pixels_off_axis_windows_and_both_precisions():
     pupil = Pupil(R, PixelRelief(np.random.default_rng(2).random((20, 20)) * 1e-6), object_n=1.1, medium_n=1.3)
     asked = {**ASKED, "centre": (8e-6, -5e-6), "source_angle": (0.05, 0.0)}

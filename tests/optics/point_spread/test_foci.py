@@ -84,7 +84,7 @@ def test_defocus_and_spherical_relief_are_in_it():
 
 def test_all_components_together_hold_the_light_of_scalar_theory():
     """Each plane wave has |e| = 1: integrals over the plane agree."""
-    found = focus(0.7, dx=0.1e-6, shape=(201, 201))
+    found = focus(0.7, dx=0.15e-6, shape=(135, 135))
     assert found.psf.sum() == pytest.approx(found.scalar.sum(), rel=2e-3)
     assert found.intensity[2].sum() > 0.1 * found.psf.sum()
 

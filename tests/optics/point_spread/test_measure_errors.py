@@ -26,6 +26,7 @@ def fine():
     return focus(0.2 * APART, 287)
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("dx", [3e-6, 1.1e-6, 0.55e-6, 2.2e-6])
 def test_coarse_samples_measure_what_fine_ones_do(dx, fine):
     """Samples 3 µm apart add up to a power of 5.7: they are looked at again."""
@@ -115,6 +116,7 @@ def test_even_windows_are_split_about_their_own_cells():
     assert off.power[0] == pytest.approx(whole.power[0], abs=3e-4)
 
 
+@pytest.mark.slow
 def test_measures_carry_derivatives_through_what_they_look_at_again():
     """Of power, Strehl ratio and encircled energy by the distance of the sensor, against central differences."""
 

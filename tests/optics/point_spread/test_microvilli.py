@@ -21,6 +21,7 @@ def slow(**others):
     return optics.vector_focus(SLOW, WAVE, dx=1e-6, shape=(41, 41), **others)
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("azimuth", [0.0, 30.0, 117.0])
 @pytest.mark.parametrize("ratio", [math.inf, 5.0])
 def test_flat_rays_obey_malus(azimuth, ratio):
@@ -87,6 +88,7 @@ def integral(radius, centre, picture):
     )
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("seed", range(30))
 def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
     """Receptors from a twentieth of λ/NA to four, anywhere about the focus; pitches to .7 λ/NA, windows of three
@@ -109,6 +111,7 @@ def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
     assert abs(found - expected) < min(error, 1.1e-6 + turned)
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize(
     ("sine", "focal", "wavefront", "aperture"),
     [
@@ -140,6 +143,7 @@ def test_what_light_errs_by_is_told(sine, focal, wavefront, aperture, defocus, t
     assert tolerance == 1e-3 or defocus == 0 or min(ratios) < 100
 
 
+@pytest.mark.slow
 def test_signals_do_not_depend_on_samples():
     """Of a hexagon aslant: coarse, narrow and even windows, and the polarisation sensitivity in them."""
     hexagon = optics.Pupil(1e-3, thin_lens_focal_length=2e-3, aperture=optics.Polygon.regular(6))

@@ -21,7 +21,7 @@ def radial_means(shares, dx, frequencies, orientations):
     for f in frequencies:
         rows = np.exp(-2j * np.pi * np.outer(f * np.sin(angle), y))
         columns = np.exp(-2j * np.pi * np.outer(f * np.cos(angle), x))
-        found.append(np.abs(np.einsum("oy,yx,ox->o", rows, shares, columns)).mean())
+        found.append(np.abs(np.sum(rows @ shares * columns, axis=1)).mean())
     return np.array(found)
 
 
@@ -29,12 +29,12 @@ def test_contrasts_between_the_grids_frequencies_are_the_pictures_own():
     """Light that fills its window turns contrasts over within a step of the grid: straight lines err by .04 there."""
     result = optics.psf(LENS, [WAVELENGTH], FOCUS + 1.6e-4, dx=0.8e-6, shape=(91, 91), tolerance=1e-4)
     transfer = optics.mtf(result, tolerance=1)
-    grid = transfer.fx[46:]
+    grid = transfer.fx[46:49]  # the few first
     f = np.linspace(0.3, 1.7, 8) * grid[0]
-    exact = radial_means(transfer.shares.numpy()[0], result.dx, f, 256)
+    exact = radial_means(transfer.shares.numpy()[0], result.dx, f, 128)
     off = np.abs(transfer.profile(f)[0] - exact).max()
     assert off < 1e-5 + 0.1 * transfer.predicted_error[0]
-    lines = np.interp(f, np.append(0, grid), radial_means(transfer.shares.numpy()[0], result.dx, [0, *grid], 256))
+    lines = np.interp(f, np.append(0, grid), radial_means(transfer.shares.numpy()[0], result.dx, [0, *grid], 128))
     assert np.abs(lines - exact).max() > 0.02 > 10 * off
 
 
@@ -44,7 +44,7 @@ def test_as_many_orientations_as_the_picture_needs():
     shares = np.zeros((1, 81, 81))
     shares[0, 40, [40 - d // 2, 40 + d // 2]] = 0.5
     tensor = precision("float64").Tensor(shares)
-    f = np.linspace(0.3, 0.5, 41) / dx
+    f = np.linspace(0.3, 0.5, 11) / dx
     fine, few = (radial_means(shares[0], dx, f, n) for n in (4096, 64))
     assert np.abs(few - fine).max() > 0.03
     found = MTF.of(tensor, dx, np.array([1e6]), np.array([2e-3])).profile(f)[0]

@@ -31,6 +31,7 @@ def members(pupils, source=math.inf):
 APERTURES = [optics.Circle(), optics.Annulus(0.5), optics.Slit(0.4, 1.3), optics.Polygon.regular(6)]
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("aperture", APERTURES, ids=lambda aperture: type(aperture).__name__)
 @pytest.mark.parametrize(("dx", "shape", "source"), [(0.25e-6, (65, 65), math.inf), (0.5e-6, (33, 48), 3e-3)])
 def test_predicted_errors_hold_and_are_not_cowardly(aperture, dx, shape, source):

@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import optics
 from optics import AccuracyError, BSplineRelief, Eye, Pupil
+from tests.slow_part import sweep
 from validation.reference import relative_l2
 
-QUIETLY = settings(max_examples=20, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 ODD = st.sampled_from([0.0, -1e-6, math.nan, math.inf, 1e-300, 1e-12, 1e-3, 1e6])
 
 
@@ -25,7 +25,7 @@ def only_one_line(error):
     assert "\n" not in str(error)
 
 
-@QUIETLY
+@sweep(20)
 @given(
     a=st.floats(0.03, 1),
     n=st.floats(1, 2),
@@ -51,7 +51,7 @@ def test_any_genotype_has_a_kernel_or_a_reason(a, n, fov_deg, width, genes):
     assert kernel.sum() < 1.005
 
 
-@QUIETLY
+@sweep(20)
 @given(
     radius=lengths(1e-6, 5e-5),
     distance=lengths(1e-5, 2e-3),
@@ -71,7 +71,7 @@ def test_any_argument_gives_a_finite_psf_or_a_named_error(radius, distance, wave
     assert 0 < result.plan.predicted_error <= 1e-2
 
 
-@QUIETLY
+@sweep(20)
 @given(
     radius=st.floats(0.5e-6, 8e-6),
     z=st.floats(20e-6, 2e-3),

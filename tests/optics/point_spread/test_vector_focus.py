@@ -32,6 +32,7 @@ def by_directions(window, z, sine, jones, light):
     return np.array([ex, ey, -2j * axial * (p * np.cos(phi) + q * np.sin(phi))])
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("sine", [0.5, 0.9])
 def test_far_away_a_lens_in_focus_is_richards_and_wolfs(sine):
     """From place to place the path bends by sin²θ/N less than plane waves have it: with ten times the distance the
@@ -118,6 +119,7 @@ def turn(field, before, after):
     return field + once + np.cross(w, once, axis=0) / (1 + c)
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("defocus", [0.0, -2e-6, 15e-6])
 @pytest.mark.parametrize("relief", [0.0, 1e-6])
 def test_predicted_errors_hold_for_each_component(defocus, relief):

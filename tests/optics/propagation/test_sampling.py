@@ -53,6 +53,7 @@ def carried(u, dx, z, window, spare, paraxial):
 
 
 class TestBlur:
+    @pytest.mark.fast_cases(3)
     @pytest.mark.parametrize("source", [disk, square, noise])
     @pytest.mark.parametrize(
         ("dx", "z", "radius", "m", "step", "centre", "paraxial"),
@@ -70,6 +71,7 @@ class TestBlur:
         actual = np.linalg.norm(np.abs(found) ** 2 - np.abs(exact) ** 2) / np.linalg.norm(np.abs(exact) ** 2)
         assert actual / FACTOR < said < actual * FACTOR
 
+    @pytest.mark.slow
     def test_falls_with_the_room(self):
         """Like 1 / room far away; the nearest light of 130 µm source and 120 µm window is nearer."""
         u, window = disk(215, 0.47e-6, 50e-6), Grid((129, 129), 0.94e-6)

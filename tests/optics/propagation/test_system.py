@@ -33,6 +33,7 @@ PUPILS = {
 }
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize(("dtype", "tolerance"), [("float32", 1e-3), ("float64", 1e-7)])
 @pytest.mark.parametrize("name", PUPILS)
 def test_a_pupil_and_free_space_are_psf(name, dtype, tolerance):

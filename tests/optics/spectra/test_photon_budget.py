@@ -59,6 +59,7 @@ def test_photons_grow_with_the_receptor_and_fall_with_the_focal_length():
     assert Eye().photons is None
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("radius", [50e-6, 25e-6])
 @pytest.mark.parametrize("time", [1e-5, 4e-5])
 def test_variance_is_the_mean_over_the_photons(radius, time):

@@ -1,0 +1,81 @@
+"""A pytest plugin that leaves slow tests out, unless `--all` is given.
+
+Slow are
+
+- tests with the mark `slow`;
+- of a test with the mark `fast_cases(n)`, all cases but n, chosen so that they cover the parameters' values: of 3 shapes
+  and 4 methods, `fast_cases(4)` runs each shape and each method at least once;
+- random examples (hypothesis) beyond the first few, in tests with `@sweep(count)`.
+
+    ./with-env pytest -n auto          # the fast part
+    ./with-env pytest -n auto --all    # everything
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+FAST_EXAMPLES = 5
+FAST, ALL = "fast", "all"  # profiles of hypothesis
+settings.register_profile(FAST)
+settings.register_profile(ALL)
+
+
+def sweep(count: int, fast: int = FAST_EXAMPLES) -> settings:
+    """Settings of a test with random examples, the same in every run: `count` with `--all`, else the first `fast`."""
+    return settings(
+        max_examples=count if settings.get_current_profile_name() == ALL else min(count, fast),
+        deadline=None,
+        derandomize=True,
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large],
+    )
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--all", action="store_true", help="run the slow tests too")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    everything = config.getoption("--all")
+    settings.load_profile(ALL if everything else FAST)
+    if everything:
+        config.option.markexpr = ""
+
+
+def slow(*values: object) -> Any:
+    """A case of `pytest.mark.parametrize` that is slow."""
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest leaves out what is marked
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    cases: defaultdict[str, list[Any]] = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("fast_cases"):
+            cases[item.nodeid.split("[")[0]].append(item)
+    for same_test in cases.values():
+        (count,) = same_test[0].get_closest_marker("fast_cases").args
+        values = [{name: id(value) for name, value in item.callspec.params.items()} for item in same_test]
+        fast = fast_cases(values, count)
+        for number, item in enumerate(same_test):
+            if number not in fast:
+                item.add_marker(pytest.mark.slow)
+
+
+def fast_cases(cases: list[dict[str, int]], count: int) -> list[int]:
+    """Places of `count` cases, chosen one after another: the first of those with the most values not chosen yet.
+
+    cases: of each parameter, a number that equal values share
+    """
+    chosen: list[int] = []
+    seen: set[tuple[str, int]] = set()
+    while len(chosen) < min(count, len(cases)):
+        left = [place for place in range(len(cases)) if place not in chosen]
+        best = max(left, key=lambda place: len(cases[place].items() - seen))
+        chosen.append(best)
+        seen |= cases[best].items()
+    return chosen
