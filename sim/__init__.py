@@ -34,17 +34,17 @@ if TYPE_CHECKING:
     from sim.envs.registration import register_task
     from sim.exr import View, read_exr, write_exr
     from sim.eyes.eyes import Eyes
+    from sim.eyes.mounts import Mount, both_sides, fan, ring
     from sim.render.batched_renderer import BatchedRenderer
     from sim.render.fidelity import Fidelity
     from sim.render.fidelity_choice import FidelityWarning, choose_fidelity
+    from sim.render.model_fidelity import choose_model_fidelity
+    from sim.render.model_renderer import ModelRenderer
     from sim.render.reference_renderer import ReferenceRenderer
-    from sim.robots.encounter import Encounter, Frozen
-    from sim.robots.model_fidelity import choose_model_fidelity
-    from sim.robots.model_renderer import ModelRenderer
-    from sim.robots.mounts import Mount, both_sides, fan, ring
-    from sim.robots.poses import Poses
-    from sim.robots.task import Task
     from sim.scene.mirror import Mirror, MirrorWarning, mirror
+    from sim.scene.poses import Poses
+    from sim.tasks.encounter import Encounter, Frozen
+    from sim.tasks.user_task import Task
     from sim.worlds.course import Course
     from sim.worlds.world import World, build_world
 
@@ -58,16 +58,16 @@ _HOME = {
     "mirror": "sim.scene.mirror",
     "BatchedRenderer": "sim.render.batched_renderer",
     "ReferenceRenderer": "sim.render.reference_renderer",
-    "ModelRenderer": "sim.robots.model_renderer",
-    "choose_model_fidelity": "sim.robots.model_fidelity",
-    "Mount": "sim.robots.mounts",
-    "both_sides": "sim.robots.mounts",
-    "fan": "sim.robots.mounts",
-    "ring": "sim.robots.mounts",
-    "Poses": "sim.robots.poses",
-    "Task": "sim.robots.task",
-    "Encounter": "sim.robots.encounter",
-    "Frozen": "sim.robots.encounter",
+    "ModelRenderer": "sim.render.model_renderer",
+    "choose_model_fidelity": "sim.render.model_fidelity",
+    "Mount": "sim.eyes.mounts",
+    "both_sides": "sim.eyes.mounts",
+    "fan": "sim.eyes.mounts",
+    "ring": "sim.eyes.mounts",
+    "Poses": "sim.scene.poses",
+    "Task": "sim.tasks.user_task",
+    "Encounter": "sim.tasks.encounter",
+    "Frozen": "sim.tasks.encounter",
     "Fidelity": "sim.render.fidelity",
     "FidelityWarning": "sim.render.fidelity_choice",
     "choose_fidelity": "sim.render.fidelity_choice",

@@ -87,9 +87,11 @@ def _played(venv: Any, steps: int) -> str:
 
 def encounter() -> str:
     """Episodes of prey and predator, both with random actions, as a PettingZoo environment."""
-    animals = [_example(name, "front_or_side")() for name in ("Prey", "Predator")]
-    animals[0].others = ()
-    env, rng, found = sim.make_parallel_env(sim.Encounter(*animals), seed=2), np.random.default_rng(1), hashlib.sha256()
+    prey, predator = (_example(name, "front_or_side") for name in ("Prey", "Predator"))
+    hunter = type("Hunter", (predator,), {"rewards": lambda self, data: {"near": -abs(data.qpos[2] - data.qpos[0])}})
+    solitary = type("Prey", (prey,), {"others": ()})
+    env = sim.make_parallel_env(sim.Encounter(solitary(), hunter()), seed=2)
+    rng, found = np.random.default_rng(1), hashlib.sha256()
     for _ in range(3):
         observations, _ = env.reset()
         while env.agents:

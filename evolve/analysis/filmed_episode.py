@@ -19,10 +19,10 @@ from evolve.learning.worlds import own_task_for
 from sim.envs.task_fidelity import fidelity_of
 from sim.envs.task_vec_env import TaskVecEnv
 from sim.envs.task_worlds import TaskWorlds
-from sim.robots.eye_kinds import kinds_of
-from sim.robots.poses import Poses
-from sim.robots.solids import solids_of
-from sim.robots.task import Task
+from sim.scene.poses import Poses
+from sim.scene.solids import solids_of
+from sim.tasks.eye_kinds import kinds_of
+from sim.tasks.user_task import Task
 
 __all__ = ["FilmedEpisode", "film", "moments"]
 

@@ -17,7 +17,7 @@ from evolve.config.run_config import RunConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.worlds import own_task_for
 from sim.envs.task_fidelity import fidelity_of
-from sim.robots.eye_kinds import kinds_of
+from sim.tasks.eye_kinds import kinds_of
 
 __all__ = ["Vision", "ssim", "vision"]
 

@@ -25,10 +25,11 @@ def coarse_bands(config: RunConfig) -> list[str]:
     """A line where the bands misjudge the world's measured spectra by more than a receptor's noise."""
     if config.task in GREY_TASKS or is_own(config.task):
         return []
-    from sim.render.band_error import band_error, measured
+    from sim.scene.band_error import band_error, measured
     from sim.worlds.world import build_world
 
-    spectra = measured(build_world(config.task))
+    world = build_world(config.task)
+    spectra = measured(world.model, world.spectra)
     light, counts = _most_light(config), _doublings(config.eye.bands)
     errors = {n: light * max(band_error(spectra, types, n) for types in _types(config)) for n in counts}
     error, allowed = errors[config.eye.bands], max(config.eye.noise_sigma, LEAST_ERROR)

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sim.robots.encounter import Frozen
-    from sim.robots.task import Task
+    from sim.tasks.encounter import Frozen
+    from sim.tasks.user_task import Task
 
 __all__ = ["OpenedCandidate", "OpenedRun"]
 
@@ -83,7 +83,7 @@ class OpenedRun(Run):
         """
         from evolve.learning.policy import load_policy
         from evolve.learning.worlds import embodied
-        from sim.robots.encounter import Frozen
+        from sim.tasks.encounter import Frozen
 
         candidate = self.candidate(candidate_id)
         path = self.policy_path(candidate.id)

@@ -10,7 +10,7 @@ from types import ModuleType
 from evolve.config.checks import ConfigError
 from evolve.config.own_task import OwnTask
 from sim.envs.task_fidelity import with_settled_others
-from sim.robots.task import Task, compiled, require_rewards
+from sim.tasks.user_task import Task, compiled, require_rewards
 
 __all__ = ["executed_task"]
 

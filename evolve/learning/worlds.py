@@ -13,11 +13,11 @@ from sim.envs.assembly import prepared_scene, vec_env_in
 from sim.envs.task_fidelity import fidelity_of
 from sim.envs.task_vec_env import TaskVecEnv
 from sim.envs.vec_env import EyesVecEnv
+from sim.render.edge_rays import FIRST
 from sim.render.fidelity import EDGES, RAYS, Fidelity
 from sim.render.fidelity_choice import fidelity_for
-from sim.robots.edge_rays import FIRST
-from sim.robots.task import Task, grown
-from sim.robots.variation import Variation
+from sim.scene.variation import Variation
+from sim.tasks.user_task import Task, grown
 
 __all__ = ["LifeWorlds", "embodied", "own_task_for", "worlds_of"]
 

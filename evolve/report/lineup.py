@@ -13,7 +13,7 @@ from evolve.report.agent_figure import agent_figure
 from evolve.report.markup import Html, html, joined, rounded
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
-from sim.robots.eye_kinds import kinds_of
+from sim.tasks.eye_kinds import kinds_of
 
 __all__ = ["azimuths", "lineup"]
 

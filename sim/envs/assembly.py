@@ -23,10 +23,10 @@ from sim.render.batched_renderer import BatchedRenderer
 from sim.render.fidelity import Fidelity, fidelity_asked
 from sim.render.fidelity_choice import chosen_fidelity
 from sim.render.prepared_scene import PreparedScene
-from sim.robots.encounter import Encounter
-from sim.robots.task import Task
-from sim.robots.variation import Variation
+from sim.scene.variation import Variation
+from sim.tasks.encounter import Encounter
 from sim.tasks.reward import check_mode
+from sim.tasks.user_task import Task
 from sim.worlds.course import Course
 from sim.worlds.world import build_world
 

@@ -11,10 +11,10 @@ import numpy as np
 from gymnasium import spaces
 
 from optics.numerics.arguments import did_you_mean, items
-from sim.robots.eye_kinds import AUXILIARY
-from sim.robots.model_renderer import ModelRenderer
-from sim.robots.optic_flow import flow_between
-from sim.robots.poses import Poses
+from sim.render.model_renderer import ModelRenderer
+from sim.render.optic_flow import flow_between
+from sim.scene.poses import Poses
+from sim.tasks.eye_kinds import AUXILIARY
 
 DEPTH, IDS, FLOW = AUXILIARY
 

@@ -12,8 +12,8 @@ from sim.envs.assembly import make_vec_env
 from sim.envs.follow_camera import RENDER_MODES
 from sim.envs.vec_env import EyesVecEnv
 from sim.eyes.eyes import Eyes
-from sim.robots.encounter import Encounter
-from sim.robots.task import Task
+from sim.tasks.encounter import Encounter
+from sim.tasks.user_task import Task
 from sim.worlds.state import WorldState
 
 _OF_BATCHES = {"seed": "it goes to reset(seed=...)", "n_envs": "this is one world: make_vec_env has several"}

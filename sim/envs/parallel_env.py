@@ -14,7 +14,7 @@ from sim.envs.follow_camera import RENDER_MODES
 from sim.envs.task_animals import TaskAnimals
 from sim.envs.task_pictures import TaskPictures
 from sim.envs.task_worlds import StepOfWorld
-from sim.robots.encounter import Encounter
+from sim.tasks.encounter import Encounter
 
 
 class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):

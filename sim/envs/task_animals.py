@@ -10,9 +10,9 @@ import numpy as np
 from sim.envs import task_state
 from sim.envs.task_senses import Seen, Senses
 from sim.envs.task_worlds import StepOfWorld, TaskWorlds
-from sim.robots.encounter import Encounter, Frozen, name_of
-from sim.robots.poses import Poses
-from sim.robots.task import Task, require_rewards
+from sim.scene.poses import Poses
+from sim.tasks.encounter import Encounter, Frozen, name_of
+from sim.tasks.user_task import Task, require_rewards
 
 NOWHERE = np.empty(0, int)
 

@@ -13,12 +13,12 @@ import optics
 from sim.envs.task_worlds import TaskWorlds
 from sim.eyes.allowed_error import allowed_error
 from sim.render.fidelity import Fidelity
-from sim.robots.encounter import Frozen, among, cast
-from sim.robots.eye_kinds import EYES, kinds_of, several
-from sim.robots.model_fidelity import choose_model_fidelity
-from sim.robots.poses import Poses
-from sim.robots.task import Task
-from sim.robots.variation import Variation
+from sim.render.model_fidelity import choose_model_fidelity
+from sim.scene.poses import Poses
+from sim.scene.variation import Variation
+from sim.tasks.encounter import Frozen, among, cast
+from sim.tasks.eye_kinds import EYES, kinds_of, several
+from sim.tasks.user_task import Task
 
 AUTO = "auto"
 WORLDS, LATER = 6, 12  # episodes that are looked into: at their beginnings, and so many random actions later

@@ -8,11 +8,11 @@ import numpy as np
 from sim.envs.retina_images import one_above_another, side_by_side
 from sim.envs.task_animals import TaskAnimals
 from sim.envs.task_senses import Senses
+from sim.pictures.eye_marks import with_eyes
 from sim.pictures.quick_camera import QuickCamera
-from sim.robots.encounter import of_world
-from sim.robots.eye_marks import with_eyes
-from sim.robots.poses import Poses
 from sim.scene.cameras import Viewpoint
+from sim.scene.poses import Poses
+from sim.tasks.encounter import of_world
 
 PICTURE = (360, 480)  # pixels (height, width)
 RIMS = 0.15  # of the model's extent: how far the rims of fields of view are drawn

@@ -11,10 +11,10 @@ from sim.envs.auxiliary import Auxiliary, checked
 from sim.envs.task_fidelity import fidelities_among
 from sim.envs.task_sight import EyesOfKind
 from sim.envs.task_worlds import TaskWorlds
+from sim.render.model_renderer import ModelRenderer
 from sim.render.pending_frame import PendingFrame, settled
-from sim.robots.eye_kinds import kinds_of, several
-from sim.robots.model_renderer import ModelRenderer
-from sim.robots.poses import Poses
+from sim.scene.poses import Poses
+from sim.tasks.eye_kinds import kinds_of, several
 
 Seen = dict[str, np.ndarray]  # by kind of eyes: (world, eye, channel, height, width); and what there is beside
 

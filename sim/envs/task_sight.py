@@ -8,11 +8,11 @@ from gymnasium import spaces
 from sim.envs.observation import ROUNDING, SIGMAS, Memory
 from sim.envs.task_worlds import TaskWorlds
 from sim.render.fidelity import Fidelity
+from sim.render.model_renderer import ModelRenderer
 from sim.render.pending_frame import PendingFrame
 from sim.render.receptor_noise import NoiseModel, Normals
-from sim.robots.eye_kinds import EyeKind
-from sim.robots.model_renderer import ModelRenderer
-from sim.robots.poses import Poses
+from sim.scene.poses import Poses
+from sim.tasks.eye_kinds import EyeKind
 
 
 class EyesOfKind:

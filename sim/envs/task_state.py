@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from sim.envs.task_worlds import TaskWorlds
-from sim.robots.encounter import name_of
+from sim.tasks.encounter import name_of
 
 MODELS = "models"  # of worlds with models of their own
 _ALL = mujoco.mjtState.mjSTATE_INTEGRATION

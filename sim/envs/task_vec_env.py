@@ -15,9 +15,9 @@ from sim.envs.task_animals import TaskAnimals
 from sim.envs.task_pictures import TaskPictures
 from sim.envs.task_senses import Senses
 from sim.envs.task_worlds import StepOfWorld, TaskWorlds
-from sim.robots.encounter import Encounter
-from sim.robots.model_renderer import ModelRenderer
-from sim.robots.task import Task
+from sim.render.model_renderer import ModelRenderer
+from sim.tasks.encounter import Encounter
+from sim.tasks.user_task import Task
 
 
 class TaskVecEnv(OneEnvironment):

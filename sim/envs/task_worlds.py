@@ -13,12 +13,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sim.robots import task as task_module
-from sim.robots.encounter import Encounter, cast, name_of, of_world, require_own_actuators
-from sim.robots.eye_kinds import kinds_of
-from sim.robots.task import Task, compiled, named_terms
-from sim.robots.variation import Variation
-from sim.robots.world_models import WorldModels
+from sim.scene.variation import Variation
+from sim.scene.world_models import WorldModels
+from sim.tasks import user_task as task_module
+from sim.tasks.encounter import Encounter, cast, name_of, of_world, require_own_actuators
+from sim.tasks.eye_kinds import kinds_of
+from sim.tasks.user_task import Task, compiled, named_terms
 
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 _OURS = (__file__, task_module.__file__)

@@ -19,7 +19,7 @@ from sim.envs.world_poses import WorldPoses, model_renderer
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.noisy_signals import NoisySignals
 from sim.render.pending_frame import PendingFrame
-from sim.robots.variation import Variation
+from sim.scene.variation import Variation
 from sim.worlds.state import WorldState
 
 _STANDING = np.array(STANDING, np.float32)

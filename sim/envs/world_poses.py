@@ -10,11 +10,11 @@ import numpy as np
 
 import optics
 from sim.eyes.eyes import BODY_RADIUS, Eyes
+from sim.eyes.mounts import ring
 from sim.render.fidelity import Fidelity
-from sim.robots.model_renderer import ModelRenderer
-from sim.robots.mounts import ring
-from sim.robots.poses import Poses
+from sim.render.model_renderer import ModelRenderer
 from sim.scene.mirror import MirrorWarning
+from sim.scene.poses import Poses
 from sim.worlds.state import WorldState
 from sim.worlds.world import World
 

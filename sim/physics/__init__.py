@@ -4,4 +4,5 @@ physics         Physics
 free_motion     agents that touch nothing
 local_contacts  agents that may touch something near
 mujoco_batch    MuJoCo's own step for many worlds
+controls        which controls belong to which actuators
 """

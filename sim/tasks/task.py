@@ -14,9 +14,10 @@ from typing import Protocol
 import numpy as np
 
 from sim.tasks.object_motion import wander
-from sim.tasks.placement import REACH, Places, free_spot
+from sim.tasks.placement import Places, free_spot
 from sim.tasks.random_streams import MotionNoise
 from sim.worlds.catalog import TASKS
+from sim.worlds.layout import REACH
 from sim.worlds.state import WorldState, wrap_angle
 from sim.worlds.world import World
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sim
-from sim.robots.movers import Movers
+from sim.tracing.movers import Movers
 from validation import C2_own_worlds as C2
 
 ASSETS = Path(importlib.util.find_spec("gymnasium").origin).parent / "envs" / "mujoco" / "assets"

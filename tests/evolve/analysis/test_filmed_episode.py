@@ -19,7 +19,7 @@ from evolve.learning.policy import load_policy
 from evolve.learning.worlds import own_task_for
 from evolve.report.footage import Footage, stage_of
 from evolve.store.directory import Run
-from sim.robots.variation import DAYLIGHT, filter_to
+from sim.scene.variation import DAYLIGHT, filter_to
 from tests.evolve.learning.test_task_module import small, written
 
 BALL = Path(__file__).parents[3] / "examples" / "find_ball.py"

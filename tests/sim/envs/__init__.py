@@ -8,7 +8,7 @@ task_sight: test_eye_kinds.py, test_task_vec_env.py
 task_animals: test_encounter.py, test_parallel_env.py
 task_pictures: test_task_vec_env.py, test_pictures.py, test_parallel_env.py
 parallel_env: test_parallel_env.py, test_pictures.py
-task_fidelity: robots/test_model_fidelity.py, test_encounter.py
+task_fidelity: render/test_model_fidelity.py, test_encounter.py
 task_state: test_task_state.py, test_differing_worlds.py, test_own_models.py
 auxiliary: test_auxiliary.py
 world_poses: test_auxiliary.py

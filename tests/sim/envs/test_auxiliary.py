@@ -11,8 +11,8 @@ import sim
 from sim.envs.world_poses import WorldPoses
 from sim.eyes.eyes import BODY_RADIUS
 from sim.eyes.sampling import directions_of
-from sim.robots.optic_flow import receptor_centres
-from sim.robots.task import grown
+from sim.render.optic_flow import receptor_centres
+from sim.tasks.user_task import grown
 from sim.worlds.state import pose
 from tests.sim.envs.hunt import Predator, Prey
 from tests.sim.envs.test_eye_kinds import Looker

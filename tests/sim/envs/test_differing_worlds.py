@@ -9,9 +9,9 @@ from scipy.stats import kstest
 import sim
 from sim.envs.task_fidelity import fidelities_of
 from sim.eyes.sampling import directions_of
-from sim.robots.optic_flow import receptor_centres
-from sim.robots.variation import Variation
-from sim.robots.world_models import WorldModels
+from sim.render.optic_flow import receptor_centres
+from sim.scene.variation import Variation
+from sim.scene.world_models import WorldModels
 from tests.sim.envs.rail import EYE
 from tests.sim.envs.rooms import SHAPES, Room, room, with_ranges
 

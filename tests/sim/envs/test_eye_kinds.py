@@ -11,7 +11,7 @@ from stable_baselines3 import PPO
 import optics
 import sim
 from sim.envs.task_fidelity import fidelities_of
-from sim.robots.task import grown
+from sim.tasks.user_task import grown
 from tests.sim.envs.hunt import Predator, Prey
 from tests.sim.envs.test_task_vec_env import Face
 

@@ -7,9 +7,10 @@ import pytest
 
 from sim.envs.info import infos_of
 from sim.envs.simulation import EPISODE_STEPS, MAX_TURN, Simulation
-from sim.tasks.placement import CLEARANCE, REACH, SEPARATION, Places
+from sim.tasks.placement import Places
 from sim.tasks.reward import EVALUATION, TRAINING
 from sim.tasks.task import first_reached, task_of
+from sim.worlds.layout import CLEARANCE, REACH, SEPARATION
 from sim.worlds.world import build_world
 
 
