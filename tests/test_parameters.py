@@ -22,11 +22,12 @@ from evolve.config.run_config import SECTIONS, GeneConfig, RunConfig
 from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RHABDOM, SIDE, gene_table
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
+from evolve.learning.animal_task import animal_task
 from evolve.learning.fitness import evaluate
-from evolve.learning.worlds import own_task_for
 from evolve.search.loop import evolve as carry
 from evolve.store.directory import Run
 from optics.numerics import backend
+from sim.envs.prepared_task import PreparedTask
 from tests.closed_form import ClosedForm
 
 # One training of two updates and one evaluation episode, through a perfect lens: about a second.
@@ -80,7 +81,7 @@ def sight(config, animal):
 
 def own_sight(config, animal):
     """The same in a task of one's own."""
-    worlds = sim.make_vec_env(own_task_for(animal, config), n_envs=1, seed=7, memory=animal.memory_frames)
+    worlds = PreparedTask(animal_task(animal, config)).vec_env(1, 7, animal.memory_frames)
     try:
         return worlds.reset()["eyes"].tobytes()
     finally:

@@ -31,7 +31,6 @@ import numpy as np
 
 import optics
 import sim
-from sim.envs.task_vec_env import TaskVecEnv
 from sim.envs.vec_env import EyesVecEnv
 from validation.page import Page, parser
 
@@ -79,7 +78,7 @@ class Row:
         return 1 / self.rates["sight"] / (1 / self.rates["physics"] + 1 / self.rates["sight"])
 
 
-def environments() -> dict[str, Callable[[int], EyesVecEnv | TaskVecEnv]]:
+def environments() -> dict[str, Callable[[int], EyesVecEnv]]:
     """Makers, by name, of so many worlds."""
     eyes = sim.Eyes(n_eyes=2, resolution=RESOLUTION, fov_deg=FOV_DEG)
     ours = {
@@ -94,23 +93,13 @@ def environments() -> dict[str, Callable[[int], EyesVecEnv | TaskVecEnv]]:
     return {**ours, **theirs}
 
 
-def parts_of(env: EyesVecEnv | TaskVecEnv) -> dict[str, Callable[[], object]]:
+def parts_of(env: EyesVecEnv) -> dict[str, Callable[[], object]]:
     """What is measured: one step of all worlds each."""
-    random, everyone = np.random.default_rng(0), np.arange(env.num_envs)
+    random = np.random.default_rng(0)
 
     def action() -> np.ndarray:
         return random.uniform(-1, 1, (env.num_envs, *env.action_space.shape)).astype(np.float32)
 
-    if isinstance(env, TaskVecEnv):
-        animals = env.animals
-
-        def moved() -> None:
-            outcomes = animals.worlds.step([action()])
-            ended = [outcome.terminated or outcome.truncated for outcome in outcomes]
-            if any(ended):
-                animals.worlds.reset(np.flatnonzero(ended))
-
-        return {"physics": moved, "sight": lambda: animals.look(everyone), "both": lambda: env.step(action())}
     simulation = env.simulation
 
     def judged() -> None:
@@ -120,7 +109,7 @@ def parts_of(env: EyesVecEnv | TaskVecEnv) -> dict[str, Callable[[], object]]:
 
     return {
         "physics": judged,
-        "sight": lambda: env._signals.begin(simulation.state).wait(),
+        "sight": lambda: [frame.wait() for kinds in env.animals.launch() for frame in kinds.values()],
         "both": lambda: env.step(action()),
     }
 
@@ -133,7 +122,7 @@ def timed(part: Callable[[], object], steps: int) -> float:
     return (time.process_time() - began) / steps
 
 
-def measured(name: str, env: EyesVecEnv | TaskVecEnv) -> Row:
+def measured(name: str, env: EyesVecEnv) -> Row:
     """Parts take turns."""
     with contextlib.closing(env), warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -17,7 +17,8 @@ import numpy as np
 
 import optics
 import sim
-from sim.envs.simulation import Simulation
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.worlds.state import WorldState
 
 WORLDS, STEPS, LOOKS, WARM_UP = 64, 40, 9, 2
@@ -44,7 +45,7 @@ CASES = {
 
 def moments(world: sim.World) -> WorldState:
     """Worlds in which everybody looks at an object, .6 to 4 m ahead."""
-    simulation, random = Simulation(world, WORLDS, 0, "training", 1), np.random.default_rng(0)
+    simulation, random = Simulation(task_of(world), WORLDS, 0), np.random.default_rng(0)
     simulation.reset()
     for _ in range(STEPS):
         simulation.step(random.uniform(-1, 1, (WORLDS, 2)))

@@ -123,7 +123,8 @@ def looks(worlds: int, lens: bool, samples: str) -> Callable[[], Callable[[], An
 
     def make() -> Callable[[], Any]:
         import sim
-        from sim.envs.simulation import Simulation
+        from sim.tasks.registry import task_of
+        from sim.tasks.simulation import Simulation
         from validation.sim_throughput import with_pupil
 
         plain = sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_deg=60)
@@ -132,7 +133,7 @@ def looks(worlds: int, lens: bool, samples: str) -> Callable[[], Callable[[], An
         light = "direct" if samples == "rays" else "all"
         fidelity = sim.Fidelity(4.0 if samples == "rays" else 1.0, eyes.bands, light=light, samples=samples)
         renderer = sim.BatchedRenderer(world, eyes, worlds, fidelity)
-        state = Simulation(world, worlds, 0, "training", 1).reset()
+        state = Simulation(task_of(world), worlds, 0).reset()
         return lambda: renderer.signals(state)
 
     return make

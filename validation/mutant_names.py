@@ -59,7 +59,7 @@ NAMED = (
         ("what may be mended is proved again", 'if result.verdict in ("good", "aborts"):', "if True:"),
     ),
     *_mutants(
-        "sim/physics/physics.py",
+        "sim/physics/agent_motion.py",
         ("a broken simulation touches nothing", "contact = contact & ~unstable", "pass"),
         ("speeds that no actuator can bring", "UNSTABLE_SPEED = 10 * MAX_SPEED", "UNSTABLE_SPEED = 1000 * MAX_SPEED"),
     ),

@@ -8,9 +8,10 @@ import numpy as np
 
 import optics
 import sim
-from sim.envs.simulation import Simulation
 from sim.eyes.sampling import BoxSampling
 from sim.render.random_views import RandomViews, on_objects
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.worlds.state import WorldState
 
 __all__ = ["SCENES", "SIGMA", "Scene", "facing_objects", "lived_through", "rms", "sees_object"]
@@ -65,7 +66,7 @@ SCENES = (
 
 def lived_through(world: sim.World, n: int, steps: int = 20) -> WorldState:
     """States that agents get into who act at random."""
-    simulation = Simulation(world, n, 3, "training", 1)
+    simulation = Simulation(task_of(world), n, 3)
     simulation.reset()
     rng = np.random.default_rng(5)
     for _ in range(steps):

@@ -38,9 +38,10 @@ import numpy as np
 
 import optics
 import sim
-from sim.envs.simulation import Simulation
 from sim.render.noisy_signals import NoisySignals
 from sim.tasks.random_streams import Streams
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.worlds.state import pose
 
 
@@ -92,7 +93,7 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
     """Agent-steps per second of one case, and ratios to MuJoCo's renderer."""
     world = sim.build_world(case.task, eyes=case.eyes)
     rng = np.random.default_rng(0)
-    state = Simulation(world, n_envs, 0, "training", 1).reset()
+    state = Simulation(task_of(world), n_envs, 0).reset()
 
     def moved() -> Any:
         return replace(state, heading=rng.uniform(-np.pi, np.pi, n_envs))

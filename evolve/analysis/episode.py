@@ -230,7 +230,7 @@ def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any], f
 def _perfect_views(worlds: Any, eyes: sim.Eyes, states: WorldState, every: int, light: float = 1.0) -> dict[str, Any]:
     """The same scenes in the same light through a perfect lens: by the same receptors, and as radiance on a finer
     grid."""
-    world, seen = worlds.simulation.world, worlds.renderer.fidelity
+    world, seen = worlds.worlds.world, worlds.renderer.fidelity
     perfect = replace(eyes, optics=None, waveguide=None)
     factor = max(1, -(-FINE_PIXELS // max(eyes.resolution)))
     fine = replace(perfect, resolution=(factor * eyes.resolution[0], factor * eyes.resolution[1]))

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from sim.tasks.encounter import Frozen
-    from sim.tasks.user_task import Task
+    from sim.tasks.task import Task
 
 __all__ = ["OpenedCandidate", "OpenedRun"]
 
@@ -81,8 +81,8 @@ class OpenedRun(Run):
             RunError: there is no such candidate, or its policy is missing or no policy.
             ValueError: the task places other eyes than the candidate has.
         """
+        from evolve.learning.animal_task import embodied
         from evolve.learning.policy import load_policy
-        from evolve.learning.worlds import embodied
         from sim.tasks.encounter import Frozen
 
         candidate = self.candidate(candidate_id)

@@ -9,8 +9,9 @@ from types import ModuleType
 
 from evolve.config.checks import ConfigError
 from evolve.config.own_task import OwnTask
-from sim.envs.task_fidelity import with_settled_others
-from sim.tasks.user_task import Task, compiled, require_rewards
+from sim.tasks.task import Task, require_rewards
+from sim.tasks.task_fidelity import with_settled_others
+from sim.tasks.task_settings import compiled
 
 __all__ = ["executed_task"]
 

@@ -11,8 +11,9 @@ from evolve.config.checks import ConfigError
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
-from evolve.learning.worlds import own_task_for
-from sim.envs.task_vec_env import TaskVecEnv
+from evolve.learning.animal_task import animal_task
+from sim.envs.prepared_task import PreparedTask
+from sim.envs.vec_env import EyesVecEnv
 
 __all__ = ["try_task"]
 
@@ -29,8 +30,8 @@ def try_task(config: RunConfig) -> None:
         return
     animal = develop(Genotype(config.genome).start, config)
     try:
-        task = own_task_for(animal, config)
-        with closing(TaskVecEnv(task, WORLDS, config.seed, animal.memory_frames)) as worlds, warnings.catch_warnings():
+        task = PreparedTask(animal_task(animal, config))
+        with closing(task.vec_env(WORLDS, config.seed, animal.memory_frames)) as worlds, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the failure itself is told
             failure = _failure(worlds)
     except (ValueError, RuntimeError, OSError) as error:
@@ -40,7 +41,7 @@ def try_task(config: RunConfig) -> None:
         raise ConfigError(f"{config.task}: {failure}", "task")
 
 
-def _failure(worlds: TaskVecEnv) -> str | None:
+def _failure(worlds: EyesVecEnv) -> str | None:
     """Of the first method that fails."""
     random = np.random.default_rng(0)
     worlds.reset()

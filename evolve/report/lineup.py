@@ -7,8 +7,8 @@ import math
 from evolve.analysis.statistics import acuity_cpd, champions
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
+from evolve.learning.animal_task import embodied
 from evolve.learning.task_module import executed_task
-from evolve.learning.worlds import embodied
 from evolve.report.agent_figure import agent_figure
 from evolve.report.markup import Html, html, joined, rounded
 from evolve.store.candidate import Candidate

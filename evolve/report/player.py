@@ -14,7 +14,7 @@ from evolve.report.ground_plan import GroundPlan
 from evolve.report.markup import Html, document, exact, html, joined, json_script, key, look, rounded
 from evolve.report.picture import data_uri, display, film_sheet
 from evolve.store.atomic_files import write_whole
-from sim.envs.simulation import MAX_TURN
+from sim.physics.sliding_agents import MAX_TURN
 from sim.worlds.world import MAX_SPEED
 
 __all__ = ["episode_sentence", "player", "write_player"]

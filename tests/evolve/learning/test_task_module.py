@@ -15,11 +15,12 @@ from evolve.config.assemble import assemble, to_toml
 from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
+from evolve.learning.animal_task import animal_task
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import TrainingDiverged, load_policy
 from evolve.learning.task_module import executed_task
 from evolve.learning.task_trial import try_task
-from evolve.learning.worlds import own_task_for, worlds_of
+from evolve.learning.worlds import worlds_of
 from evolve.search import dask_worker
 from evolve.search.job import Job
 from evolve.search.worker import evaluate_candidate
@@ -67,7 +68,7 @@ def test_an_animal_lives_in_it_twice_alike(tmp_path):
 
 def test_eyes_are_the_animals_own_where_the_task_puts_them():
     config, animal = small("genome.elevation_deg.start=20", "genome.placement_range_deg.start=80")
-    task = own_task_for(animal, config)
+    task = animal_task(animal, config).task
     assert [mount.azimuth_deg for mount in task.mounts] == [40, -40]
     assert {mount.elevation_deg for mount in task.mounts} == {20}
     assert np.hypot(*task.mounts[0].offset[:2]) == pytest.approx(0.26)  # as far out, turned with the eye

@@ -10,8 +10,8 @@ from stable_baselines3 import PPO
 
 import optics
 import sim
-from sim.envs.task_fidelity import fidelities_of
-from sim.tasks.user_task import grown
+from sim.tasks.task import grown
+from sim.tasks.task_fidelity import fidelities_of
 from tests.sim.envs.hunt import Predator, Prey
 from tests.sim.envs.test_task_vec_env import Face
 

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import sim
-from sim.envs.simulation import Simulation
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.noisy_signals import NoisySignals
 from sim.render.receptor_noise import FEW
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.worlds.world import build_world
 
 EYES = sim.Eyes(n_eyes=2, resolution=(3, 5), fov_deg=60, placement_range_deg=60)
@@ -18,7 +19,7 @@ N = 3 * FEW
 def before_and_after():
     """A renderer of N worlds, and two different states of them."""
     world = build_world("detection")
-    states = [Simulation(world, N, seed, "training", 1).reset() for seed in (0, 1)]
+    states = [Simulation(task_of(world), N, seed).reset() for seed in (0, 1)]
     return BatchedRenderer(world, EYES, N, sim.Fidelity(4, EYES.bands)), *states
 
 
