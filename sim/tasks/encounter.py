@@ -170,9 +170,9 @@ def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
     for animal in animals:
         given: object = animal
         if isinstance(given, str | BatchTask):
-            said = given if isinstance(given, str) else type(given).__name__
+            label = given if isinstance(given, str) else type(given).__name__
             raise ValueError(
-                f"{where}: {said!r} has the body of one agent: must be a sim.Task, whose model has several"
+                f"{where}: {label!r} has the body of one agent: must be a sim.Task, whose model has several"
             )
         of_kind(where, animal, Task, "Prey()")
     names = [name_of(animal) for animal in animals]

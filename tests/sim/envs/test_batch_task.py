@@ -158,7 +158,7 @@ class WrongWorld(FindBalls):
         (NoMapping, "NoMapping: rewards returned .*: must be arrays by name"),
         (WrongEnd, r"WrongEnd: terminated has shape \(\): must be \(4,\)"),
         (NotFinite, r"NotFinite: feels: 'feels' is \[nan\] in world 2: must be finite"),
-        (Neighbour, "reset: was given world 3 and changed physics of world 2: must not"),
+        (Neighbour, "reset: was given world 3 and changed physics of world 2: must leave it alone"),
         (OwnChance, "the same seed: .* differs after action 0: must repeat every episode"),
         (Crowd, "world 0: reward differs after action 0: must not depend on other worlds"),
         (Mover, "judge: moved bodies of world 0, which is not in Outcome.changed"),
