@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from contextlib import closing
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from evolve.config.checks import ConfigError
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
-from evolve.learning.worlds import own_task_for
-from sim.envs.task_vec_env import TaskVecEnv
+
+if TYPE_CHECKING:
+    from sim.envs.task_vec_env import TaskVecEnv
 
 __all__ = ["try_task"]
 
@@ -27,6 +29,9 @@ def try_task(config: RunConfig) -> None:
     """
     if config.own_task is None:
         return
+    from evolve.learning.worlds import own_task_for  # takes seconds to load, and built-in tasks are not tried
+    from sim.envs.task_vec_env import TaskVecEnv
+
     animal = develop(Genotype(config.genome).start, config)
     try:
         task = own_task_for(animal, config)
