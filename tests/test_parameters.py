@@ -4,7 +4,6 @@ The tables name each field of each config dataclass, and each gene, with a chang
 A field or gene that is missing here fails the test, so whoever adds one says what it does.
 """
 
-from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
@@ -15,7 +14,6 @@ from unittest import mock
 import numpy as np
 import pytest
 
-import evolve.cli.commands.run
 import sim
 from evolve.config.assemble import assemble
 from evolve.config.run_config import SECTIONS, GeneConfig, RunConfig
@@ -24,6 +22,7 @@ from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.animal_task import animal_task
 from evolve.learning.fitness import evaluate
+from evolve.runs import carry_on
 from evolve.search.loop import evolve as carry
 from evolve.store.directory import Run
 from optics.numerics import backend
@@ -116,11 +115,10 @@ def budget_stages(config, animal):
 
 def hired(config, animal):
     """Workers that a run starts."""
-    with TemporaryDirectory() as folder, mock.patch.object(evolve.cli.commands.run, "LocalExecutor") as executor:
+    with TemporaryDirectory() as folder, mock.patch.object(carry_on, "LocalExecutor") as executor:
         executor.side_effect = KeyboardInterrupt
-        evolve.cli.commands.run._carry(
-            Run.create(Path(folder) / "run", config), Namespace(json=False, executor="local", tensorboard=False), None
-        )
+        with pytest.raises(KeyboardInterrupt):
+            carry_on.carry_on(Run.create(Path(folder) / "run", config), mock.Mock())
         return executor.call_args.args[1]
 
 

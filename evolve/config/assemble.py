@@ -49,7 +49,7 @@ def assemble(
     """A run's configuration from all its sources; `task` and `assignments` ("search.population=8") win.
 
     task: one of TASKS, or FILE.py:CLASS; may be missing where preset or file names one
-    starts: where the genes start instead, as `evolve.cli.start_from` reads it from another run
+    starts: where the genes start instead, as `evolve.runs.start_from` reads it from another run
     scale: how much of its work a preset does, where it comes in several: one of SCALES, "laptop" if not given
 
     Raises:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from contextlib import closing
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +12,9 @@ from evolve.config.checks import ConfigError
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
-from evolve.learning.animal_task import animal_task
-from sim.envs.prepared_task import PreparedTask
-from sim.envs.vec_env import EyesVecEnv
+
+if TYPE_CHECKING:
+    from sim.envs.vec_env import EyesVecEnv
 
 __all__ = ["try_task"]
 
@@ -28,6 +29,9 @@ def try_task(config: RunConfig) -> None:
     """
     if config.own_task is None:
         return
+    from evolve.learning.animal_task import animal_task  # takes seconds to load, and built-in tasks are not tried
+    from sim.envs.prepared_task import PreparedTask
+
     animal = develop(Genotype(config.genome).start, config)
     try:
         task = PreparedTask(animal_task(animal, config))

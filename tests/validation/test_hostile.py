@@ -34,7 +34,7 @@ BROKEN = {
         "evolve.genome.phenotype_on_record._of_gene",
         lambda g, k, value: value,
     ),
-    "escapes obeyed": (hostile_runs.steering_text, "evolve.cli.output.printable", str),
+    "escapes obeyed": (hostile_runs.steering_text, "evolve.runs.output.printable", str),
     "text unescaped": (hostile_files.text_on_a_page, "evolve.report.markup._escaped", str),
     "policies unchecked": (hostile_files.forged_policy, "evolve.learning.policy._require_shape", lambda *_: None),
     "places unchecked": (hostile_files.bomb_of_a_model, "sim.scene.source.require_finite", lambda *_: None),

@@ -28,7 +28,7 @@ def validate(arguments: Namespace) -> int:
     if not scripts:
         print("evolve: error: validate needs a checkout of rhabdom: its scripts are not installed", file=sys.stderr)
         return 2
-    from evolve.cli.progress import clock  # not at the top: the doctor works on every system
+    from evolve.runs.progress import clock  # not at the top: the doctor works on every system
 
     backend.require()
     print(f"{len(scripts)} scripts, most of which take seconds and some minutes", flush=True)

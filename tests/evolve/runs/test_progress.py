@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import pytest
 
-from evolve.cli import progress
-from evolve.cli.progress import Bar, Events, Lines, Tally, watcher
 from evolve.config.numbering import Place
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
+from evolve.runs import progress
+from evolve.runs.progress import Bar, Events, Lines, Tally, watcher
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation

@@ -2,12 +2,12 @@
 
 import pytest
 
-from evolve.cli.start_from import starts_from
 from evolve.config.assemble import assemble
 from evolve.config.numbering import Place
 from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
+from evolve.runs.start_from import starts_from
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, RunError
 from evolve.store.evaluation import Evaluation

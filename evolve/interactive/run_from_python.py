@@ -1,4 +1,4 @@
-"""`evolve.run`: a run from its beginning to its end."""
+"""`evolve.run` and `evolve.resume`: a run to its end."""
 
 from __future__ import annotations
 
@@ -11,15 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from evolve.cli.start_from import starts_from
-from evolve.config.assemble import assemble
 from evolve.config.checks import ConfigError, quoted
-from evolve.interactive.carry_on import Callback, carry_on, require_callbacks
+from evolve.interactive.callbacks import Callback, Callbacks
 from evolve.interactive.opened_run import OpenedRun
-from evolve.search.search import Search
-from optics.numerics import device
+from evolve.runs.begin import RunRequest, prepare
 
-__all__ = ["run"]
+__all__ = ["resume", "run"]
 
 
 def run(
@@ -54,24 +51,40 @@ def run(
         BackendError: Dr.Jit has no LLVM that it can use.
     """
     _check(task=task, preset=preset, settings=settings, config=config, scale=scale, start_from=start_from, out=out)
-    require_callbacks(callbacks)
-    starts = starts_from(start_from) if start_from else None
+    watchers = Callbacks(callbacks, progress)
     assignments = [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
-    chosen = assemble(task, preset, None if config is None else Path(config), assignments, starts, scale)
-    Search(chosen)  # an unknown optimizer, say, is refused before anything is written
-    device.make_ready()
-    if chosen.own_task is not None:
-        from evolve.learning.task_trial import try_task
-
-        try_task(chosen)
-    origin = starts.name.removeprefix("--from ") if starts else None
-    if out is None:
-        begun = OpenedRun.create_next(chosen, preset.removesuffix(f"-{chosen.task}"), origin)
-    else:
-        begun = OpenedRun.create(out, chosen, origin)
-    with begun.lock():
-        carry_on(begun, callbacks, progress)
+    file = None if config is None else Path(config)
+    with prepare(RunRequest(task, preset, file, assignments, scale, start_from)).begin(OpenedRun, out) as begun:
+        watchers.carry_on(begun)
     return begun
+
+
+def resume(
+    directory: Path | str,
+    task: str | None = None,
+    *,
+    callbacks: Sequence[Callback] = (),
+    progress: bool = True,
+) -> OpenedRun:
+    """Carry an interrupted run to its end, as the command `evolve resume` does, and return it. A finished run stays as
+    it is.
+
+    directory: of the run; the command may have begun it, or Python
+    task: "FILE.py:CLASS", if the run evolves a user task: its code runs only if you name it
+    callbacks: each called as callback(run, candidate) after every evaluated candidate; an exception ends the run
+    progress: whether to print how it goes, to stderr
+
+    Raises:
+        ConfigError: an argument or the config cannot be used, or the user task has not been named, has changed or
+            fails; one line.
+        RunError: there is no run, its record is damaged or cannot be written, or its format is a former one.
+        LockedError: another process works on it.
+        BackendError: Dr.Jit has no LLVM that it can use.
+    """
+    _check(directory=directory, task=task)
+    opened = OpenedRun.open(directory, task)
+    opened.resume(callbacks, progress)
+    return opened
 
 
 RIGHT: Mapping[str, tuple[Any, str]] = {
@@ -82,6 +95,7 @@ RIGHT: Mapping[str, tuple[Any, str]] = {
     "config": ((str, os.PathLike, NoneType), "a file's path"),
     "start_from": ((str, NoneType), "'RUN:ID'"),
     "out": ((str, os.PathLike, NoneType), "a directory's path"),
+    "directory": ((str, os.PathLike), "a directory's path"),
 }
 
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, TextIO
 
-from evolve.cli.output import as_it_is, printable
 from evolve.config.numbering import Place
+from evolve.runs.output import as_it_is, printable
 from evolve.search.successive_halving import evaluations
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run

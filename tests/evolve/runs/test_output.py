@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from evolve.cli.output import Voice, as_it_is, printable, voices
+from evolve.runs.output import Voice, as_it_is, printable, voices
 from evolve.search.successive_halving import finished
 from evolve.store.directory import Run
 from tests.evolve.closed_form import tiny
@@ -22,9 +22,10 @@ DRIVER = """
 import sys
 import evolve.cli.commands.run as commands
 from evolve.cli.main import main
+from evolve.runs import carry_on
 from tests.evolve import closed_form
 if __name__ == "__main__":
-    commands.evaluate_candidate, commands.prepare_device = getattr(closed_form, sys.argv[1]), None
+    carry_on.evaluate_candidate, carry_on.prepare_device = getattr(closed_form, sys.argv[1]), None
     commands._finish = lambda run, as_json: 0
     sys.exit(main(sys.argv[2:]))
 """
