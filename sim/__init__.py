@@ -13,7 +13,9 @@ choose_model_fidelity               how finely eyes on a model see
 Task                                what a robot of one's own has to do: for make_vec_env
 BatchTask                           the same for arrays of all worlds, which is faster
 check_batch_task                    whether one keeps to the protocol
-ArrayWorlds, SlidingAgents          what moves them: any MuJoCo model, or the built-in agent
+Outcome, RewardTerms                what its `judge` returns
+Physics                             what moves its worlds
+ArrayWorlds, SlidingAgents          two of these: any MuJoCo model, and the built-in agent
 Encounter, Frozen                   several animals in one world, that see each other
 make_parallel_env                   these as a PettingZoo environment
 make_vec_env, make_env              the environments, natively batched or single
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from sim.eyes.eyes import Eyes
     from sim.eyes.mounts import Mount, both_sides, fan, ring
     from sim.physics.array_worlds import ArrayWorlds
+    from sim.physics.physics import Physics
     from sim.physics.sliding_agents import SlidingAgents
     from sim.render.batched_renderer import BatchedRenderer
     from sim.render.fidelity import Fidelity
@@ -51,6 +54,7 @@ if TYPE_CHECKING:
     from sim.scene.poses import Poses
     from sim.tasks.batch_task import BatchTask
     from sim.tasks.encounter import Encounter, Frozen
+    from sim.tasks.outcome import Outcome, RewardTerms
     from sim.tasks.task import Task
     from sim.worlds.course import Course
     from sim.worlds.world import World, build_world
@@ -74,6 +78,9 @@ _HOME = {
     "Poses": "sim.scene.poses",
     "Task": "sim.tasks.task",
     "BatchTask": "sim.tasks.batch_task",
+    "Outcome": "sim.tasks.outcome",
+    "RewardTerms": "sim.tasks.outcome",
+    "Physics": "sim.physics.physics",
     "ArrayWorlds": "sim.physics.array_worlds",
     "SlidingAgents": "sim.physics.sliding_agents",
     "Encounter": "sim.tasks.encounter",
@@ -106,8 +113,11 @@ __all__ = [
     "MirrorWarning",
     "ModelRenderer",
     "Mount",
+    "Outcome",
+    "Physics",
     "Poses",
     "ReferenceRenderer",
+    "RewardTerms",
     "SlidingAgents",
     "Task",
     "View",

@@ -38,8 +38,8 @@ import numpy as np
 
 import optics
 import sim
-from sim.render.noisy_signals import NoisySignals
-from sim.tasks.random_streams import Streams
+from sim.envs.eyes_of_kind import EyesOfKind
+from sim.tasks.random_streams import StreamsByPurpose
 from sim.tasks.registry import task_of
 from sim.tasks.simulation import Simulation
 from sim.worlds.state import pose
@@ -139,18 +139,24 @@ class _Step:
     def __init__(self, case: Case, n_envs: int) -> None:
         self._worlds = sim.make_vec_env(case.task, with_pupil(case.eyes), n_envs)
         self._worlds.reset()
-        self._alone = NoisySignals(self._worlds.renderer, self._worlds.simulation.streams.noise_keys)
+        simulation = self._worlds.simulation
         self._rng = np.random.default_rng(0)
         self._parts: list[Callable[[], Any]] = []
         self.wholes: list[float] = []
         self.shares: list[float] = []
-        simulation = self._worlds.simulation
-        task, chance = simulation.task, Streams(1, n_envs).motion
-        simulation.task = SimpleNamespace(world=task.world, begin=task.begin, judge=task.judge, move=task.move)
-        self._note(simulation.task, "move", lambda state, _, seconds: task.move(state, chance, seconds))
-        self._note(simulation._physics, "step", simulation._physics.step)
-        self._note(self._worlds._signals, "begin", lambda *asked: self._alone.begin(*asked).wait())
-        self._note(self._worlds._signals, "begin_some", lambda *asked: self._alone.begin_some(*asked).wait())
+        physics, chance = simulation.physics, StreamsByPurpose(1, n_envs)
+        (sight,) = self._worlds.animals.learners[0].sights.values()
+        alone = EyesOfKind(simulation, sight.renderer, simulation.streams.noise_keys[0][0], memory=1)
+        move = simulation.task.moved
+
+        def moved(worlds: Any) -> Any:
+            then = SimpleNamespace(state=worlds.state, chance=chance, seconds=worlds.seconds)
+            self._parts.append(lambda: move(then))
+            return move(worlds)
+
+        simulation.task.moved = moved  # type: ignore[method-assign]
+        self._note(physics.agents, "step", physics.agents.step)
+        self._note(sight, "begin", lambda *asked: alone.begin(*asked).wait())
 
     def _note(self, owner: Any, name: str, alone: Callable[..., Any]) -> None:
         """Remember what the step asks of this method, for doing it again `alone`."""

@@ -10,9 +10,8 @@ from evolve.genome.phenotype import Phenotype
 from evolve.learning.task_module import executed_task
 from sim.render.fidelity import Fidelity, fidelity_asked
 from sim.tasks.batch_task import BatchTask
-from sim.tasks.per_world import PerWorld
 from sim.tasks.registry import task_of
-from sim.tasks.task import Task, grown
+from sim.tasks.user_tasks import UserTask, batched, with_evolved_eyes
 from sim.worlds.world import build_world
 
 __all__ = ["animal_task", "embodied"]
@@ -27,7 +26,7 @@ def animal_task(phenotype: Phenotype, config: RunConfig, mode: str = "evaluation
     """
     if (code := config.choice.named_code) is not None:
         task = embodied(executed_task(code), phenotype, config)
-        return PerWorld(task).in_mode(mode)
+        return batched(task).in_mode(mode)
     eyes, layout = phenotype.eyes(config.eye), getattr(config.world, mode)
     asked = fidelity_asked(config.eye.rays_per_receptor, eyes)
     world = build_world(config.task, seed=layout["world_seed"], mazes=layout["mazes"], course=layout["course"])
@@ -36,13 +35,13 @@ def animal_task(phenotype: Phenotype, config: RunConfig, mode: str = "evaluation
     return built_in
 
 
-def embodied(task: Task, phenotype: Phenotype, config: RunConfig) -> Task:
+def embodied(task: UserTask, phenotype: Phenotype, config: RunConfig) -> UserTask:
     """A user's task with this animal in it, whose eyes have the fidelity of the run or, if that is "auto", the task's.
 
     Raises:
         ValueError: it places other eyes than the animal has.
     """
-    animal = grown(task, phenotype.eyes(config.eye), phenotype.elevation_deg or 0.0)
+    animal = with_evolved_eyes(task, phenotype.eyes(config.eye), phenotype.elevation_deg or 0.0)
     rays, bands = config.eye.rays_per_receptor, config.eye.bands
     if rays != AUTO:
         animal.fidelity = Fidelity(float(rays), bands)

@@ -9,30 +9,32 @@ from types import ModuleType
 
 from evolve.config.checks import ConfigError
 from evolve.config.task_code import TaskCode
-from sim.tasks.task import Task, require_rewards
+from sim.tasks.batch_task import BatchTask
+from sim.tasks.task import Task
 from sim.tasks.task_fidelity import with_settled_others
 from sim.tasks.task_settings import compiled
+from sim.tasks.user_tasks import require_rewards
 
 __all__ = ["executed_task"]
 
 
 @lru_cache(maxsize=4)
-def executed_task(code: TaskCode) -> Task:
+def executed_task(code: TaskCode) -> Task | BatchTask:
     """The task: its file's text is executed as it was read, whatever the file holds by now.
 
     Raises:
         ConfigError: one line, with file and line where it comes from there: it cannot be executed, the class is no
-            `sim.Task` or wants arguments, its model cannot be compiled, or a setting of it is wrong.
+            `sim.Task` or `sim.BatchTask` or wants arguments, its model cannot be compiled, or a setting of it is wrong.
     """
     module = _executed(code)
     cls = getattr(module, code.name, None)
-    if not (isinstance(cls, type) and issubclass(cls, Task)):
-        raise ConfigError(f"{code.label}: must be a class that derives from sim.Task", "task")
+    if not (isinstance(cls, type) and issubclass(cls, Task | BatchTask)):
+        raise ConfigError(f"{code.label}: must be a class that derives from sim.Task or sim.BatchTask", "task")
     try:
         task = cls()
         compiled(task)
         require_rewards(task)
-        return with_settled_others(task)
+        return with_settled_others(task) if isinstance(task, Task) else task
     except (Exception, SystemExit) as error:
         raise ConfigError(f"{code.label}: {_told(error, code)}", "task") from error
 

@@ -20,11 +20,11 @@ from sim.render.fidelity import Fidelity, fidelity_asked
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.encounter import Encounter
 from sim.tasks.eye_kinds import auxiliary_of
-from sim.tasks.per_world import PerWorld
 from sim.tasks.registry import task_of
 from sim.tasks.reward import check_mode
 from sim.tasks.simulation import check_least_return
 from sim.tasks.task import Task
+from sim.tasks.user_tasks import batched
 from sim.worlds.course import Course
 from sim.worlds.world import build_world
 
@@ -93,7 +93,7 @@ def make_vec_env(
     if isinstance(task, Task | BatchTask | Encounter):
         _refuse_for_tasks({name: value for name, value in locals().items() if name != "how"})
         _check(n_envs, seed, memory, mode, render_mode)
-        prepared = PreparedTask(_batched(task).in_mode(mode))
+        prepared = PreparedTask(batched(task).in_mode(mode))
         return prepared.vec_env(n_envs, seed, memory, **how)
     eyes = Eyes() if eyes is None else eyes
     _require_eyes(eyes)
@@ -132,16 +132,6 @@ def make_parallel_env(
     from sim.envs.parallel_env import EncounterEnv
 
     return EncounterEnv(encounter, seed, memory, render_mode)
-
-
-def _batched(task: Task | BatchTask | Encounter) -> BatchTask:
-    """A user's task for arrays of worlds."""
-    return task if isinstance(task, BatchTask) else _paid(PerWorld(task))
-
-
-def _paid(task: PerWorld) -> PerWorld:
-    task.require_rewards()
-    return task
 
 
 def in_bands(eyes: Eyes | Mapping[str, Eyes], bands: int) -> Any:

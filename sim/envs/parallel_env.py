@@ -16,8 +16,8 @@ from sim.envs.prepared_task import PreparedTask
 from sim.envs.renderers import renderers_for
 from sim.envs.world_pictures import WorldPictures
 from sim.tasks.encounter import Encounter
-from sim.tasks.per_world import PerWorld
 from sim.tasks.simulation import Simulation
+from sim.tasks.user_tasks import batched
 
 
 class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
@@ -32,8 +32,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
     def __init__(self, encounter: Encounter, seed: int | None, memory: int, render_mode: str | None) -> None:
         self.possible_agents, self.agents = list(encounter.names), list[str]()
         self.render_mode = render_mode
-        task = PerWorld(encounter)
-        task.require_rewards()
+        task = batched(encounter)
         simulation = Simulation(task, 1, seed)
         self._animals = Animals(simulation, renderers_for(simulation, PreparedTask(task).fidelities, None), memory)
         self._pictures = WorldPictures(self._animals, render_mode)

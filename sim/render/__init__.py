@@ -14,7 +14,6 @@ random_views        the views that they look through
 prepared_scene      PreparedScene: what choosing a fidelity and rendering both begin with
 memory_budget       whether there is memory for it
 receptor_noise      noise for all worlds at once
-noisy_signals       signals with that noise
 pending_frame       frames that are begun early and waited for late
 model_renderer      ModelRenderer: eyes mounted on any MuJoCo model
 model_wavefront     its kernels

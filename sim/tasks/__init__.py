@@ -3,6 +3,7 @@
 batch_task      BatchTask: a task on arrays of all worlds; Agent: who acts in it
 task            Task: a task of one world at a time, in plain Python
 task_settings   settings that both have
+user_tasks      tasks that users write: for arrays, with eyes that evolve
 per_world       PerWorld: a Task, or several, as a BatchTask
 encounter       Encounter: several tasks in one world; Frozen
 registry        the built-in tasks by name

@@ -21,7 +21,7 @@ from sim.tasks.batch_task import Agent, BatchTask
 from sim.tasks.encounter import Encounter, cast, name_of, of_world, require_own_actuators
 from sim.tasks.eye_kinds import auxiliary_of, kinds_of
 from sim.tasks.outcome import Outcome, RewardTerms
-from sim.tasks.task import Task, named_terms, require_rewards
+from sim.tasks.task import Task, named_terms
 from sim.tasks.task_settings import compiled
 
 __all__ = ["PerWorld"]
@@ -72,11 +72,6 @@ class PerWorld(BatchTask):
             found.frozen = tuple(replace(other, task=_in_mode(other.task, mode)) for other in self.frozen)
             found.animals = (*found.learners, *(other.task for other in found.frozen))
         return found
-
-    def require_rewards(self) -> None:
-        """ValueError unless everybody who learns is paid."""
-        for learner in self.learners:
-            require_rewards(learner)
 
     def physics(self, n: int, threads: int, variation: Variation | None) -> Physics:
         return MujocoWorlds(self.animals[0].model, self.model, n, threads, self.substeps, variation)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 
-from sim.eyes.eyes import Eyes
-from sim.eyes.mounts import Mount, fan
 from sim.physics.controls import controls_of
-from sim.tasks.eye_kinds import several
 from sim.tasks.task_settings import TaskSettings
 
 if TYPE_CHECKING:
@@ -66,42 +62,6 @@ class Task(TaskSettings):
     def feels(self, data: mujoco.MjData) -> np.ndarray:
         """What the animal knows beside what it sees, (k,); here: nothing."""
         return np.zeros(0)
-
-    def place(self, n_eyes: int, placement_range_deg: float, elevation_deg: float) -> Sequence[Mount]:
-        """Where an evolving animal has its eyes; here: the first of `mounts`, fanned out, see `sim.fan`."""
-        assert not isinstance(self.mounts, Mapping)
-        return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)
-
-
-def require_rewards(task: Task) -> None:
-    """ValueError unless whoever learns it is paid."""
-    if getattr(task.rewards, "__func__", None) is Task.rewards:
-        name = type(task).__name__
-        raise ValueError(f"{name}: rewards: must be defined, to return numbers by name, such as {{'progress': 0.1}}")
-
-
-def grown(task: Task, eyes: Eyes, elevation_deg: float = 0.0) -> Task:
-    """The same task for an animal with such eyes, where the task places them.
-
-    Raises:
-        ValueError: the task places another number of eyes, or none, since it has no mounts, or has several kinds; its
-            `place` fails.
-    """
-    name, animal = type(task).__name__, copy.copy(task)
-    if several(task):
-        raise ValueError(f"{name}: eye and mounts have several kinds of eyes: must have one, where eyes evolve")
-    if not task.mounts and type(task).place is Task.place:
-        raise ValueError(f"{name}: mounts = {task.mounts!r}: must hold one sim.Mount at least, where the eyes are")
-    animal.eye, animal.auxiliary = eyes.eye(), ()
-    try:
-        animal.mounts = tuple(task.place(eyes.n_eyes, eyes.placement_range_deg, elevation_deg))
-    except ValueError:
-        raise
-    except Exception as error:
-        raise ValueError(f"{name}: place: {type(error).__name__}: {error}") from error
-    if len(animal.mounts) != eyes.n_eyes or not all(isinstance(mount, Mount) for mount in animal.mounts):
-        raise ValueError(f"{name}: place returned {animal.mounts!r:.200}: must be {eyes.n_eyes} of sim.Mount")
-    return animal
 
 
 def named_terms(task: Task, data: mujoco.MjData, whose: str = "") -> dict[str, float]:

@@ -11,7 +11,7 @@ import mujoco
 import optics
 from optics.numerics.arguments import did_you_mean, finite, whole
 from optics.spectra.spectrum import Spectrum
-from sim.eyes.mounts import Mount
+from sim.eyes.mounts import Mount, fan
 from sim.physics.controls import actuator_names, controls_of
 from sim.render.fidelity import Fidelity
 from sim.scene import source
@@ -71,6 +71,11 @@ class TaskSettings:
     def n_actions(self, model: mujoco.MjModel) -> int:
         """Numbers in an action; here: as many controls as its actuators take, which is one each of most kinds."""
         return len(controls_of(model, self.actuators))
+
+    def place(self, n_eyes: int, placement_range_deg: float, elevation_deg: float) -> Sequence[Mount]:
+        """Where an evolving animal has its eyes; here: the first of `mounts`, fanned out, see `sim.fan`."""
+        assert not isinstance(self.mounts, Mapping)
+        return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)
 
 
 def compiled(task: TaskSettings, model: mujoco.MjModel | None = None) -> mujoco.MjModel:

@@ -37,7 +37,7 @@ def test_parts_do_what_they_are_called():
     with contextlib.closing(D4.environments()["ant"](2)) as env:
         env.reset()
         (sight,) = env.animals.learners[0].sights.values()
-        worlds, looks = env.worlds, []
+        worlds, looks = env.simulation, []
         begin = sight.renderer.begin
         sight.renderer.begin = lambda *seen: looks.append(1) or begin(*seen)
         found = {}

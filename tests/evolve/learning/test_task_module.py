@@ -66,6 +66,47 @@ def test_an_animal_lives_in_it_twice_alike(tmp_path):
     assert policy.features_extractor.felt.seen.item() in (8 + 128, 8 + 256)
 
 
+BATCH = """
+import numpy as np
+import sim
+from pathlib import Path
+
+class FindBalls(sim.BatchTask):
+    model = {model!r}
+    mounts = (sim.Mount("cart", offset=(0.26, 0, 0.12)),)
+    fidelity = sim.Fidelity(2, bands=4)
+    episode_steps = 20
+
+    def reset(self, worlds, chosen, rngs):
+        worlds.mocap_pos[chosen, 0, 1] = [rng.uniform(-2, 2) for rng in rngs]
+
+    def rewards(self, worlds):
+        return {{"near": -np.abs(worlds.mocap_pos[:, 0, 1] - worlds.qpos[:, 0]) / 10}}
+
+    def succeeded(self, worlds):
+        return np.abs(worlds.mocap_pos[:, 0, 1] - worlds.qpos[:, 0]) < 0.3
+
+    def feels(self, worlds):
+        return worlds.qvel
+"""
+
+
+def test_a_batch_task_evolves_as_the_same_task_of_one_world_at_a_time(tmp_path):
+    """With the same numbers: returns, and the policy's bytes."""
+    file = tmp_path / "balls.py"
+    file.write_text(BATCH.format(model=executed_task(small()[0].choice.named_code).model))
+    lives = []
+    for named in (f"{BALL}:FindBall", f"{file}:FindBalls"):
+        config, animal = small(named=named)
+        try_task(config)
+        lives.append(evaluate(animal, config, 3, tmp_path / named.rpartition(":")[2]))
+    single, batch = lives
+    assert single.failure is None
+    assert batch.returns == single.returns
+    assert batch.success_rate == single.success_rate
+    assert (tmp_path / "FindBalls").read_bytes() == (tmp_path / "FindBall").read_bytes()
+
+
 def test_eyes_are_the_animals_own_where_the_task_puts_them():
     config, animal = small("genome.elevation_deg.start=20", "genome.placement_range_deg.start=80")
     task = animal_task(animal, config).task

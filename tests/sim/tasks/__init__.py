@@ -19,4 +19,5 @@ outcome: test_task.py, envs/test_task_vec_env.py
 batch_arrays: envs/test_batch_task.py
 reach: test_task.py
 task_fidelity: render/test_model_fidelity.py, envs/test_encounter.py
+user_tasks: envs/test_eye_kinds.py, envs/test_batch_task.py, evolve/learning/test_task_module.py
 """
