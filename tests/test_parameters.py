@@ -252,7 +252,7 @@ def _names(cls, prefix=""):
         if f.name == "genome":
             yield from (f"genome.GENE.{part.name}" for part in fields(GeneConfig))
         elif f.name in ("own", "task_sha256"):
-            continue  # text of a task of one's own, and its hash: tests/evolve/config/test_own_task.py
+            continue  # text of a task of one's own, and its hash: tests/evolve/config/test_task_choice.py
         elif f.name in SECTIONS:
             yield from _names(SECTIONS[f.name], f"{f.name}.")
         else:

@@ -15,6 +15,7 @@ import sim
 from evolve.analysis.filmed_episode import FilmedEpisode, film
 from evolve.config.formats import task_then
 from evolve.config.run_config import EyeConfig, WorldConfig
+from evolve.config.task_card import card_of
 from evolve.genome.phenotype import Phenotype
 from evolve.genome.plain_values import parsed
 from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
@@ -72,6 +73,12 @@ class Episode:
     def __len__(self) -> int:
         """Actions taken."""
         return len(self.action)
+
+    @property
+    def title(self) -> str:
+        """Of the task, for headings."""
+        card = card_of(self.task)
+        return self.task if card is None else card.title
 
     @property
     def eyes(self) -> sim.Eyes:
@@ -142,7 +149,7 @@ def record(
     """
     candidate = run.candidate(candidate_id)
     require_policy(candidate, run.policy_path(candidate.id))
-    own = run.config.own_task
+    own = run.config.choice.named_code
     try:
         policy = load_policy(run.policy_path(candidate.id))
     except ValueError as error:

@@ -13,6 +13,7 @@ import numpy as np
 import sim
 from evolve.analysis.filmed_scene import FilmedScene
 from evolve.config.run_config import EyeConfig, RunConfig
+from evolve.config.task_card import card_of
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.animal_task import animal_task
 from evolve.learning.policy import EyePolicy
@@ -76,6 +77,12 @@ class FilmedEpisode:
     def __len__(self) -> int:
         """Actions taken."""
         return len(self.action)
+
+    @property
+    def title(self) -> str:
+        """Of the task, for headings."""
+        card = card_of(self.task)
+        return self.task if card is None else card.title
 
     @property
     def eyes(self) -> sim.Eyes:

@@ -12,7 +12,6 @@ import optics
 import sim
 from evolve.analysis.filmed_episode import moments
 from evolve.analysis.statistics import eye_image_quality, polychromatic, psnr
-from evolve.config.own_task import is_own
 from evolve.config.run_config import RunConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.animal_task import animal_task
@@ -48,7 +47,7 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
     try:
         quality, contrast = eye_image_quality(animal, config.eye), _contrast(eyes.eye())
         seen, perfect = (
-            _own_views(animal, config) if is_own(config.task) else seen_and_perfect(eyes, config.task, config.world)
+            _own_views(animal, config) if config.card.has_file else seen_and_perfect(eyes, config.task, config.world)
         )
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)

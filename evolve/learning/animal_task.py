@@ -24,8 +24,8 @@ def animal_task(phenotype: Phenotype, config: RunConfig, mode: str = "evaluation
         ConfigError: it is a user's task and has not been named, or its module cannot be executed.
         ValueError: it places other eyes than the animal has.
     """
-    if config.own_task is not None:
-        task = embodied(executed_task(config.own_task), phenotype, config)
+    if (code := config.choice.named_code) is not None:
+        task = embodied(executed_task(code), phenotype, config)
         return batched(task).in_mode(mode)
     eyes, layout = phenotype.eyes(config.eye), getattr(config.world, mode)
     asked = fidelity_asked(config.eye.rays_per_receptor, eyes)

@@ -1,4 +1,4 @@
-"""A task of somebody's own, tried for a moment before anything is begun: what fails there fails in every animal."""
+"""A user's task, tried for a moment before a run begins: a failure there would occur in every animal."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ WORLDS, ACTIONS = 2, 4
 
 
 def try_task(config: RunConfig) -> None:
-    """Let the first animal take a few random actions; nothing, where the task is one of rhabdom's own.
+    """Let the first animal take a few random actions; nothing, if the task is a built-in one.
 
     Raises:
         ConfigError: one line: what the task's module, model, eyes or methods fail with.
     """
-    if config.own_task is None:
+    if config.choice.named_code is None:
         return
     from evolve.learning.animal_task import animal_task  # takes seconds to load, and built-in tasks are not tried
     from sim.envs.prepared_task import PreparedTask

@@ -52,7 +52,7 @@ def _thinned(best: list[tuple[int, Candidate]]) -> list[tuple[int, Candidate]]:
 
 def azimuths(animal: Phenotype, config: RunConfig) -> list[float] | None:
     """Where a task of somebody's own places the animal's eyes [rad]; None: as rhabdom's own tasks do."""
-    own = config.own_task
+    own = config.choice.named_code
     if own is None:
         return None
     (kind,) = kinds_of(embodied(executed_task(own), animal, config))

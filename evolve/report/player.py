@@ -25,8 +25,7 @@ TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # as in player.js
 
 def write_player(episode: AnyEpisode, path: Path) -> Path:
     """Write the playable episode as a page of its own; returns its path."""
-    task = episode.task.rpartition(":")[2] if isinstance(episode, FilmedEpisode) else episode.task.capitalize()
-    name = f"{task}: candidate {episode.candidate_id} plays"
+    name = f"{episode.title}: candidate {episode.candidate_id} plays"
     body = html(
         '<header><p class="kicker">rhabdom · replay</p>\n<h1>{}</h1>\n<p>{}</p></header>\n{}',
         *(name, episode_sentence(episode), player(episode, stage_of(episode))),

@@ -115,7 +115,7 @@ def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> in
     try:
         carry_on(run, shown.watched, _workers(scheduler))
     except KeyboardInterrupt:
-        own = f" --task {arguments.task}" if run.config.own is not None else ""
+        own = f" --task {arguments.task}" if run.config.code is not None else ""
         print(
             f"\nevolve: interrupted; {len(run.candidates)} of {run.config.candidates} candidates are on record. "
             f"Continue with: evolve resume {run.path}{own}",

@@ -94,7 +94,7 @@ class FindBalls(sim.BatchTask):
 def test_a_batch_task_evolves_as_the_same_task_of_one_world_at_a_time(tmp_path):
     """With the same numbers: returns, and the policy's bytes."""
     file = tmp_path / "balls.py"
-    file.write_text(BATCH.format(model=executed_task(small()[0].own_task).model))
+    file.write_text(BATCH.format(model=executed_task(small()[0].choice.named_code).model))
     lives = []
     for named in (f"{BALL}:FindBall", f"{file}:FindBalls"):
         config, animal = small(named=named)
@@ -115,7 +115,7 @@ def test_eyes_are_the_animals_own_where_the_task_puts_them():
     assert np.hypot(*task.mounts[0].offset[:2]) == pytest.approx(0.26)  # as far out, turned with the eye
     assert task.eye.resolution == animal.resolution
     assert task.eye.noise_sigma == config.eye.noise_sigma
-    plain = executed_task(config.own_task)
+    plain = executed_task(config.choice.named_code)
     assert len(plain.mounts) == 1  # what belongs to the class is as it was
 
 
@@ -195,7 +195,7 @@ def test_a_job_carries_the_text_as_it_was(tmp_path):
     config, animal = small(named=f"{file}:FindBall")
     job = Job(0, animal, config, 1, tmp_path / "policy")
     file.write_text("raise SystemError\n")
-    assert executed_task(job.arguments[1].own_task).episode_steps == 20
+    assert executed_task(job.arguments[1].choice.named_code).episode_steps == 20
 
 
 def test_dask_is_sent_the_text(tmp_path):
@@ -208,7 +208,7 @@ def test_dask_is_sent_the_text(tmp_path):
     given = []
 
     def live(phenotype, config, *rest, progress):
-        given.append(executed_task(config.own_task).episode_steps)
+        given.append(executed_task(config.choice.named_code).episode_steps)
         return Evaluation(fitness=1.0)
 
     dask_worker._evaluate(live, pickle.loads(pickle.dumps(order)), lambda *_: None)

@@ -1,5 +1,5 @@
-"""A task of somebody's own, as text: a class of a Python file, which is read and hashed here, and executed nowhere but
-where animals live (`evolve.learning.task_module`)."""
+"""The code of a user's task, as text: a class of a Python file. It is read and hashed here, and executed only by
+`evolve.learning.task_module`."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from typing import Any
 from evolve.config.checks import ConfigError
 from optics.numerics.arguments import did_you_mean
 
-__all__ = ["LABEL", "OwnTask", "is_own", "looks_own"]
+__all__ = ["LABEL", "TaskCode", "names_code"]
 
 LABEL = re.compile(r"[^\n\r/\\]+\.py:[A-Za-z_]\w*")
 LARGEST_FILE = 2_000_000  # bytes
 
 
 @dataclass(frozen=True)
-class OwnTask:
+class TaskCode:
     """FILE.py:CLASS as it was read.
 
     name: of the class · file: where it was · text: of the whole file
@@ -40,7 +40,7 @@ class OwnTask:
         return hashlib.sha256(self.text.encode()).hexdigest()
 
     @classmethod
-    def read(cls, named: str) -> OwnTask:
+    def read(cls, named: str) -> TaskCode:
         """From "FILE.py:CLASS"; the file is parsed, and not executed.
 
         Raises:
@@ -64,14 +64,9 @@ class OwnTask:
         return cls(name, file.resolve(), text)
 
 
-def is_own(task: Any) -> bool:
-    """Whether this is what a config calls a task of somebody's own."""
-    return isinstance(task, str) and LABEL.fullmatch(task) is not None
-
-
-def looks_own(task: Any) -> bool:
-    """Whether somebody who says this means a file."""
-    return isinstance(task, str) and (task.endswith(".py") or ".py:" in task)
+def names_code(said: Any) -> bool:
+    """Whether a user who specifies this task means a Python file."""
+    return isinstance(said, str) and (said.endswith(".py") or ".py:" in said)
 
 
 def _parsed(file: Path, content: bytes) -> tuple[str, list[str]]:

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from evolve.config.assemble import assemble, from_text, to_toml
-from evolve.config.own_task import OwnTask
 from evolve.config.run_config import ConfigError
+from evolve.config.task_code import TaskCode
 
 BALL = Path(__file__).parents[3] / "examples" / "find_ball.py"
 NAMED = f"{BALL}:FindBall"
@@ -24,19 +24,19 @@ def test_a_config_names_file_class_and_hash_and_no_path():
     config = assemble(NAMED, "quick")
     written = to_toml(config)
     assert (config.task, config.task_name) == ("find_ball.py:FindBall", "FindBall")
-    assert f'task_sha256 = "{OwnTask.read(NAMED).sha256}"' in written
+    assert f'task_sha256 = "{TaskCode.read(NAMED).sha256}"' in written
     assert str(BALL.parent) not in written
     again = from_text(written)
     assert again == config
-    assert again.own is None
-    assert again.with_own_task(NAMED).own_task.text == BALL.read_text()
+    assert again.code is None
+    assert again.with_code(NAMED).choice.named_code.text == BALL.read_text()
 
 
 def test_nothing_is_executed_unless_it_is_named(trap, tmp_path):
     config = from_text(to_toml(assemble(f"{trap}:Trap", "quick")))
     with pytest.raises(ConfigError, match=r"runs only if you name it: add --task trap\.py:Trap"):
-        _ = config.own_task
-    config.with_own_task(f"{trap}:Trap")
+        _ = config.choice.named_code
+    config.with_code(f"{trap}:Trap")
     assert not (tmp_path / "executed").exists()
 
 
@@ -44,13 +44,13 @@ def test_another_text_is_another_task(trap):
     config = from_text(to_toml(assemble(f"{trap}:Trap", "quick")))
     trap.write_text(trap.read_text() + "# one remark more\n")
     with pytest.raises(ConfigError, match=r"trap\.py has changed since the run began"):
-        config.with_own_task(f"{trap}:Trap")
+        config.with_code(f"{trap}:Trap")
 
 
 def test_line_ends_are_no_change(trap):
     config = assemble(f"{trap}:Trap", "quick")
     trap.write_bytes(trap.read_bytes().replace(b"\n", b"\r\n"))
-    assert config.with_own_task(f"{trap}:Trap").own_task.sha256 == config.task_sha256
+    assert config.with_code(f"{trap}:Trap").choice.named_code.sha256 == config.task_sha256
 
 
 def test_files_of_settings_name_no_code(trap, tmp_path):
