@@ -265,6 +265,6 @@ def test_a_place_that_fails_is_named(tmp_path):
 
 def test_of_a_stranger_nothing_is_executed():
     config, animal = small()
-    stranger = dataclasses.replace(config, own=None)
+    stranger = dataclasses.replace(config, code=None)
     with pytest.raises(ConfigError, match="runs only if you name it"):
         worlds_of(animal, stranger, 1, 2)
