@@ -1,8 +1,9 @@
 """Behaviour: one hash for everything that a change of structure must leave alone
 
-Two checkouts behave alike where their hashes are the same, on one machine with the same libraries: episodes of every
-task in training and evaluation (24 worlds, 300 steps), PSFs by every method, the record of a seeded evolution, what
-its best agent saw as EXR files, and the numbers of its report.
+Two checkouts behave alike if their hashes are equal, on one machine with the same libraries. Hashes cover episodes of
+the built-in tasks in training and evaluation (1, 24 and 64 worlds, 300 steps), episodes of the user tasks in
+`examples/` (also as a PettingZoo environment), PSFs by every method, the records of seeded evolutions, the EXR files of
+their best agents, and the numbers of a report.
 
     python -m validation.behaviour [--out FILE.json] [--against FILE.json]
 
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import importlib.util
 import json
 import re
 import subprocess
@@ -20,6 +22,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,8 +30,11 @@ import optics
 import sim
 
 TASKS = ("navigation", "maze", "detection", "tracking", "foraging")
+EXAMPLES = Path(__file__).parents[1] / "examples"
 MODES = ("training", "evaluation")
-WORLDS, STEPS = 24, 300
+WORLDS, STEPS = (1, 24, 64), 300
+USER_TASKS = {"FindBall": "find_ball", "AntSeeks": "ant_seeks", "Prey": "front_or_side"}  # class: file in examples/
+USER_WORLDS, USER_STEPS = (1, 12), 100
 PSFS = 5  # of each method
 METHODS = (
     "hankel",
@@ -43,6 +49,11 @@ METHODS = (
     "pinhole",
     "auto",
 )
+SMALL = (  # evolution of a user task: a generation of two, with one rollout each
+    *("--preset", "quick", "--seed", "4", "--set", "workers=1", "--set", "learning.n_envs=32"),
+    *("--set", "search.population=2", "--set", "search.generations=2", "--set", "evaluation.episodes=8"),
+    *("--set", "learning.total_steps=2048", "--set", "learning.eval_interval=2048"),
+)
 EVOLUTION = (
     *("run", "detection", "--preset", "quick", "--seed", "3"),
     *("--set", "learning.total_steps=16384", "--set", "learning.eval_interval=8192", "--set", "workers=1"),
@@ -50,20 +61,56 @@ EVOLUTION = (
 )
 
 
-def episodes(task: str, mode: str) -> str:
-    """Everything that 24 agents see, feel and earn in 300 random actions, through a perfect lens."""
-    eyes = sim.Eyes(n_eyes=2, resolution=(3, 5))
-    venv = sim.make_vec_env(task, eyes, WORLDS, seed=5, mode=mode, memory=2)
+def episodes(task: str, mode: str, worlds: int) -> str:
+    """Hash of all observations, rewards and infos of 300 random actions, through a perfect lens."""
+    venv = sim.make_vec_env(task, sim.Eyes(n_eyes=2, resolution=(3, 5)), worlds, seed=5, mode=mode, memory=2)
+    return _played(venv, STEPS)
+
+
+def user_episodes(task: str, worlds: int) -> str:
+    """The same of a user task from `examples/`."""
+    return _played(sim.make_vec_env(_example(task)(), n_envs=worlds, seed=5, memory=2), USER_STEPS)
+
+
+def _played(venv: Any, steps: int) -> str:
     rng, found = np.random.default_rng(1), hashlib.sha256()
-    observation = venv.reset()
-    for _ in range(STEPS):
+    observation, shape = venv.reset(), (venv.num_envs, *venv.action_space.shape)
+    for _ in range(steps):
         for name in sorted(observation):
             found.update(observation[name].tobytes())
-        observation, reward, done, infos = venv.step(rng.uniform(-1, 1, (WORLDS, 2)).astype(np.float32))
+        observation, reward, done, infos = venv.step(rng.uniform(-1, 1, shape).astype(np.float32))
         terms = [sorted(info["reward_terms"].items()) for info in infos]
         found.update(reward.tobytes() + done.tobytes() + repr(terms).encode())
     venv.close()
     return found.hexdigest()
+
+
+def encounter() -> str:
+    """Episodes of prey and predator, both with random actions, as a PettingZoo environment."""
+    prey, predator = (_example(name, "front_or_side") for name in ("Prey", "Predator"))
+    hunter = type("Hunter", (predator,), {"rewards": lambda self, data: {"near": -abs(data.qpos[2] - data.qpos[0])}})
+    solitary = type("Prey", (prey,), {"others": ()})
+    env = sim.make_parallel_env(sim.Encounter(solitary(), hunter()), seed=2)
+    rng, found = np.random.default_rng(1), hashlib.sha256()
+    for _ in range(3):
+        observations, _ = env.reset()
+        while env.agents:
+            for name in sorted(observations):
+                found.update(b"".join(observations[name][key].tobytes() for key in sorted(observations[name])))
+            actions = {name: rng.uniform(-1, 1, env.action_space(name).shape) for name in env.agents}
+            observations, rewards, *_ = env.step(actions)
+            found.update(repr(sorted(rewards.items())).encode())
+    env.close()
+    return found.hexdigest()
+
+
+def _example(name: str, file: str | None = None) -> Any:
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{file or USER_TASKS[name]}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return getattr(module, name)
 
 
 def blurred_view() -> str:
@@ -96,22 +143,38 @@ def psfs(method: str) -> Iterator[tuple[str, str]]:
         yield f"psf {method} {case}", hashlib.sha256(said).hexdigest()
 
 
+def user_evolution(task: str, folder: Path) -> Iterator[tuple[str, str]]:
+    """Record and EXR files of a small seeded evolution of a user task."""
+    run = folder / task
+    _evolve("run", f"{EXAMPLES / USER_TASKS[task]}.py:{task}", *SMALL, "--out", str(run))
+    yield f"record {task}", _record(run)
+    yield from _frames(run, task)
+
+
 def evolution(folder: Path) -> Iterator[tuple[str, str]]:
     """Record, EXR files and report of a small seeded evolution."""
     run = folder / "run"
     _evolve(*EVOLUTION, "--out", str(run))
+    yield "record", _record(run)
+    yield from _frames(run)
     lines = [json.loads(line) for line in (run / "candidates.jsonl").read_text().splitlines()]
-    told = [{key: value for key, value in line.items() if key != "seconds"} for line in lines]
-    yield "record", _hash(json.dumps(told, sort_keys=True))
-    for file in sorted((run / "exr").glob("*.exr"))[:4]:
-        views = sim.read_exr(file)
-        pixels = b"".join(np.ascontiguousarray(view.radiance).tobytes() for view in views)
-        yield f"exr {file.name}", hashlib.sha256(pixels).hexdigest()
     for line in lines:
-        line["seconds"] = 60.0  # what a clock says differs from run to run
+        line["seconds"] = 60.0  # measured times differ from run to run
     (run / "candidates.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
     _evolve("report", str(run))
     yield "numbers of the report", _hash(" ".join(_numbers((run / "report.html").read_text())))
+
+
+def _record(run: Path) -> str:
+    lines = [json.loads(line) for line in (run / "candidates.jsonl").read_text().splitlines()]
+    return _hash(json.dumps([{k: v for k, v in line.items() if k != "seconds"} for line in lines], sort_keys=True))
+
+
+def _frames(run: Path, task: str = "") -> Iterator[tuple[str, str]]:
+    for file in sorted((run / "exr").glob("*.exr"))[:4]:
+        views = sim.read_exr(file)
+        pixels = b"".join(np.ascontiguousarray(view.radiance).tobytes() for view in views)
+        yield f"exr {task} {file.name}".replace("  ", " "), hashlib.sha256(pixels).hexdigest()
 
 
 def _numbers(page: str) -> list[str]:
@@ -130,12 +193,16 @@ def _hash(text: str) -> str:
 
 def behaviour() -> dict[str, str]:
     """Name of an output -> its hash."""
-    found = {f"episodes {task} {mode}": episodes(task, mode) for task in TASKS for mode in MODES}
+    found = {f"episodes {t} {mode}, {n} worlds": episodes(t, mode, n) for t in TASKS for mode in MODES for n in WORLDS}
+    found |= {f"episodes {task}, {n} worlds": user_episodes(task, n) for task in USER_TASKS for n in USER_WORLDS}
+    found["episodes of an encounter"] = encounter()
     found["view through a pupil"] = blurred_view()
     for method in METHODS:
         found |= psfs(method)
     with tempfile.TemporaryDirectory() as folder:
         found |= evolution(Path(folder))
+        for task in USER_TASKS:
+            found |= user_evolution(task, Path(folder))
     return found
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from sim.robots.mounts import Mount
-from sim.robots.poses import Poses
-from sim.robots.solids import Solid
+from sim.eyes.mounts import Mount
+from sim.scene.poses import Poses
+from sim.scene.solids import Solid
 
 __all__ = ["FilmedScene"]
 

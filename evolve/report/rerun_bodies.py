@@ -9,7 +9,7 @@ import numpy as np
 import sim
 from evolve.analysis.filmed_scene import FilmedScene
 from evolve.report.rerun_stream import RerunStream, camera_frames
-from sim.robots.solids import Solid
+from sim.scene.solids import Solid
 
 __all__ = ["EYES", "draw_bodies"]
 

@@ -5,16 +5,15 @@ No animal knows these. They are exact, and for whoever trains: targets of auxili
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from gymnasium import spaces
 
-from optics.numerics.arguments import did_you_mean, items
-from sim.robots.eye_kinds import AUXILIARY
-from sim.robots.model_renderer import ModelRenderer
-from sim.robots.optic_flow import flow_between
-from sim.robots.poses import Poses
+from sim.render.model_renderer import ModelRenderer
+from sim.render.optic_flow import flow_between
+from sim.scene.poses import Poses
+from sim.tasks.eye_kinds import AUXILIARY
 
 DEPTH, IDS, FLOW = AUXILIARY
 
@@ -64,19 +63,3 @@ class Auxiliary:
         before = now if self._before is None else self._before
         frames = self._renderer.eye_frames(now), self._renderer.eye_frames(before)
         return -np.nan_to_num(flow_between(self._renderer.eye, depth, ids, (now, before), frames), nan=0.0)
-
-
-def checked(names: Iterable[str], where: str) -> tuple[str, ...]:
-    """Names of what is wanted, in the order of AUXILIARY.
-
-    Raises:
-        ValueError: one is unknown; `where` it was asked for.
-    """
-    if isinstance(names, str):
-        raise ValueError(f"{where} = {names!r}: must be several names, such as ({names!r},)")
-    asked = items(where, names, str, repr(AUXILIARY[0]))
-    for name in asked:
-        if name not in AUXILIARY:
-            hint = did_you_mean(name, AUXILIARY) or f": must be of {', '.join(map(repr, AUXILIARY))}"
-            raise ValueError(f"{where}: {name!r}{hint}")
-    return tuple(name for name in AUXILIARY if name in asked)

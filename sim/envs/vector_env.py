@@ -11,8 +11,8 @@ from gymnasium.vector.utils import batch_space
 from sim.envs.assembly import make_vec_env
 from sim.envs.follow_camera import RENDER_MODES
 from sim.eyes.eyes import Eyes
-from sim.robots.encounter import Encounter
-from sim.robots.task import Task
+from sim.tasks.encounter import Encounter
+from sim.tasks.task import Task
 
 
 class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):

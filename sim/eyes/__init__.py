@@ -8,4 +8,6 @@ field_areas       areas, and what of all receptive fields lies in each
 receptor_sums     from rays to receptors
 depth_layers      one PSF for each of a few distances
 allowed_error     what may be wrong of a signal
+mounts            Mount: where an eye is on a model; fan, ring, both_sides
+inside            eyes that are inside of a geom
 """

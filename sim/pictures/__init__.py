@@ -4,4 +4,5 @@ quick_camera   pictures with smooth edges, from few rays
 camera_rays    the rays of a picture, and the light that they find
 lattice        pixels that are looked at first
 merged_mirror  a mirror of fewer shapes
+eye_marks           eyes on pictures of a model
 """

@@ -17,9 +17,9 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.pictures.merged_mirror import MergedMirror
-from sim.render.frozen_kernels import garbage_kept
 from sim.scene.cameras import Viewpoint
 from sim.scene.device_arrays import aligned, floats, whole_numbers
+from sim.scene.frozen_kernels import garbage_kept
 from sim.scene.variant import MitsubaObject, variant
 
 # Four wavelengths are one mi.Spectrum. Of all sets of them, 5 nm apart and at least 25 nm from each other, these come

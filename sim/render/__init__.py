@@ -12,10 +12,13 @@ sample_choice       and for rays or areas
 fidelity_trials     trials of what was not chosen yet
 random_views        the views that they look through
 prepared_scene      PreparedScene: what choosing a fidelity and rendering both begin with
-band_error          what a few spectral bands make of measured colours
 memory_budget       whether there is memory for it
-frozen_kernels      what holds while Dr.Jit records
 receptor_noise      noise for all worlds at once
-noisy_signals       signals with that noise
 pending_frame       frames that are begun early and waited for late
+model_renderer      ModelRenderer: eyes mounted on any MuJoCo model
+model_wavefront     its kernels
+model_fidelity      how many rays they need
+edge_rays           many rays at edges, few elsewhere
+renderable          what eyes on a model may be
+optic_flow          motion on the retina
 """

@@ -24,11 +24,11 @@ from sim.render import memory_budget
 from sim.render.area_wavefront import AreaWavefront
 from sim.render.fidelity import AREAS, EDGES, Fidelity
 from sim.render.fidelity_choice import chosen_fidelity
-from sim.render.frozen_kernels import garbage_kept
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.render.prepared_scene import PreparedScene
 from sim.render.wavefront import PoseBuffer, RayWavefront, Wavefront
 from sim.scene.device_arrays import floats, in_fours
+from sim.scene.frozen_kernels import garbage_kept
 from sim.scene.variant import variant
 from sim.tracing import lighting
 from sim.tracing.areas.area_tracer import AreaTracer

@@ -10,9 +10,9 @@ import numpy as np
 import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.sampling import EyeSampling
-from sim.render.band_error import band_error, measured
 from sim.render.fidelity import Level
 from sim.render.fidelity_trials import FidelityTrials
+from sim.scene.band_error import band_error, measured
 from sim.tracing.lighting import BOUNCE, DIRECT
 from sim.worlds.world import World
 
@@ -35,7 +35,7 @@ def bands(eye: optics.Eye, allowed: float) -> tuple[int, Level]:
 
 def own_bands(world: World, eye: optics.Eye) -> Level:
     """What the eye's own bands make of the world's measured reflectances; of colours given as RGB nothing is known."""
-    if not (spectra := measured(world)):
+    if not (spectra := measured(world.model, world.spectra)):
         return Level("bands", f"{eye.bands}", None, "the eyes' own")
     error = float(eye.throughput) * band_error(spectra, eye.receptors, eye.bands)
     return Level("bands", f"{eye.bands}", error, "the eyes' own; error: of measured reflectances in daylight")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +12,23 @@ from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.eyes.sampling import EyeSampling, FieldSampling, Trial, eye_sampling
 from sim.eyes.sensor import Sensor
-from sim.render.band_error import with_band_averaged_lights
+from sim.scene.band_error import lights_in_bands
+from sim.scene.mirror import MirrorWarning
 from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.static_scene import StaticScene, build_static_scene
 from sim.tracing.tracer import Tracers
 from sim.worlds.world import World
+
+
+def with_band_averaged_lights(world: World, eye: optics.Eye) -> World:
+    """The same world as this eye's bands have it, see `lights_in_bands`.
+
+    Warns (`sim.MirrorWarning`) of lights of which so few bands give a type another catch.
+    """
+    spectra, off = lights_in_bands(world.model, world.spectra, eye)
+    for words in off:
+        warnings.warn(words, MirrorWarning, stacklevel=3)
+    return replace(world, spectra=spectra)
 
 
 class PreparedScene:

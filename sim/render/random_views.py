@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
-from sim.tasks.placement import CLEARANCE
+from sim.worlds.layout import CLEARANCE
 from sim.worlds.world import World
 
 # [m] from a cell's centre, along either axis: less than half a cell without the agent's body, 1 - 0.2.

@@ -18,9 +18,9 @@ import numpy as np
 
 import optics
 from optics.numerics.autodiff import Array
-from sim.render.frozen_kernels import garbage_kept
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.scene.device_arrays import aligned
+from sim.scene.frozen_kernels import garbage_kept
 from sim.scene.variant import variant
 
 PER_DRAW = 4  # normal numbers from one evaluation of Philox4x32

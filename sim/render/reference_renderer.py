@@ -15,7 +15,7 @@ import numpy as np
 import optics
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.eyes.receptive_fields import cells_for
-from sim.render.band_error import with_band_averaged_lights
+from sim.render.prepared_scene import with_band_averaged_lights
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import mirror
 from sim.worlds.state import WorldState, pose

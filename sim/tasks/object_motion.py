@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from sim.tasks.placement import SEPARATION
 from sim.tasks.random_streams import MotionNoise
+from sim.worlds.layout import SEPARATION
 from sim.worlds.state import WorldState, wrap_angle
 
 SPEED = 0.5  # [m/s], as published

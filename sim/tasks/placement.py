@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-REACH = 1.0  # [m] from the agent's centre to an object's: closer counts as reached, as published
-SEPARATION = 2 * REACH  # [m] between objects: no place is within reach of two
-CLEARANCE = REACH + 0.5  # [m] between the agent's start and an object; the first action from rest takes it 0.44 m
+from sim.worlds.layout import CLEARANCE, SEPARATION
+
 TRIES = 100  # chosen: on detection's field none of 20 000 first tries failed
 
 

@@ -13,6 +13,10 @@ from optics.spectra.spectrum import Spectrum
 CELL = 2.0  # [m] side of a grid cell
 WALL_HEIGHT = 1.0  # [m]: as high as the objects; a receptor row of 11° sees nothing but wall up to 8 m away
 
+REACH = 1.0  # [m] from the agent's centre to an object's: closer counts as reached, as published
+SEPARATION = 2 * REACH  # [m] between objects: no place is within reach of two
+CLEARANCE = REACH + 0.5  # [m] between the agent's start and an object; the first action from rest takes it 0.44 m
+
 # Collision filter: the agent's contype meets the walls' conaffinity, and nothing else meets anything, so that only
 # pairs of the agent and a wall are ever tested.
 WALL_CONAFFINITY = 1

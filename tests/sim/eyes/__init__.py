@@ -8,4 +8,6 @@ receptive_fields: test_sensor.py, tracing/test_lighting.py
 receptor_sums: test_sensor.py
 depth_layers: test_depth_layers.py
 allowed_error: test_allowed_error.py
+mounts: test_mounts.py
+inside: test_mounts.py
 """

@@ -12,10 +12,13 @@ sample_choice: test_sample_choice.py, test_fidelity.py
 random_views: test_fidelity.py
 fidelity_trials: test_fidelity.py, eyes/test_depth_layers.py
 prepared_scene: test_batched_renderer.py, test_fidelity.py
-band_error: test_band_error.py, robots/test_model_lamps.py
 memory_budget: test_memory_budget.py, test_sample_choice.py
-frozen_kernels: test_frozen_kernels.py, test_batched_renderer.py
 receptor_noise: test_receptor_noise.py
-noisy_signals: test_noisy_signals.py
-pending_frame: test_pending_frame.py, test_noisy_signals.py
+pending_frame: test_pending_frame.py, envs/test_eyes_of_kind.py
+model_renderer: test_model_renderer.py
+renderable: test_model_renderer.py, test_edge_rays.py
+model_wavefront: test_model_renderer.py
+model_fidelity: test_model_fidelity.py, test_model_light.py
+edge_rays: test_edge_rays.py
+optic_flow: test_labels.py
 """

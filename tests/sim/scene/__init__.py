@@ -17,6 +17,17 @@ bsdfs: test_bsdfs.py
 lights: test_lights.py, test_mirror_light.py
 sky: test_sky.py
 spectra: test_spectra.py
-device_arrays: render/test_frozen_kernels.py
+device_arrays: test_frozen_kernels.py
 color: test_color.py, test_exr.py
+variation: test_variation.py
+world_models: envs/test_differing_worlds.py, envs/test_own_models.py
+model_settings: envs/test_own_models.py
+as_built: test_as_built.py
+appearances: envs/test_differing_materials.py
+poses: render/test_model_renderer.py
+solids: evolve/report/test_rerun_bodies.py
+moved_bodies: envs/test_auxiliary.py
+primitive_geoms: tracing/test_movers.py
+band_error: test_band_error.py, render/test_model_lamps.py
+frozen_kernels: test_frozen_kernels.py, render/test_batched_renderer.py
 """

@@ -26,4 +26,10 @@ areas.shadows: test_areas.py
 areas.sphere_areas: test_area_integrals.py, test_areas.py
 areas.stripes: test_area_integrals.py, test_areas.py
 lighting: test_lighting.py, render/test_batched_renderer.py, render/test_reference_renderer.py
+paint: envs/test_differing_worlds.py, render/test_glow_colors.py
+model_scene: render/test_model_renderer.py
+model_lights: render/test_model_renderer.py, render/test_model_lamps.py
+model_tracer: render/test_model_renderer.py, render/test_model_light.py
+primitives: test_movers.py
+movers: test_movers.py
 """

@@ -1,0 +1,143 @@
+"""Where eyes are on a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from optics.numerics.arguments import did_you_mean, finite, items, of_kind, reals, shown, whole
+
+EXAMPLE = "sim.Mount('head')"
+MOST_EYES = 10_000  # choice: of a fan, more than any animal has
+KINDS = ("site", "camera", "body")  # what a name is looked for among, in this order
+# Axes (ahead, left, up) in the frame of what an eye is on, as rows: x ahead and z up, but for MuJoCo's cameras, which
+# look along -z with x to the right.
+_AXES = {
+    "site": np.eye(3),
+    "body": np.eye(3),
+    "camera": np.array([[0.0, 0, -1], [-1, 0, 0], [0, 1, 0]]),
+}
+
+
+@dataclass(frozen=True)
+class Mount:
+    """An eye's place: it looks along +x of a body or site, or as a camera looks, turned by these angles.
+
+    on: name of a site, a camera or a body of the model
+    azimuth_deg: to the left, about the frame's z axis (a camera's up) · elevation_deg: up, after that
+    roll_deg: about the eye's own axis, its top towards its left, last of all
+    offset: of the pupil from the frame's origin [m], (ahead, left, up) before the eye is turned
+    kind: "site", "camera" or "body", where several have that name; None: the first of these
+
+    Raises:
+        ValueError: no name, angles or offsets that are not finite, and an unknown kind.
+    """
+
+    on: str
+    azimuth_deg: float = 0.0
+    elevation_deg: float = 0.0
+    roll_deg: float = 0.0
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    kind: str | None = None
+
+    def __post_init__(self) -> None:
+        if not of_kind("Mount: on", self.on, str, "'head'"):
+            raise ValueError(f"Mount: on = {self.on!r}: must be the name of a site, a camera or a body, such as 'head'")
+        for name in ("azimuth_deg", "elevation_deg", "roll_deg"):
+            object.__setattr__(self, name, finite(f"Mount: {name}", getattr(self, name)))
+        offset = reals("Mount: offset", self.offset)
+        if offset.shape != (3,) or not np.isfinite(offset).all():
+            raise ValueError(f"Mount: offset = {shown(self.offset)}: must be three lengths (ahead, left, up) [m]")
+        object.__setattr__(self, "offset", tuple(map(float, offset)))
+        if self.kind is not None and not (isinstance(self.kind, str) and self.kind in KINDS):
+            raise ValueError(f"Mount: kind = {shown(self.kind)}: must be one of {', '.join(map(repr, KINDS))}, or None")
+
+    def mirrored(self) -> Mount:
+        """The eye on the other side of the body: left and right exchanged."""
+        ahead, left, up = self.offset
+        return replace(self, azimuth_deg=-self.azimuth_deg, roll_deg=-self.roll_deg, offset=(ahead, -left, up))
+
+    def found_in(self, model: mujoco.MjModel) -> tuple[str, int]:
+        """Of which kind the thing is that it is on, and its id.
+
+        Raises:
+            ValueError: there is none of that name.
+        """
+        for kind in KINDS if self.kind is None else (self.kind,):
+            index = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), self.on)
+            if index >= 0:
+                return kind, index
+        names = _names(model, KINDS if self.kind is None else (self.kind,))
+        what = " or ".join(KINDS) if self.kind is None else self.kind
+        raise ValueError(f"Mount: no {what} {self.on!r} in the model{did_you_mean(self.on, names)}")
+
+    def local(self, kind: str) -> tuple[np.ndarray, np.ndarray]:
+        """Pupil [m] (3,) and eye's frame (3, 3) in the frame of what it is on; columns (right, up, ahead)."""
+        ahead, left, up = _AXES[kind]
+        azimuth, elevation, roll = np.radians([self.azimuth_deg, self.elevation_deg, self.roll_deg])
+        level = np.cos(azimuth) * ahead + np.sin(azimuth) * left
+        beside = -np.sin(azimuth) * ahead + np.cos(azimuth) * left
+        axis = np.cos(elevation) * level + np.sin(elevation) * up
+        top = -np.sin(elevation) * level + np.cos(elevation) * up
+        upwards = np.cos(roll) * top + np.sin(roll) * beside
+        rightwards = np.sin(roll) * top - np.cos(roll) * beside
+        return np.asarray(self.offset) @ _AXES[kind], np.column_stack([rightwards, upwards, axis])
+
+
+def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
+    """Several places of eyes.
+
+    Raises:
+        ValueError: `said` is one mount, or something else.
+    """
+    if not isinstance(said, Sequence) or not all(isinstance(mount, Mount) for mount in said):
+        raise ValueError(f"{where} = {said!r:.80}: must be several of sim.Mount, such as (sim.Mount('head'),)")
+    return tuple(said)
+
+
+def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
+    """Each of them and its mirror image: left, right, left, right ..."""
+    return tuple(one for mount in items("mounts", mounts, Mount, EXAMPLE) for one in (mount, mount.mirrored()))
+
+
+def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
+    """Eyes in a circle around a body's z axis that look outwards, left to right, as `Eyes` has them on our agent: the
+    range is from the first to the last, and 360 (n - 1) / n closes a circle of n evenly.
+
+    Raises:
+        ValueError: less than one eye.
+    """
+    return fan(Mount(on, offset=(finite("radius", radius), 0.0, 0.0)), n_eyes, placement_range_deg)
+
+
+def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: float = 0.0) -> tuple[Mount, ...]:
+    """Eyes left to right, evenly over a range of azimuths: each is this one, with its offset, turned about the upward
+    axis of what it is on, and then further up by `elevation_deg`; one eye is where this one is.
+
+    Raises:
+        ValueError: less than one eye.
+    """
+    of_kind("mount", mount, Mount, EXAMPLE)
+    n_eyes = whole("n_eyes", n_eyes, 1, MOST_EYES)
+    half, elevation_deg = finite("placement_range_deg", placement_range_deg) / 2, finite("elevation_deg", elevation_deg)
+    azimuths = np.linspace(half, -half, n_eyes) if n_eyes > 1 else np.zeros(1)
+    return tuple(_turned(mount, float(azimuth), elevation_deg) for azimuth in azimuths)
+
+
+def _turned(mount: Mount, azimuth_deg: float, elevation_deg: float) -> Mount:
+    (ahead, left, up), (c, s) = mount.offset, (f(np.radians(azimuth_deg)) for f in (np.cos, np.sin))
+    return replace(
+        mount,
+        azimuth_deg=mount.azimuth_deg + azimuth_deg,
+        elevation_deg=mount.elevation_deg + elevation_deg,
+        offset=(ahead * c - left * s, ahead * s + left * c, up),
+    )
+
+
+def _names(model: mujoco.MjModel, kinds: Iterable[str]) -> list[str]:
+    counts = {"site": model.nsite, "camera": model.ncam, "body": model.nbody}
+    return [name for kind in kinds for i in range(counts[kind]) if (name := getattr(model, kind)(i).name)]

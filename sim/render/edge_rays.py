@@ -1,0 +1,121 @@
+"""Many rays where a receptor sees an edge, few elsewhere: perfect lenses on models of one's own.
+
+Four rays through a receptor's square tell whether all of it looks alike (Whitted 1980 asks a pixel's corners); where
+they differ, all rays are traced. An edge may pass between them and cut off a corner, a quarter of the square at most.
+Whatever is beyond it fills a neighbour, so receptors that are very unlike a neighbour get all rays, too. For that, the
+first rays also look at squares beyond the rim of the field. Missed is what is smaller than the gaps between four rays
+and fills no neighbour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.eyes.sampling import BoxSampling, beyond_rim_of
+from sim.render.model_wavefront import ModelWavefront
+from sim.scene.device_arrays import as_whole_numbers
+from sim.scene.poses import Poses
+from sim.scene.variant import MitsubaObject
+
+FIRST = 4  # rays through every receptor's square
+
+
+class EdgeRays:
+    """What `ModelWavefront.light` finds with `fine`'s rays, from fewer.
+
+    wavefront: of a sensor with FIRST rays per receptor
+    sampling: of the receptors · rays: per receptor, at edges
+    signals: what a component is worth to each type of receptor, (channel, component)
+    noticed: rays whose signals differ by no more are alike
+    """
+
+    def __init__(
+        self, wavefront: ModelWavefront, sampling: BoxSampling, rays: float, signals: np.ndarray, noticed: float
+    ) -> None:
+        fine = sampling.sensor(rays)
+        self._wavefront, self._rays, self._noticed = wavefront, fine.rays_per_receptor, noticed
+        self._beyond = beyond_rim_of(sampling.eye.resolution)
+        self._signals = [[float(worth) for worth in channel] for channel in signals]
+        self._coarse: Any = dr.freeze(lambda *args: self._look_once(*args))
+        self._fine: Any = dr.freeze(lambda *args: self._look_again(*args))
+        first = np.concatenate([sampling.sensor(FIRST).directions, sampling.beyond_rim(FIRST)])
+        self._first, self._along = wavefront.look(first), wavefront.look(fine.directions)
+
+    def launch(self, poses: Poses, eyes: np.ndarray) -> Callable[[], np.ndarray]:
+        """Start to look; what is returned waits for it: sums over FIRST rays, flat (component, world, eye, receptor),
+        as if so many were traced everywhere."""
+        found = self._wavefront.launch(self._coarse, self._first, poses, eyes)
+        return lambda: self._refined(found())
+
+    @property
+    def recordings(self) -> int:
+        """How often the kernels were recorded."""
+        return int(self._coarse.n_recordings + self._fine.n_recordings)
+
+    def _refined(self, found: np.ndarray) -> np.ndarray:
+        cells = found.reshape(len(found), -1, self._beyond.size)  # (component or spread, view, receptor or beyond)
+        receptors = np.count_nonzero(~self._beyond)
+        light, spread = cells[:-1, :, :receptors].reshape(len(found) - 1, -1), cells[-1, :, :receptors].ravel()
+        edges = np.flatnonzero((spread > self._noticed) | self._beside_edges(cells[:-1]))
+        if len(edges):
+            lanes = (self._rays * edges[:, None] + np.arange(self._rays)).ravel()
+            look = {**self._along, "lanes": mi.UInt32(as_whole_numbers(lanes))}
+            light[:, edges] = self._wavefront.again(self._fine, look)() * (FIRST / self._rays)
+        return light.ravel()
+
+    def _beside_edges(self, light: np.ndarray) -> np.ndarray:
+        """Receptors so unlike a neighbour that an edge may run between the first rays of either, flat; light:
+        (component, view, receptor or beyond)."""
+        means = np.tensordot(np.array(self._signals), light, 1) / FIRST
+        field = np.empty((*means.shape[:2], *self._beyond.shape), means.dtype)
+        field[..., ~self._beyond], field[..., self._beyond] = np.split(means, [np.count_nonzero(~self._beyond)], axis=2)
+        far = FIRST * self._noticed
+        found = np.zeros(field.shape[1:], bool)
+        for y, x in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            one, other = _shifted(y, x), _shifted(-y, -x)
+            apart = (np.abs(field[:, :, *one] - field[:, :, *other]) > far).any(axis=0)
+            found[:, *one] |= apart
+            found[:, *other] |= apart
+        return found[:, 1:-1, 1:-1].ravel()
+
+    def _look_once(
+        self, still: MitsubaObject, meshes: list[MitsubaObject], buffers: dict[str, Array], look: dict[str, Array]
+    ) -> tuple[Array, ...]:
+        """Sums over each receptor's rays, per component, and how far apart their signals are."""
+        components, _ = self._wavefront.components(still, buffers, look)
+        signals = [sum(w * c for w, c in zip(worth, components, strict=True)) for worth in self._signals]
+        dr.eval(components, signals)  # once, as sums of neighbours would trace all rays again for every component
+        spread = mi.Float(0)
+        for signal in signals:
+            highest, lowest = (dr.block_reduce(op, signal, FIRST) for op in (dr.ReduceOp.Max, dr.ReduceOp.Min))
+            spread = dr.maximum(spread, highest - lowest)
+        return *_sums(components, FIRST), spread
+
+    def _look_again(
+        self, still: MitsubaObject, meshes: list[MitsubaObject], buffers: dict[str, Array], look: dict[str, Array]
+    ) -> tuple[Array, ...]:
+        """Sums over the rays of the receptors that are looked at again, per component."""
+        components, _ = self._wavefront.components(still, buffers, look)
+        dr.eval(components)
+        return _sums(components, self._rays)
+
+
+def _shifted(y: int, x: int) -> tuple[slice, slice]:
+    """All but the last rows and columns; from the other end where a shift is negative."""
+    return slice(max(-y, 0), -y if y > 0 else None), slice(max(-x, 0), -x if x > 0 else None)
+
+
+def _sums(components: list[Array], rays: int) -> tuple[Array, ...]:
+    return tuple(dr.block_reduce(dr.ReduceOp.Add, component, rays) for component in components)
+
+
+def edges_pay(resolution: tuple[int, int], rays: float) -> bool:
+    """Whether the first rays, those beyond the rim among them, are half as many as so many everywhere, or fewer: more
+    save nothing, where a few receptors want all."""
+    return 2 * FIRST * beyond_rim_of(resolution).size <= rays * resolution[0] * resolution[1]

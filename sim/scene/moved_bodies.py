@@ -1,0 +1,109 @@
+"""Poses of models in which only a few bodies move: other arrays are built only if something reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from sim.scene.poses import OF_MODELS, Poses, of_models
+
+_PREFIX = {"geom": "geom_x", "site": "site_x", "camera": "cam_x"}
+
+
+class ReferencePose:
+    """A model in its reference pose, from which a few bodies move.
+
+    bodies: ids of the bodies that move; they carry geoms, sites and cameras rigidly, and no other body
+    """
+
+    def __init__(self, model: mujoco.MjModel, bodies: Sequence[int]) -> None:
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        self.poses, self.bodies = Poses.of(data), list(bodies)
+        self.body_of = {"geom": model.geom_bodyid.copy(), "site": model.site_bodyid, "camera": model.cam_bodyid}
+        self._local = {(kind, i): self._in_body(kind, i) for kind in _PREFIX for i in self.moved(kind)}
+
+    def moved(self, kind: str) -> list[int]:
+        """Ids of the things of a kind that the bodies carry."""
+        return [int(i) for i in np.flatnonzero(np.isin(self.body_of[kind], self.bodies))]
+
+    def local(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
+        """Origin (3,) [m] and rotation (3, 3) of a thing in the frame of its body."""
+        return self._local[kind, index]
+
+    def _in_body(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
+        prefix = _PREFIX[kind]
+        origin, turned = self.poses.frames("body", int(self.body_of[kind][index]))
+        place, rotation = (getattr(self.poses, f"{prefix}{what}")[0, index] for what in ("pos", "mat"))
+        # Rounded, so that a thing that shares its body's frame gets exactly 0 and 1.
+        found = turned[0].T @ (place - origin[0]), turned[0].T @ rotation
+        return np.round(found[0], 14) + 0.0, np.round(found[1], 14) + 0.0
+
+
+class MovedBodies(Poses):
+    """All bodies are in the reference pose, except the moved ones.
+
+    positions: of the moved bodies [m], (world, body, 3) · rotations: (world, body, 3, 3)
+    models: of all worlds, if their sizes, colours or materials differ; None: as the renderer's model
+    """
+
+    reference: ReferencePose
+    positions: np.ndarray
+    rotations: np.ndarray
+
+    def __init__(
+        self,
+        reference: ReferencePose,
+        positions: np.ndarray,
+        rotations: np.ndarray,
+        models: Sequence[mujoco.MjModel] | None = None,
+    ) -> None:
+        own = {} if models is None else {name: of_models(models, name) for name in OF_MODELS}
+        vars(self).update(reference=reference, positions=positions, rotations=rotations, **own)
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        """Arrays of `Poses`, when they are first read."""
+        if name not in Poses.__dataclass_fields__:
+            raise AttributeError(name)
+        vars(self)[name] = built = self._built(name)
+        return built
+
+    @property
+    def n(self) -> int:
+        return len(self.positions)
+
+    def geom_places(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
+        return np.stack([self._frame("geom", int(geom))[0] for geom in geoms], axis=1)
+
+    def frames(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
+        if kind != "body":
+            return self._frame(kind, index)
+        if index not in self.reference.bodies:
+            return super().frames(kind, index)
+        place = self.reference.bodies.index(index)
+        return self.positions[:, place], self.rotations[:, place]
+
+    def _frame(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
+        body = int(self.reference.body_of[kind][index])
+        if body not in self.reference.bodies:
+            still = (getattr(self.reference.poses, f"{_PREFIX[kind]}{what}")[0, index] for what in ("pos", "mat"))
+            origin, rotation = (np.broadcast_to(array, (self.n, *array.shape)) for array in still)
+            return origin, rotation
+        origin, rotation = self.frames("body", body)
+        offset, turn = self.reference.local(kind, index)
+        return (
+            origin + rotation @ offset if offset.any() else origin,
+            rotation if np.array_equal(turn, np.eye(3)) else rotation @ turn,
+        )
+
+    def _built(self, name: str) -> np.ndarray:
+        found: np.ndarray = np.repeat(getattr(self.reference.poses, name), self.n, axis=0)
+        if name in ("xpos", "xmat"):
+            found[:, self.reference.bodies] = self.positions if name == "xpos" else self.rotations
+        for kind, prefix in _PREFIX.items():
+            if name.startswith(prefix):
+                for index in self.reference.moved(kind):
+                    found[:, index] = self._frame(kind, index)[name.endswith("mat")]
+        return found

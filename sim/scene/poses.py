@@ -1,0 +1,134 @@
+"""Where everything in many worlds of one model is, and how large, of which colour and of which material."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+from zlib import crc32
+
+import mujoco
+import numpy as np
+
+OF_MODELS = (
+    "geom_size",
+    "geom_rgba",
+    "geom_matid",
+    "mat_rgba",
+    "mat_emission",
+    "light_diffuse",
+    "light_active",
+    "heights",
+    "others",
+)
+OTHERS = (  # what else looks go by
+    "geom_group",
+    "geom_type",
+    "geom_dataid",
+    "mat_texid",
+    "mat_texrepeat",
+    "mat_texuniform",
+    "light_type",
+    "light_attenuation",
+    "light_cutoff",
+    "light_exponent",
+)
+HEADLIGHT = ("active", "diffuse")
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Positions [m] (world, thing, 3) and rotations (world, thing, 3, 3) as mjData has them after mj_forward.
+
+    geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat, xpos, xmat (of bodies) · light_xpos, light_xdir
+    geom_size (world, geom, 3), geom_rgba (world, geom, 4), geom_matid (world, geom), mat_rgba, mat_emission,
+        light_diffuse, light_active: as each world's own mjModel has them; None: as the renderer's model
+    heights: a checksum of each height field's, (world, hfield), since they are many
+    others: a checksum of each of OTHERS and of HEADLIGHT, (world, field)
+    """
+
+    geom_xpos: np.ndarray
+    geom_xmat: np.ndarray
+    site_xpos: np.ndarray
+    site_xmat: np.ndarray
+    cam_xpos: np.ndarray
+    cam_xmat: np.ndarray
+    xpos: np.ndarray
+    xmat: np.ndarray
+    light_xpos: np.ndarray
+    light_xdir: np.ndarray
+    geom_size: np.ndarray | None = None
+    geom_rgba: np.ndarray | None = None
+    geom_matid: np.ndarray | None = None
+    mat_rgba: np.ndarray | None = None
+    mat_emission: np.ndarray | None = None
+    light_diffuse: np.ndarray | None = None
+    light_active: np.ndarray | None = None
+    heights: np.ndarray | None = None
+    others: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, datas: Sequence[mujoco.MjData] | mujoco.MjData) -> Poses:
+        """Of as many worlds as there are data; one's of one."""
+        datas = [datas] if isinstance(datas, mujoco.MjData) else datas
+        names = [f.name for f in fields(cls) if f.name not in OF_MODELS]
+        stacked = {name: np.stack([getattr(data, name) for data in datas]) for name in names}
+        found = {name: _square(array) if name.endswith("mat") else array for name, array in stacked.items()}
+        models = [data.model for data in datas]
+        return cls(**found, **{name: of_models(models, name) for name in OF_MODELS})
+
+    @classmethod
+    def joined(cls, *parts: Poses) -> Poses:
+        """The worlds of all of them, one after the other."""
+        found: dict[str, list[Any]] = {f.name: [getattr(part, f.name) for part in parts] for f in fields(cls)}
+        joined: dict[str, Any] = {n: None if each[0] is None else np.concatenate(each) for n, each in found.items()}
+        return cls(**joined)
+
+    @property
+    def n(self) -> int:
+        """Number of worlds."""
+        return len(self.geom_xpos)
+
+    def geom_places(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
+        """Centres of these geoms [m], (world, geom, 3)."""
+        return self.geom_xpos[:, geoms]
+
+    def frames(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
+        """Origins (world, 3) and rotations (world, 3, 3) of a site, a camera or a body."""
+        name = {"site": "site_x", "camera": "cam_x", "body": "x"}[kind]
+        return getattr(self, f"{name}pos")[:, index], getattr(self, f"{name}mat")[:, index]
+
+
+def of_models(models: Sequence[mujoco.MjModel], name: str) -> np.ndarray:
+    """One of OF_MODELS as these models have it now, (world, ...)."""
+    if all(model is models[0] for model in models):
+        field = of_model(models[0], name).copy()  # it may be written to later
+        return np.broadcast_to(field, (len(models), *field.shape))
+    return np.stack([of_model(model, name) for model in models])
+
+
+def of_model(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """One of OF_MODELS as a model has it now."""
+    if name == "heights":
+        return _heights(model)
+    if name == "others":
+        return _others(model)
+    found: np.ndarray = getattr(model, name)
+    return found
+
+
+def _heights(model: mujoco.MjModel) -> np.ndarray:
+    if not model.nhfield:
+        return np.zeros(0, np.uint32)
+    sizes = zip(model.hfield_adr, model.hfield_nrow * model.hfield_ncol, strict=True)
+    return np.array([crc32(model.hfield_data[start : start + size]) for start, size in sizes], np.uint32)
+
+
+def _others(model: mujoco.MjModel) -> np.ndarray:
+    headlight = model.vis.headlight
+    lamp = [crc32(np.asarray(getattr(headlight, name), np.float32).tobytes()) for name in HEADLIGHT]
+    return np.array([*(crc32(getattr(model, name)) for name in OTHERS), *lamp], np.uint32)
+
+
+def _square(rows: np.ndarray) -> np.ndarray:
+    return rows.reshape(*rows.shape[:2], 3, 3)

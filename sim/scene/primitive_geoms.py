@@ -1,0 +1,21 @@
+"""Geoms that are primitives: rays meet them in closed form."""
+
+from __future__ import annotations
+
+import mujoco
+
+from sim.scene import shapes, surfaces
+
+_TYPES = mujoco.mjtGeom
+KINDS = {
+    _TYPES.mjGEOM_SPHERE: "ellipsoid",
+    _TYPES.mjGEOM_ELLIPSOID: "ellipsoid",
+    _TYPES.mjGEOM_CAPSULE: "capsule",
+    _TYPES.mjGEOM_CYLINDER: "cylinder",
+    _TYPES.mjGEOM_BOX: "box",
+}
+
+
+def kind_of(model: mujoco.MjModel, geom: int) -> str | None:
+    """Name of the primitive that a geom is; None for meshes and for textures that need triangles."""
+    return None if shapes.is_textured(model, geom) else KINDS.get(surfaces.geom_type(model, geom))

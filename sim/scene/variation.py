@@ -1,0 +1,188 @@
+"""What differs between the episodes of a task of one's own: light, and how large, of what and where things are.
+
+All of a world's lights, the sky among them, are multiplied by one spectrum, and signals with them, exactly: light adds
+up. Sizes, colours, materials and places are the worlds' own, see `sim.scene.world_models`. So all worlds are still one
+kernel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.constants import c, h, k
+
+from optics.numerics.arguments import did_you_mean
+from optics.spectra.spectrum import cie_1931, daylight
+
+DAYLIGHT = 6504.0  # [K] the correlated colour temperature of CIE D65
+LIGHT, TEMPERATURE = "light", "color_temperature"
+SIZE, COLOR, MATERIAL, START = OF_THINGS = ("size", "color", "material", "start")  # of what has a name: "ball.size"
+# Of their ranges: factors, kelvins, shares of red, green and blue, and lengths or angles.
+LIMITS = {
+    LIGHT: (1e-6, 1e6),
+    TEMPERATURE: (1000.0, 40_000.0),
+    SIZE: (1e-3, 1e3),
+    COLOR: (0.0, 1.0),
+    START: (-1e6, 1e6),
+}
+_VISIBLE = np.arange(380, 781, 5) * 1e-9
+
+Range = tuple[Any, ...]
+Drawn = float | np.ndarray | str
+
+
+@dataclass(frozen=True)
+class Variation:
+    """ranges: (low, high) by name: "light", "color_temperature", and "NAME.size", "NAME.color" or "NAME.start" of
+        things; colours, and places in space, are three numbers each, (low, high) two opposite corners · low = high is
+        one value for all · "NAME.material": names of which one is drawn
+
+    Raises:
+        ValueError: another name, or no range.
+    """
+
+    ranges: Mapping[str, Range]
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.ranges, Mapping):
+            raise ValueError(f"vary = {self.ranges!r:.80}: must be ranges by name, such as {{'light': (0.1, 1)}}")
+        for name, given in self.ranges.items():
+            what = kind_of(name)
+            if what == MATERIAL:
+                _check_names(name, given)
+                continue
+            least, most = LIMITS[what]
+            corners = _corners(given)
+            wanted = {COLOR: (3,), START: None}.get(what, ())
+            fits = corners is not None and corners.shape[1:] in ({(), (3,)} if wanted is None else {wanted})
+            if corners is None or not fits or not (least <= corners[0]).all() or not (corners[1] <= most).all():
+                raise ValueError(f"vary: {name} = {given!r}: must be {_FORM[what]} within [{least:g}, {most:g}]")
+            if (corners[0] > corners[1]).any():
+                raise ValueError(f"vary: {name} = {given!r}: must be (low, high), low first")
+
+    def draw(self, random: np.random.Generator) -> dict[str, Drawn]:
+        """For one episode: factors evenly over their logarithm, temperatures over their reciprocal, in which equal
+        steps look alike (mired), colours and places evenly between their corners, materials alike."""
+        found: dict[str, Drawn] = {}
+        for name, given in self.ranges.items():
+            what = kind_of(name)
+            if what == MATERIAL:
+                found[name] = str(given[random.integers(len(given))])
+                continue
+            low, high = given
+            if what in (LIGHT, SIZE):
+                found[name] = low * (high / low) ** random.random()
+            elif what == TEMPERATURE:
+                found[name] = 1 / (1 / low + (1 / high - 1 / low) * random.random())
+            else:
+                corners = np.asarray((low, high), float)
+                drawn = corners[0] + (corners[1] - corners[0]) * random.random(corners.shape[1:])
+                found[name] = drawn if drawn.ndim else float(drawn)
+        return found
+
+    def blank(self, n: int) -> dict[str, np.ndarray]:
+        """Room for what is drawn, by name: (n,) or (n, 3), numbers or names."""
+        return {
+            name: np.array(given)[np.zeros(n, int)] if kind_of(name) == MATERIAL else np.ones((n, *np.shape(given[0])))
+            for name, given in self.ranges.items()
+        }
+
+    def of_things(self, what: str) -> dict[str, str]:
+        """Names of ranges by the things that they are of; what: one of OF_THINGS."""
+        return {name.rpartition(".")[0]: name for name in self.ranges if kind_of(name) == what}
+
+    @property
+    def of_light(self) -> tuple[str, ...]:
+        """What of it is light's."""
+        return tuple(name for name in self.ranges if name in (LIGHT, TEMPERATURE))
+
+    @property
+    def of_looks(self) -> bool:
+        """Whether sizes, colours or materials differ."""
+        return any(kind_of(name) in (SIZE, COLOR, MATERIAL) for name in self.ranges)
+
+    def light(self, values: Mapping[str, np.ndarray], wavelengths: np.ndarray) -> np.ndarray | None:
+        """What lights are multiplied by, (world, band) float32; None: nothing. values: by name, of each world ·
+        wavelengths [m]"""
+        if not self.of_light:
+            return None
+        n = len(values[self.of_light[0]])
+        factors = np.ones((n, len(wavelengths)))
+        if LIGHT in values:
+            factors *= values[LIGHT][:, None]
+        if TEMPERATURE in values:
+            factors *= np.array([filter_to(kelvins, wavelengths) for kelvins in values[TEMPERATURE]])
+        return factors.astype(np.float32)
+
+    def extremes(self, wavelengths: np.ndarray) -> np.ndarray:
+        """`light` at the ends of all its ranges, (case, band): where the brightest of all bands is. One band by itself
+        may be brighter in between, of warm and cold light by a third."""
+        names = self.of_light
+        ends = [self.ranges[name] for name in names]
+        corners = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, len(names)) if names else None
+        if corners is None:
+            return np.ones((1, len(wavelengths)), np.float32)
+        found = self.light(dict(zip(names, corners.T, strict=True)), wavelengths)
+        assert found is not None
+        return found
+
+
+_FORM = {
+    LIGHT: "(low, high)",
+    TEMPERATURE: "(low, high)",
+    SIZE: "(low, high), factors,",
+    COLOR: "((red, green, blue), (red, green, blue))",
+    START: "(low, high), numbers or points (x, y, z),",
+}
+
+
+def kind_of(name: str) -> str:
+    """What a range is of: LIGHT, TEMPERATURE, or one of OF_THINGS.
+
+    Raises:
+        ValueError: it is of none.
+    """
+    if name in (LIGHT, TEMPERATURE):
+        return name
+    thing, _, what = str(name).rpartition(".")
+    if thing and what in OF_THINGS:
+        return what
+    near = [LIGHT, TEMPERATURE, *(f"{thing}.{each}" for each in OF_THINGS if thing)]
+    known = [LIGHT, TEMPERATURE, *(f"NAME.{each}" for each in OF_THINGS)]
+    hint = did_you_mean(name, near) or f": must be one of {', '.join(known)}"
+    raise ValueError(f"vary: {name!r}{hint}")
+
+
+def _check_names(name: str, given: Any) -> None:
+    names = given if isinstance(given, tuple | list) and all(isinstance(each, str) for each in given) else ()
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"vary: {name} = {given!r}: must be (name, name, ...), materials, each of them once")
+
+
+def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
+    """Transmission (band,) of a filter that makes of daylight what has this colour temperature and is as bright for
+    people: the ratio of black bodies of this temperature and of DAYLIGHT (Planck's law), so scaled that daylight keeps
+    its illuminance."""
+    seen = daylight(_VISIBLE) * cie_1931(_VISIBLE)[:, 1]
+    scale = seen.sum() / (seen * _ratio(kelvins, _VISIBLE)).sum()
+    found: np.ndarray = scale * _ratio(kelvins, wavelengths)
+    return found
+
+
+def _ratio(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
+    """Of Planck's spectra, both of which fall as λ⁻⁵."""
+    x = h * c / (k * np.asarray(wavelengths))
+    found: np.ndarray = np.expm1(x / DAYLIGHT) / np.expm1(x / kelvins)
+    return found
+
+
+def _corners(given: Any) -> np.ndarray | None:
+    """(low, high) as an array (2,) or (2, 3); None: it is no such pair of finite numbers."""
+    try:
+        corners = np.asarray(given, float)
+    except (TypeError, ValueError):
+        return None
+    return corners if corners.shape in ((2,), (2, 3)) and np.isfinite(corners).all() else None

@@ -1,0 +1,211 @@
+"""A model for each world, where sizes, colours and materials differ or a task changes it, and where things are when an
+episode begins.
+
+A size goes through MuJoCo's compiler, so that mass, inertia and all that follows from them are the compiler's own: what
+has a density weighs by its volume, what was given a mass keeps it. A world's model and data stay the same objects.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from optics.numerics.arguments import did_you_mean
+from sim.scene import source, surfaces
+from sim.scene import variation as of_worlds
+from sim.scene.appearances import in_material, material_of
+from sim.scene.model_settings import ModelSettings
+from sim.scene.primitive_geoms import kind_of as primitive_of
+from sim.scene.variation import COLOR, MATERIAL, OF_THINGS, SIZE, START, Variation
+
+Drawn = Mapping[str, of_worlds.Drawn]
+# Fields that no size changes: what is large among them would be copied for nothing.
+_FIXED = ("tex", "mesh", "hfield", "skin", "mat_", "name", "text", "numeric", "tuple", "key", "path")
+_JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+
+
+class WorldModels:
+    """Of `n` worlds of one model.
+
+    given: what the model was made of · model: what became of it; worlds have copies
+    models: of each world; one for all, unless they are `own`
+    own: whether each world has one for itself: where something of them differs or a task changes them (`separate`);
+        then each episode begins with the model as it was compiled
+    varied: names of the geoms whose size, colour or material differs, and of the materials that are drawn
+
+    Raises:
+        ValueError: the model has no such thing, or one that cannot differ.
+    """
+
+    def __init__(self, given: Any, model: mujoco.MjModel, n: int, variation: Variation | None) -> None:
+        ranges = {what: {} if variation is None else variation.of_things(what) for what in OF_THINGS}
+        self.model = model
+        self._sizes = {_geom(model, thing, name): name for thing, name in ranges[SIZE].items()}
+        self._colors = {_geom(model, thing, name): name for thing, name in ranges[COLOR].items()}
+        self._starts = {name: _place(model, thing, name, variation) for thing, name in ranges[START].items()}
+        materials = {_geom(model, thing, name): name for thing, name in ranges[MATERIAL].items()}
+        self._materials = {geom: (name, self._candidates(geom, name, variation)) for geom, name in materials.items()}
+        self.varied = {
+            model.geom(g).name: tuple(self._materials[g][1]) if g in self._materials else ()
+            for g in sorted({*self._sizes, *self._colors, *self._materials})
+        }
+        self.own, self._compiled = False, ModelSettings(model).held()
+        self.models = [copy.copy(model)] * n
+        self._settings = [ModelSettings(self.models[0])] * n
+        if self.varied:
+            self.separate()
+        if self._sizes:
+            self._prepare_sizes(given)
+
+    def separate(self) -> None:
+        """A model for each world from now on, as it was compiled."""
+        self.own, self.models = True, [copy.copy(self.model) for _ in self.models]
+        self._settings = [ModelSettings(model) for model in self.models]
+
+    def held(self, world: int) -> bytes:
+        """All that physics goes by of a world's model now."""
+        return self._settings[world].held()
+
+    def hold(self, world: int, held: bytes) -> None:
+        """Inverse of `held`."""
+        self._settings[world].hold(held)
+
+    def differs(self) -> bool:
+        """Whether the model that worlds share is no longer as it was compiled."""
+        return not self.own and self.held(0) != self._compiled
+
+    def noted(self) -> bytes:
+        """The model that several worlds share, as it is now; nothing if each has its own."""
+        return b"" if self.own else self.held(0)
+
+    def require_unchanged(self, before: bytes, whose: str) -> None:
+        """Compare with what `noted` returned; whose: what a message begins with. If there is only one world, its model
+        becomes its own as soon as a task changes it.
+
+        Raises:
+            RuntimeError: the model that several worlds share has changed.
+        """
+        if self.own or self.held(0) == before:
+            return
+        self.own = len(self.models) == 1
+        if not self.own:
+            raise RuntimeError(
+                f"{whose}: data.model has another {self._settings[0].differing(before)} now, and all worlds share it: "
+                "must be changed by the first `reset`, too; then each world has a model of its own"
+            )
+
+    def begin(self, world: int, drawn: Drawn) -> None:
+        """A world's sizes, colours and materials from now on; a model of its own is otherwise as it was compiled.
+
+        Raises:
+            ValueError: a material that is not one of its own.
+        """
+        mine = self.models[world]
+        if self.own and self.held(world) != self._compiled:
+            self.hold(world, self._compiled)
+        if self._sizes:
+            self._resize(mine, drawn)
+        for geom, name in self._colors.items():
+            mine.geom_rgba[geom] = surfaces.set_rgba([*np.asarray(drawn[name]), surfaces.rgba(self.model, geom)[3]])
+        for geom, (name, candidates) in self._materials.items():
+            if (material := str(drawn[name])) not in candidates:
+                raise ValueError(f"{name} = {material!r}: must be one of {', '.join(candidates)}")
+            mine.geom_matid[geom] = candidates[material]
+
+    def place(self, data: mujoco.MjData, drawn: Drawn) -> None:
+        """Things are where an episode begins."""
+        for name, (where, address) in self._starts.items():
+            getattr(data, where)[address] = drawn[name]
+
+    def _candidates(self, geom: int, name: str, variation: Variation | None) -> dict[str, int]:
+        """Ids of materials, by name."""
+        assert variation is not None
+        if geom in self._colors:
+            raise ValueError(f"vary: {name} and {self._colors[geom]}: must be one of them; materials have colours")
+        if not np.array_equal(self.model.geom_rgba[geom], surfaces.UNSET_RGBA):
+            raise ValueError(f"vary: {name}: the geom's own rgba takes the place of its materials': must have none")
+        return {each: material_of(self.model, each, f"vary: {name}") for each in variation.ranges[name]}
+
+    def _prepare_sizes(self, given: Any) -> None:
+        model, self._spec = self.model, _specification(given)
+        for geom, name in self._sizes.items():
+            drawn = self._materials.get(geom, ("", {}))[1].values()
+            looks = [in_material(model, geom, material).model for material in drawn] or [model]
+            if any(primitive_of(look, geom) is None for look in looks):
+                raise ValueError(
+                    f"vary: {name}: must be a sphere, capsule, cylinder, ellipsoid or box without a texture"
+                )
+        by_name = {geom.name: geom for geom in self._spec.geoms}
+        self._geoms = {geom: by_name[model.geom(geom).name] for geom in self._sizes}
+        self._natural = {geom: (np.array(mjs.size), np.array(mjs.fromto)) for geom, mjs in self._geoms.items()}
+        self._fields = _fields_of(model)
+
+    def _resize(self, mine: mujoco.MjModel, drawn: Drawn) -> None:
+        for geom, mjs in self._geoms.items():
+            factor, (size, ends) = float(drawn[self._sizes[geom]]), self._natural[geom]
+            middle = np.tile((ends[:3] + ends[3:]) / 2, 2)
+            # A capsule that was given by its ends keeps its middle, and its half length is nobody's number.
+            mjs.size, mjs.fromto = factor * size, middle + factor * (ends - middle)
+        compiled = self._spec.compile()
+        for name in self._fields:
+            np.copyto(getattr(mine, name), getattr(compiled, name))
+        for name in ("meaninertia", "meanmass", "meansize", "extent"):
+            setattr(mine.stat, name, getattr(compiled.stat, name))
+        mine.stat.center[:] = compiled.stat.center
+
+
+def _geom(model: mujoco.MjModel, thing: str, name: str) -> int:
+    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, thing)
+    if found < 0:
+        known = [model.geom(g).name for g in range(model.ngeom) if model.geom(g).name]
+        hint = did_you_mean(thing, known) or (
+            f"; it has {', '.join(map(repr, known))}" if known else "; none has a name"
+        )
+        raise ValueError(f"vary: {name}: the model has no geom {thing!r}{hint}")
+    return int(found)
+
+
+def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | None) -> tuple[str, Any]:
+    """Which entries of which field of mjData say where a thing is."""
+    assert variation is not None
+    spatial = np.ndim(variation.ranges[name][0]) == 1
+    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, thing)
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, thing)
+    if joint >= 0 and mujoco.mjtJoint(int(model.jnt_type[joint])) in _JOINTS and not spatial:
+        return "qpos", int(model.jnt_qposadr[joint])
+    if body >= 0 and spatial and model.body_mocapid[body] >= 0:
+        return "mocap_pos", int(model.body_mocapid[body])
+    if body >= 0 and spatial and model.body_jntnum[body] == 1:
+        first = int(model.body_jntadr[body])
+        if model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE:
+            start = int(model.jnt_qposadr[first])
+            return "qpos", slice(start, start + 3)
+    form = "points (x, y, z)" if spatial else "numbers"
+    wanted = "a mocap body or one with a free joint" if spatial else "a hinge or slide joint"
+    joints = [model.joint(j).name for j in range(model.njnt)]
+    bodies = [model.body(b).name for b in range(1, model.nbody)]
+    hint = did_you_mean(thing, [known for known in (bodies if spatial else joints) if known])
+    raise ValueError(f"vary: {name} is between {form}: {thing!r} must be {wanted}{hint}")
+
+
+def _specification(given: Any) -> mujoco.MjSpec:
+    """What can be compiled anew."""
+    if isinstance(given, mujoco.MjSpec):
+        return given.copy()
+    if isinstance(given, str) and given.lstrip().startswith("<"):
+        return mujoco.MjSpec.from_string(given)
+    if isinstance(given, str | Path) and Path(given).suffix != ".mjb":
+        source.load(given)  # says what is wrong, where something is
+        return mujoco.MjSpec.from_file(str(given))
+    kind = f"a {type(given).__name__}" if isinstance(given, mujoco.MjModel) else "a compiled file"
+    raise ValueError(f"vary: sizes: model is {kind}: must be MJCF or an MjSpec, which can be compiled anew")
+
+
+def _fields_of(model: mujoco.MjModel) -> list[str]:
+    names = [name for name in dir(model) if not name.startswith(("_", *_FIXED))]
+    return [name for name in names if isinstance(getattr(model, name), np.ndarray) and getattr(model, name).size]

@@ -1,0 +1,201 @@
+"""Several animals in one world, each a task of its own: who learns, and who acts by a policy that is as it is."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from optics.numerics.arguments import did_you_mean, of_kind
+from sim.physics.controls import actuator_names
+from sim.tasks.batch_task import BatchTask
+from sim.tasks.task import Task
+
+FRAMES_AXES = 5  # memory, eye, channel, height, width: of what eyes see in an observation, and of nothing else
+SAID_BY_ANY = ("spectra", "vary")  # what belongs to the world, too, and may be left to one animal
+SHARED = ("substeps", "episode_steps")  # what belongs to the world: every animal must say the same of it
+
+
+@dataclass(frozen=True, eq=False)
+class Frozen:
+    """An animal that does not learn, in the world of one that does: one of its task's `others`.
+
+    task: what it is: its eyes, its actions and its endings; its rewards are not asked for, and others of its own are
+        left out
+    policy: what has stable-baselines3's `predict` (a learner, or what `evolve.load_policy` returns), or a function of
+        the observations of all worlds at once, as `make_vec_env` has them, that returns actions (world, number); None:
+        its actions are zeros, and nobody looks through its eyes
+
+    Raises:
+        ValueError: these are something else.
+    """
+
+    task: Task
+    policy: Any = None
+
+    def __post_init__(self) -> None:
+        of_kind("Frozen: task", self.task, Task, "Predator()")
+        if self.policy is not None and not callable(getattr(self.policy, "predict", self.policy)):
+            raise ValueError(f"Frozen: policy = {self.policy!r:.80}: must be a function, have `predict`, or be None")
+        object.__setattr__(self, "task", among(self.task, ()))
+
+    @property
+    def memory(self) -> int:
+        """Frames in the observations that its policy wants."""
+        known = getattr(getattr(self.policy, "observation_space", None), "spaces", {})
+        shapes = [space.shape for space in known.values()]
+        return max((shape[0] for shape in shapes if len(shape) == FRAMES_AXES), default=1)
+
+    def actions(self, observation: Mapping[str, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
+        """What it does in every world, of this shape (world, number).
+
+        Raises:
+            RuntimeError: its policy fails, or returns something else.
+        """
+        try:
+            predict = getattr(self.policy, "predict", None)
+            found = self.policy(observation) if predict is None else predict(observation, deterministic=True)[0]
+            actions = np.asarray(found, np.float32)
+        except Exception as error:
+            said = " ".join(f"{type(error).__name__}: {error}".split())
+            raise RuntimeError(f"policy of {name_of(self.task)!r}: {said}") from error
+        if actions.shape != shape:
+            raise RuntimeError(
+                f"policy of {name_of(self.task)!r} returned actions of shape {actions.shape}: must be {shape}"
+            )
+        return actions
+
+
+class Encounter:
+    """Animals that meet in one world and see each other, such as `sim.Encounter(Prey(), Predator())`.
+
+    animals: their tasks, all of one model, each with a body, actuators and eyes of its own; what they are called is
+        their `name`
+
+    Raises:
+        ValueError: none, two of one name, or of different models.
+    """
+
+    def __init__(self, *animals: Task) -> None:
+        self.animals = together(animals, "Encounter")
+        for animal, name in zip(animals, self.names, strict=True):
+            if animal.others:
+                raise ValueError(f"Encounter: {name} has others of its own: must be a task without any")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What its animals are called."""
+        return tuple(map(name_of, self.animals))
+
+    def alone(self, name: str, policies: Mapping[str, Any]) -> Task:
+        """The task of one animal, in which the others are frozen: for `make_vec_env` and `make_env`.
+
+        policies: of the others, by name, see `sim.Frozen`; others do nothing
+
+        Raises:
+            ValueError: there is no such animal.
+        """
+        for asked in (name, *policies):
+            if asked not in self.names:
+                known = did_you_mean(asked, self.names) or f": it has {', '.join(self.names)}"
+                raise ValueError(f"Encounter: no animal {asked!r}{known}")
+        if name in policies:
+            raise ValueError(f"Encounter: policies: {name!r} is the one that learns: must be left out")
+        rest = [animal for animal in self.animals if name_of(animal) != name]
+        frozen = [Frozen(animal, policies.get(name_of(animal))) for animal in rest]
+        return among(self.animals[self.names.index(name)], frozen)
+
+
+def among(task: Task, others: Sequence[Frozen]) -> Task:
+    """The same task with these others."""
+    learner = copy.copy(task)
+    learner.others = tuple(others)
+    return learner
+
+
+def name_of(task: Task) -> str:
+    """What an animal is called among others."""
+    return type(task).__name__ if task.name is None else str(task.name)
+
+
+def cast(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen, ...]]:
+    """Those who learn, and those who do not.
+
+    Raises:
+        ValueError: they cannot be in one world.
+    """
+    if isinstance(task, Encounter):
+        return task.animals, ()
+    where = f"{type(task).__name__}: others"
+    for other in task.others:
+        of_kind(where, other, Frozen, "sim.Frozen(Predator(), policy)")
+    together((task, *(other.task for other in task.others)), where)
+    return (task,), tuple(task.others)
+
+
+def of_world(animals: Sequence[Task], what: str) -> Any:
+    """What belongs to the world and may be said by any animal: that of the first who says it."""
+    return next((said for animal in animals if (said := getattr(animal, what))), None)
+
+
+def require_own_actuators(animals: Sequence[Task], model: mujoco.MjModel) -> None:
+    """Those that act by `actuators` each have their own.
+
+    Raises:
+        ValueError: two animals drive the same one: the last would have its way.
+    """
+    owner: dict[str, str] = {}
+    for animal in animals:
+        if type(animal).act is not Task.act:
+            continue
+        name, driven = name_of(animal), animal.actuators
+        for one in actuator_names(model) if driven is None else driven:
+            if owner.setdefault(one, name) != name:
+                raise ValueError(f"{owner[one]} and {name}: actuators: both drive {one!r}: must name their own")
+
+
+def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
+    """Animals that can be in one world.
+
+    Raises:
+        ValueError: they cannot; `where` it was asked for.
+    """
+    if not animals:
+        raise ValueError(f"{where}: no animals: must be one sim.Task at least")
+    for animal in animals:
+        given: object = animal
+        if isinstance(given, str | BatchTask):
+            label = given if isinstance(given, str) else type(given).__name__
+            raise ValueError(
+                f"{where}: {label!r} has the body of one agent: must be a sim.Task, whose model has several"
+            )
+        of_kind(where, animal, Task, "Prey()")
+    names = [name_of(animal) for animal in animals]
+    first, first_name = animals[0], names[0]
+    for number, (name, animal) in enumerate(zip(names, animals, strict=True)):
+        if name in names[:number]:
+            raise ValueError(f"{where}: two animals are called {name!r}: must differ, give one of them another `name`")
+        if number and not _same_model(first, animal):
+            raise ValueError(f"{where}: {first_name} and {name} have different models: must be one model for all")
+        for what in SHARED:
+            values = getattr(first, what), getattr(animal, what)
+            if values[0] != values[1]:
+                raise ValueError(f"{where}: {what} = {values[0]} of {first_name}, {values[1]} of {name}: must be equal")
+    for what in SAID_BY_ANY:
+        said = [(name, value) for name, animal in zip(names, animals, strict=True) if (value := getattr(animal, what))]
+        for name, value in said[1:]:
+            if value != said[0][1]:
+                raise ValueError(f"{where}: {what} of {said[0][0]} and of {name} differ: must be equal, or one's alone")
+    return tuple(animals)
+
+
+def _same_model(one: Task, other: Task) -> bool:
+    models = [getattr(task, "model", None) for task in (one, other)]
+    if models[0] is models[1]:
+        return True
+    return all(isinstance(model, str | Path) for model in models) and str(models[0]) == str(models[1])

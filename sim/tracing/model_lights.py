@@ -1,0 +1,115 @@
+"""Lights of any model, that may move: directional ones, points and spots, and the headlight of each eye.
+
+What they send is Mitsuba's (`sim.scene.lights`), so that the renderer shows what `sim.mirror` does.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.scene import lights
+from sim.scene.device_arrays import three
+from sim.scene.poses import Poses
+from sim.scene.spectra import Spectra
+from sim.scene.variant import Description
+from sim.tracing import lighting
+
+ROWS = 2  # of four floats for each light: where it is, and where it shines
+FAR = 1e6  # [m] to what a directional light comes from
+_DIRECTIONAL, _POINT, _SPOT = "directional", "point", "spot"
+
+
+@dataclass(frozen=True)
+class ModelLight:
+    """light: id in the model; -1: the headlight of the eye that looks · kind: "directional", "point" or "spot"
+    level: irradiance on what faces it, or intensity of a point (1 m away), per band (band,)
+    cutoff, exponent: of a spot: cosine of its half angle, and how its light falls off to the side
+    """
+
+    light: int
+    kind: str
+    level: np.ndarray
+    cutoff: float = -1.0
+    exponent: float = 0.0
+
+
+def model_lights(
+    model: mujoco.MjModel, spectra: Spectra, wavelengths: np.ndarray, light: str = lighting.DIRECT
+) -> tuple[list[ModelLight], list[str]]:
+    """A model's lights at these wavelengths [m] in the variant in force, and what of them has no counterpart here;
+    light: what of it is followed."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    emitters, left_out = lights.emitters(model, data, spectra)
+    found = []
+    for emitter in emitters:
+        kind = emitter.description["type"]
+        if kind not in (_DIRECTIONAL, _POINT, _SPOT):
+            left_out += ["light of the sky on surfaces"] if light == lighting.DIRECT else []
+            continue
+        level = _level({k: v for k, v in emitter.description.items() if k != "texture"}, wavelengths)
+        cutoff, exponent = -1.0, 0.0
+        if kind == _SPOT:
+            cutoff = math.cos(math.radians(emitter.description["cutoff_angle"]))
+            exponent = float(model.light_exponent[emitter.light])
+        found.append(ModelLight(emitter.light, kind, level, cutoff, exponent))
+    return found, left_out
+
+
+def _level(description: Description, wavelengths: np.ndarray) -> np.ndarray:
+    """Irradiance of a directional light, or intensity."""
+    emitter, found = mi.load_dict(description), []
+    for spectrum in lighting.spectra(wavelengths):
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.wavelengths = spectrum
+        if description["type"] != _DIRECTIONAL:
+            si.p = mi.Point3f(description["to_world"] @ mi.ScalarPoint3f(0, 0, 1))
+        _, weight = emitter.sample_direction(si, mi.Point2f(0.5))
+        found.append(np.array(weight).ravel())
+    return np.concatenate(found)[: len(wavelengths)]
+
+
+class Lights:
+    """All of them, for the kernel. Each is asked for once per ray."""
+
+    def __init__(self, found: list[ModelLight]) -> None:
+        self.found = found
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def rows(self, poses: Poses) -> np.ndarray:
+        """Where they are and shine, (world, light, 4 ROWS) float32; the headlights' are not read."""
+        rows = np.zeros((poses.n, len(self), ROWS, 4), np.float32)
+        for k, light in enumerate(self.found):
+            if light.light >= 0:
+                aim = poses.light_xdir[:, light.light]
+                rows[:, k, 0, :3] = poses.light_xpos[:, light.light]
+                rows[:, k, 1, :3] = aim / np.linalg.norm(aim, axis=-1, keepdims=True)
+        return rows.reshape(poses.n, len(self), -1)
+
+    def towards(self, k: int, point: Array, axis: Array, rows: Array, first: Array) -> tuple[Array, Array, Array]:
+        """Unit vector from a point to a light, how far that is [m], and how much of its level arrives on what faces it;
+        axis: of the eye that looks."""
+        light = self.found[k]
+        if light.light < 0:
+            return -axis, mi.Float(FAR), mi.Float(1)
+        place, aim = (three(rows, first + k * ROWS + i) for i in range(ROWS))
+        if light.kind == _DIRECTIONAL:
+            return -aim, mi.Float(FAR), mi.Float(1)
+        way = place - mi.Vector3f(point)
+        square = dr.maximum(dr.squared_norm(way), 1e-12)
+        distance = dr.sqrt(square)
+        towards, share = way / distance, dr.rcp(square)
+        if light.kind == _SPOT:
+            cosine = -dr.dot(towards, aim)
+            profile: Array = dr.power(dr.maximum(cosine, 1e-6), light.exponent)
+            share = dr.select(cosine > light.cutoff, share * profile, 0)
+        return towards, distance, share

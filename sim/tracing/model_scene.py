@@ -1,0 +1,176 @@
+"""A model taken apart: what stands still becomes one Mitsuba scene, and what moves is met by itself.
+
+Surfaces are matt here, and opaque: what of a material is gloss, mirror or glass is left out, and said so.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from optics import Eye
+from optics.spectra.spectrum import Spectrum
+from sim.scene import bsdfs, inventory, lights, shapes, sky, surfaces
+from sim.scene.appearances import Appearance, Varied, appearances_of, in_white, varied_geoms
+from sim.scene.as_built import AsBuilt
+from sim.scene.band_error import lights_in_bands
+from sim.scene.merged_parts import PlacedPart, merged
+from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
+from sim.scene.primitive_geoms import kind_of
+from sim.scene.rays import names_of
+from sim.scene.spectra import of_geom, resolve
+from sim.scene.variant import Description, MitsubaObject, default_variant
+from sim.scene.variant import variant as in_variant
+from sim.tracing.lighting import DIRECT
+from sim.tracing.model_lights import Lights, model_lights
+from sim.tracing.movers import Movers
+from sim.tracing.paint import Paint
+
+_HERE = Path(__file__).parents[1]
+
+
+class ModelScene:
+    """What a renderer needs of a model.
+
+    model · variant: of Mitsuba · geoms: ids of all that are seen
+    scene: mi.Scene of what stands still, and the sky · movers: what moves · lights: all of them
+    spectra: measured ones of materials and lights, by name · has_sky: whether there is something to see at infinity
+    glows: BSDFs whose reflectance is the radiance of what glows, by look; these are met like movers
+    paint: of sizes and colours that differ from world to world, `varied` by name: what differs is met like a mover,
+        though it may stand still
+    as_built: what worlds are compared with
+    bsdfs: of every mover, in their order; kept here, since a BSDFPtr does not keep its objects alive
+
+    Warns (`sim.MirrorWarning`) once of what has no counterpart, and of measured lights that the eye's bands are too few
+    for.
+
+    Raises:
+        ValueError: a model without visible geoms, and spectra or variation of what it does not have.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        eye: Eye,
+        groups: Sequence[int] = VISIBLE_GROUPS,
+        spectra: Mapping[str, Spectrum | str] | None = None,
+        varied: Varied = (),
+        light: str = DIRECT,
+    ) -> None:
+        self.model, self.variant = model, default_variant()
+        self.spectra, wavelengths = resolve(model, spectra), eye.spectral_bands.wavelengths
+        in_bands, off = lights_in_bands(model, self.spectra, eye)
+        seen = surfaces.visible(model, groups)
+        self.geoms = [g for g in seen if shapes.has_shape(model, g)]
+        if not self.geoms:
+            raise ValueError("the model has no visible geom of a kind that can be mirrored")
+        with in_variant(self.variant):
+            differ = varied_geoms(model, self.geoms, varied, self.spectra)
+            drawn = {geom: materials for geom, materials in differ.items() if materials}
+            painted = [geom for geom in differ if geom not in drawn]
+            looks = appearances_of(model, self.geoms, drawn)
+            glows = ((look, self._glow(look, look.geom in painted)) for look in looks)
+            self.glows = {look: glow for look, glow in glows if glow is not None}
+            matt = {look: self._matt(look, look.geom in painted) for look in looks}
+            moving = [each for each in looks if _moves(model, each.geom) or each.geom in differ or each in self.glows]
+            meshes = {look: self._mesh(look, matt[look]) for look in moving if kind_of(look.model, look.geom) is None}
+            self.movers = Movers(model, moving, meshes)
+            glow = any(look.geom in painted for look in self.glows)
+            self.paint = Paint(model, painted, self.movers.geoms, wavelengths, glow)
+            self.bsdfs = [matt[look] for look in self.movers.looks]
+            found, left_out = model_lights(model, in_bands, wavelengths, light)
+            self.lights = Lights(found)
+            self._matt_still = {look.geom: matt[look] for look in looks if look not in moving}
+            self.scene = self._still()
+            self.has_sky = self.scene.environment() is not None
+        reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
+        self.as_built = AsBuilt(
+            model, self.geoms, [g for g in reachable if g not in seen], self.movers.geoms, self.movers.resizable, differ
+        )
+        left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, looks, light)]
+        for words in (*([f"eyes do not see: {'; '.join(left_out)}"] if left_out else []), *off):
+            warnings.warn(words, MirrorWarning, stacklevel=_outside())
+
+    def _matt(self, look: Appearance, white: bool) -> MitsubaObject:
+        to_uv = shapes.uv_transform(look.model, look.geom)
+        if white:
+            return bsdfs.matt_white(look.model, look.geom, to_uv)
+        return bsdfs.matt(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
+
+    def _glow(self, look: Appearance, white: bool) -> MitsubaObject | None:
+        """A BSDF whose reflectance is the radiance of what glows: the kernel asks for it as for the others, and
+        multiplies what is white by its world's colour."""
+        to_uv, geom = shapes.uv_transform(look.model, look.geom), look.geom
+        model = in_white(look.model, geom) if white else look.model
+        radiance = lights.glow(model, geom, to_uv, of_geom(model, geom, self.spectra))
+        if radiance is None:
+            return None
+        return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": radiance}})
+
+    def _mesh(self, look: Appearance, bsdf: MitsubaObject) -> MitsubaObject:
+        """A geom in its own frame."""
+        parts = enumerate(shapes.parts(look.model, look.geom))
+        built = {f"part_{k}": shapes.build(part, np.eye(4), f"part_{k}", bsdf, None) for k, part in parts}
+        return mi.load_dict({"type": "scene", **built}, optimize=False)
+
+    @cached_property
+    def told_apart(self) -> tuple[MitsubaObject, np.ndarray]:
+        """What stands still, each geom by itself, and the geoms of its shapes by Mitsuba's ids; -1 where there is none.
+        Ids are all that rays on a GPU say of what they meet."""
+        with in_variant(self.variant):
+            built = {name: shapes.build(part, pose, name, bsdf, None) for name, part, pose, bsdf in self._still_parts()}
+            scene = mi.load_dict({"type": "scene", **built}, optimize=False)
+            known = names_of(scene)
+        geoms = np.full(max(known, default=0) + 1, -1)
+        for shape, name in known.items():
+            geoms[shape] = int(name.split("_")[1])
+        return scene, geoms
+
+    def _still_parts(self) -> list[PlacedPart]:
+        data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, data)
+        return [
+            (f"geom_{g}_{k}", part, shapes.pose(data, g), bsdf)
+            for g, bsdf in self._matt_still.items()
+            for k, part in enumerate(shapes.parts(self.model, g))
+        ]
+
+    def _still(self) -> MitsubaObject:
+        description: Description = {"type": "scene", **merged(self._still_parts(), "still")}
+        heaven = sky.description(self.model, lights.white())
+        if heaven is not None:
+            description["sky"] = heaven
+        return mi.load_dict(description, optimize=False)
+
+
+def _moves(model: mujoco.MjModel, geom: int) -> bool:
+    body = model.geom_bodyid[geom]
+    return bool(model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0)
+
+
+def _outside() -> int:
+    """How many calls ago somebody else's code was running: that is where a warning points."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(_HERE):
+        frame, level = frame.f_back, level + 1
+    return level
+
+
+def _not_matt(model: mujoco.MjModel, looks: Sequence[Appearance], light: str) -> list[str]:
+    """What surfaces do that is left out, in words."""
+    materials = sorted({look.material for look in looks if look.material >= 0})
+    glossy = [m for m in materials if bsdfs.has_gloss(model, m)]
+    glowing = [m for m in materials if model.mat_emission[m] > 0 and light == DIRECT]
+    mirrors = list(dict.fromkeys(look.geom for look in looks if bsdfs.mirror_share(look.model, look.geom) > 0))
+    glass = list(dict.fromkeys(look.geom for look in looks if look.alpha < 1))
+    words = [f"gloss of {inventory.listed_materials(model, glossy)}"] if glossy else []
+    words += [f"light of {inventory.listed_materials(model, glowing)} on surfaces"] if glowing else []
+    words += [f"reflections in {inventory.listed_geoms(model, mirrors)}"] if mirrors else []
+    return words + ([f"what is behind the transparent {inventory.listed_geoms(model, glass)}"] if glass else [])

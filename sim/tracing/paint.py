@@ -1,0 +1,98 @@
+"""Colours that differ from world to world, as reflectances in the eye's bands, for the kernel.
+
+What is painted is built white, texture and all, and the kernel multiplies it by its world's colour: MuJoCo, too, has a
+colour multiply a texture. Spectra of colours are Mitsuba's (Jakob and Hanika 2019), as everywhere. What glows, glows in
+its world's colour, too, by the spectrum that `sim.scene.lights.emission` has for it.
+"""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import mujoco
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.scene import surfaces
+from sim.scene.color import decode_srgb
+from sim.scene.device_arrays import whole_numbers
+from sim.scene.poses import Poses
+from sim.tracing import lighting
+
+
+class Paint:
+    """Of some geoms, in the order of `geoms`; needs the variant in force.
+
+    movers: ids of all movers · glow: whether any of the geoms glows · inputs: arrays for the kernel
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, geoms: list[int], movers: np.ndarray, wavelengths: np.ndarray, glow: bool
+    ) -> None:
+        self.geoms, self._spectra, self._bands = np.array(geoms, int), lighting.spectra(wavelengths), len(wavelengths)
+        self._own = np.array([surfaces.rgba(model, g)[:3] for g in geoms]).reshape(-1, 3)
+        self._of_material = model.geom_matid[self.geoms][:, None] >= 0
+        place = {geom: k for k, geom in enumerate(geoms)}
+        self.inputs = {"painted": whole_numbers([*(place.get(int(g), len(geoms)) for g in movers), len(geoms)])}
+        textures = [(g, surfaces.texture_id(model, g)) for g in geoms]
+        self.glow, self._textured = glow, [t >= 0 and surfaces.is_mirrored(model, g, t) for g, t in textures]
+        self._known: dict[tuple[tuple[float, ...], bool], np.ndarray] = {}
+
+    def __len__(self) -> int:
+        return len(self.geoms)
+
+    @property
+    def n_rows(self) -> int:
+        """Of four floats each, in one world; never none."""
+        return max(len(self) * len(self._spectra) * (1 + self.glow), 1)
+
+    def rows(self, poses: Poses) -> np.ndarray:
+        """Reflectances, (world, 4 n_rows) float32; then, if any glow, what their glow is multiplied by."""
+        rows = np.zeros((poses.n, self.n_rows * lighting.LANES), np.float32)
+        if not len(self):
+            return rows
+        each = rows.reshape(poses.n, 1 + self.glow, len(self), -1)
+        colors = self._colors(poses)
+        for world, glow, k in np.ndindex(each.shape[:3]):
+            color = tuple(map(float, colors[world % len(colors), k]))
+            each[world, glow, k, : self._bands] = self._spectrum(color, bool(glow) and not self._textured[k])
+        return rows
+
+    def _colors(self, poses: Poses) -> np.ndarray:
+        """(world or 1, geom, 3) sRGB: a world's own or, where it has none, the material's, as MuJoCo has it."""
+        if poses.geom_rgba is None:
+            return self._own[None]
+        here = poses.geom_rgba[:, self.geoms]
+        unset = (here == surfaces.UNSET_RGBA).all(axis=-1, keepdims=True) & self._of_material
+        return np.where(unset, self._own, here[..., :3])
+
+    def of(
+        self, which: Array, rows: Array, first: Array, inputs: dict[str, Array], seen: Array, *, glow: bool = False
+    ) -> list[Array]:
+        """What a mover's reflectances are multiplied by, or its glow, as spectra; first: of the world's rows."""
+        k = dr.gather(mi.UInt32, inputs["painted"], which, seen)
+        painted = seen & (k < len(self))
+        start = first + (len(self) * len(self._spectra) if glow else 0)
+        found = []
+        for chunk in range(len(self._spectra)):
+            row = start + dr.select(painted, k, 0) * len(self._spectra) + chunk
+            found.append(dr.select(painted, mi.Spectrum(*dr.gather(mi.Vector4f, rows, row)), 1))
+        return found
+
+    def _spectrum(self, rgb: tuple[float, ...], emitted: bool) -> np.ndarray:
+        """Of a display-referred colour, (band,): a reflectance, or, as emitters have it, its hue's times its level."""
+        if (rgb, emitted) not in self._known:
+            if len(self._known) > 10_000:
+                self._known.clear()
+            linear = np.clip(decode_srgb(np.array(rgb)), 0, 1)
+            level = float(linear.max()) if emitted else 1.0
+            self._known[rgb, emitted] = level * self._reflectance(linear / level if level > 0 else linear)
+        return self._known[rgb, emitted]
+
+    def _reflectance(self, linear: np.ndarray) -> np.ndarray:
+        texture, si = mi.load_dict({"type": "rgb", "value": linear.tolist()}), dr.zeros(mi.SurfaceInteraction3f)
+        found = []
+        for spectrum in self._spectra:
+            si.wavelengths = spectrum
+            found.append(np.array(texture.eval(si)).ravel())
+        return np.concatenate(found)[: self._bands]

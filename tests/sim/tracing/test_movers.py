@@ -1,0 +1,196 @@
+"""Rays that meet movers, against MuJoCo's own ray caster."""
+
+import drjit as dr
+import mujoco
+import numpy as np
+import pytest
+
+import sim
+from optics import Eye
+from sim.scene import variant
+from sim.tracing import movers, primitives
+
+SHAPES = {
+    "sphere": '<geom type="sphere" size=".3"/>',
+    "ellipsoid": '<geom type="ellipsoid" size=".4 .15 .25"/>',
+    "capsule": '<geom type="capsule" size=".15 .3"/>',
+    "cylinder": '<geom type="cylinder" size=".25 .2"/>',
+    "box": '<geom type="box" size=".3 .15 .2"/>',
+    "mesh": '<geom type="mesh" mesh="wedge"/>',
+}
+WEDGE = '<asset><mesh name="wedge" vertex="-.3 -.3 -.2  .4 -.3 -.2  0 .4 -.2  0 0 .4"/></asset>'
+EYE = Eye(resolution=(24, 24), fov_deg=40, bands=1)
+WORLDS = 6
+
+
+def model_of(*shapes):
+    bodies = "".join(
+        f'<body name="b{i}" pos="{i * 0.5} 0 0"><freejoint/>{shape}</body>' for i, shape in enumerate(shapes)
+    )
+    return mujoco.MjModel.from_xml_string(
+        f"""<mujoco><visual><headlight active="0"/></visual>{WEDGE}<worldbody>
+        <light type="directional" dir=".3 .2 -1"/><geom type="plane" size="9 9 .1" pos="0 0 -3"/>
+        <camera name="eye" pos="0 -2.5 .4" xyaxes="1 0 0 0 .1 1"/>{bodies}</worldbody></mujoco>"""
+    )
+
+
+def posed(model, seed, spread=0.4):
+    rng = np.random.default_rng(seed)
+    data = mujoco.MjData(model)
+    for k in range(model.nq // 7):
+        data.qpos[7 * k : 7 * k + 3] += rng.uniform(-spread, spread, 3)
+        quaternion = rng.normal(size=4)
+        data.qpos[7 * k + 3 : 7 * k + 7] = quaternion / np.linalg.norm(quaternion)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def cast(model, data, pupil, directions):
+    """Depth along the axis of what MuJoCo's rays meet."""
+    found, geom = np.empty(len(directions)), np.zeros(1, np.int32)
+    for i, direction in enumerate(directions):
+        found[i] = mujoco.mj_ray(model, data, pupil, direction, None, 1, -1, geom, None)
+    return np.where(found < 0, np.inf, found)
+
+
+def depths(model, datas):
+    renderer = sim.ModelRenderer(model, EYE, [sim.Mount("eye")], max(len(datas), 1), sim.Fidelity(1, bands=1))
+    pupils, frames = renderer.eye_frames(sim.Poses.of(datas))
+    side = 2 * np.tan(np.radians(EYE.fov_deg) / 2) / EYE.resolution[1]
+    row, column = np.indices(EYE.resolution)
+    plane = np.stack([(column - 11.5) * side, (11.5 - row) * side, np.ones(row.shape)], axis=-1).reshape(-1, 3)
+    expected = [
+        cast(model, data, pupil[0], plane @ frame[0].T).reshape(EYE.resolution)
+        for data, pupil, frame in zip(datas, pupils, frames, strict=True)
+    ]
+    return renderer.depth(datas)[:, 0], np.array(expected)
+
+
+def agreement(found, expected):
+    """Share of rays that meet the same thing: to 1e-4, ten times float32's rounding of what is 3 m away."""
+    return np.mean(np.isclose(found, expected, rtol=1e-4, atol=0))
+
+
+@pytest.mark.parametrize("name", list(SHAPES))
+def test_each_kind_is_met_where_mujoco_meets_it(name):
+    """But for single rays at a limb, where rounding decides."""
+    model = model_of(SHAPES[name])
+    datas = [posed(model, seed) for seed in range(WORLDS)]
+    found, expected = depths(model, datas)
+    assert 0.02 < np.mean(expected < 3.2) < 0.6
+    assert agreement(found, expected) > 0.998
+
+
+def test_all_kinds_together():
+    model = model_of(*SHAPES.values(), *SHAPES.values())
+    datas = [posed(model, seed, 0.8) for seed in range(WORLDS)]
+    found, expected = depths(model, datas)
+    assert agreement(found, expected) > 0.998
+
+
+def kernels_of(look, datas):
+    """How many are launched by the first look, and what it sees."""
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        dr.kernel_history_clear()
+        found = look(datas)
+        return sum(each["type"] == dr.KernelType.JIT for each in dr.kernel_history()), found
+
+
+@pytest.mark.parametrize(("what", "more"), [("depth", 1), ("signals", 2)])
+def test_on_a_gpu_each_mesh_has_kernels_of_its_own(monkeypatch, what, more):
+    """OptiX meets one scene per kernel. As if this were a GPU: the same is seen, and every mesh has a kernel more for
+    what is looked at, and one for the shadow of the lamp."""
+    launched, expected = {}, {}
+    for gpu in (False, True):
+        for place in (movers, variant):
+            monkeypatch.setattr(place, "on_gpu", lambda gpu=gpu: gpu)
+        for meshes in (1, 2, 3):
+            model = model_of(SHAPES["box"], *[SHAPES["mesh"]] * meshes)
+            renderer = sim.ModelRenderer(model, EYE, [sim.Mount("eye")], 1, sim.Fidelity(1, bands=1))
+            launched[gpu, meshes], found = kernels_of(getattr(renderer, what), [posed(model, 0)])
+            np.testing.assert_array_equal(found, expected.setdefault(meshes, found))
+    assert launched[False, 1] == launched[False, 2] == launched[False, 3]
+    assert launched[True, 2] - launched[True, 1] == launched[True, 3] - launched[True, 2] == more
+    assert launched[True, 1] >= launched[False, 1] + 2 * more  # before the mesh, it, and what is made of it
+
+
+@pytest.mark.parametrize("name", ["ellipsoid", "capsule", "cylinder", "box"])
+def test_other_shapes_do_not_agree(name, monkeypatch):
+    """A capsule without its ends, a cylinder without its lids, an ellipsoid and a box of other sizes."""
+    right = primitives.PRIMITIVES[name]
+
+    def wrong(o, d, size):
+        if name in ("capsule", "cylinder"):
+            return primitives._into_side(o, d, size.x)
+        return right.hit(o, d, size * 1.05)
+
+    monkeypatch.setitem(primitives.PRIMITIVES, name, primitives.Primitive(wrong, right.normal))
+    model = model_of(SHAPES[name])
+    found, expected = depths(model, [posed(model, seed) for seed in range(WORLDS)])
+    assert agreement(found, expected) < 0.99
+
+
+def test_what_stands_still_hides_what_moves():
+    model = mujoco.MjModel.from_xml_string("""<mujoco><visual><headlight ambient="0 0 0"/></visual><worldbody>
+        <camera name="eye" pos="0 -2 0" xyaxes="1 0 0 0 0 1"/><geom type="box" size=".5 .1 .5" pos="0 -1 0"/>
+        <body><freejoint/><geom size=".4"/></body>
+        </worldbody></mujoco>""")
+    found, expected = depths(model, [posed(model, 0, 0.1)])
+    assert agreement(found, expected) > 0.998
+    assert found[0, 12, 12] == pytest.approx(0.9, abs=1e-5)
+
+
+def test_too_many_meshes_for_one_kernel_are_named(monkeypatch):
+    monkeypatch.setattr(movers, "MESHES", 1)
+    with pytest.raises(ValueError, match="2 moving meshes: must be 1 at most; hide some by group"):
+        depths(model_of(SHAPES["mesh"], SHAPES["mesh"]), [])
+
+
+def still_and_moving(geom, assets=""):
+    """What an eye at the origin sees of a geom 2 m ahead, along x, that stands still, and of one that could move."""
+    models = [
+        mujoco.MjModel.from_xml_string(f"""<mujoco><visual><headlight active="0"/></visual>{assets}<worldbody>
+            <light type="directional" dir="1 .5 -.5"/><body name="eye"/>
+            <geom type="box" size=".1 900 900" pos="300 0 0"/>
+            <body>{joint}{geom}</body></worldbody></mujoco>""")
+        for joint in ("", "<freejoint/>")
+    ]
+    return models, [posed_as_is(model) for model in models]
+
+
+def posed_as_is(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def coarse_ball():
+    """With normals that MuJoCo makes smooth: neighbouring faces differ by less than a right angle."""
+    polar, around = np.linspace(0, np.pi, 9)[1:-1], np.arange(14) * 2 * np.pi / 14
+    rings = [[np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)] for p in polar for a in around]
+    vertices = " ".join(map(str, np.ravel([*rings, [0, 0, 1], [0, 0, -1]])))
+    return f'<asset><mesh name="ball" smoothnormal="true" vertex="{vertices}"/></asset>'
+
+
+def test_a_smooth_mesh_is_shaded_alike_whether_it_moves_or_not():
+    models, datas = still_and_moving('<geom type="mesh" mesh="ball" pos="4 0 0" euler="10 20 30"/>', coarse_ball())
+    eye = Eye(resolution=(40, 40), fov_deg=30, bands=1)
+    still, moving = (
+        sim.ModelRenderer(model, eye, [sim.Mount("eye")], 1, sim.Fidelity(4, bands=1)).signals([data])
+        for model, data in zip(models, datas, strict=True)
+    )
+    assert len(np.unique(still.round(3))) > 40  # shades
+    np.testing.assert_allclose(moving, still, atol=2e-4)
+
+
+def test_what_is_small_and_far_is_met_by_all_its_rays():
+    """A ball of 5 cm 100 m away, whose squared distances float32 tells apart by steps of a third of its square."""
+    models, datas = still_and_moving('<geom name="far" size=".05" pos="100 3 2"/>')
+    azimuth, elevation = np.degrees([np.arctan2(3, 100), np.arctan2(2, np.hypot(3, 100))])
+    mount = sim.Mount("eye", azimuth_deg=float(azimuth), elevation_deg=float(elevation))
+    seen = []
+    for model, data in zip(models, datas, strict=True):
+        renderer = sim.ModelRenderer(model, Eye(resolution=(40, 40), fov_deg=0.07, bands=1), [mount], 1)
+        seen.append(renderer.ids([data])[0, 0] == model.geom("far").id)
+    assert 600 < seen[0].sum() < 1100
+    assert (seen[0] != seen[1]).sum() < 20  # at the limb
