@@ -12,6 +12,11 @@ sys.modules["OpenImageIO"] = None  # type: ignore[assignment]
 pytest_plugins = ["pytester", "tests.cpu_times", "tests.sharing", "tests.slow_part"]
 
 
+# Tests start many processes, xdist's workers among them: without bytecode each would compile all sources again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
+
 def pytest_configure() -> None:
     """Workers beside each other have a thread each: Dr.Jit's second one spins while it waits, at the others' cost."""
     if "PYTEST_XDIST_WORKER" in os.environ:

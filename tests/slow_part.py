@@ -3,8 +3,8 @@
 Slow are
 
 - tests with the mark `slow`;
-- of a test with the mark `fast_cases(n)`, all cases but n, chosen so that they cover the parameters' values: of 3 shapes
-  and 4 methods, `fast_cases(4)` runs each shape and each method at least once;
+- of a test with the mark `fast_cases(n)`, all cases but n, chosen so that they cover the values of the parameters: of 3
+  shapes and 4 methods, `fast_cases(4)` runs each shape and each method at least once;
 - random examples (hypothesis) beyond the first few, in tests with `@sweep(count)`.
 
     ./with-env pytest -n auto          # the fast part

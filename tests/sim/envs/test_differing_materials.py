@@ -74,6 +74,7 @@ def material_of(data, geom="thing"):
     return data.model.material(int(data.model.geom_matid[data.model.geom(geom).id])).name
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.filterwarnings("ignore::sim.MirrorWarning")
 @pytest.mark.parametrize(("kind", "light"), [*((kind, "direct") for kind in SIZES), ("sphere", "bounce")])
 def test_eyes_see_what_a_model_sees_that_is_built_so(kind, light):

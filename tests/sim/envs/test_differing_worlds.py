@@ -151,7 +151,8 @@ def test_sizes_are_drawn_evenly_over_their_logarithm_and_anew():
     task.episode_steps = 1
     env = sim.make_vec_env(task, n_envs=16, seed=3)
     env.reset()
-    found = [env.step(np.zeros((16, 1)))[3][w]["varied"]["thing.size"] for _ in range(12) for w in range(16)]
+    infos = [info for _ in range(12) for info in env.step(np.zeros((16, 1)))[3]]
+    found = [info["varied"]["thing.size"] for info in infos]
     assert kstest((np.log(found) - np.log(0.25)) / np.log(16), "uniform").pvalue > 0.01
     worlds = np.reshape(env.simulation.varied["thing.size"], -1)
     np.testing.assert_allclose([d.model.geom("thing").size[0] for d in env.worlds.datas], 0.3 * worlds)

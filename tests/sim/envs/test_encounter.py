@@ -155,11 +155,26 @@ def test_worlds_with_frozen_animals_go_back_bit_for_bit():
             np.testing.assert_array_equal(array, other[name])
 
 
+def new_learner(env, **settings):
+    return PPO("MultiInputPolicy", env, n_steps=32, learning_rate=3e-3, gamma=0.9, seed=0, **settings)
+
+
 def test_both_learn_in_turn():
-    """A predator learns before prey that stands still, then the prey before that predator, which is as it was left."""
-    settings = {"n_steps": 32, "batch_size": 256, "learning_rate": 3e-3, "n_epochs": 8, "gamma": 0.9, "seed": 0}
+    """A predator learns, then the prey before that predator, which stays as it was."""
+    hunts = sim.make_vec_env(hunt().alone("Predator", {"Prey": still}), n_envs=2)
+    predator = new_learner(hunts, batch_size=64, n_epochs=1).learn(64)
+    weights = predator.policy.state_dict()["action_net.weight"].clone()
+    flees = sim.make_vec_env(hunt().alone("Prey", {"Predator": predator}), n_envs=2)
+    prey = new_learner(flees, batch_size=64, n_epochs=1).learn(128)
+    assert (predator.policy.state_dict()["action_net.weight"] == weights).all()
+    assert prey.num_timesteps == 128
+
+
+@pytest.mark.slow
+def test_a_predator_learns_to_approach():
+    """Its prey stands still."""
     hunts = sim.make_vec_env(hunt().alone("Predator", {"Prey": still}), n_envs=32)
-    predator = PPO("MultiInputPolicy", hunts, **settings).learn(12_000)
+    predator = new_learner(hunts, batch_size=256, n_epochs=8).learn(12_000)
 
     def ends_at(policy):
         observation = hunts.reset()
@@ -169,12 +184,6 @@ def test_both_learn_in_turn():
 
     apart = ends_at(still)
     assert ends_at(lambda seen: predator.predict(seen, deterministic=True)[0]) < 0.9 * apart
-    weights = predator.policy.state_dict()["action_net.weight"].clone()
-    flees = sim.make_vec_env(hunt().alone("Prey", {"Predator": predator}), n_envs=32)
-    prey = PPO("MultiInputPolicy", flees, **settings)
-    prey.learn(2048)
-    assert (predator.policy.state_dict()["action_net.weight"] == weights).all()
-    assert prey.num_timesteps == 2048
 
 
 def test_animals_that_are_alike_learn_one_policy():

@@ -52,7 +52,7 @@ def test_gymnasium_checks_the_pictures_too():
 @pytest.mark.parametrize("eyes", [EYES, dataclasses.replace(EYES, noise_sigma=0.0, receptors="goldfish")])
 def test_observations_stay_within_finite_bounds(eyes):
     """Close to objects and walls, where signals are brightest; the bounds are not idle either."""
-    env = sim.make_env("detection", eyes)
+    env = sim.make_env("detection", eyes, rays_per_receptor=1)
     space = env.observation_space["eyes"]
     assert np.isfinite([space.low, space.high]).all()
     observation, _ = env.reset(seed=0)
@@ -73,8 +73,8 @@ def test_ids_are_known_after_importing_sim():
 
 
 def test_it_is_world_0_of_the_batch():
-    env = sim.make_env("detection", EYES, memory=2)
-    venv = sim.make_vec_env("detection", EYES, 3, seed=5, memory=2)
+    env = sim.make_env("detection", EYES, memory=2, rays_per_receptor=1)
+    venv = sim.make_vec_env("detection", EYES, 3, seed=5, memory=2, rays_per_receptor=1)
     (one, _), many = env.reset(seed=5), venv.reset()
     rng = np.random.default_rng(0)
     for _ in range(10):
@@ -89,7 +89,7 @@ def test_it_is_world_0_of_the_batch():
 
 
 def test_picture_follows_the_agent():
-    env = sim.make_env("detection", EYES, render_mode="rgb_array")
+    env = sim.make_env("detection", EYES, rays_per_receptor=1, render_mode="rgb_array")
     env.reset(seed=0)
     first = env.render()
     assert first.shape == (360, 480, 3)
@@ -109,7 +109,7 @@ def test_fields_are_drawn_on_the_eyes_level_and_end_where_sight_ends():
     """One eye that looks straight ahead, at an object 3 m away: the picture changes in a wedge between the two and past
     the object, and neither behind it nor beside the field."""
     eyes = sim.Eyes(n_eyes=1, resolution=(5, 5), fov_deg=40)
-    env = sim.make_env("detection", eyes, render_mode="rgb_array")
+    env = sim.make_env("detection", eyes, rays_per_receptor=1, render_mode="rgb_array")
     env.reset(seed=0)
     state = env.state
     objects = state.objects.copy()
@@ -162,7 +162,7 @@ def test_pictures_of_eyes_show_their_signals(receptors):
     mosaic = receptors == "mosaic"
     kinds = optics.Receptors((600, 520, 460), mosaic=((0, 1), (1, 2))) if mosaic else receptors
     eyes = dataclasses.replace(EYES, noise_sigma=0.0, receptors=kinds)
-    env = sim.make_env("detection", eyes, render_mode="eyes")
+    env = sim.make_env("detection", eyes, rays_per_receptor=1, render_mode="eyes")
     observation, _ = env.reset(seed=1)
     picture = env.render()
     assert picture.dtype == np.uint8
@@ -190,8 +190,8 @@ def test_pictures_of_eyes_show_their_signals(receptors):
 def test_batches_are_shown_as_tiles_of_the_single_worlds_pictures(mode, rows, columns, monkeypatch):
     small = partialmethod(FollowCamera.picture, size=(90, 120))  # as good as large ones, and a sixteenth of the work
     monkeypatch.setattr(FollowCamera, "picture", small)
-    venv = sim.make_vec_env("detection", EYES, rows * columns, 3, render_mode=mode)
-    env = sim.make_env("detection", EYES, render_mode=mode)
+    venv = sim.make_vec_env("detection", EYES, rows * columns, 3, rays_per_receptor=1, render_mode=mode)
+    env = sim.make_env("detection", EYES, rays_per_receptor=1, render_mode=mode)
     venv.reset()
     env.reset(seed=3)
     tiles, first = venv.render(), env.render()
@@ -203,8 +203,8 @@ def test_batches_are_shown_as_tiles_of_the_single_worlds_pictures(mode, rows, co
 
 def test_renders_nothing_before_the_world_has_begun():
     with pytest.raises(RuntimeError, match="call reset first"):
-        sim.make_env("detection", EYES, render_mode="eyes").render()
-    assert sim.make_env("detection", EYES).render() is None
+        sim.make_env("detection", EYES, rays_per_receptor=1, render_mode="eyes").render()
+    assert sim.make_env("detection", EYES, rays_per_receptor=1).render() is None
 
 
 @pytest.mark.parametrize(
@@ -232,7 +232,7 @@ def test_bad_options_are_named(options, named):
 
 
 def test_actions_of_another_shape_are_named():
-    env = sim.make_env("detection", EYES)
+    env = sim.make_env("detection", EYES, rays_per_receptor=1)
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"actions have shape \(1, 3\): must be \(1, 2\)"):
         env.step(np.zeros(3))

@@ -47,6 +47,7 @@ def played(task, n=3, steps=9, **how):
     return seen, last
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("memory", [1, 2])
 def test_each_kind_sees_what_it_would_see_alone(memory):
     """The first even with the noise of a task that has no other kind; past the end of an episode, too."""
@@ -125,6 +126,11 @@ def test_fidelity_is_each_kinds_own():
     env = sim.make_vec_env(task, n_envs=1)
     rays = {name: sight.renderer.fidelity.rays_per_receptor for name, sight in env.animals.learners[0].sights.items()}
     assert rays == {"wide": 1, "sharp": 9}
+
+
+@pytest.mark.slow
+def test_automatic_fidelity_is_each_kinds_own():
+    task = Looker()
     task.fidelity = {"wide": "auto", "sharp": sim.Fidelity(9, bands=4)}
     assert fidelities_of(task)["wide"] == fidelities_of(alone("wide", fidelity="auto"))["eyes"]
     assert fidelities_of(task)["sharp"].rays_per_receptor == 9

@@ -58,6 +58,7 @@ FEATURES = {
 }
 
 
+@pytest.mark.fast_cases(10)
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("feature", FEATURES)
 def test_every_feature_serves_every_task(task, feature):
@@ -76,6 +77,7 @@ def test_every_feature_serves_every_task(task, feature):
     env.close()
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("task", TASKS)
 def test_states_are_stored_and_restored(task):
     """70 actions: more than random numbers for moving objects are drawn ahead."""

@@ -21,8 +21,8 @@ def test_pettingzoo_is_content():
 
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
-        parallel_api_test(sim.make_parallel_env(hunt(), memory=2), num_cycles=50)
-        parallel_seed_test(lambda: sim.make_parallel_env(hunt(), seed=None), num_cycles=25)
+        parallel_api_test(sim.make_parallel_env(hunt(), memory=2), num_cycles=20)
+        parallel_seed_test(lambda: sim.make_parallel_env(hunt(), seed=None), num_cycles=10)
 
 
 def test_everybody_acts_and_sees_with_its_own_eyes(env):

@@ -130,12 +130,14 @@ def test_who_says_no_length_gets_the_tasks(how, steps):
     assert gymnasium.spec("rhabdom/Detection-v0").max_episode_steps == 256
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("told", "steps"), [(None, 128), (90, 90), (300, 128)])
 def test_a_course_keeps_its_own_length(told, steps):
     how = {} if told is None else {"max_episode_steps": told}
     assert lengths("rhabdom/Navigation-v0", [-1, 0], 130, course="long", **how, **OPTIONS) == [steps, steps]
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("task", [Face, Face()], ids=["class", "task"])
 @pytest.mark.parametrize(("told", "steps"), [(None, 40), (3, 3), (50, 50)])
 def test_tasks_of_ones_own_have_ids_too(task, told, steps):
@@ -186,6 +188,7 @@ def test_what_is_not_done_is_refused():
         sim.make_env(Face()).reset(options={"light": 2})
 
 
+@pytest.mark.slow
 def test_gymnasium_finds_it_by_the_name_of_the_module():
     code = (
         "import gymnasium; print(type(gymnasium.make_vec('sim:rhabdom/Navigation-v0', rays_per_receptor=1).unwrapped))"

@@ -81,6 +81,7 @@ def test_areas_share_their_light_among_layers_as_rays_do(close_by, monkeypatch):
     assert error() > 0.1
 
 
+@pytest.mark.slow
 def test_auto_takes_layers_for_large_eyes_alone(close_by):
     world, large, _ = close_by
     small = sim.Eyes(2, (15, 15), optics=optics.Pupil(25e-6, thin_lens_focal_length=2.4e-4))

@@ -118,7 +118,7 @@ def _settled(behind_a_lens):
 
 
 def _seen(eyes):
-    worlds = sim.make_vec_env("foraging", eyes, 1, 7)
+    worlds = sim.make_vec_env("foraging", eyes, 1, 7, rays_per_receptor=4)
     try:
         return worlds.reset()["eyes"][0, 0]
     finally:
