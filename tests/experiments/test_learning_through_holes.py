@@ -22,6 +22,7 @@ def through_holes(peak, noise, group="0.001"):
     return [replace(ROW, group=group, relative_aperture=a, success_rate=float(np.clip(s, 0, 1))) for a, s in pairs]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("peak", [0.15, 0.25])
 def test_the_best_width_is_found_with_an_interval_that_holds_it(peak):
     """Animals are spread evenly over a, not over log a, which would move a kernel's mean to the wider side."""

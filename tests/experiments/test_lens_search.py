@@ -38,6 +38,7 @@ def test_gradient_is_that_of_the_loss(spot):
         assert slope[place] == pytest.approx(difference, rel=0.05, abs=0.02 * np.abs(slope).max())
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("method", ["gradient, shrinking spot", "CMA-ES, Strehl ratio"])
 def test_searches_begin_at_the_start_and_improve(method, monkeypatch):
     monkeypatch.setattr(lens_optimizers, "start", lambda seed: blurred())

@@ -41,6 +41,7 @@ PAGES = {
 OPTICAL = ("image_quality", "above_noise", "above_noise_of_hole", "strehl", "psnr_db", "ssim")
 
 
+@pytest.mark.fast_cases(16)
 @pytest.mark.parametrize("record", RECORDS, ids=lambda path: path.name)
 def test_record_is_a_run(record):
     run = Run.open(record)
@@ -110,6 +111,7 @@ def stored_rows(page):
     return RESULTS / "data" / f"{page}.csv"
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("page", ["brains_for_eyes", "eyes_for_tasks"])
 def test_pages_of_designed_trainings_say_what_their_stores_say(page):
     data, experiment = stored_rows(page), importlib.import_module(f"experiments.{page}")
@@ -118,6 +120,7 @@ def test_pages_of_designed_trainings_say_what_their_stores_say(page):
     assert made.markdown == (RESULTS / f"{page}.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("page", [slow(page) if page == "seeing_ultraviolet" else page for page in PAGES])
 def test_pages_say_what_their_stores_say(page):
     experiment = importlib.import_module(f"experiments.{page}")

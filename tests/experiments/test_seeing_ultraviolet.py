@@ -47,6 +47,7 @@ def test_nothing_but_three_peaks_evolves():
         assert other.lambda_max_nm != start.lambda_max_nm
 
 
+@pytest.mark.slow
 def test_page_of_stored_runs(tmp_path):
     rows = [
         replace(

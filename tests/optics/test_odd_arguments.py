@@ -153,6 +153,7 @@ FIELDS = {
 CALLS = SHAPES | ELEMENTS | SPECTRA | EYES | PICTURES | MEASURES | FIELDS
 
 
+@pytest.mark.fast_cases(8)
 @pytest.mark.parametrize("name", [slow(name) if name in ("propagate", "vector_focus") else name for name in CALLS])
 def test_any_argument(name):
     assert complaints(getattr(optics, name), CALLS[name]) == {}

@@ -110,6 +110,7 @@ CALLS = {
 }  # fmt: skip
 
 
+@pytest.mark.fast_cases(8)
 @pytest.mark.parametrize("name", [slow(name) if name == "AppositionEye.contrast" else name for name in CALLS])
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # NaN in, NaN out
 def test_any_argument(name):

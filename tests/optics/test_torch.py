@@ -21,6 +21,7 @@ def test_values_are_those_of_psf():
     np.testing.assert_array_equal(here.detach().numpy(), there.psf)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("shape", [(4, 4), (7, 7)])
 def test_gradients_equal_central_differences(shape):
     """float64: differences of h = 1e-10 m carry 1e-9/1e-4 of rounding, hence 1e-4 of the largest gradient. What the

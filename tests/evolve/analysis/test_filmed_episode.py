@@ -129,6 +129,7 @@ def test_what_is_drawn_is_footage(episode):
     assert shown == [0, 3, 6, 9, 12, 15, 18]
 
 
+@pytest.mark.slow
 def test_eyes_are_judged_by_the_scenes_of_the_task(path):
     run = Run.open(path, NAMED)
     seen = vision(run.best.phenotype, run.config)

@@ -59,6 +59,7 @@ def test_machine_without_llvm_is_told_the_remedy_before_anything_is_written(tmp_
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_ctrl_c_saves_says_how_to_go_on_and_exits_130(tmp_path):
     """As a terminal does it: the interrupt goes to the whole process group. (Where these tests run in the background,
     interrupts may be ignored, and children inherit that.)"""

@@ -85,6 +85,7 @@ def test_demo_writes_over_nothing_of_others(call, tmp_path):
     assert (tmp_path / "config.toml").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_only_a_finished_run_is_shipped(run, finished, tmp_path):
     with pytest.raises(ValueError, match="must be a finished run"):
         ship(run.path, tmp_path / "demo")

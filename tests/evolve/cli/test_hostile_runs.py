@@ -41,6 +41,7 @@ def refused(call, command, path, complaint):
     assert err.replace("\n", "").isprintable()
 
 
+@pytest.mark.fast_cases(16)
 @pytest.mark.parametrize("commands", [COMMANDS[:1], slow(COMMANDS[1:])], ids=[COMMANDS[0], "the others"])
 @pytest.mark.parametrize("damage", VALUES)
 def test_damaged_records_are_named_by_every_command(call, run, damage, commands):

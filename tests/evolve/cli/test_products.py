@@ -57,6 +57,7 @@ def test_quiet_is_quiet_and_errors_are_not(call, run, browser, tmp_path):
     assert browser == []
 
 
+@pytest.mark.slow
 def test_resume_of_a_finished_run_does_nothing_and_says_so(call, finished, browser, tmp_path):
     (finished / "report.html").write_text("as it was")
     (finished / "exr").mkdir(exist_ok=True)
@@ -109,6 +110,7 @@ def test_where_no_episode_can_be_played_the_report_is_kept(call, finished, tmp_p
     assert (run / "report.html").read_text() == "of an hour ago"
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("write", [write_report, write_page])
 def test_a_run_that_is_deleted_while_its_report_is_made_stays_deleted(run, episode, tmp_path, write):
     path = shutil.copytree(run.path, tmp_path / "run")

@@ -57,6 +57,7 @@ def test_record_is_the_commands(closed_form, call, finished, tmp_path, monkeypat
     assert run.best.fitness == Run.open(run.path).best.fitness
 
 
+@pytest.mark.slow
 def test_a_callback_may_end_the_run_which_can_go_on(closed_form, tmp_path):
     class EnoughError(Exception):
         pass

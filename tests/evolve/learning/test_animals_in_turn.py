@@ -54,6 +54,7 @@ def lived(named):
     return config, develop(Genotype(config.genome).start, config)
 
 
+@pytest.mark.slow
 def test_a_frozen_animal_is_the_runs_best(folder):
     """Its eyes, its memory and its policy, on the body it is given."""
     run = evolve.Run.open(folder / "prey")

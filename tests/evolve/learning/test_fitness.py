@@ -136,6 +136,7 @@ def test_unseen_mazes_are_seen_by_the_evaluation_alone(tmp_path):
     assert of_two != taught
 
 
+@pytest.mark.slow
 def test_every_stage_has_chance_of_its_own(tmp_path, monkeypatch):
     """A training that went on in the worlds of its first stage would learn them by heart."""
     seeds, make = [], fitness.worlds_of

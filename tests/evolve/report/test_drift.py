@@ -82,6 +82,7 @@ def test_what_cannot_be_compared_is_refused_in_a_line(runs, tmp_path):
         drift_of(runs, 1)
 
 
+@pytest.mark.slow
 def test_the_command_says_it_to_people_and_machines(call, runs):
     code, out, _ = call("drift", *(run.path for run in runs), "--searches", 5)
     assert code == 0

@@ -151,6 +151,7 @@ def test_exact_settings():
     assert [exact(v) for v in (16.0, 0.01, -0.5)] == ["16", "0.01", "−0.5"]
 
 
+@pytest.mark.slow
 def test_reliefs_of_more_genes_and_receptors_of_genes_are_reported(tmp_path):
     asked = ("eye.relief_points=5", "eye.receptors=genes", "genome.spectral.open=true", "search.population=2")
     config = assemble("foraging", assignments=asked)

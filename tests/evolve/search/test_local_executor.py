@@ -54,6 +54,7 @@ def expected(job):
     return -abs(job.phenotype.fov_deg - 70) + 1e-9 * (job.seed % 1000)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("evaluate", [bowl, slow_for_some])
 def test_every_job_comes_out_once_with_its_own_outcome(tmp_path, evaluate):
     found = outcomes(evaluate, tmp_path, count=5)
@@ -71,6 +72,7 @@ def test_settings_that_cannot_be_used_are_no_animals_failure(tmp_path):
         outcomes(cannot_begin, tmp_path, workers=1)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("evaluate", "reason"),
     [
@@ -133,6 +135,7 @@ def test_workers_have_one_thread_and_leave_our_environment_alone(tmp_path, monke
     assert "OMP_NUM_THREADS" not in os.environ
 
 
+@pytest.mark.slow
 def test_workers_are_as_many_as_asked_and_work_for_long(tmp_path):
     for workers in (1, 3):
         folder = tmp_path / str(workers)
@@ -233,6 +236,7 @@ print(mapped, faults())
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other libraries are left alone")
 def test_freed_memory_is_kept_for_the_next_arrays():
     """In a process of its own, which stays as it has been set: pages are mapped once, and not each time."""

@@ -108,7 +108,7 @@ def steady(tmp_path_factory):
     return carry(tmp_path_factory.mktemp("steady") / "run", tiny(*STEADY))[0]
 
 
-@pytest.mark.fast_cases(3)
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("until", [1, 4, 7])
 @pytest.mark.parametrize("optimizer", ["CMA", "mutation", "DE"])
 def test_interrupted_steady_state_continues_to_the_same_history(tmp_path, optimizer, until):
@@ -122,6 +122,7 @@ def test_interrupted_steady_state_continues_to_the_same_history(tmp_path, optimi
     assert max(calls(run.path).values()) <= 2, "only those under way may be begun again"
 
 
+@pytest.mark.slow
 def test_steady_state_proposes_from_what_is_known_by_then(tmp_path, steady):
     """The fifth candidate is proposed when the first is done, so it cannot know of the others; nor does it wait."""
     assert [c.id for c in steady.in_order_of_finish] == list(range(12))
@@ -157,7 +158,7 @@ class Imagined:
         return self.busy / (self.workers * self.now)
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [8, 16])
 def test_steady_state_keeps_workers_busy_that_would_wait_for_a_generation(tmp_path, workers):
     """Sixteen workers for a generation of sixteen: all wait for the slowest. docs/cluster.md has the numbers."""

@@ -30,6 +30,7 @@ def history(config, fitness=sphere):
 OPTIMIZERS = ["CMA", "mutation", "DE", "PSO", "TBPSA", "OnePlusOne"]
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("optimizer", OPTIMIZERS)
 def test_same_seed_same_run_bit_for_bit(optimizer):
     settings = ("search.generations=20", f"search.optimizer={optimizer}")
@@ -64,7 +65,7 @@ def test_search_converges():
     assert distance[-1] < 0.05 * distance[0]
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("genes", ["morphological", "neural"])
 def test_search_converges_where_the_best_lies_at_the_end_of_all_ranges(genes, seed):

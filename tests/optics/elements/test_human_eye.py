@@ -45,7 +45,7 @@ def test_standard_observer_has_the_contrasts_of_its_authors():
     assert standard_contrasts() == pytest.approx(FIGURE_11, rel=READING)
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [
@@ -60,6 +60,7 @@ def test_and_no_other_reading_of_the_table_has(change):
     assert np.abs(off).max() > 3 * READING
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("radius", [1e-3, 3e-3])
 def test_without_aberrations_it_is_perfect_in_570_nm(radius):
     """The paraboloid alone has 4 µm of spherical aberration at 3 mm, which leaves nothing of the peak."""
@@ -98,6 +99,7 @@ def test_mean_mtf():
     assert expected == pytest.approx(0.427, abs=5e-4)
 
 
+@pytest.mark.slow
 def test_standard_observer_is_near_the_mean_of_two_hundred():
     """White light and 6 mm, where aberrations count most: within .05, where a perfect lens is off by more than .7."""
     seen = standard_contrasts().mean(axis=0)

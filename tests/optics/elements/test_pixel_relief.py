@@ -36,7 +36,7 @@ class TestGratings:
             peaks.append(window.psf.max())
         return peaks[1] / peaks[0]
 
-    @pytest.mark.fast_cases(3)
+    @pytest.mark.fast_cases(1)
     @pytest.mark.parametrize(("levels", "order"), [(2, 1), (4, 1), (2, -1), (2, 3), (4, -3), (8, 1), (8, -7)])
     def test_efficiency_of_a_staircase(self, levels, order):
         """sinc²(m/N), 0.405, 0.811, 0.950 in the first order (Swanson 1989). Off the axis the lens focuses a little
@@ -44,6 +44,7 @@ class TestGratings:
         expected = reference.staircase_grating_efficiency(order, levels)
         assert self.efficiency(levels, order) == pytest.approx(expected, rel=0.02)
 
+    @pytest.mark.slow
     def test_splines_through_the_same_heights_are_another_grating(self):
         """What PixelRelief is there for: the same samples joined smoothly have half the efficiency."""
         steps = self.efficiency(4, 1)
@@ -77,6 +78,7 @@ class TestLenses:
             expected, rel=0.04 if levels == 2 else 3e-3
         )
 
+    @pytest.mark.slow
     def test_whole_waves_change_nothing(self):
         """A wrapped lens is the lens: the pixels of a Fresnel lens, at its wavelength."""
         whole = self.lens(24)
@@ -110,7 +112,7 @@ class TestMethods:
         options = {"dx": 0.5e-6, "shape": (41, 37), "tolerance": tolerance, "dtype": dtype, **options}
         return optics.psf(pupil, [WAVELENGTH], 150e-6, method=method, **options)
 
-    @pytest.mark.fast_cases(4)
+    @pytest.mark.fast_cases(2)
     @pytest.mark.parametrize("opening", OPENINGS)
     @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-8])
     def test_all_keep_the_tolerance(self, opening, tolerance):

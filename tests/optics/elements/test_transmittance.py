@@ -113,7 +113,7 @@ def test_samples_of_a_gaussian_are_one():
     assert relative_l2(sampled, known) < 1e-4
 
 
-@pytest.mark.fast_cases(4)
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("aperture", [TELESCOPE, optics.Circle(), Rings([0.2, 0.5, 0.7, 1.0])], ids=repr)
 @pytest.mark.parametrize("method", ["low_rank", "far_field", "angular_spectrum", "split_angular_spectrum"])
 def test_methods_agree(aperture, method):

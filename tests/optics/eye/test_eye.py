@@ -246,6 +246,7 @@ def test_bad_distance():
 class TestBands:
     """bands="auto", held against the same eye with 64."""
 
+    @pytest.mark.fast_cases(1)
     @pytest.mark.parametrize(("tolerance", "seed"), [(0.1, 0), (0.05, 1)])
     def test_signals_are_those_of_64_bands(self, tolerance, seed):
         """Random patches of smooth colours behind random glass, whose speckle differs from band to band."""

@@ -71,6 +71,7 @@ def test_see_follows_central_differences(name):
     assert backward == pytest.approx(forward, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_kernel_follows_central_differences():
     """Cell by cell: how the kernel changes as the object comes nearer."""
     import drjit as dr

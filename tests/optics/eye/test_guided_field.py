@@ -41,6 +41,7 @@ def test_an_eye_of_one_receptor_is_an_ommatidium(cells, diameter):
     assert np.linalg.norm(kernel - expected) < 5e-3 * np.linalg.norm(expected)
 
 
+@pytest.mark.slow
 def test_a_lopsided_pupil_turns_nothing_round():
     """A wavefront with coma and tilt: kernels are fields turned by 180°."""
     bent = Pupil(

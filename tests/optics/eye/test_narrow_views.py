@@ -8,6 +8,7 @@ import pytest
 import optics
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_cells_hold_the_light_that_the_direct_sum_sends_there(seed):
     """140 waves of glass over 38 µm; before few nodes stood for all, the kernel was refused."""

@@ -46,6 +46,7 @@ def distance(near, far, place):
     return 2 / (1 / near + 1 / far + place * (1 / near - 1 / far))
 
 
+@pytest.mark.slow
 def test_waveguides_err_by_no_more_of_what_they_leave_of_white():
     """A rhabdom of 1.4 µm takes .16 of a square's light: against the raw tolerance one layer would do, which errs by
     .2 of white."""

@@ -55,7 +55,7 @@ def test_sampling_limit_is_half_a_cycle_per_receptor():
     assert twice.sampling_cpd == pytest.approx(2 * found.sampling_cpd)
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.1, 0.4])
 def test_noise_limit_inverts_the_circular_mtf(sigma):
     """σ / a² = MTF(f). The lens is slow, so that its PSF's window is many fringes wide and the MTF finely sampled."""

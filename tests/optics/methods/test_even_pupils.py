@@ -37,7 +37,7 @@ EVEN = {
 }
 
 
-@pytest.mark.fast_cases(4)
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("shape", [(65, 65), (48, 77)])
 @pytest.mark.parametrize("ways", [whole_spectrum, split_spectrum])
 @pytest.mark.parametrize("name", EVEN)

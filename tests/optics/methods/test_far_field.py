@@ -33,7 +33,7 @@ def exactly(beam, problem):
     return optics.psf(beam.pupil, [LAMBDA], beam.distance, dx=window.dx, shape=window.shape, **ask).psf[0]
 
 
-@pytest.mark.fast_cases(3)
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-5])
 @pytest.mark.parametrize(("radius", "z", "degrees"), [(8e-6, 241e-6, 42), (14e-6, 567e-6, 40), (5e-6, 100e-6, 20)])
 def test_a_few_nodes_stand_for_all(radius, z, degrees, tolerance):

@@ -85,6 +85,7 @@ def test_fraunhofers_error_falls_with_the_fresnel_number():
     assert order_of_convergence(distances / distances[0], errors("fraunhofer", cases)) == pytest.approx(-2, abs=0.1)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("method", "close"), [("fresnel", 0.95), ("fraunhofer", 0.8)])
 def test_predicted_error_bounds_the_actual_one(method, close):
     """100 random pupils were 100 % bounded, fresnel 100 % and fraunhofer 90 % of them within 30x."""

@@ -69,6 +69,7 @@ def test_error_falls_with_the_fourth_root_of_the_fresnel_number():
     assert order_of_convergence(distances, errors) == pytest.approx(0.25, abs=0.08)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("method", ["geometric", "pinhole"])
 def test_predicted_error_bounds_the_actual_one(method):
     """Of 120 random pupils all were bounded within a factor 1.2, and within 30x."""

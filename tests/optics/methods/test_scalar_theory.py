@@ -30,7 +30,7 @@ def in_focus(sine):
     return math.sqrt(polarised), math.sqrt(np.sum(rho * off**2) / np.sum(rho * mean**2))
 
 
-@pytest.mark.fast_cases(2)
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("sine", [0.01, *(sine for sine, _ in IN_FOCUS[1:])])
 def test_a_round_pupil_in_focus_errs_as_tabulated(sine):
     polarised, unpolarised = in_focus(sine)

@@ -48,7 +48,7 @@ CASES = {
 }
 
 
-@pytest.mark.fast_cases(9)
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize("method", EXACT)
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_methods_agree_with_the_textbook(case, method):

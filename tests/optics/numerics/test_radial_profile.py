@@ -38,7 +38,7 @@ def test_a_window_far_off_the_axis_needs_no_line():
     assert relative_l2(result.psf[0], exact) < 1e-3
 
 
-@pytest.mark.fast_cases(2)
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("radius", "distance"), [(1e-7, 1e-9), (1e-7, 1e-7), (1e-9, 1e-9), (3e-5, 1e-6)])
 def test_planes_nearer_than_the_pupil_is_wide(radius, distance):
     """There the kernel's poles need more nodes than its phase: the axis against Osterberg and Smith's closed form."""

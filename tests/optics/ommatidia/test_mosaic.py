@@ -100,6 +100,7 @@ def test_nothing_is_left_of_gratings_finer_than_a_facet_passes():
         eye.contrast(math.nan)
 
 
+@pytest.mark.slow
 def test_in_water_a_facet_passes_finer_gratings():
     """Waves are shorter before it: contrast ends at 2R n/λ, and is the sensitivity's transform up to there. To what
     this window cuts off; with the index left out there is no contrast at the second frequency."""

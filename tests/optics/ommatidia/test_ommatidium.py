@@ -63,7 +63,7 @@ def test_wide_slow_lenses_are_the_formulas_limit():
     assert found == pytest.approx(width(angles, formulas(mode, angles)), rel=3e-4)
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("diameter", [1.4e-6, 2.2e-6])
 def test_every_mode_takes_what_the_formulas_say(diameter):
     """Along x, where sine modes are dark, and relative to the first mode's peak."""

@@ -91,7 +91,7 @@ def assert_derivatives(function, values, name, rel=1e-4):
 HEIGHTS = np.random.default_rng(2).random((4, 4)) * 2e-6
 
 
-@pytest.mark.fast_cases(8)
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("name", sorted(PARAMETERS))
 @pytest.mark.parametrize("method", METHODS)
 def test_psf_of_a_relief(method, name):
@@ -106,6 +106,7 @@ def test_psf_of_a_symmetric_pupil(method, name):
     assert_derivatives(lambda values: total(values, None, method), PARAMETERS, name)
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("method", [slow(method) if method == "geometric" else method for method in METHODS])
 def test_psf_by_control_points(method):
     import drjit as dr
@@ -146,7 +147,7 @@ QUALITIES = {
 }
 
 
-@pytest.mark.fast_cases(4)
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("name", ["radius", "distance", "n"])
 @pytest.mark.parametrize("quality", sorted(QUALITIES))
 def test_quality(quality, name):

@@ -46,7 +46,7 @@ def written_out(pupil, x, y):
 METHODS = ("low_rank", "angular_spectrum", "split_angular_spectrum", "rayleigh_sommerfeld")
 
 
-@pytest.mark.fast_cases(3)
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("name", "method"), [*itertools.product(PUPILS, METHODS), ("lens", "hankel"), ("ring", "hankel")]
 )

@@ -26,7 +26,7 @@ def fine():
     return focus(0.2 * APART, 287)
 
 
-@pytest.mark.fast_cases(2)
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("dx", [3e-6, 1.1e-6, 0.55e-6, 2.2e-6])
 def test_coarse_samples_measure_what_fine_ones_do(dx, fine):
     """Samples 3 µm apart add up to a power of 5.7: they are looked at again."""
@@ -74,6 +74,7 @@ def test_a_mean_over_wavelengths_is_not_mistaken_for_one_of_them():
     assert not white.can_be_seen_anew
 
 
+@pytest.mark.slow
 def test_a_mean_over_wavelengths_is_looked_at_again():
     """As the mean of what its wavelengths are when each is looked at: coarse samples measure what fine ones do."""
     share = np.array([0.3, 0.7])

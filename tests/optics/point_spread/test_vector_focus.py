@@ -119,7 +119,7 @@ def turn(field, before, after):
     return field + once + np.cross(w, once, axis=0) / (1 + c)
 
 
-@pytest.mark.fast_cases(2)
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("defocus", [0.0, -2e-6, 15e-6])
 @pytest.mark.parametrize("relief", [0.0, 1e-6])
 def test_predicted_errors_hold_for_each_component(defocus, relief):

@@ -73,6 +73,7 @@ def test_predicted_error_holds():
         assert reference.relative_l2(got, true) < error < 0.02
 
 
+@pytest.mark.slow
 def test_as_few_wavelengths_as_the_tolerance_allows():
     """Against the mean over every fourth nanometre of PSFs asked for one by one, with weights typed out here."""
     nm = np.arange(420.0, 681, 4)
@@ -91,6 +92,7 @@ def test_as_few_wavelengths_as_the_tolerance_allows():
     assert counts[0] < counts[2]
 
 
+@pytest.mark.slow
 def test_the_spectrums_error_falls_with_the_fourth_power(monkeypatch):
     """Of splines; linear between wavelengths it would fall with the second."""
     monkeypatch.setattr("optics.point_spread.white.LEFT", 1e-9)  # take whatever number is asked for

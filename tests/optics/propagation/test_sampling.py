@@ -53,7 +53,7 @@ def carried(u, dx, z, window, spare, paraxial):
 
 
 class TestBlur:
-    @pytest.mark.fast_cases(3)
+    @pytest.mark.fast_cases(2)
     @pytest.mark.parametrize("source", [disk, square, noise])
     @pytest.mark.parametrize(
         ("dx", "z", "radius", "m", "step", "centre", "paraxial"),

@@ -85,6 +85,7 @@ def test_two_halves_are_a_whole():
     assert field_error(added.u, whole.u) < 1e-12
 
 
+@pytest.mark.slow
 def test_a_relief_of_the_mediums_index_changes_nothing():
     relief = 10e-6 * np.random.default_rng(1).random((8, 8))
     through = [

@@ -11,6 +11,7 @@ from optics.spectra.bands import SpectralBands, cie_1931, daylight, pigment_abso
 from optics.spectra.receptors import receptors_of
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_frozen_tables_are_those_of_colour_science():
     colour = pytest.importorskip("colour")

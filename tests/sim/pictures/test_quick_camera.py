@@ -70,6 +70,7 @@ def _agree(quick, slow, noise=NOISE, bias=BIAS):
     return np.abs(difference).mean() < noise and np.abs(difference.mean(axis=(0, 1))).max() < bias
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("task", sim.TASKS)
 def test_worlds_look_as_in_slow_pictures(task, monkeypatch):
     world = sim.build_world(task)
@@ -84,6 +85,7 @@ def test_worlds_look_as_in_slow_pictures(task, monkeypatch):
     assert not _agree(quick.picture(data, view, SIZE[1], SIZE[0]), slow)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("task", ["detection", "navigation"])
 def test_lights_from_elsewhere_do_not_agree(task):
     world = sim.build_world(task)
@@ -101,7 +103,7 @@ def test_other_models_look_as_in_slow_pictures_wherever_their_parts_are(mixture)
     is 3 levels where it is bright and 20 where it is dark. Poses do not make new recordings."""
     model, quick, mirror = mixture
     pictures = []
-    for angle in (0.0, 1.5, 3.0, 4.5):
+    for angle in (0.0, 1.5):
         data = _posed(model, angle)
         pictures.append(quick.picture(data, "side", SIZE[1], SIZE[0]))
         assert _agree(pictures[-1], _slow(mirror, data, "side"), noise=8, bias=8)
@@ -124,6 +126,7 @@ def test_nearness_is_the_mirrors(mixture):
     assert (nearness[ids < 0] == 0).mean() > 0.95
 
 
+@pytest.mark.slow
 def test_a_camera_inside_of_a_body_looks_out_of_it():
     model = mujoco.MjModel.from_xml_string("""
         <mujoco><visual><headlight active="0"/></visual><worldbody><light type="directional" dir="0 0 -1"/>

@@ -2,6 +2,7 @@
 
 import dataclasses
 import gc
+from functools import cache
 
 import drjit as dr
 import mujoco
@@ -46,12 +47,16 @@ def placed(world, state, index):
     return data
 
 
-@pytest.fixture(scope="module")
-def references():
-    """Per task: world, state, and Mitsuba's renderings (batch, env, eye, band, y, x)."""
-    found = {}
-    for task in ("detection", "navigation"):
-        world, state = begun(task, 2)
+@cache
+def scene(task):
+    return begun(task, 2)
+
+
+class References(dict):
+    """Per task: world, state, and Mitsuba's renderings (batch, env, eye, band, y, x), rendered on first use."""
+
+    def __missing__(self, task):
+        world, state = scene(task)
         wavelengths = EYES.eye().spectral_bands.wavelengths
         mirror = sim.mirror(world.model)
         images = np.empty((BATCHES, state.n, EYES.n_eyes, len(wavelengths), *EYES.resolution))
@@ -62,8 +67,13 @@ def references():
                     images[batch, env, eye] = mirror.render(
                         f"eye_{eye}", EYES.resolution[1], EYES.resolution[0], "direct", SPP, wavelengths, seed=batch
                     )
-        found[task] = world, state, images
-    return found
+        self[task] = world, state, images
+        return self[task]
+
+
+@pytest.fixture(scope="module")
+def references():
+    return References()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,6 +119,7 @@ SPECTRUM = 1e-4
 both_tracers = pytest.mark.parametrize("tracer", ["closed_form", "mitsuba"])
 
 
+@pytest.mark.fast_cases(1)
 @both_tracers
 @pytest.mark.parametrize("task", ["detection", "navigation"])
 def test_agrees_with_mitsubas_direct_integrator(references, task, tracer):
@@ -158,6 +169,7 @@ def no_mover_shadows(original):
     return lambda radii, centres, ray: dr.zeros(type(original(radii, centres, ray)))
 
 
+@pytest.mark.fast_cases(3)
 @both_tracers
 @pytest.mark.parametrize(
     ("module", "name", "sabotage"),
@@ -175,8 +187,8 @@ def test_parity_is_lost_when_something_is_wrong(references, monkeypatch, module,
     assert disagreement(*references["detection"], tracer).significant
 
 
-def test_signals_weight_the_bands(references):
-    world, state, _ = references["detection"]
+def test_signals_weight_the_bands():
+    world, state = scene("detection")
     renderer = sim.BatchedRenderer(world, EYES, state.n, sim.Fidelity(3, EYES.bands))
     rays = renderer.radiance(state)
     assert rays.shape == (2, 2, 9 * 15 * 3, 6)
@@ -187,9 +199,9 @@ def test_signals_weight_the_bands(references):
 
 @both_tracers
 @pytest.mark.parametrize("task", ["detection", "navigation"])
-def test_kernels_are_recorded_once_and_results_do_not_alias(references, task, tracer):
+def test_kernels_are_recorded_once_and_results_do_not_alias(task, tracer):
     gc.collect()  # kernels look at the shapes of all scenes: when others' go meanwhile, they are recorded anew
-    world, state, _ = references[task]
+    world, state = scene(task)
     renderer = sim.BatchedRenderer(world, EYES, state.n, sim.Fidelity(2, EYES.bands, light="bounce"), tracer)
     first = renderer.signals(state)
     kept = first.copy()
@@ -203,16 +215,16 @@ def test_kernels_are_recorded_once_and_results_do_not_alias(references, task, tr
 
 @both_tracers
 @pytest.mark.parametrize("task", ["detection", "navigation"])
-def test_a_world_looks_the_same_among_any_number_of_neighbours(references, task, tracer):
-    world, state, _ = references[task]
+def test_a_world_looks_the_same_among_any_number_of_neighbours(task, tracer):
+    world, state = scene(task)
     alone = sim.BatchedRenderer(world, EYES, 1, sim.Fidelity(2, EYES.bands, light="bounce"), tracer)
     many = alone.resized(16)
     crowd = state.take(np.arange(16) % 2)
     np.testing.assert_array_equal(many.signals(crowd)[3], alone.signals(state.take(np.array([1])))[0])
 
 
-def test_bad_arguments_are_named(references):
-    world, state, _ = references["detection"]
+def test_bad_arguments_are_named():
+    world, state = scene("detection")
     with pytest.raises(ValueError, match="n_envs"):
         sim.BatchedRenderer(world, EYES, 0, sim.Fidelity(1, EYES.bands))
     with pytest.raises(ValueError, match=r"fidelity = 4: must be a sim\.Fidelity"):

@@ -66,6 +66,7 @@ def signals(world, eyes, state, fidelity, samples):
     return np.moveaxis(renderer.signals(state), 2, -1)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("name", CASES)
 def test_the_pick_is_enough_and_not_far_more_than_enough(name):
     """Over all receptors where agents come, and over those that see an object where one is near."""
