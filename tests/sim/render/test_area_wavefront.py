@@ -19,6 +19,7 @@ def signals(world, eyes, state, areas=2):
     return sim.BatchedRenderer(world, eyes, state.n, fidelity).signals(state)
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("task", ["detection", "stairs"])
 @pytest.mark.parametrize("eyes", [EYES, LENS])
 def test_shared_borders_change_nothing(monkeypatch, task, eyes):

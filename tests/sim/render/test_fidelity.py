@@ -107,13 +107,19 @@ def test_what_cannot_be_kept_is_said():
     assert fidelity.predicted_error > 2e-4
 
 
-def test_an_asked_for_tracer_has_no_areas():
+@pytest.mark.slow
+def test_an_asked_for_tracer_gets_rays():
     world = sim.build_world("detection")
     assert sim.choose_fidelity(world, FEW, bands="own", tracer="mitsuba").samples == "rays"
+
+
+def test_an_asked_for_tracer_has_no_areas():
+    world = sim.build_world("detection")
     with pytest.raises(ValueError, match="tracer = 'mitsuba' traces rays only"):
         sim.BatchedRenderer(world, FEW, 1, sim.Fidelity(1, FEW.bands, samples="areas"), "mitsuba")
 
 
+@pytest.mark.slow
 def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
     """With the eyes' own bands: bands are most of the work of choosing all."""
     world = sim.build_world("detection")
@@ -128,6 +134,7 @@ def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
     assert found[0] < rays(0.1, noise_sigma=0.002) < PUPIL_RAYS[-1]
 
 
+@pytest.mark.slow
 def test_light_is_followed_as_far_as_it_matters():
     """Walls light each other in a maze: behind a narrow pupil that is lost in the noise, behind a wide one not. What
     the trials expect of it is what agents see, to a factor of 1.5."""
@@ -165,6 +172,7 @@ def test_the_same_pick_every_time_whatever_the_number_of_worlds():
     assert len(one.sensor.directions) == round(one.fidelity.rays_per_receptor * 99)
 
 
+@pytest.mark.slow
 def test_environments_and_renderers_have_what_is_chosen_with_the_eyes_own_bands():
     """The same value, whoever prepares the scene: the maker of an environment, a renderer or choose_fidelity."""
     world = sim.build_world("detection")
@@ -175,6 +183,7 @@ def test_environments_and_renderers_have_what_is_chosen_with_the_eyes_own_bands(
     assert sim.choose_fidelity(world, FEW).bands != FEW.bands
 
 
+@pytest.mark.slow
 def test_it_can_be_overruled():
     world = sim.build_world("detection")
     eyes = behind_lens(FEW, 0.25)
