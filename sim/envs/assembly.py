@@ -22,7 +22,7 @@ from sim.eyes.eyes import Eyes
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.fidelity import Fidelity, fidelity_asked
 from sim.render.fidelity_choice import chosen_fidelity
-from sim.render.prepared_scene import PreparedScene
+from sim.render.world_scene import WorldScene
 from sim.scene.variation import Variation
 from sim.tasks.encounter import Encounter
 from sim.tasks.reward import check_mode
@@ -142,13 +142,13 @@ def prepared_scene(
     mazes: int = 1,
     course: str | Course = "short",
     spectra: Mapping[str, Spectrum | str] | None = None,
-) -> PreparedScene:
+) -> WorldScene:
     """A task's world made ready for given eyes; arguments as `make_vec_env` has them."""
-    return PreparedScene(build_world(task, seed=world_seed, mazes=mazes, course=course, spectra=spectra), eyes)
+    return WorldScene(build_world(task, seed=world_seed, mazes=mazes, course=course, spectra=spectra), eyes)
 
 
 def vec_env_in(
-    scene: PreparedScene,
+    scene: WorldScene,
     fidelity: Fidelity,
     n_envs: int,
     seed: int | None,

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.pending_frame import PendingFrame
-from sim.render.receptor_noise import FEW, NoiseModel, Normals
+from sim.render.receptor_noise import NoiseModel, Normals
 from sim.worlds.state import WorldState
 
 
@@ -31,11 +29,6 @@ class NoisySignals:
         frame = (renderer.eyes.n_eyes, renderer.eye.channels, *renderer.eyes.resolution)
         self._normals = Normals(keys, frame) if self._noise else None
 
-    @cached_property
-    def _few(self) -> BatchedRenderer:
-        """For a few of the worlds."""
-        return self.renderer.resized(FEW)
-
     def restart(self, keys: np.ndarray) -> None:
         """Noise from its first frame on, under these keys (n,)."""
         if self._normals:
@@ -43,25 +36,20 @@ class NoisySignals:
 
     def begin(self, state: WorldState) -> PendingFrame:
         """Look at all worlds."""
-        return self._noisy(self.renderer.begin(state), slice(None), np.arange(state.n))
+        return self._noisy(self.renderer.begin(state, self._light()), np.arange(state.n))
 
     def begin_some(self, state: WorldState, worlds: np.ndarray) -> PendingFrame:
         """Look at these of the worlds alone; if they are few, beside a look at all that is under way."""
-        if len(worlds) <= FEW < state.n:
-            signals = self._few.begin(state.take(np.resize(worlds, FEW)))
-            return self._noisy(signals, slice(len(worlds)), worlds)
-        return self._noisy(self.renderer.begin(state), worlds, worlds)
+        return self._noisy(self.renderer.begin_some(state, worlds, self._light()), worlds)
 
-    def _noisy(self, signals: PendingFrame, rows: np.ndarray | slice, worlds: np.ndarray) -> PendingFrame:
-        """These rows of the signals, and on them the noise of these worlds."""
-        if self.level is not None:
-            level = self.level[worlds].astype(np.float32)[:, None, None, None, None]
-            return self._with_noise(signals.then(lambda seen: seen[rows] * level), slice(None), worlds)
-        return self._with_noise(signals, rows, worlds)
+    def _light(self) -> np.ndarray | None:
+        """Factors of the bands in all worlds."""
+        return None if self.level is None else np.repeat(self.level[:, None], self.renderer.eye.bands, axis=1)
 
-    def _with_noise(self, signals: PendingFrame, rows: np.ndarray | slice, worlds: np.ndarray) -> PendingFrame:
+    def _noisy(self, signals: PendingFrame, worlds: np.ndarray) -> PendingFrame:
+        """Signals of these worlds, and their noise."""
         noise = self._noise
         if noise is None or self._normals is None:
-            return signals.then(lambda seen: seen[rows])
+            return signals
         normals = self._normals.begin(worlds)
-        return signals.then(lambda seen: noise(seen[rows], normals.wait()))
+        return signals.then(lambda seen: noise(seen, normals.wait()))

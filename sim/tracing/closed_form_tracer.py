@@ -17,14 +17,14 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.eyes.eyes import EYE_HEIGHT
 from sim.scene.device_arrays import floats
 from sim.tracing import lighting, spheres
+from sim.tracing.eye_ray import EyeRay
 from sim.tracing.reflectance_atlas import Atlas, bake
-from sim.tracing.static_scene import StaticScene
+from sim.tracing.spheres import SphereRows
+from sim.tracing.upright_scene import UprightScene
 from sim.tracing.wall_intersection import Footprints, footprints_of
-from sim.tracing.walls import ALIGNED, NoClosedForm, Walls, walls_of
-from sim.worlds.world import World
+from sim.tracing.walls import ALIGNED, NoClosedForm
 
 # Singular values below this share of the largest are rounding: eight times float32's 1.2e-7.
 RANK_TOLERANCE = 1e-6
@@ -79,54 +79,54 @@ class _Hit:
     reflectance: list[Array]
 
 
+@dataclass(frozen=True)
+class ClosedFormSurroundings:
+    """centres: of the spheres that are seen, in one lane's world (Point3f) · inputs: arrays that the kernel reads"""
+
+    centres: list[Array]
+    inputs: dict[str, Array]
+
+
 class ClosedForm:
     """Traces rays through one world.
 
     name, why: of this way of tracing, for reports
     light: what of it is followed, one of `lighting.LEVELS`
     basis: (component, band): what each component is worth in each band
-    walls, footprints, lights, components: what the world is made of
+    world, walls, footprints, lights, components: what it is made of
     faces: textures of walls and floor, see `face_rows` · sphere_textures: the way to their texels, and where they are
 
     Raises:
-        NoClosedForm: worlds that are not made of upright walls, and, where light that is reflected twice is followed,
-            for walls of several heights or lower than what stands between them.
+        NoClosedForm: walls that lie on no grid, and, where light that is reflected twice is followed, walls of several
+            heights or lower than what stands between them, bodies that change their height, and a texture that would
+            turn with the eyes' body.
     """
 
     name = "closed_form"
+    scene = None  # no Mitsuba scene takes part
 
-    def __init__(
-        self, world: World, static: StaticScene, wavelengths: np.ndarray, light: str = lighting.DIRECT
-    ) -> None:
-        walls = walls_of(world.model, static.geoms)
-        self.light = light
+    def __init__(self, scene: UprightScene, wavelengths: np.ndarray, light: str = lighting.DIRECT) -> None:
+        self.light, self.walls, self.world = light, scene.walls, scene
         if light != lighting.DIRECT:
-            _check_tops(world, walls, static)
-        self.footprints: Footprints = footprints_of(walls)
-        self.why = f"{len(walls)} upright walls, {self.footprints.how}"
-        self._bodies, self.walls = static.bodies, walls
-        self.lights = lighting.directional_lights(static.scene, wavelengths)
-        if any(source.direction[2] <= 0 for source in self.lights):
-            raise NoClosedForm("a light shines from below")
-        geoms, place = np.unique(walls.geoms, return_inverse=True)
-        visible = static.spheres if light == lighting.DIRECT else static.bodies
-        bsdfs = [*(static.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
-        atlas = bake(world.model, [*geoms, *visible.geoms], bsdfs, wavelengths)
+            _check_tops(scene)
+        self.footprints: Footprints = footprints_of(self.walls)
+        self.why = f"{len(self.walls)} upright walls, {self.footprints.how}"
+        self._bodies, self.lights = scene.bodies, scene.lights
+        geoms, place = np.unique(self.walls.geoms, return_inverse=True)
+        visible = scene.spheres if light == lighting.DIRECT else scene.bodies
+        bsdfs = [*(scene.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
+        atlas = bake(scene.model, [*geoms, *visible.geoms], bsdfs, wavelengths)
         irradiance = np.array([source.irradiance for source in self.lights]).reshape(-1, len(wavelengths))
         fewest = components_of if light == lighting.DIRECT else reflected_components_of
         self.components = fewest(atlas.texels, irradiance)
         self.basis = self.components.basis
-        self.faces = face_rows(walls.uv, atlas, place)
-        self._n_faces = len(walls.geoms)
+        self.faces = face_rows(self.walls.uv, atlas, place)
+        self._n_faces = len(self.walls.geoms)
         self.one_dimensional = atlas.one_dimensional
         self.sphere_textures = [
             (atlas.to_texels[len(geoms) + k], atlas.places[len(geoms) + k]) for k in range(len(visible))
         ]
         self._static = self._inputs()
-
-    @property
-    def scene(self) -> None:
-        """No Mitsuba scene takes part."""
 
     @property
     def inputs(self) -> dict[str, Array]:
@@ -139,22 +139,31 @@ class ClosedForm:
         tables |= {"faces": self.faces.astype(np.float32).ravel(), **self.footprints.tables}
         return {name: floats(table) for name, table in tables.items()}
 
-    def radiance(
-        self,
-        scene: None,
-        ray: Array,
-        agent: Array,
-        centres: list[Array],
-        inputs: dict[str, Array],
-        bounce_sample: Array | None = None,
-    ) -> tuple[list[Array], Array]:
-        """What comes along each ray, one array per component, and from how far [m]."""
-        bodies = [*centres, agent]
-        hit = self._hit(ray, centres, inputs)
+    def buffers(self, n_envs: int) -> SphereRows:
+        """For so many worlds."""
+        return SphereRows(self.world.spheres, n_envs)
+
+    def around(self, scenes: None, rows: Array, inputs: dict[str, Array], world: Array) -> ClosedFormSurroundings:
+        """What a lane in this world reads."""
+        return ClosedFormSurroundings(spheres.centres_in(rows, len(self.world.spheres), world), inputs)
+
+    def all_bodies(self, centres: list[Array], stand: Array) -> list[Array]:
+        """Centres of the spheres that are seen, and of the eyes' own body, if that is one; stand: where it is."""
+        if not self.world.has_own:
+            return centres
+        return [*centres, mi.Point3f(stand.x, stand.y, float(self.world.heights[-1]))]
+
+    def radiance(self, seen: EyeRay, there: ClosedFormSurroundings, samples: Array) -> tuple[list[Array], Array]:
+        """What comes along each ray, one array per component, and from how far [m]; the first two of samples: each
+        ray's own on the unit square, wanted for light that bounces (`lighting.onwards`)."""
+        centres, inputs = there.centres, there.inputs
+        bodies = self.all_bodies(centres, seen.body)
+        hit = self._hit(seen.ray, centres, inputs)
         light = self._irradiance(hit, bodies, inputs)
         if self.light == lighting.BOUNCE:
-            there = self._hit(lighting.onwards(hit.point, hit.normal, bounce_sample), bodies, inputs)
-            second = zip(there.reflectance, self._irradiance(there, bodies, inputs), strict=True)
+            onwards = lighting.onwards(hit.point, hit.normal, mi.Point2f(samples.x, samples.y))
+            second_hit = self._hit(onwards, bodies, inputs)
+            second = zip(second_hit.reflectance, self._irradiance(second_hit, bodies, inputs), strict=True)
             light = [dr.select(hit.lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
         return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
 
@@ -251,11 +260,17 @@ class ClosedForm:
         return [sum(w * dr.gather(mi.Float, inputs[f"texels_{k}"], i) for i, w in index) for k in range(n)]
 
 
-def _check_tops(world: World, walls: Walls, static: StaticScene) -> None:
+def _check_tops(scene: UprightScene) -> None:
     """No top of a wall may be seen from where light is reflected: from any point of walls and movers."""
-    objects = [world.model.body(name).pos[2] for name in world.objects]
-    bodies = np.add(np.add([*objects, EYE_HEIGHT], static.bodies.radii), static.bodies.offsets[:, 2])
-    lowest, highest = walls.top.min(initial=np.inf), max(walls.top.max(initial=-np.inf), bodies.max())
+    for geom, settled in zip(scene.bodies.geoms, scene.settled, strict=True):
+        if not settled:
+            raise NoClosedForm(f"geom {scene.model.geom(geom).name or str(geom)!r} may change its height")
+    if scene.has_own and scene.bodies.textured[-1]:
+        name = scene.model.geom(scene.bodies.geoms[-1]).name
+        raise NoClosedForm(f"geom {name!r}, on which the eyes are, has a texture, which would have to turn with it")
+    bodies = scene.heights + scene.bodies.radii
+    lowest = scene.walls.top.min(initial=np.inf)
+    highest = max(scene.walls.top.max(initial=-np.inf), bodies.max(initial=-np.inf))
     if highest > lowest + ALIGNED:
         raise NoClosedForm(f"light that is reflected twice sees the top of a wall {lowest:.2g} m high")
 

@@ -27,7 +27,7 @@ from sim.tracing.areas.patch import Area, Patch
 from sim.tracing.areas.sphere_areas import Slice, SphereTexture, SphereView, Strip
 from sim.tracing.areas.stripes import Stripes, Texture
 from sim.tracing.closed_form_tracer import ClosedForm
-from sim.tracing.spheres import Spheres
+from sim.tracing.spheres import SphereRows, centres_in
 from sim.tracing.walls import ALIGNED, NoClosedForm
 
 LEAST_DIP = 1e-4  # of directions that meet the floor
@@ -39,8 +39,6 @@ class AreaTracer:
     """Sees by areas.
 
     rays: the tracer of rays through the same world, for the same light
-    radii, heights: of the bodies that move, and of their centres above the floor [m], the agent's last
-    frames: of the spheres that are seen, from their axes to the world's
 
     name, why: of this way of tracing, for reports
     light: what of it is followed
@@ -53,8 +51,10 @@ class AreaTracer:
     name = "areas"
     scene = None
 
-    def __init__(self, rays: ClosedForm, bodies: Spheres, heights: np.ndarray, n_seen: int) -> None:
-        walls, self._radii = rays.walls, list(map(float, bodies.radii))
+    def __init__(self, rays: ClosedForm) -> None:
+        world, self.rays = rays.world, rays
+        walls, bodies, n_seen = rays.walls, world.bodies, len(world.spheres)
+        self._radii = list(map(float, bodies.radii))
         if len(walls) and np.ptp(walls.top) > ALIGNED:
             raise NoClosedForm("walls of several heights")
         if not rays.one_dimensional:
@@ -66,7 +66,7 @@ class AreaTracer:
         seen = slice(n_seen)
         self._reflected = None
         if rays.light != lighting.DIRECT:
-            self._reflected = LightTable(rays, bodies.radii[seen], heights[seen])
+            self._reflected = LightTable(rays, bodies.radii[seen], world.heights[seen])
         rows = np.concatenate([rays.faces[:, :4], rays.faces[:, 8:10]], axis=1)
         spheres = [place[:2] for _, place in rays.sphere_textures]
         places = np.unique(np.concatenate([rows[:, 4:], np.reshape(spheres, (-1, 2))]), axis=0)
@@ -117,6 +117,14 @@ class AreaTracer:
         """Of the faces at an area's left and right border."""
         left, right = (self.met(area.origin, area.level(mi.Float(a)), inputs) for a in (-0.5, 0.5))
         return left, right
+
+    def buffers(self, n_envs: int) -> SphereRows:
+        """For so many worlds."""
+        return self.rays.buffers(n_envs)
+
+    def bodies(self, rows: Array, world: Array, stand: Array) -> list[Array]:
+        """Centres of the bodies in a lane's world; stand: where the eyes' own is."""
+        return self.rays.all_bodies(centres_in(rows, len(self.rays.world.spheres), world), stand)
 
     @property
     def places(self) -> int:

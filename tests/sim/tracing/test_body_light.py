@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from sim.render.prepared_scene import PreparedScene
+from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tracing.areas.body_light import BodyLight
 from sim.tracing.areas.illumination import Illumination, Moment
@@ -23,7 +23,7 @@ SIDES = ((1.0, 0.0, 0.0), (0.0, -0.6, 0.8), (-0.8, 0.0, -0.6))
 
 @pytest.fixture(scope="module")
 def scene():
-    return PreparedScene(build_world("detection"), COARSE)
+    return WorldScene(build_world("detection"), COARSE)
 
 
 def moment(tracer, centres):

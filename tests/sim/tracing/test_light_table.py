@@ -10,7 +10,7 @@ import pytest
 
 import optics
 import sim
-from sim.render.prepared_scene import PreparedScene
+from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tracing import lighting
 from sim.tracing.areas import illumination, light_baking, light_store, light_table, lit_bodies
@@ -200,7 +200,7 @@ def test_light_that_is_reflected_more_often(monkeypatch):
 
 def tables(world):
     """As they are stored, of a world in bounced light."""
-    return PreparedScene(world, EYES).areas(lighting.BOUNCE).inputs
+    return WorldScene(world, EYES).areas(lighting.BOUNCE).inputs
 
 
 def test_tables_are_baked_once_per_world(monkeypatch):
