@@ -11,6 +11,11 @@ ReferenceRenderer                   the same, slowly: Mitsuba's integrators and 
 ModelRenderer, Mount, Poses         eyes on any model of one's own; fan, ring, both_sides: of several
 choose_model_fidelity               how finely eyes on a model see
 Task                                what a robot of one's own has to do: for make_vec_env
+BatchTask                           the same for arrays of all worlds, which is faster
+check_batch_task                    whether one keeps to the protocol
+Outcome, RewardTerms                what its `judge` returns
+Physics                             what moves its worlds
+ArrayWorlds, SlidingAgents          two of these: any MuJoCo model, and the built-in agent
 Encounter, Frozen                   several animals in one world, that see each other
 make_parallel_env                   these as a PettingZoo environment
 make_vec_env, make_env              the environments, natively batched or single
@@ -30,11 +35,15 @@ from sim.worlds import catalog
 
 if TYPE_CHECKING:
     from sim.envs.assembly import make_parallel_env, make_vec_env
+    from sim.envs.batch_task_checker import check_batch_task
     from sim.envs.env import make_env
     from sim.envs.registration import register_task
     from sim.exr import View, read_exr, write_exr
     from sim.eyes.eyes import Eyes
     from sim.eyes.mounts import Mount, both_sides, fan, ring
+    from sim.physics.array_worlds import ArrayWorlds
+    from sim.physics.physics import Physics
+    from sim.physics.sliding_agents import SlidingAgents
     from sim.render.batched_renderer import BatchedRenderer
     from sim.render.fidelity import Fidelity
     from sim.render.fidelity_choice import FidelityWarning, choose_fidelity
@@ -43,8 +52,10 @@ if TYPE_CHECKING:
     from sim.render.reference_renderer import ReferenceRenderer
     from sim.scene.mirror import Mirror, MirrorWarning, mirror
     from sim.scene.poses import Poses
+    from sim.tasks.batch_task import BatchTask
     from sim.tasks.encounter import Encounter, Frozen
-    from sim.tasks.user_task import Task
+    from sim.tasks.outcome import Outcome, RewardTerms
+    from sim.tasks.task import Task
     from sim.worlds.course import Course
     from sim.worlds.world import World, build_world
 
@@ -65,13 +76,20 @@ _HOME = {
     "fan": "sim.eyes.mounts",
     "ring": "sim.eyes.mounts",
     "Poses": "sim.scene.poses",
-    "Task": "sim.tasks.user_task",
+    "Task": "sim.tasks.task",
+    "BatchTask": "sim.tasks.batch_task",
+    "Outcome": "sim.tasks.outcome",
+    "RewardTerms": "sim.tasks.outcome",
+    "Physics": "sim.physics.physics",
+    "ArrayWorlds": "sim.physics.array_worlds",
+    "SlidingAgents": "sim.physics.sliding_agents",
     "Encounter": "sim.tasks.encounter",
     "Frozen": "sim.tasks.encounter",
     "Fidelity": "sim.render.fidelity",
     "FidelityWarning": "sim.render.fidelity_choice",
     "choose_fidelity": "sim.render.fidelity_choice",
     "make_env": "sim.envs.env",
+    "check_batch_task": "sim.envs.batch_task_checker",
     "make_vec_env": "sim.envs.assembly",
     "make_parallel_env": "sim.envs.assembly",
     "register_task": "sim.envs.registration",
@@ -82,6 +100,8 @@ _HOME = {
 
 __all__ = [
     "TASKS",
+    "ArrayWorlds",
+    "BatchTask",
     "BatchedRenderer",
     "Course",
     "Encounter",
@@ -93,13 +113,18 @@ __all__ = [
     "MirrorWarning",
     "ModelRenderer",
     "Mount",
+    "Outcome",
+    "Physics",
     "Poses",
     "ReferenceRenderer",
+    "RewardTerms",
+    "SlidingAgents",
     "Task",
     "View",
     "World",
     "both_sides",
     "build_world",
+    "check_batch_task",
     "choose_fidelity",
     "choose_model_fidelity",
     "fan",

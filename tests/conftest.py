@@ -22,5 +22,5 @@ def pytest_configure() -> None:
 def short_episodes():
     """Episodes of 32 actions, not 256: for what does not depend on their length, and needs many of them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sim.envs.simulation.EPISODE_STEPS", 32)
+        patch.setattr("sim.tasks.built_in.EPISODE_STEPS", 32)
         yield

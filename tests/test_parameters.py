@@ -4,7 +4,6 @@ The tables name each field of each config dataclass, and each gene, with a chang
 A field or gene that is missing here fails the test, so whoever adds one says what it does.
 """
 
-from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
@@ -15,18 +14,19 @@ from unittest import mock
 import numpy as np
 import pytest
 
-import evolve.cli.commands.run
 import sim
 from evolve.config.assemble import assemble
 from evolve.config.run_config import SECTIONS, GeneConfig, RunConfig
 from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RHABDOM, SIDE, gene_table
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
+from evolve.learning.animal_task import animal_task
 from evolve.learning.fitness import evaluate
-from evolve.learning.worlds import own_task_for
+from evolve.runs import carry_on
 from evolve.search.loop import evolve as carry
 from evolve.store.directory import Run
 from optics.numerics import backend
+from sim.envs.prepared_task import PreparedTask
 from tests.closed_form import ClosedForm
 
 # One training of two updates and one evaluation episode, through a perfect lens: about a second.
@@ -80,7 +80,7 @@ def sight(config, animal):
 
 def own_sight(config, animal):
     """The same in a task of one's own."""
-    worlds = sim.make_vec_env(own_task_for(animal, config), n_envs=1, seed=7, memory=animal.memory_frames)
+    worlds = PreparedTask(animal_task(animal, config)).vec_env(1, 7, animal.memory_frames)
     try:
         return worlds.reset()["eyes"].tobytes()
     finally:
@@ -115,11 +115,10 @@ def budget_stages(config, animal):
 
 def hired(config, animal):
     """Workers that a run starts."""
-    with TemporaryDirectory() as folder, mock.patch.object(evolve.cli.commands.run, "LocalExecutor") as executor:
+    with TemporaryDirectory() as folder, mock.patch.object(carry_on, "LocalExecutor") as executor:
         executor.side_effect = KeyboardInterrupt
-        evolve.cli.commands.run._carry(
-            Run.create(Path(folder) / "run", config), Namespace(json=False, executor="local", tensorboard=False), None
-        )
+        with pytest.raises(KeyboardInterrupt):
+            carry_on.carry_on(Run.create(Path(folder) / "run", config), mock.Mock())
         return executor.call_args.args[1]
 
 
@@ -253,7 +252,7 @@ def _names(cls, prefix=""):
         if f.name == "genome":
             yield from (f"genome.GENE.{part.name}" for part in fields(GeneConfig))
         elif f.name in ("own", "task_sha256"):
-            continue  # text of a task of one's own, and its hash: tests/evolve/config/test_own_task.py
+            continue  # text of a task of one's own, and its hash: tests/evolve/config/test_task_choice.py
         elif f.name in SECTIONS:
             yield from _names(SECTIONS[f.name], f"{f.name}.")
         else:

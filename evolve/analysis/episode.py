@@ -15,6 +15,7 @@ import sim
 from evolve.analysis.filmed_episode import FilmedEpisode, film
 from evolve.config.formats import task_then
 from evolve.config.run_config import EyeConfig, WorldConfig
+from evolve.config.task_card import card_of
 from evolve.genome.phenotype import Phenotype
 from evolve.genome.plain_values import parsed
 from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
@@ -72,6 +73,12 @@ class Episode:
     def __len__(self) -> int:
         """Actions taken."""
         return len(self.action)
+
+    @property
+    def title(self) -> str:
+        """Of the task, for headings."""
+        card = card_of(self.task)
+        return self.task if card is None else card.title
 
     @property
     def eyes(self) -> sim.Eyes:
@@ -142,7 +149,7 @@ def record(
     """
     candidate = run.candidate(candidate_id)
     require_policy(candidate, run.policy_path(candidate.id))
-    own = run.config.own_task
+    own = run.config.choice.named_code
     try:
         policy = load_policy(run.policy_path(candidate.id))
     except ValueError as error:
@@ -230,7 +237,7 @@ def _play(policy: EyePolicy, worlds: Any) -> tuple[WorldState, dict[str, Any], f
 def _perfect_views(worlds: Any, eyes: sim.Eyes, states: WorldState, every: int, light: float = 1.0) -> dict[str, Any]:
     """The same scenes in the same light through a perfect lens: by the same receptors, and as radiance on a finer
     grid."""
-    world, seen = worlds.simulation.world, worlds.renderer.fidelity
+    world, seen = worlds.worlds.world, worlds.renderer.fidelity
     perfect = replace(eyes, optics=None, waveguide=None)
     factor = max(1, -(-FINE_PIXELS // max(eyes.resolution)))
     fine = replace(perfect, resolution=(factor * eyes.resolution[0], factor * eyes.resolution[1]))

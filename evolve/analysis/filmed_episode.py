@@ -13,16 +13,15 @@ import numpy as np
 import sim
 from evolve.analysis.filmed_scene import FilmedScene
 from evolve.config.run_config import EyeConfig, RunConfig
+from evolve.config.task_card import card_of
 from evolve.genome.phenotype import Phenotype
+from evolve.learning.animal_task import animal_task
 from evolve.learning.policy import EyePolicy
-from evolve.learning.worlds import own_task_for
-from sim.envs.task_fidelity import fidelity_of
-from sim.envs.task_vec_env import TaskVecEnv
-from sim.envs.task_worlds import TaskWorlds
+from sim.envs.prepared_task import PreparedTask
+from sim.envs.vec_env import EyesVecEnv
 from sim.scene.poses import Poses
 from sim.scene.solids import solids_of
-from sim.tasks.eye_kinds import kinds_of
-from sim.tasks.user_task import Task
+from sim.tasks.simulation import Simulation
 
 __all__ = ["FilmedEpisode", "film", "moments"]
 
@@ -80,6 +79,12 @@ class FilmedEpisode:
         return len(self.action)
 
     @property
+    def title(self) -> str:
+        """Of the task, for headings."""
+        card = card_of(self.task)
+        return self.task if card is None else card.title
+
+    @property
     def eyes(self) -> sim.Eyes:
         """The eyes that saw it, as if they were on rhabdom's own agent."""
         return self.phenotype.eyes(self.eye)
@@ -89,18 +94,18 @@ def film(
     phenotype: Phenotype, config: RunConfig, policy: EyePolicy, candidate_id: int, seed: int, radiance_every: int
 ) -> FilmedEpisode:
     """Let an animal play one episode; same arguments, same episode."""
-    task = own_task_for(phenotype, config)
-    (kind,) = kinds_of(task)
-    with contextlib.closing(TaskVecEnv(task, 1, seed, phenotype.memory_frames, "rgb_array")) as worlds:
+    task = PreparedTask(animal_task(phenotype, config))
+    (kind,) = task.task.agents()[0].kinds
+    with contextlib.closing(task.vec_env(1, seed, phenotype.memory_frames, render_mode="rgb_array")) as worlds:
         first = worlds.reset()
+        model = worlds.worlds.model
         solids = solids_of(worlds.worlds.datas[0].model)  # now: the next episode's may differ, and begins by itself
         poses, columns, lit = _play(policy, worlds, first)
-        views = _perfect_views(worlds.worlds, task, poses, radiance_every, lit)
-        (sight,) = worlds.animals.learners[0].sights.values()
+        views = _perfect_views(worlds.simulation, task, poses, radiance_every, lit)
         everywhere = Poses.joined(*poses)
-        eyes = sight.renderer.eye_frames(everywhere)
-        scene = FilmedScene.of(worlds.worlds.model, solids, everywhere, kind.mounts[0], eyes)
-        seconds = task.substeps * float(worlds.worlds.model.opt.timestep)
+        eyes = worlds.renderer.eye_frames(everywhere)
+        scene = FilmedScene.of(model, solids, everywhere, kind.mounts[0], eyes)
+        seconds = worlds.worlds.seconds
     return FilmedEpisode(
         task=config.task,
         candidate_id=candidate_id,
@@ -116,17 +121,17 @@ def film(
     )
 
 
-def moments(task: Task, n: int, seed: int) -> tuple[mujoco.MjModel, dict[str, Any], Poses]:
+def moments(task: PreparedTask, n: int, seed: int) -> tuple[mujoco.MjModel, dict[str, Any], Poses]:
     """The model; what a `sim.ModelRenderer` must know of spectra and of geoms that differ; and where everything is at
     the beginnings of n episodes."""
-    with contextlib.closing(TaskVecEnv(task, n, seed)) as worlds:
+    with contextlib.closing(Simulation(task.task, n, seed)) as worlds:
         worlds.reset()
-        how = {"spectra": worlds.worlds.spectra, "varied": worlds.worlds.bodies.varied}
-        return worlds.worlds.model, how, Poses.of(worlds.worlds.datas)
+        how = {"spectra": task.task.spectra, "varied": worlds.physics.varied}
+        return worlds.physics.model, how, worlds.poses()
 
 
 def _play(
-    policy: EyePolicy, worlds: TaskVecEnv, observation: dict[str, np.ndarray]
+    policy: EyePolicy, worlds: EyesVecEnv, observation: dict[str, np.ndarray]
 ) -> tuple[list[Poses], dict[str, Any], Lit]:
     """Where everything was before each action, the columns that playing fills, and the episode's light; the episode
     has just begun with this observation."""
@@ -134,12 +139,13 @@ def _play(
     rows: list[tuple[Any, ...]] = []
     pictures: list[np.ndarray] = []
     info, done = dict[str, Any](), False
-    variation, varied = worlds.worlds.variation, {name: v.copy() for name, v in worlds.worlds.varied.items()}
-    every = max(1, -(-worlds.worlds.episode_steps // MOST_PICTURES))
+    simulation = worlds.simulation
+    variation, varied = simulation.variation, {name: v.copy() for name, v in simulation.varied.items()}
+    every = max(1, -(-simulation.episode_steps // MOST_PICTURES))
     while not done:
         if len(rows) % every == 0:
             pictures.append(worlds.get_images()[0])
-        poses.append(Poses.of(worlds.worlds.datas))
+        poses.append(simulation.poses())
         seen = observation["eyes"][0, -1]
         action = policy.predict(observation, deterministic=True)[0]
         observation, reward, dones, infos = worlds.step(action)
@@ -165,17 +171,17 @@ def _play(
     return poses, columns, lit
 
 
-def _perfect_views(worlds: TaskWorlds, task: Task, poses: list[Poses], every: int, lit: Lit) -> dict[str, Any]:
+def _perfect_views(worlds: Simulation, task: PreparedTask, poses: list[Poses], every: int, lit: Lit) -> dict[str, Any]:
     """The same scenes through a perfect lens: by the same receptors, and as radiance on a finer grid."""
-    (kind,) = kinds_of(task)
+    (kind,) = worlds.agents[0].kinds
     perfect = replace(kind.eye, pupil=None, waveguide=None)
     height, width = perfect.resolution
     factor = max(1, -(-FINE_PIXELS // max(height, width)))
     fine = replace(perfect, resolution=(factor * height, factor * width))
-    fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
-    how: dict[str, Any] = {"spectra": worlds.spectra, "varied": worlds.bodies.varied}
+    fidelity = replace(task.fidelity, rays_per_receptor=RAYS)
+    how: dict[str, Any] = {"spectra": worlds.task.spectra, "varied": worlds.physics.varied}
     receptors, pictures = (
-        sim.ModelRenderer(worlds.model, eye, kind.mounts, 1, fidelity, **how) for eye in (perfect, fine)
+        sim.ModelRenderer(worlds.physics.model, eye, kind.mounts, 1, fidelity, **how) for eye in (perfect, fine)
     )
     wavelengths = np.asarray(receptors.eye.spectral_bands.wavelengths)
     frames, light = np.arange(0, len(poses), every), lit(wavelengths)

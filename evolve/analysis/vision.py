@@ -12,12 +12,10 @@ import optics
 import sim
 from evolve.analysis.filmed_episode import moments
 from evolve.analysis.statistics import eye_image_quality, polychromatic, psnr
-from evolve.config.own_task import is_own
 from evolve.config.run_config import RunConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.learning.worlds import own_task_for
-from sim.envs.task_fidelity import fidelity_of
-from sim.tasks.eye_kinds import kinds_of
+from evolve.learning.animal_task import animal_task
+from sim.envs.prepared_task import PreparedTask
 
 __all__ = ["Vision", "ssim", "vision"]
 
@@ -49,7 +47,7 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
     try:
         quality, contrast = eye_image_quality(animal, config.eye), _contrast(eyes.eye())
         seen, perfect = (
-            _own_views(animal, config) if is_own(config.task) else seen_and_perfect(eyes, config.task, config.world)
+            _own_views(animal, config) if config.card.has_file else seen_and_perfect(eyes, config.task, config.world)
         )
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)
@@ -65,7 +63,7 @@ def seen_and_perfect(eyes: sim.Eyes, task: str, world: WorldConfig | None = None
     worlds = sim.make_vec_env(task, perfect, SCENES, 0, mode="evaluation", **where)
     try:
         worlds.reset()
-        built, states = worlds.simulation.world, worlds.state
+        built, states = worlds.worlds.world, worlds.state
     finally:
         worlds.close()
     seen, sharp = (
@@ -76,10 +74,10 @@ def seen_and_perfect(eyes: sim.Eyes, task: str, world: WorldConfig | None = None
 
 def _own_views(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
     """The same in a task of somebody's own."""
-    task = own_task_for(animal, config)
+    task = PreparedTask(animal_task(animal, config))
     model, how, poses = moments(task, SCENES, 0)
-    (kind,) = kinds_of(task)
-    fidelity = replace(fidelity_of(task), rays_per_receptor=RAYS)
+    (kind,) = task.task.agents()[0].kinds
+    fidelity = replace(task.fidelity, rays_per_receptor=RAYS)
     seen, sharp = (
         sim.ModelRenderer(model, eye, kind.mounts, SCENES, fidelity, **how).signals(poses)
         for eye in (kind.eye, replace(kind.eye, pupil=None, waveguide=None))

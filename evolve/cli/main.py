@@ -15,7 +15,7 @@ from importlib import import_module
 from evolve.cli.arguments import parse
 from evolve.cli.commands import INTERRUPTED
 from evolve.cli.notes import notes
-from evolve.cli.output import voices
+from evolve.runs.output import voices
 
 __all__ = ["main"]
 

@@ -6,7 +6,7 @@ import sys
 from types import TracebackType
 from typing import Any, TextIO
 
-from evolve.cli.output import as_it_is, printable
+from evolve.runs.output import as_it_is, printable
 
 __all__ = ["Waiting"]
 

@@ -10,7 +10,9 @@ lint           what is odd, though nothing forbids it
 relief_starts  where the genes of a relief start
 formats        formats of config.toml, and how former ones are read
 square_eyes    one gene for both sides of an eye
-own_task       a task of somebody's own, as text
+task_choice    TaskChoice: which task, and its code if it may run
+task_card      TaskCard: what is known of a task without executing it
+task_code      TaskCode: a user's task, as text
 numbering      which id belongs to which generation
 tasks/         what a task sets unless a run says otherwise
 """

@@ -11,12 +11,14 @@ from typing import Any
 
 from evolve.config.checks import check_gene_value, check_value, suggestion
 from evolve.config.formats import FORMAT, format_of, upgraded
-from evolve.config.own_task import OwnTask, is_own, looks_own
 from evolve.config.provenance import Source
 from evolve.config.relief_starts import no_such_gene, with_relief
 from evolve.config.run_config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
 from evolve.config.sources import parsed_toml, preset_sources, read_assignment, read_toml, task_defaults
 from evolve.config.square_eyes import no_such_side, with_square_eyes
+from evolve.config.task_card import TaskCard, card_of
+from evolve.config.task_choice import TaskChoice
+from evolve.config.task_code import TaskCode, names_code
 from evolve.genome.genes import (
     ALL_GENES,
     CLUSTERS,
@@ -25,7 +27,6 @@ from evolve.genome.genes import (
     RHABDOM,
     SIDE,
     SIDES,
-    TILT,
     GeneConfig,
     group_members,
 )
@@ -49,28 +50,26 @@ def assemble(
     """A run's configuration from all its sources; `task` and `assignments` ("search.population=8") win.
 
     task: one of TASKS, or FILE.py:CLASS; may be missing where preset or file names one
-    starts: where the genes start instead, as `evolve.cli.start_from` reads it from another run
+    starts: where the genes start instead, as `evolve.runs.start_from` reads it from another run
     scale: how much of its work a preset does, where it comes in several: one of SCALES, "laptop" if not given
 
     Raises:
         ConfigError: unknown key, wrong type, value out of range, contradiction, unreadable file; one line that names
             key, value, what is allowed, and where it was set.
     """
-    own = OwnTask.read(task) if task is not None and looks_own(task) else None
-    asked = [_asked_for(read_toml(file), own)] if file is not None else []
+    choice = None if task is None else TaskChoice.named(task)
+    code = None if choice is None else choice.code
+    asked = [_asked_for(read_toml(file), code)] if file is not None else []
     if starts is not None:
         asked.append(starts)
-    asked += [_asked_for(read_assignment(text), own) for text in assignments]
-    if own is not None:
-        asked.append(Source("", {"task": own.label, "task_sha256": own.sha256}))
-        return replace(_assembled(None, preset_sources(preset, scale), asked), own=own)
-    return _assembled(task, preset_sources(preset, scale), asked)
+    asked += [_asked_for(read_assignment(text), code) for text in assignments]
+    if choice is not None:
+        asked.append(Source("", dict(choice.settings)))
+    return replace(_assembled(preset_sources(preset, scale), asked), code=code)
 
 
-def _assembled(task: str | None, below: list[Source], asked: list[Source]) -> RunConfig:
+def _assembled(below: list[Source], asked: list[Source]) -> RunConfig:
     """From what was asked, later sources winning, over the task's and the preset's settings."""
-    if task is not None:
-        asked.append(Source("", {"task": task}))
     known_task = [source.tree["task"] for source in (*below, *asked) if "task" in source.tree]
     if not known_task:
         raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
@@ -97,20 +96,20 @@ def from_text(text: bytes | str, name: str = "config.toml") -> RunConfig:
 
 def _read_back(written: Source) -> RunConfig:
     """Every default is written out, so no task's and no preset's settings are looked up."""
-    return _assembled(None, [], [replace(written, tree=upgraded(written.tree))])
+    return _assembled([], [replace(written, tree=upgraded(written.tree))])
 
 
-def _asked_for(source: Source, own: OwnTask | None) -> Source:
+def _asked_for(source: Source, code: TaskCode | None) -> Source:
     """What somebody asks for, maybe with another run's config.toml: of this format, and naming no code to run, which
     only the command itself does."""
-    if looks_own(source.tree.get("task")) and own is None:
+    if names_code(source.tree.get("task")) and code is None:
         raise ConfigError(
             f"{source.name}: task = {source.tree['task']!r}: a file names no code to run: say evolve run FILE.py:CLASS",
             "task",
         )
     if "format" in source.tree and format_of(source.tree) != FORMAT:
         raise ConfigError(f"{source.name}: format = {source.tree['format']}: must be {FORMAT}", "format")
-    known = ("format", "task", "task_sha256") if own else ("format",)
+    known = ("format", "task", "task_sha256") if code else ("format",)
     return replace(source, tree={key: value for key, value in source.tree.items() if key not in known})
 
 
@@ -118,8 +117,8 @@ def to_toml(config: RunConfig) -> str:
     """TOML text with every setting; `from_toml` reads it back equal."""
     import tomli_w
 
-    tree = {"format": FORMAT, **asdict(replace(config, own=None))}
-    del tree["own"]
+    tree = {"format": FORMAT, **asdict(replace(config, code=None))}
+    del tree["code"]
     if not config.task_sha256:
         del tree["task_sha256"]
     for name, use in tree["genome"].items():
@@ -148,7 +147,7 @@ def _blamed(error: ConfigError, layers: Iterable[Source]) -> str:
 
 def _checked_entry(key: str, value: Any) -> Any:
     if key == "task":
-        if not is_own(value) and (not isinstance(value, str) or value not in TASKS):
+        if card_of(value) is None:
             raise ConfigError(f"unknown task {str(value)!r}; {suggestion(str(value), TASKS)}", key)
         return value
     if key in TOP_LEVEL:
@@ -204,7 +203,7 @@ def _merge(below: Tree, above: Tree) -> Tree:
     return merged
 
 
-def _require_genes(source: Source, eye: EyeConfig, own: bool) -> None:
+def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
     """Genes that are named one by one must be genes of such eyes."""
     for name in with_relief(source.tree, eye).get("genome", {}):
         if name in (SIDE, *SIDES) and name not in eye.genes:
@@ -214,10 +213,10 @@ def _require_genes(source: Source, eye: EyeConfig, own: bool) -> None:
                 f"genome.{name}: only eyes with rhabdoms have this gene; set eye.rhabdoms = true",
                 *(f"genome.{name}", "eye.rhabdoms"),
             )
-        if name == TILT and not own:
+        if not card.has_gene(name):
             raise ConfigError(
-                f"genome.{TILT}: is for tasks of one's own; in others eyes look along the floor",
-                *(f"genome.{TILT}", "task"),
+                f"genome.{name}: is for tasks of one's own; in others eyes look along the floor",
+                *(f"genome.{name}", "task"),
             )
         if name in ALL_GENES and name not in eye.genes:
             raise ConfigError(no_such_gene(name, eye), f"genome.{name}", "eye.relief_points", "eye.relief_symmetric")
@@ -226,11 +225,12 @@ def _require_genes(source: Source, eye: EyeConfig, own: bool) -> None:
 def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
     """RunConfig from checked trees, later ones winning, defaults filled in."""
     asked = _merged(trees)
-    eye, own = EyeConfig(**asked.get("eye", {})), is_own(asked.get("task"))
-    table = {name: gene for name, gene in eye.genes.items() if own or name != TILT}
+    eye, card = EyeConfig(**asked.get("eye", {})), card_of(asked["task"])
+    assert card is not None  # `_checked` has seen it
+    table = {name: gene for name, gene in eye.genes.items() if card.has_gene(name)}
     layers = [with_square_eyes(source, eye) for source in layers]
     for source in layers:
-        _require_genes(source, eye, own)
+        _require_genes(source, eye, card)
     tree = _merged([with_relief(_checked(source), eye) for source in layers])
     sections = {name: cls(**tree.get(name, {})) for name, cls in SECTIONS.items()}
     genes = tree.get("genome", {})

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from evolve.config.own_task import is_own
 from evolve.config.run_config import EyeConfig, RunConfig, SearchConfig
 from evolve.genome.genes import INHERITED, LAMBDA_MAX
 
 __all__ = ["coarse_bands", "idle_genes", "idle_settings", "idle_starts", "lint"]
 
-GREY_TASKS = ("navigation", "maze", "detection", "tracking")
 PEAKS = 17  # of an open gene's range, at which its pigment is tried
 SHOWN = 4  # names in a line, at most
 LEAST_ERROR = 1e-3  # of white's signal: what the 64 bands that others are held against may be wrong by themselves
@@ -23,7 +21,7 @@ def lint(config: RunConfig) -> list[str]:
 
 def coarse_bands(config: RunConfig) -> list[str]:
     """A line where the bands misjudge the world's measured spectra by more than a receptor's noise."""
-    if config.task in GREY_TASKS or is_own(config.task):
+    if config.card.grey is not False:  # spectra are unknown or flat
         return []
     from sim.scene.band_error import band_error, measured
     from sim.worlds.world import build_world
@@ -84,7 +82,7 @@ def idle_genes(config: RunConfig) -> list[str]:
     for name in ("refractive_index", "dispersion"):
         if flat and uses[name].open:
             notes.append(f"genome.{name} is open but has no effect: the relief is fixed and flat")
-    if config.task in GREY_TASKS and any(uses[name].open for name in LAMBDA_MAX):
+    if config.card.grey and any(uses[name].open for name in LAMBDA_MAX):
         notes.append(f"genes of lambda_max are open but have no effect: the world of {config.task} is grey")
     types = uses["receptor_types"]
     most = int(types.high if types.open else types.start)

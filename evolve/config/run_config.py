@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from evolve.config.checks import ConfigError, check_gene_use, check_values, quoted
-from evolve.config.own_task import OwnTask, is_own
 from evolve.config.settings import (
     SECTIONS,
     EvaluationConfig,
@@ -18,8 +16,11 @@ from evolve.config.settings import (
     WorldConfig,
     setting,
 )
+from evolve.config.task_card import OF_COURSES, OF_MAZES, OF_SLIDING_AGENTS, OPTIONAL_GENES, TaskCard, tasks_with
+from evolve.config.task_choice import TaskChoice
+from evolve.config.task_code import TaskCode
 from evolve.genome import anatomy
-from evolve.genome.genes import CLUSTERS, GENES, INHERITED, TILT, Gene, GeneConfig
+from evolve.genome.genes import CLUSTERS, GENES, INHERITED, Gene, GeneConfig
 from evolve.genome.interval import Interval
 from optics.spectra.receptors import RECEPTORS
 from sim.worlds.catalog import COURSES, TASKS
@@ -37,8 +38,6 @@ __all__ = [
     "WorldConfig",
 ]
 
-# What only our own agents have: a speed and a turn, contact with walls, a course. Their body stands level.
-OF_OUR_AGENTS = ("world.least_light", "learning.first_speed", "learning.contact_ramp", "learning.least_return")
 RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
 # Numerical apertures: 0.25 is a fly's. With less a rhabdom guides next to nothing, with more it has hundreds of modes.
 LEAST_STEP, MOST_STEP = 0.2, 0.5
@@ -49,8 +48,8 @@ LEAST_EXPOSURE = 2e-4  # [lx s]: of some 30 photons from white at a = 1; of few,
 class RunConfig:
     """Everything that decides a run's outcome, and how many processes work on it.
 
-    task: one of TASKS, or FILE.py:CLASS, a `sim.Task` of somebody's own
-    own: that task, if whoever works with this config has named it: nothing of it is executed otherwise
+    task: one of TASKS, or FILE.py:CLASS, a user's `sim.Task`
+    code: of a user's task, if the user has named it: nothing of it is executed otherwise
 
     Raises:
         ConfigError: settings that contradict each other.
@@ -66,7 +65,7 @@ class RunConfig:
     search: SearchConfig = field(default_factory=SearchConfig)
     learning: LearningConfig = field(default_factory=LearningConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
-    own: OwnTask | None = field(default=None, compare=False, repr=False)
+    code: TaskCode | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         check_values(self, ("seed", "workers"))
@@ -104,34 +103,30 @@ class RunConfig:
             raise ConfigError(message, *keys)
 
     def _check_task(self) -> None:
-        own = is_own(self.task)
-        if not own and (not isinstance(self.task, str) or self.task not in TASKS):
-            raise ConfigError(
-                f"task = {quoted(self.task)}: must be one of {', '.join(TASKS)}, or FILE.py:CLASS, one of your own",
-                "task",
-            )
-        if (re.fullmatch("[0-9a-f]{64}", self.task_sha256) is None) if own else self.task_sha256:
-            needs = "the SHA-256 of the file, 64 digits" if own else "empty, as no file belongs to this task"
-            raise ConfigError(f"task_sha256 = {self.task_sha256!r:.80}: must be {needs}", "task_sha256", "task")
-        if not own and TILT in self.genome:
-            raise ConfigError(
-                f"genome.{TILT}: is for tasks of one's own; in {self.task} eyes look along the floor",
-                *(f"genome.{TILT}", "task"),
-            )
-        for key in OF_OUR_AGENTS if own else ():
-            section, name = key.split(".")
-            if getattr(getattr(self, section), name) != getattr(SECTIONS[section], name):
-                raise ConfigError(f"{key}: is for rhabdom's own agents, not for {self.task}", key, "task")
+        for name in OPTIONAL_GENES:
+            if name in self.genome and not self.card.has_gene(name):
+                raise ConfigError(
+                    f"genome.{name}: is for tasks of one's own; in {self.task} eyes look along the floor",
+                    *(f"genome.{name}", "task"),
+                )
+        self._check_settings(OF_SLIDING_AGENTS)
 
     def _check_world(self) -> None:
         """Only what the task's world has may be set."""
         for name in ("course", "evaluation_course"):
             if (course := getattr(self.world, name)) not in COURSES:
                 raise ConfigError(f"world.{name} = {course!r}: must be one of {', '.join(COURSES)}", f"world.{name}")
-        of_task = {"mazes": "maze", "unseen": "maze", "course": "navigation", "evaluation_course": "navigation"}
-        for name, task in of_task.items():
-            if self.task != task and getattr(self.world, name) != getattr(WorldConfig, name):
-                raise ConfigError(f"world.{name}: is for the task {task}, not for {self.task}", f"world.{name}", "task")
+        self._check_settings((*OF_MAZES, *OF_COURSES))
+
+    def _check_settings(self, keys: tuple[str, ...]) -> None:
+        """Settings that the task does not have must be left at their defaults."""
+        for key in keys:
+            section, name = key.split(".")
+            default = getattr(SECTIONS[section], name)
+            if key not in self.card.settings and getattr(getattr(self, section), name) != default:
+                others = tasks_with(key)
+                whose = f"the task {others[0]}" if len(others) == 1 else "rhabdom's own agents"
+                raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
 
     def _check_light(self) -> None:
         """So little light that it must be a mistake, or a time to count photons in where none are counted."""
@@ -243,41 +238,27 @@ class RunConfig:
         return {name: gene for name, gene in self.eye.genes.items() if name in self.genome}
 
     @property
-    def task_name(self) -> str:
-        """In a few letters: "detection"; the class of a task of one's own."""
-        return self.task.rpartition(":")[2]
+    def choice(self) -> TaskChoice:
+        """The task, and its code if it may run."""
+        return TaskChoice(self.task, self.task_sha256, self.code)
 
     @property
-    def own_task(self) -> OwnTask | None:
-        """The task of one's own that animals of this run live in; None: one of TASKS.
+    def card(self) -> TaskCard:
+        """Properties of the task."""
+        return self.choice.card
 
-        Raises:
-            ConfigError: it has not been named, so that its code must not run.
-        """
-        if is_own(self.task) and self.own is None:
-            raise ConfigError(
-                f"this run evolves {self.task}, whose code runs only if you name it: add --task {self.task} "
-                "(or the file's path where it is now)"
-            )
-        return self.own
+    @property
+    def task_name(self) -> str:
+        """In a few letters: "detection"; the class of a user's task."""
+        return self.card.name
 
-    def with_own_task(self, named: str) -> RunConfig:
+    def with_code(self, named: str) -> RunConfig:
         """The same, with the code of its task named: "FILE.py:CLASS".
 
         Raises:
             ConfigError: the run has no such task, the class has another name, or the file has changed.
         """
-        if not is_own(self.task):
-            raise ConfigError(f"--task {named}: this run's task, {self.task}, is rhabdom's own: leave it out")
-        own = OwnTask.read(named)
-        if own.name != self.task_name:
-            raise ConfigError(f"--task {named}: this run evolves {self.task}, not {own.name}")
-        if own.sha256 != self.task_sha256:
-            raise ConfigError(
-                f"--task {named}: {own.file.name} has changed since the run began (SHA-256 {own.sha256[:12]}..., was "
-                f"{self.task_sha256[:12]}...): bring the old text back, or begin a new run"
-            )
-        return replace(self, own=own)
+        return replace(self, code=self.choice.read(named))
 
     @property
     def candidates(self) -> int:
@@ -286,5 +267,5 @@ class RunConfig:
 
 
 def _default_genome() -> Mapping[str, GeneConfig]:
-    """Of animals in rhabdom's own tasks."""
-    return {name: gene.default for name, gene in GENES.items() if name != TILT}
+    """Of animals in the built-in tasks."""
+    return {name: gene.default for name, gene in GENES.items() if name not in OPTIONAL_GENES}

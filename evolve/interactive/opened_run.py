@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING
 
 from evolve.analysis.statistics import generation_statistics
 from evolve.config.run_config import EyeConfig
-from evolve.interactive.carry_on import Callback, carry_on, require_callbacks
+from evolve.interactive.callbacks import Callback, Callbacks
 from evolve.interactive.summary import animal_as_html, run_as_html
 from evolve.interactive.table import candidate_table
-from evolve.search.successive_halving import finished
+from evolve.runs.resume import resuming
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, RunError
 from evolve.store.policies import require_policy
-from evolve.store.versions import record_start
-from optics.numerics import device
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from sim.tasks.encounter import Frozen
-    from sim.tasks.user_task import Task
+    from sim.tasks.task import Task
 
 __all__ = ["OpenedCandidate", "OpenedRun"]
 
@@ -81,8 +79,8 @@ class OpenedRun(Run):
             RunError: there is no such candidate, or its policy is missing or no policy.
             ValueError: the task places other eyes than the candidate has.
         """
+        from evolve.learning.animal_task import embodied
         from evolve.learning.policy import load_policy
-        from evolve.learning.worlds import embodied
         from sim.tasks.encounter import Frozen
 
         candidate = self.candidate(candidate_id)
@@ -103,19 +101,10 @@ class OpenedRun(Run):
             RunError: its format is a former one.
             ConfigError: its task is somebody's own and has not been named, or cannot be begun; or callbacks are none.
         """
-        from evolve.learning.task_trial import try_task
-
-        require_callbacks(callbacks)
-        device.make_ready()
-        with self.lock():
-            self.repair()
-            if finished(self):
-                self.forget_trainings(candidate.id for candidate in self.candidates)
-                return
-            self.require_present_format()
-            try_task(self.config)  # before anything is written
-            record_start(self.path, len(self.candidates))
-            carry_on(self, callbacks, progress)
+        watchers = Callbacks(callbacks, progress)
+        with resuming(self) as unfinished:
+            if unfinished:
+                watchers.carry_on(self)
 
     def to_dataframe(self) -> pd.DataFrame:
         """A row per candidate, by its id: how it fared, and the value of every gene that shows in it."""

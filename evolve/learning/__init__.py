@@ -1,6 +1,7 @@
 """One lifetime: an animal learns its task.
 
 fitness           evaluate: a candidate's whole life
+animal_task       the task with an animal in it
 worlds            where an animal lives
 task_module       a task of somebody's own, executed
 task_trial        the same, tried for a moment

@@ -1,9 +1,10 @@
-"""A task of somebody's own, tried for a moment before anything is begun: what fails there fails in every animal."""
+"""A user's task, tried for a moment before a run begins: a failure there would occur in every animal."""
 
 from __future__ import annotations
 
 import warnings
 from contextlib import closing
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from evolve.config.checks import ConfigError
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
-from evolve.learning.worlds import own_task_for
-from sim.envs.task_vec_env import TaskVecEnv
+
+if TYPE_CHECKING:
+    from sim.envs.vec_env import EyesVecEnv
 
 __all__ = ["try_task"]
 
@@ -20,17 +22,20 @@ WORLDS, ACTIONS = 2, 4
 
 
 def try_task(config: RunConfig) -> None:
-    """Let the first animal take a few random actions; nothing, where the task is one of rhabdom's own.
+    """Let the first animal take a few random actions; nothing, if the task is a built-in one.
 
     Raises:
         ConfigError: one line: what the task's module, model, eyes or methods fail with.
     """
-    if config.own_task is None:
+    if config.choice.named_code is None:
         return
+    from evolve.learning.animal_task import animal_task  # takes seconds to load, and built-in tasks are not tried
+    from sim.envs.prepared_task import PreparedTask
+
     animal = develop(Genotype(config.genome).start, config)
     try:
-        task = own_task_for(animal, config)
-        with closing(TaskVecEnv(task, WORLDS, config.seed, animal.memory_frames)) as worlds, warnings.catch_warnings():
+        task = PreparedTask(animal_task(animal, config))
+        with closing(task.vec_env(WORLDS, config.seed, animal.memory_frames)) as worlds, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the failure itself is told
             failure = _failure(worlds)
     except (ValueError, RuntimeError, OSError) as error:
@@ -40,7 +45,7 @@ def try_task(config: RunConfig) -> None:
         raise ConfigError(f"{config.task}: {failure}", "task")
 
 
-def _failure(worlds: TaskVecEnv) -> str | None:
+def _failure(worlds: EyesVecEnv) -> str | None:
     """Of the first method that fails."""
     random = np.random.default_rng(0)
     worlds.reset()

@@ -10,7 +10,7 @@ import numpy as np
 import sim
 from evolve.analysis.episode import Episode
 from sim.eyes.eyes import BODY_RADIUS
-from sim.physics.physics import SUBSTEPS
+from sim.physics.agent_motion import SUBSTEPS
 
 __all__ = ["GroundPlan"]
 

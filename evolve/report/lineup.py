@@ -7,8 +7,8 @@ import math
 from evolve.analysis.statistics import acuity_cpd, champions
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
+from evolve.learning.animal_task import embodied
 from evolve.learning.task_module import executed_task
-from evolve.learning.worlds import embodied
 from evolve.report.agent_figure import agent_figure
 from evolve.report.markup import Html, html, joined, rounded
 from evolve.store.candidate import Candidate
@@ -52,7 +52,7 @@ def _thinned(best: list[tuple[int, Candidate]]) -> list[tuple[int, Candidate]]:
 
 def azimuths(animal: Phenotype, config: RunConfig) -> list[float] | None:
     """Where a task of somebody's own places the animal's eyes [rad]; None: as rhabdom's own tasks do."""
-    own = config.own_task
+    own = config.choice.named_code
     if own is None:
         return None
     (kind,) = kinds_of(embodied(executed_task(own), animal, config))

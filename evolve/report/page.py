@@ -9,8 +9,6 @@ from functools import partial
 from evolve.analysis.genealogy import descent
 from evolve.analysis.statistics import acuity_cpd, champions, gene_values, generation_statistics, trajectory
 from evolve.analysis.vision import SCENES, Vision, vision
-from evolve.config.own_task import is_own
-from evolve.config.run_config import TASKS
 from evolve.genome.genes import CLUSTERS, Gene
 from evolve.report import tables
 from evolve.report.doing import Doing, in_silence
@@ -46,13 +44,11 @@ VISION = {
 
 def header(run: Run) -> Html:
     """Title, what was evolved, headline numbers."""
-    task, own = run.config.task_name, is_own(run.config.task)
-    name = task if own else task.capitalize()
-    aim = html("for {}, a task of one’s own", run.config.task) if own else html("to {}", TASKS[task])
+    card = run.config.card
     return html(
         '<header><p class="kicker">rhabdom · evolution report · {}</p>\n<h1>{}</h1>\n'
         "<p>Eyes and brains evolved {}. {}</p>\n</header>\n",
-        *(run.path.resolve().name, name, aim, _best_in_a_sentence(run)),
+        *(run.path.resolve().name, card.title, card.aim, _best_in_a_sentence(run)),
     )
 
 

@@ -14,7 +14,7 @@ from evolve.report.ground_plan import GroundPlan
 from evolve.report.markup import Html, document, exact, html, joined, json_script, key, look, rounded
 from evolve.report.picture import data_uri, display, film_sheet
 from evolve.store.atomic_files import write_whole
-from sim.envs.simulation import MAX_TURN
+from sim.physics.sliding_agents import MAX_TURN
 from sim.worlds.world import MAX_SPEED
 
 __all__ = ["episode_sentence", "player", "write_player"]
@@ -25,8 +25,7 @@ TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # as in player.js
 
 def write_player(episode: AnyEpisode, path: Path) -> Path:
     """Write the playable episode as a page of its own; returns its path."""
-    task = episode.task.rpartition(":")[2] if isinstance(episode, FilmedEpisode) else episode.task.capitalize()
-    name = f"{task}: candidate {episode.candidate_id} plays"
+    name = f"{episode.title}: candidate {episode.candidate_id} plays"
     body = html(
         '<header><p class="kicker">rhabdom · replay</p>\n<h1>{}</h1>\n<p>{}</p></header>\n{}',
         *(name, episode_sentence(episode), player(episode, stage_of(episode))),

@@ -18,7 +18,7 @@ from typing import Any
 
 from evolve.config.assemble import from_text
 from evolve.config.checks import ConfigError
-from evolve.config.own_task import OwnTask
+from evolve.config.task_code import TaskCode
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.training_stage import TrainingStage
 from evolve.search.job import ATTEMPTS, Job
@@ -53,7 +53,7 @@ class Order:
     ends: of the budget stages up to where it trains; () where budgets are not divided
     begun: (stage, checkpoint): where its training stands, if it has begun
     software: that the sender runs
-    own: file and text of a task of somebody's own; None: one of rhabdom's
+    code: file and text of a user's task; None: built-in tasks need none
     """
 
     function: str
@@ -66,15 +66,15 @@ class Order:
     software: Mapping[str, str]
     ends: tuple[int, ...] = ()
     begun: tuple[int, bytes] | None = None
-    own: tuple[str, str] | None = None
+    code: tuple[str, str] | None = None
 
 
 def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Order:
     """A job whose config is `toml`; `counter` and `topic` are names on the scheduler."""
     phenotype = json.dumps(job.phenotype.to_json())
-    task = job.config.own_task
-    own = None if task is None else (str(task.file), task.text)
-    order = Order(function, job.id, phenotype, toml, job.seed, counter, topic, _software(), own=own)
+    task = job.config.choice.named_code
+    code = None if task is None else (str(task.file), task.text)
+    order = Order(function, job.id, phenotype, toml, job.seed, counter, topic, _software(), code=code)
     if job.stage is None:
         return order
     kept = [(number, read(path)) for number, path in enumerate(job.stage.checkpoints[:-1]) if path.exists()]
@@ -123,9 +123,9 @@ def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:
 
 def _evaluate(function: Callable[..., Evaluation], order: Order, progress: Callable[[int, int], None]) -> Reply:
     config = from_text(order.config)
-    if order.own is not None:
-        file, text = order.own
-        config = replace(config, own=OwnTask(config.task_name, Path(file), text))
+    if order.code is not None:
+        file, text = order.code
+        config = replace(config, code=TaskCode(config.task_name, Path(file), text))
     phenotype = Phenotype.from_json(json.loads(order.phenotype))
     with TemporaryDirectory() as folder:
         policy = Path(folder) / f"{order.id:06d}"

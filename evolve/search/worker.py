@@ -102,8 +102,9 @@ def evaluate_candidate(
     from sim.scene.mirror import MirrorWarning
 
     with warnings.catch_warnings():
-        if config.own_task is not None:  # every candidate lives in its model: whoever began the run has been told
-            warnings.simplefilter("ignore", MirrorWarning)
+        warnings.simplefilter(
+            "ignore", MirrorWarning
+        )  # the same of every candidate: whoever began the run has been told
         return evaluate(phenotype, config, seed, policy_path, progress, stage)
 
 

@@ -95,7 +95,7 @@ class Run:
         except FileNotFoundError:
             raise RunError(f"{path} is no run: it holds no {CONFIG}") from None
         if task is not None:
-            config = config.with_own_task(task)
+            config = config.with_code(task)
         return cls(path, config, Record.read(path / CANDIDATES, config))
 
     @classmethod

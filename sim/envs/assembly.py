@@ -8,25 +8,23 @@ from dataclasses import replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-import drjit as dr
 import numpy as np
 
 from optics.numerics.arguments import shown, whole
 from optics.spectra.spectrum import Spectrum
-from sim.envs.auxiliary import checked
 from sim.envs.follow_camera import check_render_mode
-from sim.envs.simulation import Simulation, check_least_return
-from sim.envs.task_vec_env import TaskVecEnv
+from sim.envs.prepared_task import PreparedTask
 from sim.envs.vec_env import EyesVecEnv
 from sim.eyes.eyes import Eyes
-from sim.render.batched_renderer import BatchedRenderer
 from sim.render.fidelity import Fidelity, fidelity_asked
-from sim.render.fidelity_choice import chosen_fidelity
-from sim.render.world_scene import WorldScene
-from sim.scene.variation import Variation
+from sim.tasks.batch_task import BatchTask
 from sim.tasks.encounter import Encounter
+from sim.tasks.eye_kinds import auxiliary_of
+from sim.tasks.registry import task_of
 from sim.tasks.reward import check_mode
-from sim.tasks.user_task import Task
+from sim.tasks.simulation import check_least_return
+from sim.tasks.task import Task
+from sim.tasks.user_tasks import batched
 from sim.worlds.course import Course
 from sim.worlds.world import build_world
 
@@ -34,12 +32,13 @@ if TYPE_CHECKING:
     from sim.envs.parallel_env import EncounterEnv
 
 AUTO = "auto"
+OF_ENVIRONMENTS = {"task", "n_envs", "seed", "memory", "mode", "least_return", "episode_steps", "render_mode"}
 MOST = 1_000_000  # choice: of worlds and of frames, more than memory holds
 
 
 def make_vec_env(
-    task: str | Task | Encounter,
-    eyes: Eyes | None = None,
+    task: str | Task | BatchTask | Encounter,
+    eyes: Eyes | Mapping[str, Eyes] | None = None,
     n_envs: int = 64,
     seed: int | None = 0,
     *,
@@ -53,10 +52,10 @@ def make_vec_env(
     least_return: float | None = None,
     episode_steps: int | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
-    vary: Mapping[str, tuple[float, float]] | None = None,
+    vary: Mapping[str, tuple[Any, ...]] | None = None,
     auxiliary: Sequence[str] = (),
     render_mode: str | None = None,
-) -> EyesVecEnv | TaskVecEnv:
+) -> EyesVecEnv:
     """A batched environment of one task.
 
     task: one of `sim.TASKS`, or a `sim.Task` of one's own, which says all but n_envs, seed, memory, episode_steps
@@ -88,25 +87,26 @@ def make_vec_env(
     """
     if episode_steps is not None:
         _require_whole("episode_steps", episode_steps, 1)
-    if isinstance(task, type) and issubclass(task, Task):
+    how: dict[str, Any] = {"least_return": least_return, "episode_steps": episode_steps, "render_mode": render_mode}
+    if isinstance(task, type) and issubclass(task, Task | BatchTask):
         raise ValueError(f"task is the class {task.__name__}: must be an instance, such as {task.__name__}()")
-    if isinstance(task, Task | Encounter):
-        _refuse_for_tasks(locals())
+    if isinstance(task, Task | BatchTask | Encounter):
+        _refuse_for_tasks({name: value for name, value in locals().items() if name != "how"})
         _check(n_envs, seed, memory, mode, render_mode)
-        return TaskVecEnv(task, n_envs, seed, memory, render_mode, episode_steps)
+        prepared = PreparedTask(batched(task).in_mode(mode))
+        return prepared.vec_env(n_envs, seed, memory, **how)
     eyes = Eyes() if eyes is None else eyes
-    if not isinstance(eyes, Eyes):
-        raise ValueError(f"eyes = {shown(eyes)}: must be sim.Eyes or None, the default ones")
+    _require_eyes(eyes)
     asked = _fidelity_of(rays_per_receptor, fidelity, eyes)
     _require_whole("world_seed", world_seed, 0)
     _check(n_envs, seed, memory, mode, render_mode)
     check_least_return(least_return, mode)
-    variation = _dimmed(vary)
-    eyes = eyes if asked is None else replace(eyes, bands=asked.bands)
-    scene = prepared_scene(task, eyes, world_seed=world_seed, mazes=mazes, course=course, spectra=spectra)
-    how: dict[str, Any] = {"memory": memory, "mode": mode, "least_return": least_return, "render_mode": render_mode}
-    how |= {"episode_steps": episode_steps, "variation": variation, "auxiliary": checked(auxiliary, "auxiliary")}
-    return vec_env_in(scene, asked or chosen_fidelity(scene), n_envs, seed, **how)
+    if asked is not None:
+        eyes = in_bands(eyes, asked.bands)
+    world = build_world(task, seed=world_seed, mazes=mazes, course=course, spectra=spectra)
+    built_in = task_of(world, mode, eyes=eyes, fidelity=asked or AUTO)
+    built_in.vary, built_in.auxiliary = vary or None, auxiliary_of(auxiliary, "auxiliary")
+    return PreparedTask(built_in).vec_env(n_envs, seed, memory, **how)
 
 
 def make_parallel_env(
@@ -134,82 +134,48 @@ def make_parallel_env(
     return EncounterEnv(encounter, seed, memory, render_mode)
 
 
-def prepared_scene(
-    task: str,
-    eyes: Eyes,
-    *,
-    world_seed: int = 0,
-    mazes: int = 1,
-    course: str | Course = "short",
-    spectra: Mapping[str, Spectrum | str] | None = None,
-) -> WorldScene:
-    """A task's world made ready for given eyes; arguments as `make_vec_env` has them."""
-    return WorldScene(build_world(task, seed=world_seed, mazes=mazes, course=course, spectra=spectra), eyes)
+def in_bands(eyes: Eyes | Mapping[str, Eyes], bands: int) -> Any:
+    """The same eyes with this number of spectral bands."""
+    if isinstance(eyes, Eyes):
+        return replace(eyes, bands=bands)
+    return {name: replace(of_kind, bands=bands) for name, of_kind in eyes.items()}
 
 
-def vec_env_in(
-    scene: WorldScene,
-    fidelity: Fidelity,
-    n_envs: int,
-    seed: int | None,
-    *,
-    memory: int = 1,
-    mode: str = "training",
-    least_return: float | None = None,
-    episode_steps: int | None = None,
-    render_mode: str | None = None,
-    variation: Variation | None = None,
-    auxiliary: tuple[str, ...] = (),
-) -> EyesVecEnv:
-    """A batched environment in a scene that has been prepared, rendered as finely as is said; arguments as
-    `make_vec_env` has them.
-
-    Raises:
-        ValueError: a bad argument, and a fidelity for another number of bands than the scene's.
-    """
-    _check(n_envs, seed, memory, mode, render_mode)
-    threads = min(dr.thread_count(), n_envs)
-    world = scene.world if episode_steps is None else replace(scene.world, episode_steps=episode_steps)
-    simulation = Simulation(world, n_envs, seed, mode, threads, least_return)
-    return EyesVecEnv(
-        simulation, BatchedRenderer.of(scene, n_envs, fidelity), memory, render_mode, variation, auxiliary
-    )
-
-
-def _dimmed(vary: Mapping[str, tuple[float, float]] | None) -> Variation | None:
-    """What varies between episodes of rhabdom's own tasks."""
-    if not vary:
-        return None
-    variation = Variation(vary)
-    for name, given in variation.ranges.items():
-        if name != "light":
-            raise ValueError(f"vary: {name!r}: is for a sim.Task; rhabdom's own tasks vary 'light' alone")
-        if given[1] > 1:
-            raise ValueError(f"vary: light = {vary[name]!r}: must be at most 1, full daylight")
-    return variation
+def _require_eyes(eyes: Any) -> None:
+    kinds = eyes.values() if isinstance(eyes, Mapping) else [eyes]
+    if not kinds or not all(isinstance(of_kind, Eyes) for of_kind in kinds):
+        raise ValueError(f"eyes = {shown(eyes)}: must be sim.Eyes, several by name, or None, the default ones")
 
 
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
     """What a task of one's own says itself."""
     defaults = {name: p.default for name, p in inspect.signature(make_vec_env).parameters.items()}
-    for name in set(defaults) - {"task", "n_envs", "seed", "memory", "episode_steps", "render_mode"}:
+    for name in set(defaults) - OF_ENVIRONMENTS:
         if given[name] != defaults[name]:
             raise ValueError(f"{name} = {given[name]!r}: must be left out, a sim.Task says it itself")
 
 
 def _fidelity_of(
-    rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | str | None, eyes: Eyes
+    rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | str | None, eyes: Eyes | Mapping[str, Eyes]
 ) -> Fidelity | None:
     """What was asked for by either name; None: to be chosen."""
     chosen = isinstance(fidelity, str) and fidelity == AUTO
     if not (fidelity is None or chosen or isinstance(fidelity, Fidelity)):
         raise ValueError(f"fidelity = {shown(fidelity)}: must be a sim.Fidelity, {AUTO!r} or None")
-    asked = rays_per_receptor if isinstance(rays_per_receptor, Fidelity) else fidelity_asked(rays_per_receptor, eyes)
+    asked = (
+        rays_per_receptor
+        if isinstance(rays_per_receptor, Fidelity)
+        else fidelity_asked(rays_per_receptor, _first(eyes))
+    )
     if fidelity is None:
         return asked
     if asked is not None:
         raise ValueError(f"rays_per_receptor = {shown(rays_per_receptor)}: must be left out where a fidelity is given")
     return fidelity if isinstance(fidelity, Fidelity) else None
+
+
+def _first(eyes: Eyes | Mapping[str, Eyes]) -> Eyes:
+    return eyes if isinstance(eyes, Eyes) else next(iter(eyes.values()))
 
 
 def _check(n_envs: int, seed: int | None, memory: int, mode: str, render_mode: str | None) -> None:

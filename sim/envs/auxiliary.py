@@ -5,13 +5,12 @@ No animal knows these. They are exact, and for whoever trains: targets of auxili
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from gymnasium import spaces
 
-from optics.numerics.arguments import did_you_mean, items
-from sim.render.model_renderer import ModelRenderer
+from sim.render.labels import Labels
 from sim.render.optic_flow import flow_between
 from sim.scene.poses import Poses
 from sim.tasks.eye_kinds import AUXILIARY
@@ -31,7 +30,7 @@ class Auxiliary:
             was not before the eye then
     """
 
-    def __init__(self, renderer: ModelRenderer, names: Sequence[str], prefix: str = "") -> None:
+    def __init__(self, renderer: Labels, names: Sequence[str], prefix: str = "") -> None:
         self._renderer, self._names, self._prefix = renderer, tuple(names), prefix
         frame, geoms = (len(renderer.mounts), *renderer.eye.resolution), renderer.model.ngeom
         known: dict[str, spaces.Box] = {
@@ -64,19 +63,3 @@ class Auxiliary:
         before = now if self._before is None else self._before
         frames = self._renderer.eye_frames(now), self._renderer.eye_frames(before)
         return -np.nan_to_num(flow_between(self._renderer.eye, depth, ids, (now, before), frames), nan=0.0)
-
-
-def checked(names: Iterable[str], where: str) -> tuple[str, ...]:
-    """Names of what is wanted, in the order of AUXILIARY.
-
-    Raises:
-        ValueError: one is unknown; `where` it was asked for.
-    """
-    if isinstance(names, str):
-        raise ValueError(f"{where} = {names!r}: must be several names, such as ({names!r},)")
-    asked = items(where, names, str, repr(AUXILIARY[0]))
-    for name in asked:
-        if name not in AUXILIARY:
-            hint = did_you_mean(name, AUXILIARY) or f": must be of {', '.join(map(repr, AUXILIARY))}"
-            raise ValueError(f"{where}: {name!r}{hint}")
-    return tuple(name for name in AUXILIARY if name in asked)

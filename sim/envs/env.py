@@ -10,11 +10,10 @@ import numpy as np
 from optics.numerics.arguments import shown
 from sim.envs.assembly import make_vec_env
 from sim.envs.follow_camera import RENDER_MODES
-from sim.envs.vec_env import EyesVecEnv
 from sim.eyes.eyes import Eyes
+from sim.tasks.batch_task import BatchTask
 from sim.tasks.encounter import Encounter
-from sim.tasks.user_task import Task
-from sim.worlds.state import WorldState
+from sim.tasks.task import Task
 
 _OF_BATCHES = {"seed": "it goes to reset(seed=...)", "n_envs": "this is one world: make_vec_env has several"}
 
@@ -32,7 +31,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     metadata = {"render_modes": [*RENDER_MODES], "render_fps": 5}  # noqa: RUF012 (Gymnasium's own declaration)
 
     def __init__(
-        self, task: str | Task, eyes: Eyes | None = None, *, render_mode: str | None = None, **options: Any
+        self, task: str | Task | BatchTask, eyes: Eyes | None = None, *, render_mode: str | None = None, **options: Any
     ) -> None:
         if isinstance(task, Encounter):
             raise ValueError(
@@ -47,14 +46,8 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         self.action_space = self._batch.action_space
 
     @property
-    def state(self) -> WorldState:
-        """The world as it is now, a batch of one: of rhabdom's own tasks.
-
-        Raises:
-            RuntimeError: of a task of one's own, whose worlds are mjData.
-        """
-        if not isinstance(self._batch, EyesVecEnv):
-            raise RuntimeError("state: is for rhabdom's own tasks: `get_state` of make_vec_env says where others stand")
+    def state(self) -> Any:
+        """The world as it is now, a batch of one, in its physics' own type: of the built-in tasks a `WorldState`."""
         return self._batch.state
 
     def reset(
@@ -85,7 +78,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         self._batch.close()
 
 
-def make_env(task: str | Task, eyes: Eyes | None = None, **options: Any) -> EyesEnv:
+def make_env(task: str | Task | BatchTask, eyes: Eyes | None = None, **options: Any) -> EyesEnv:
     """A single environment; see `EyesEnv`."""
     return EyesEnv(task, eyes, **options)
 

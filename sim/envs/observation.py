@@ -3,32 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from gymnasium import spaces
-
-from sim.eyes.eyes import Eyes
 
 # Standard deviations of noise within which signals are said to stay: 1 in 1e23 draws does not.
 SIGMAS = 10.0
 ROUNDING = 1e-4  # of float32, as a share of the brightest signal
-
-
-def observation_space(eyes: Eyes, channels: int, memory: int, brightest: float, noise: float) -> spaces.Dict:
-    """Space of one world's observation. brightest: what a receptor reports of white facing all lights at once; as much
-    again may come from its surroundings. noise: the largest standard deviation."""
-    shape = (memory, eyes.n_eyes, channels, *eyes.resolution)
-    margin = SIGMAS * noise + ROUNDING * brightest
-    return spaces.Dict(
-        {
-            "eyes": spaces.Box(-margin, 2 * brightest + margin, shape, np.float32),
-            "contact": spaces.Box(0.0, 1.0, (1,), np.float32),
-            "previous_action": spaces.Box(-1.0, 1.0, (2,), np.float32),
-        }
-    )
-
-
-def action_space() -> spaces.Box:
-    """[0] forward speed: -1 = stop, +1 = full; [1] change of heading: ±1 = ±MAX_TURN, positive to the left."""
-    return spaces.Box(-1.0, 1.0, (2,), np.float32)
 
 
 class Memory:
@@ -84,6 +62,3 @@ class Memory:
         if self.frames == 1:
             return frame[:, None]
         return np.stack([*(past[worlds] for past in self._past[1:]), frame], axis=1)
-
-
-STANDING = (-1.0, 0.0)  # the "previous action" of an agent that has not moved yet: no speed, no turn

@@ -10,11 +10,14 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
 from optics.numerics.arguments import did_you_mean
+from sim.envs.animals import Animals
 from sim.envs.follow_camera import RENDER_MODES
-from sim.envs.task_animals import TaskAnimals
-from sim.envs.task_pictures import TaskPictures
-from sim.envs.task_worlds import StepOfWorld
+from sim.envs.prepared_task import PreparedTask
+from sim.envs.renderers import renderers_for
+from sim.envs.world_pictures import WorldPictures
 from sim.tasks.encounter import Encounter
+from sim.tasks.simulation import Simulation
+from sim.tasks.user_tasks import batched
 
 
 class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
@@ -29,9 +32,11 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
     def __init__(self, encounter: Encounter, seed: int | None, memory: int, render_mode: str | None) -> None:
         self.possible_agents, self.agents = list(encounter.names), list[str]()
         self.render_mode = render_mode
-        self._animals = TaskAnimals(encounter, 1, seed, memory)
-        self._pictures = TaskPictures(self._animals, render_mode)
-        self._only, self._begun = np.arange(1), False
+        task = batched(encounter)
+        simulation = Simulation(task, 1, seed)
+        self._animals = Animals(simulation, renderers_for(simulation, PreparedTask(task).fidelities, None), memory)
+        self._pictures = WorldPictures(self._animals, render_mode)
+        self._begun = False
         self.observation_spaces = self._named([senses.observation_space for senses in self._animals.learners])
         self.action_spaces = self._named([senses.action_space for senses in self._animals.learners])
 
@@ -48,7 +53,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         if seed is not None:
             self._animals.seed(seed)
         self.agents, self._begun = list(self.possible_agents), True
-        observations, varied = self._observed(self._animals.reset()), self._animals.worlds.told(0)
+        observations, varied = self._observed(self._animals.reset()), self._animals.simulation.told(0)
         return observations, {name: {"reward_terms": {}, "is_success": False, **varied} for name in self.agents}
 
     def step(
@@ -69,14 +74,18 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         self._require_begun()
         if not self.agents:
             return {}, {}, {}, {}, {}
-        outcomes = self._named(self._animals.act(self._commanded(actions)))
-        observations = self._observed(self._animals.remember(self._animals.look(self._only), self._only[:0]))
-        terminated = {name: outcome.terminated for name, outcome in outcomes.items()}
-        truncated = {name: outcome.truncated for name, outcome in outcomes.items()}
-        rewards = {name: float(sum(outcome.terms.values())) for name, outcome in outcomes.items()}
+        advanced = self._animals.advance(self._commanded(actions))
+        step, nobody = advanced.step, np.empty(0, int)
+        observations = self._observed(self._animals.remember(self._animals.seen(advanced), nobody))
+        terminated, truncated = self._named(step.terminated.tolist()), self._named(step.truncated.tolist())
+        rewards = self._named(step.reward.tolist())
         if any(terminated.values()) or any(truncated.values()):
             self.agents = []  # an episode ends for all
-        infos = {name: {**_info(one), **self._animals.worlds.told(0)} for name, one in outcomes.items()}
+        failure = {"failure": step.failure[0]} if step.failure else {}
+        infos = {
+            name: {"reward_terms": terms, "is_success": success, **failure, **self._animals.simulation.told(0)}
+            for name, terms, success in zip(self.possible_agents, step.terms.rows, step.success.tolist(), strict=True)
+        }
         return observations, rewards, terminated, truncated, infos
 
     def render(self) -> np.ndarray | list[np.ndarray] | None:
@@ -92,7 +101,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         return pictures[0] if self.render_mode == "rgb_array" else pictures
 
     def close(self) -> None:
-        self._animals.worlds.close()
+        self._animals.simulation.close()
 
     def _require_begun(self) -> None:
         if not self._begun:
@@ -119,8 +128,3 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
                 raise ValueError(f"actions: {name!r} has shape {action.shape}: must be {shape}")
             found.append(action[None])
         return found
-
-
-def _info(outcome: StepOfWorld) -> dict[str, Any]:
-    info: dict[str, Any] = {"reward_terms": outcome.terms, "is_success": outcome.success}
-    return info if outcome.failure is None else {**info, "failure": outcome.failure}

@@ -11,7 +11,8 @@ from typing import Any
 from optics.numerics.arguments import whole
 from sim.envs.env import EyesEnv
 from sim.envs.vector_env import EyesVectorEnv
-from sim.tasks.user_task import MOST_STEPS, Task
+from sim.tasks.task import Task
+from sim.tasks.task_settings import MOST_STEPS
 from sim.worlds.course import Course
 from sim.worlds.navigation import course_named
 

@@ -13,7 +13,7 @@ import gymnasium
 from sim.worlds.catalog import EPISODE_STEPS, TASKS
 
 if TYPE_CHECKING:
-    from sim.tasks.user_task import Task
+    from sim.tasks.task import Task
 
 IDS = {f"rhabdom/{task.capitalize()}-v0": task for task in TASKS}
 
@@ -36,7 +36,8 @@ def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
         ValueError: it is no task, or says no length.
     """
     from optics.numerics.arguments import whole
-    from sim.tasks.user_task import MOST_STEPS, Task
+    from sim.tasks.task import Task
+    from sim.tasks.task_settings import MOST_STEPS
 
     if not isinstance(task, Task) and not (isinstance(task, type) and issubclass(task, Task)):
         raise ValueError(f"register_task: task = {task!r:.80}: must be a sim.Task, or its class")

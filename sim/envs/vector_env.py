@@ -12,7 +12,7 @@ from sim.envs.assembly import make_vec_env
 from sim.envs.follow_camera import RENDER_MODES
 from sim.eyes.eyes import Eyes
 from sim.tasks.encounter import Encounter
-from sim.tasks.user_task import Task
+from sim.tasks.task import Task
 
 
 class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):

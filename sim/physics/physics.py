@@ -1,242 +1,71 @@
-"""The batched MuJoCo step: every world one action further, on as many threads as this process owns.
-
-The agent is a heavy body on two slide joints driven by velocity actuators; its heading is set, not simulated.
-Objects are mocap bodies that collide with nothing, so that physics need not know where they are. Agents that surely
-touch nothing during the action move in closed form (`sim.physics.free_motion`); the others are MuJoCo's, among the few
-geoms that they could touch (`sim.physics.local_contacts`).
-"""
+"""What moves the worlds of a batch: the protocol that tasks, environments and renderers rely on."""
 
 from __future__ import annotations
 
-import copy
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
 
-from sim.physics.free_motion import free_motion_of
-from sim.physics.local_contacts import local_contacts_of
-from sim.physics.mujoco_batch import BatchedStep
-from sim.worlds.state import WorldState
-from sim.worlds.world import MAX_SPEED, World
+from sim.scene.poses import Poses
+from sim.scene.variation import Drawn
 
-SUBSTEPS = 10  # of the model's timestep per action, as published
-UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s]: no actuator can do that
-FEW_GEOMS = 200  # so few are sooner gone through one by one than by MuJoCo's tree of boxes
+__all__ = ["Physics"]
 
 
-@dataclass(frozen=True)
-class Motion:
-    """One action's motion of the agents.
+class Physics(Protocol):
+    """All worlds of a batch: where everything is, and how it moves on.
 
-    path: at the end of each substep [m], (n, substep, 2) · velocity at the last [m/s], (n, 2)
-    contact: touched anything in any substep, (n,) bool
-    unstable: the simulation broke down: path and velocity are the last good ones, (n,) bool
+    model: that renderers are built of · n: number of worlds · seconds: that one action lasts
+    chance: random streams of the worlds, set by whoever seeds them
+    varied: names of geoms whose size, colour or material differs between worlds, and of their materials
     """
 
-    path: np.ndarray
-    velocity: np.ndarray
-    contact: np.ndarray
-    unstable: np.ndarray
+    model: mujoco.MjModel
+    n: int
+    seconds: float
+    varied: Mapping[str, tuple[str, ...]]
+    chance: Any
 
-    def put(self, worlds: np.ndarray, motion: Motion) -> None:
-        """Set the motion of these worlds, in place: only while the whole is being put together."""
-        for name, array in vars(self).items():
-            array[worlds] = getattr(motion, name)
+    @property
+    def state(self) -> Any:
+        """All worlds as they are now, in this physics' own type."""
 
+    def begin(self, world: int, drawn: Mapping[str, Drawn]) -> None:
+        """Reset one world before its task starts an episode; drawn: values of what varies between episodes."""
 
-@dataclass(frozen=True)
-class Agents:
-    """Where agents are [m], (n, 2), their headings [rad], (n,), and velocities [m/s], (n, 2)."""
+    def settle(self, worlds: np.ndarray) -> None:
+        """Compute where everything is after the task has started episodes in these worlds."""
 
-    position: np.ndarray
-    heading: np.ndarray
-    velocity: np.ndarray
+    def adopt_changed_model(self) -> bool:
+        """Whether the first episode's start changed the model; each world then gets a model of its own."""
 
-    def take(self, some: np.ndarray) -> Agents:
-        return Agents(self.position[some], self.heading[some], self.velocity[some])
+    def watch(self) -> None:
+        """Remember what a task must not change during a step."""
 
+    def check(self, whose: str) -> None:
+        """Compare with what `watch` remembered.
 
-class Physics:
-    """Batched physics of one world's model.
+        Raises:
+            RuntimeError: the task changed the model that all worlds share.
+        """
 
-    threads: of MuJoCo's batched step, see `sim.physics.mujoco_batch`
-    closed_form: whether agents out of reach of everything move in closed form, and those near something among that
-        alone (`.free_motion`, `.local_contacts`: how, None where they cannot); otherwise everything is MuJoCo's, in the
-        whole world
+    def step(self, skipped: Collection[int]) -> dict[int, str]:
+        """Move all worlds on by one action, except skipped ones; returns why worlds broke down, by world."""
 
-    Raises:
-        ValueError: a model without the agent's joints, actuators and touch sensor, and for objects that could collide.
-    """
+    def poses(self) -> Poses:
+        """Where everything is now."""
 
-    def __init__(self, world: World, threads: int, closed_form: bool = True) -> None:
-        model = _without_detours(world.model)
-        self._model = model
-        self._step_batch = BatchedStep(model, threads)
-        self._columns = _Columns.of(model)
-        self._actuators = [_actuator(model, joint) for joint in ("agent_x", "agent_y")]
-        self._touch = _touch_columns(model)
-        _check_objects(model, world.objects)
-        self._start = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
-        mujoco.mj_getState(model, mujoco.MjData(model), self._start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        self.seconds = SUBSTEPS * model.opt.timestep
-        agent = int(model.jnt_bodyid[_joint(model, "agent_x")])
-        self.free_motion = free_motion_of(model, agent, self._untouched, MAX_SPEED) if closed_form else None
-        self.local_contacts = local_contacts_of(world, model, self.free_motion, threads)
+    def held(self) -> dict[str, np.ndarray]:
+        """All that the future depends on, as arrays whose first axis is the world.
 
-    def step(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
-        """One action: SUBSTEPS with the commanded velocity [m/s] (n, 2) held."""
-        if self.free_motion is None:
-            return self._simulate(agents, velocity)
-        path, speed = self.free_motion(agents.velocity, velocity)
-        met = self.free_motion.met(agents.position, path)
-        free = ~met.any(axis=1) & self.free_motion.obeys(velocity)
-        # False for NaN, too: MuJoCo tells what it makes of that.
-        free &= (np.abs(agents.velocity) < UNSTABLE_SPEED).all(axis=-1)
-        n = len(velocity)
-        motion = Motion(agents.position[:, None] + path, speed, np.zeros(n, bool), np.zeros(n, bool))
-        near = np.flatnonzero(~free)
-        if len(near):
-            motion.put(near, self._near(agents.take(near), velocity[near], met[near]))
-        return motion
+        Raises:
+            RuntimeError: the model has features whose state MuJoCo does not report.
+        """
 
-    def _near(self, agents: Agents | WorldState, velocity: np.ndarray, met: np.ndarray) -> Motion:
-        """Of agents that may touch something, each among what it may meet. Where that is too much, where something
-        turns it aside to where it could meet more, and where it breaks down, it is done again in the whole world."""
-        if self.local_contacts is None:
-            return self._simulate(agents, velocity)
-        few = self.local_contacts.few(met)
-        motion = self._motion(agents.position, *self.local_contacts.step(few, *self._start_of(agents, velocity)))
-        strayed = self.local_contacts.strayed(agents.position, motion.path - agents.position[:, None], few)
-        again = np.flatnonzero(strayed | motion.unstable)
-        if len(again):
-            motion.put(again, self._simulate(agents.take(again), velocity[again]))
-        return motion
-
-    def _simulate(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
-        """MuJoCo's step, in the whole world."""
-        models = [self._model] * len(velocity)
-        return self._motion(agents.position, *self._step_batch(models, *self._start_of(agents, velocity)))
-
-    def _start_of(self, agents: Agents | WorldState, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """MuJoCo's states (n, ...), and controls (n, substep, nu) that hold a commanded velocity [m/s] (n, 2)."""
-        initial = self._initial(len(velocity))
-        initial[:, self._columns.position] = agents.position - self._columns.origin
-        initial[:, self._columns.heading] = agents.heading
-        initial[:, self._columns.velocity] = agents.velocity
-        return initial, self._control(velocity)
-
-    def _initial(self, n: int) -> np.ndarray:
-        return np.repeat(self._start[None], n, axis=0)
-
-    def _control(self, velocity: np.ndarray) -> np.ndarray:
-        control = np.zeros((len(velocity), SUBSTEPS, self._model.nu))
-        control[:, :, self._actuators] = velocity[:, None]
-        return control
-
-    def _untouched(
-        self, speed: np.ndarray, command: np.ndarray, displacement: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """What MuJoCo makes of speeds and commands (n, 2) with contacts off: see sim.physics.free_motion.Run."""
-        model = copy.copy(self._model)
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-        initial = self._initial(len(speed))
-        initial[:, self._columns.position] += displacement
-        initial[:, self._columns.velocity] = speed
-        states, _ = BatchedStep(model, 1)([model] * len(speed), initial, self._control(command))
-        path = states[:, :, self._columns.position] - initial[:, None, self._columns.position]
-        return path, states[:, :, self._columns.velocity]
+    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        """Inverse of `held`, for these worlds."""
 
     def close(self) -> None:
-        """Stop the thread pool."""
-        self._step_batch.close()
-        if self.local_contacts:
-            self.local_contacts.close()
-
-    def _motion(self, position: np.ndarray, states: np.ndarray, sensors: np.ndarray) -> Motion:
-        path = states[:, :, self._columns.position] + self._columns.origin
-        velocity = states[:, -1, self._columns.velocity].copy()
-        # MuJoCo resets a world that broke down, and its clock with it.
-        due = self._start[0] + self.seconds
-        unstable = ~np.isfinite(states[:, -1]).all(axis=-1)  # an earlier state that is not sets the clock back
-        unstable |= np.abs(states[:, -1, 0] - due) > self._model.opt.timestep / 2
-        unstable |= ~(np.abs(velocity) < UNSTABLE_SPEED).all(axis=-1)
-        contact = np.asarray((sensors[:, :, self._touch] > 0).reshape(len(states), -1).any(axis=1))
-        if unstable.any():
-            path[unstable] = np.nan_to_num(position)[unstable, None]
-            velocity = np.where(unstable[:, None], 0.0, velocity)
-            contact = contact & ~unstable
-        return Motion(path, velocity, contact, unstable)
-
-
-@dataclass(frozen=True)
-class _Columns:
-    """Where the agent is in MuJoCo's full physics state, and where its slide joints are zero [m]."""
-
-    position: slice | list[int]
-    heading: int
-    velocity: slice | list[int]
-    origin: np.ndarray
-
-    @classmethod
-    def of(cls, model: mujoco.MjModel) -> _Columns:
-        qpos = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
-        qvel = qpos + mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_QPOS)
-        joints = [_joint(model, name) for name in ("agent_x", "agent_y", "agent_heading")]
-        body = model.jnt_bodyid[joints[0]]
-        return cls(
-            position=_columns([qpos + int(model.jnt_qposadr[j]) for j in joints[:2]]),
-            heading=qpos + int(model.jnt_qposadr[joints[2]]),
-            velocity=_columns([qvel + int(model.jnt_dofadr[j]) for j in joints[:2]]),
-            origin=model.body_pos[body, :2] - model.qpos0[[int(model.jnt_qposadr[j]) for j in joints[:2]]],
-        )
-
-
-def _without_detours(model: mujoco.MjModel) -> mujoco.MjModel:
-    """The same model, without two of MuJoCo's preparations that pay only where much is in contact: a tenth to a fifth
-    of an agent's time at a wall, and the same motion bit for bit."""
-    lean = copy.copy(model)
-    lean.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
-    if model.ngeom <= FEW_GEOMS:
-        lean.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
-    return lean
-
-
-def _joint(model: mujoco.MjModel, name: str) -> int:
-    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
-    if joint < 0:
-        raise ValueError(f"the model has no joint {name!r}, which every agent needs")
-    return joint
-
-
-def _actuator(model: mujoco.MjModel, joint_name: str) -> int:
-    joint = _joint(model, joint_name)
-    driving = np.flatnonzero(
-        (model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT) & (model.actuator_trnid[:, 0] == joint)
-    )
-    if len(driving) != 1:
-        raise ValueError(f"joint {joint_name!r} has {len(driving)} actuators, needs one (velocity)")
-    return int(driving[0])
-
-
-def _columns(wanted: list[int]) -> slice | list[int]:
-    """Columns of an array; where they are side by side, without a copy."""
-    side_by_side = wanted == list(range(wanted[0], wanted[0] + len(wanted)))
-    return slice(wanted[0], wanted[-1] + 1) if side_by_side else wanted
-
-
-def _touch_columns(model: mujoco.MjModel) -> slice | list[int]:
-    touch = np.flatnonzero(model.sensor_type == mujoco.mjtSensor.mjSENS_TOUCH)
-    if not len(touch):
-        raise ValueError("the model has no touch sensor on the agent")
-    return _columns([int(model.sensor_adr[i]) for i in touch])
-
-
-def _check_objects(model: mujoco.MjModel, names: tuple[str, ...]) -> None:
-    for name in names:
-        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-        if body < 0 or model.body_mocapid[body] < 0:
-            raise ValueError(f"object {name!r} is not a mocap body of the model")
-        geoms = model.geom_bodyid == body
-        if (model.geom_contype[geoms] | model.geom_conaffinity[geoms]).any():
-            raise ValueError(f"object {name!r} collides; physics moves the agent alone")
+        """Stop threads."""

@@ -24,6 +24,5 @@ random_views        the views that they look through
 model_fidelity      choose_model_fidelity: how many rays eyes on a model need
 memory_budget       whether there is memory for it
 receptor_noise      noise for all worlds at once
-noisy_signals       signals with that noise
 pending_frame       frames that are begun early and waited for late
 """

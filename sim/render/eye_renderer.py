@@ -9,11 +9,12 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import drjit as dr
 import numpy as np
 
+import optics
 from optics.numerics.arguments import whole
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.allowed_error import allowed_error
@@ -22,14 +23,14 @@ from sim.eyes.sensor import Sensor
 from sim.render.area_kernel import AreaKernel
 from sim.render.edge_rays import FIRST, EdgeRays
 from sim.render.fidelity import AREAS, EDGES, Fidelity
+from sim.render.labels import Labels
 from sim.render.light_factors import LightFactors
 from sim.render.memory_budget import Demand, check_memory
 from sim.render.pending_frame import FrameSlot, PendingFrame
-from sim.render.prepared_scene import PreparedScene
+from sim.render.prepared_scene import Placed, PreparedScene
 from sim.render.ray_kernel import KernelInputs, Moving, RayKernel, launched
 from sim.render.receptor_noise import FEW
 from sim.render.renderable import check_renderable
-from sim.scene.poses import Poses
 from sim.scene.variant import variant
 from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.eye_places import EyeFrames
@@ -75,11 +76,12 @@ class EyeRenderer:
         self.brightest = self.brightest_in(np.ones(len(self._white)))
         self._set_width(n_envs)
 
-    def resized(self, n_envs: int) -> EyeRenderer:
+    def resized(self, n_envs: int) -> Self:
         """The same eyes and scene for another number of worlds; the scene is shared, not loaded again."""
         other = copy.copy(self)
         other._check_memory(n_envs, other._samples_per_receptor)
-        other.__dict__.pop("_few", None)
+        for of_width in ("_few", "labels"):
+            vars(other).pop(of_width, None)
         other._set_width(n_envs)
         return other
 
@@ -118,11 +120,13 @@ class EyeRenderer:
 
     # --- what is seen
 
-    def signals(self, poses: Poses, light: np.ndarray | None = None) -> np.ndarray:
+    def signals(self, poses: Placed, light: np.ndarray | None = None) -> np.ndarray:
         """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
         a² sum_b weights[channel, b] radiance_b.
 
-        poses: of every world · light: what all lights of each world are multiplied by, (env, band); None: nothing
+        poses: of every world, after mj_forward or mj_step: its data, or arrays stacked over worlds; the data of an only
+            world need not be in a list; of built-in worlds their state, too
+        light: what all lights of each world are multiplied by, (env, band); None: nothing
 
         Raises:
             ValueError: another number of worlds, another model's poses, poses that are not finite or not known yet,
@@ -130,26 +134,26 @@ class EyeRenderer:
         """
         return self.begin(poses, light).wait()
 
-    def begin(self, poses: Poses, light: np.ndarray | None = None) -> PendingFrame:
+    def begin(self, poses: Placed, light: np.ndarray | None = None) -> PendingFrame:
         """Begin to see; it runs beside whatever comes next, until the signals are waited for."""
         factors = None if light is None else LightFactors.of(light, (self.n_envs, self.eye.bands))
         return self._launched(poses).then(lambda found: self._signals(found, factors))
 
-    def begin_some(self, poses: Poses, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
+    def begin_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
         """Begin to see these of the worlds alone, (len(worlds), eye, channel, height, width); if they are few, beside a
         look at all that is under way."""
         if not len(worlds) <= FEW < self.n_envs:
             return self.begin(poses, light).then(lambda seen: seen[worlds])
         few = np.resize(worlds, FEW)
-        seen = self._few.begin(poses.take(few), None if light is None else np.asarray(light)[few])
+        seen = self._few.begin(self.scene.placed(poses).take(few), None if light is None else np.asarray(light)[few])
         return seen.then(lambda signals: signals[: len(worlds)])
 
     @cached_property
-    def _few(self) -> EyeRenderer:
+    def _few(self) -> Self:
         """For a few of the worlds."""
         return self.resized(FEW)
 
-    def receptor_radiance(self, poses: Poses) -> np.ndarray:
+    def receptor_radiance(self, poses: Placed) -> np.ndarray:
         """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
         bands, (height, width) = self.eye.bands, self.eye.resolution
         layers = self._components(self._launched(poses).wait())
@@ -157,19 +161,41 @@ class EyeRenderer:
         sums = sums.reshape(len(layers) * bands, self.n_envs * len(self.mounts), -1)
         return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, len(self.mounts), height, width)
 
-    def radiance(self, poses: Poses) -> np.ndarray:
+    def radiance(self, poses: Placed) -> np.ndarray:
         """Spectral radiance along every ray, (env, eye, ray, band) float32."""
         layers = self._components(self._launched(poses, self._rays).wait())
         rays = np.einsum("lkn,kb->nb", layers, self.tracer.basis.astype(np.float32))
         return rays.reshape(self.n_envs, len(self.mounts), -1, self.eye.bands)
 
-    def eye_frames(self, poses: Poses) -> EyeFrames:
+    def eye_frames(self, poses: Placed) -> EyeFrames:
         """Where the eyes are."""
-        return self.scene.places.frames(poses)
+        return self.scene.places.frames(self.scene.placed(poses))
+
+    @cached_property
+    def labels(self) -> Labels:
+        """What receptors look at, as exact numbers."""
+        return Labels(self.scene, self.n_envs)
+
+    def depth(self, poses: Placed) -> np.ndarray:
+        """See `Labels.depth`."""
+        return self.labels.depth(poses)
+
+    def ids(self, poses: Placed) -> np.ndarray:
+        """See `Labels.ids`."""
+        return self.labels.ids(poses)
+
+    def flow(self, poses: Placed, later: Placed) -> np.ndarray:
+        """See `Labels.flow`."""
+        return self.labels.flow(poses, later)
 
     def brightest_in(self, light: np.ndarray) -> float:
         """`brightest` where all lights are multiplied by this, (band,)."""
         return float((self.eye.throughput * self.eye.spectral_bands.weights @ (self._white * light)).max())
+
+    @property
+    def bands(self) -> optics.SpectralBands:
+        """Of the eyes."""
+        return self.eye.spectral_bands
 
     @property
     def moving(self) -> int:
@@ -191,20 +217,23 @@ class EyeRenderer:
     def recordings(self) -> int:
         """How often the kernels were recorded: once per kernel in use, up to three times where meshes move."""
         edges = 0 if self._edges is None else self._edges.recordings
-        return int(self._rays.n_recordings + self._sums.n_recordings) + edges
+        labels = vars(self).get("labels")
+        recorded = int(self._rays.n_recordings + self._sums.n_recordings) + edges
+        return recorded + (0 if labels is None else labels.recordings)
 
     # --- kernels
 
-    def _launched(self, poses: Poses, frozen: Any = None) -> PendingFrame:
+    def _launched(self, poses: Placed, frozen: Any = None) -> PendingFrame:
         """Kernels at work on these worlds: receptors' sums, or another frozen one."""
-        self.scene.check_poses(poses, self.n_envs)
+        placed = self.scene.placed(poses)
+        self.scene.check_poses(placed, self.n_envs)
 
         def start(kernel: Any, inputs: KernelInputs) -> Callable[[], np.ndarray]:
             return launched(kernel, self.tracer.scene, self._moving.frame, inputs, self.scene.variant)
 
         def launch() -> Callable[[], np.ndarray]:
             with variant(self.scene.variant):
-                self._moving.fill(poses)
+                self._moving.fill(placed)
             if frozen is None and self._edges is not None:
                 return self._edges.launch(start)
             return start(self._sums if frozen is None else frozen, self._inputs)

@@ -14,9 +14,8 @@ from sim.eyes.sampling import directions_of
 from sim.render.eye_rays import FreeEyes
 from sim.render.optic_flow import flow_between, receptor_centres
 from sim.render.pending_frame import FrameSlot
-from sim.render.prepared_scene import PreparedScene
+from sim.render.prepared_scene import Placed, PreparedScene
 from sim.render.ray_kernel import Frame, KernelInputs, Moving, RayKernel, launched
-from sim.scene.poses import Poses
 from sim.scene.variant import variant
 from sim.tracing.eye_places import EyeFrames
 from sim.tracing.model_tracer import ModelTracer, Scenes
@@ -49,41 +48,43 @@ class Labels:
         self._distances: Any = dr.freeze(distances)
         self._hits: Any = dr.freeze(hits)
 
-    def depth(self, poses: Poses) -> np.ndarray:
+    def depth(self, poses: Placed) -> np.ndarray:
         """How far what each receptor's centre looks at is, along the eye's axis [m], (env, eye, height, width) float32;
         infinite where there is nothing."""
         return self._seen(self._distances, self._scenes, poses)
 
-    def ids(self, poses: Poses) -> np.ndarray:
+    def ids(self, poses: Placed) -> np.ndarray:
         """Which geom each receptor's centre looks at, (env, eye, height, width) int32; -1 where there is nothing."""
         scene = self.scene.scene
         apart, geoms = scene.told_apart
         found = self._seen(self._hits, Scenes(apart, self._scenes.meshes), poses).astype(int)
         return np.concatenate([scene.movers.geoms, geoms])[found].astype(np.int32)
 
-    def flow(self, poses: Poses, later: Poses) -> np.ndarray:
+    def flow(self, poses: Placed, later: Placed) -> np.ndarray:
         """Optic flow from one moment to another: by how much what each receptor's centre looks at has moved on the
         retina, to the right and down [receptors], (env, eye, 2, height, width) float32; NaN where there is nothing, or
         where it is no longer before the eye."""
-        self.scene.check_poses(later, self.n_envs)
-        frames = self.eye_frames(poses), self.eye_frames(later)
-        return flow_between(self.eye, self.depth(poses), self.ids(poses), (poses, later), frames)
+        moments = self.scene.placed(poses), self.scene.placed(later)
+        self.scene.check_poses(moments[1], self.n_envs)
+        frames = self.eye_frames(moments[0]), self.eye_frames(moments[1])
+        return flow_between(self.eye, self.depth(moments[0]), self.ids(moments[0]), moments, frames)
 
-    def eye_frames(self, poses: Poses) -> EyeFrames:
+    def eye_frames(self, poses: Placed) -> EyeFrames:
         """Where the eyes are."""
-        return self.scene.places.frames(poses)
+        return self.scene.places.frames(self.scene.placed(poses))
 
     @property
     def recordings(self) -> int:
         """How often the kernels were recorded."""
         return int(self._distances.n_recordings + self._hits.n_recordings)
 
-    def _seen(self, kernel: Any, scenes: Scenes, poses: Poses) -> np.ndarray:
-        self.scene.check_poses(poses, self.n_envs)
+    def _seen(self, kernel: Any, scenes: Scenes, poses: Placed) -> np.ndarray:
+        placed = self.scene.placed(poses)
+        self.scene.check_poses(placed, self.n_envs)
 
         def launch() -> Callable[[], np.ndarray]:
             with variant(self.scene.variant):
-                self._moving.fill(poses)
+                self._moving.fill(placed)
             return launched(kernel, scenes, self._moving.frame, self._inputs, self.scene.variant)
 
         found = self._slot.begin(launch).wait()

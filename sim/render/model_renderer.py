@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
-from typing import TypeAlias
 
 import mujoco
-import numpy as np
 
 import optics
 from optics.numerics.arguments import of_kind, whole
@@ -16,18 +13,13 @@ from optics.spectra.spectrum import Spectrum
 from sim.eyes.mounts import Mount, mounts_of
 from sim.render.eye_renderer import MOST_ENVS, EyeRenderer
 from sim.render.fidelity import AREAS, Fidelity
-from sim.render.labels import Labels
-from sim.render.pending_frame import PendingFrame
 from sim.render.prepared_scene import PreparedScene
 from sim.render.renderable import check_renderable
 from sim.scene import source
 from sim.scene.appearances import Varied
 from sim.scene.mirror import VISIBLE_GROUPS
-from sim.scene.poses import Poses
-from sim.tracing.eye_places import EyeFrames
 
 SIXTEEN = 16  # rays per receptor
-Worlds: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData  # where everything is in all of them
 
 
 class ModelRenderer(EyeRenderer):
@@ -88,48 +80,3 @@ class ModelRenderer(EyeRenderer):
             tracer=tracer,
         )
         super().__init__(scene, n_envs, fidelity)
-
-    def signals(self, poses: Worlds, light: np.ndarray | None = None) -> np.ndarray:
-        """See `EyeRenderer.signals`.
-
-        poses: of every world, after mj_forward or mj_step: its data, or arrays stacked over worlds; the data of an only
-            world need not be in a list
-        """
-        return super().signals(_placed(poses), light)
-
-    def begin(self, poses: Worlds, light: np.ndarray | None = None) -> PendingFrame:
-        """Begin to see; it runs beside whatever comes next, until the signals are waited for."""
-        return super().begin(_placed(poses), light)
-
-    def receptor_radiance(self, poses: Worlds) -> np.ndarray:
-        """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
-        return super().receptor_radiance(_placed(poses))
-
-    def depth(self, poses: Worlds) -> np.ndarray:
-        """See `Labels.depth`."""
-        return self._labels.depth(_placed(poses))
-
-    def ids(self, poses: Worlds) -> np.ndarray:
-        """See `Labels.ids`."""
-        return self._labels.ids(_placed(poses))
-
-    def flow(self, poses: Worlds, later: Worlds) -> np.ndarray:
-        """See `Labels.flow`."""
-        return self._labels.flow(_placed(poses), _placed(later))
-
-    def eye_frames(self, poses: Worlds) -> EyeFrames:
-        """Pupils [m] (world, eye, 3) and eyes' frames (world, eye, 3, 3), columns (right, up, ahead)."""
-        return super().eye_frames(_placed(poses))
-
-    @property
-    def recordings(self) -> int:
-        """How often the kernels were recorded: once per kernel in use, up to three times where meshes move."""
-        return super().recordings + (self._labels.recordings if "_labels" in vars(self) else 0)
-
-    @cached_property
-    def _labels(self) -> Labels:
-        return Labels(self.scene, self.n_envs)
-
-
-def _placed(poses: Worlds) -> Poses:
-    return poses if isinstance(poses, Poses) else Poses.of(poses)

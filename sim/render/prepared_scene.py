@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
@@ -26,6 +27,8 @@ from sim.tracing.eye_places import EyePlaces, LevelStand
 from sim.tracing.model_scene import ModelScene
 from sim.tracing.tracer import Tracer, Tracers
 from sim.tracing.upright_scene import UprightScene
+
+Placed: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData | Any  # where everything is in all worlds
 
 
 class PreparedScene:
@@ -137,6 +140,10 @@ class PreparedScene:
             self._samplings[depth] = eye_sampling(self.eye, depth)
         found = self._samplings[depth]
         return replace(found, tolerance=tolerance) if isinstance(found, FieldSampling) else found
+
+    def placed(self, poses: Placed) -> Poses:
+        """Where everything is, as arrays."""
+        return poses if isinstance(poses, Poses) else Poses.of(poses)
 
     def check_poses(self, poses: Poses, n_envs: int) -> None:
         """Refuse what cannot be rendered.

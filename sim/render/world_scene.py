@@ -6,12 +6,15 @@ import numpy as np
 
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.eyes.mounts import ring
-from sim.render.prepared_scene import PreparedScene
+from sim.render.prepared_scene import Placed, PreparedScene
 from sim.scene.moved_bodies import MovedBodies, ReferencePose
+from sim.scene.poses import Poses
 from sim.tracing import lighting
 from sim.tracing.eye_places import LevelStand
 from sim.worlds.state import WorldState
 from sim.worlds.world import World
+
+OUTSIDE = 1e-6  # of the radius: how far above the skin free eyes are, so that rounding does not put them below
 
 
 class WorldScene(PreparedScene):
@@ -27,7 +30,7 @@ class WorldScene(PreparedScene):
 
     def __init__(self, world: World, eyes: Eyes, tracer: str = "auto") -> None:
         self.world, self.eyes = world, eyes
-        mounts = ring("agent", eyes.n_eyes, eyes.placement_range_deg, BODY_RADIUS)
+        mounts = ring("agent", eyes.n_eyes, eyes.placement_range_deg, BODY_RADIUS * (1 + OUTSIDE))
         azimuths, body = eyes.azimuths(), int(world.model.body("agent").id)
         stand = LevelStand(body, EYE_HEIGHT, eye_positions(azimuths), eye_rotations(azimuths))
         super().__init__(world.model, eyes.eye(), mounts, spectra=world.spectra, tracer=tracer, stand=stand)
@@ -35,6 +38,10 @@ class WorldScene(PreparedScene):
         bodies = [body, *(int(world.model.body(name).id) for name in world.objects)]
         self._reference = ReferencePose(world.model, bodies)
         self._turns = self._reference.poses.xmat[0, bodies]
+
+    def placed(self, poses: Placed | WorldState) -> Poses:
+        """Where everything is, as arrays; of a state, too."""
+        return self.poses(poses) if isinstance(poses, WorldState) else super().placed(poses)
 
     def poses(self, state: WorldState) -> MovedBodies:
         """Where everything is in these worlds."""

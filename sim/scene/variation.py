@@ -99,6 +99,11 @@ class Variation:
         """What of it is light's."""
         return tuple(name for name in self.ranges if name in (LIGHT, TEMPERATURE))
 
+    @property
+    def of_looks(self) -> bool:
+        """Whether sizes, colours or materials differ."""
+        return any(kind_of(name) in (SIZE, COLOR, MATERIAL) for name in self.ranges)
+
     def light(self, values: Mapping[str, np.ndarray], wavelengths: np.ndarray) -> np.ndarray | None:
         """What lights are multiplied by, (world, band) float32; None: nothing. values: by name, of each world ·
         wavelengths [m]"""

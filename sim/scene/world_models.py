@@ -8,8 +8,7 @@ has a density weighs by its volume, what was given a mass keeps it. A world's mo
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -80,16 +79,17 @@ class WorldModels:
         """Whether the model that worlds share is no longer as it was compiled."""
         return not self.own and self.held(0) != self._compiled
 
-    @contextmanager
-    def left_alone(self, whose: str) -> Iterator[None]:
-        """While tasks do what they do; whose: what a message begins with. An only world's model is its own as soon as a
-        task changes it.
+    def noted(self) -> bytes:
+        """The model that several worlds share, as it is now; nothing if each has its own."""
+        return b"" if self.own else self.held(0)
+
+    def require_unchanged(self, before: bytes, whose: str) -> None:
+        """Compare with what `noted` returned; whose: what a message begins with. If there is only one world, its model
+        becomes its own as soon as a task changes it.
 
         Raises:
-            RuntimeError: the model that several worlds share is no longer as before.
+            RuntimeError: the model that several worlds share has changed.
         """
-        before = b"" if self.own else self.held(0)
-        yield
         if self.own or self.held(0) == before:
             return
         self.own = len(self.models) == 1

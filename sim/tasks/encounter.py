@@ -13,7 +13,8 @@ import numpy as np
 
 from optics.numerics.arguments import did_you_mean, of_kind
 from sim.physics.controls import actuator_names
-from sim.tasks.user_task import Task
+from sim.tasks.batch_task import BatchTask
+from sim.tasks.task import Task
 
 FRAMES_AXES = 5  # memory, eye, channel, height, width: of what eyes see in an observation, and of nothing else
 SAID_BY_ANY = ("spectra", "vary")  # what belongs to the world, too, and may be left to one animal
@@ -167,6 +168,12 @@ def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
     if not animals:
         raise ValueError(f"{where}: no animals: must be one sim.Task at least")
     for animal in animals:
+        given: object = animal
+        if isinstance(given, str | BatchTask):
+            label = given if isinstance(given, str) else type(given).__name__
+            raise ValueError(
+                f"{where}: {label!r} has the body of one agent: must be a sim.Task, whose model has several"
+            )
         of_kind(where, animal, Task, "Prey()")
     names = [name_of(animal) for animal in animals]
     first, first_name = animals[0], names[0]

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import optics
-from optics.numerics.arguments import of_kind
+from optics.numerics.arguments import did_you_mean, items, of_kind
 from sim.eyes.mounts import Mount, mounts_of
 from sim.render.fidelity import Fidelity
 
 if TYPE_CHECKING:
-    from sim.tasks.user_task import Task
+    from sim.tasks.task_settings import TaskSettings
 
 EYES = "eyes"  # what an only kind is called
 AUXILIARY = ("depth", "ids", "flow")  # of each receptor, what an observation may hold, see `sim.Task`
@@ -30,12 +30,12 @@ class EyeKind:
     fidelity: Fidelity | str
 
 
-def several(task: Task) -> bool:
+def several(task: TaskSettings) -> bool:
     """Whether a task says eyes of more kinds than one, by name."""
     return isinstance(task.eye, Mapping) or isinstance(task.mounts, Mapping)
 
 
-def kinds_of(task: Task) -> tuple[EyeKind, ...]:
+def kinds_of(task: TaskSettings) -> tuple[EyeKind, ...]:
     """In the task's order.
 
     Raises:
@@ -71,6 +71,22 @@ def kinds_of(task: Task) -> tuple[EyeKind, ...]:
         )
         for name in eyes
     )
+
+
+def auxiliary_of(names: Iterable[str], where: str) -> tuple[str, ...]:
+    """Names of what is wanted, in the order of AUXILIARY.
+
+    Raises:
+        ValueError: one is unknown; `where` it was asked for.
+    """
+    if isinstance(names, str):
+        raise ValueError(f"{where} = {names!r}: must be several names, such as ({names!r},)")
+    asked = items(where, names, str, repr(AUXILIARY[0]))
+    for name in asked:
+        if name not in AUXILIARY:
+            hint = did_you_mean(name, AUXILIARY) or f": must be of {', '.join(map(repr, AUXILIARY))}"
+            raise ValueError(f"{where}: {name!r}{hint}")
+    return tuple(name for name in AUXILIARY if name in asked)
 
 
 def _an_eye(where: str, said: Any) -> optics.Eye:

@@ -1,43 +1,106 @@
-"""Random streams: one per world and purpose, so that a world's episodes do not depend on its neighbours."""
+"""Random streams of worlds, by two schemes; in both a world's episodes do not depend on the number of worlds."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
+
+__all__ = ["MotionNoise", "RandomStreams", "StreamsByPurpose", "StreamsByWorld"]
 
 AHEAD = 64  # actions: a call per world and action costs more than the numbers
 
 
-class Streams:
-    """For every world i: `placement[i]`, `light[i]`, a part of `motion` and a key for its noise, children of one seed
-    that depend on the seed, i and the purpose alone; never on the number of worlds.
-
-    noise_keys: (n,) uint64, for sim.render.receptor_noise
+class RandomStreams(Protocol):
+    """entropy: what all streams are derived from; seeded with it again, every episode repeats
+    episodes, variation: generators of each world, for starts of episodes and for what varies between them
+    noise_keys: of receptor noise, by agent: (kind of eyes, world) uint64, for `sim.render.receptor_noise`
     """
 
-    def __init__(self, seed: int | None, n: int) -> None:
+    entropy: Any
+    noise_keys: list[np.ndarray]
+
+    @property
+    def episodes(self) -> list[np.random.Generator]:
+        """For starts of episodes."""
+
+    @property
+    def variation(self) -> list[np.random.Generator]:
+        """For what varies between episodes."""
+
+    def held(self) -> dict[str, np.ndarray]:
+        """Where all streams stand; each array's first axis is the world."""
+
+    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        """Inverse of `held`, for these worlds."""
+
+
+class StreamsByPurpose:
+    """One stream for each world and purpose: children of one seed that depend on the seed, the world's number and the
+    purpose alone. The built-in tasks use this scheme.
+
+    motion: of objects that move at random
+    """
+
+    def __init__(self, seed: Any, n: int, kinds: Sequence[int] = (1,)) -> None:
         root = np.random.SeedSequence(seed)
-        self.seed = root.entropy
+        self.entropy = root.entropy
 
-        def children(purpose: int) -> list[np.random.SeedSequence]:
-            return [np.random.SeedSequence(root.entropy, spawn_key=(i, purpose)) for i in range(n)]
+        def children(*purpose: int) -> list[np.random.SeedSequence]:
+            return [np.random.SeedSequence(root.entropy, spawn_key=(i, *purpose)) for i in range(n)]
 
-        self.placement, motion = (
+        self.episodes, motion = (
             [np.random.Generator(np.random.PCG64(child)) for child in children(purpose)] for purpose in (0, 1)
         )
         self.motion = MotionNoise(motion)
-        self._of_light = children(3)
-        self.noise_keys = np.array([child.generate_state(1, np.uint64)[0] for child in children(2)])
+        self._of_variation = children(3)
+        (count,) = kinds
+        keys = [children(2) if kind == 0 else children(2, kind) for kind in range(count)]
+        self.noise_keys = [np.array([[c.generate_state(1, np.uint64)[0] for c in of_kind] for of_kind in keys])]
 
     @cached_property
-    def light(self) -> list[np.random.Generator]:
-        """Of what light an episode has."""
-        return [np.random.Generator(np.random.PCG64(child)) for child in self._of_light]
+    def variation(self) -> list[np.random.Generator]:
+        """For what varies between episodes, light above all."""
+        return [np.random.Generator(np.random.PCG64(child)) for child in self._of_variation]
+
+    def held(self) -> dict[str, np.ndarray]:
+        return {"chance": _states(self.episodes), "varying": _states(self.variation), **self.motion.held()}
+
+    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        _set_states(self.episodes, state["chance"], worlds)
+        _set_states(self.variation, state["varying"], worlds)
+        self.motion.hold(state, worlds)
+
+
+class StreamsByWorld:
+    """One stream for each world, which serves all that its episodes draw. User tasks use this scheme.
+
+    kinds: numbers of kinds of eyes, by agent
+    """
+
+    def __init__(self, seed: Any, n: int, kinds: Sequence[int] = (1,)) -> None:
+        self.entropy = np.random.SeedSequence(seed).entropy
+        children = [np.random.SeedSequence(self.entropy, spawn_key=(i,)) for i in range(n)]
+        self.episodes = self.variation = [np.random.default_rng(child) for child in children]
+        drawn = np.array([child.generate_state(sum(kinds), np.uint64) for child in children]).T
+        # The first kind of each agent has the first keys: one more kind changes no other agent's noise.
+        more, self.noise_keys = len(kinds), []
+        for number, count in enumerate(kinds):
+            self.noise_keys.append(np.concatenate([drawn[number : number + 1], drawn[more : more + count - 1]]))
+            more += count - 1
+
+    def held(self) -> dict[str, np.ndarray]:
+        return {"chance": _states(self.episodes)}
+
+    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        _set_states(self.episodes, state["chance"], worlds)
 
 
 class MotionNoise:
-    """What chance does to movers: for every action of every world, numbers from the world's own generator."""
+    """Random numbers for objects that move: for each action of each world, from the world's own generator."""
 
     def __init__(self, generators: list[np.random.Generator]) -> None:
         self._generators = generators
@@ -51,3 +114,35 @@ class MotionNoise:
             self._drawn = np.ascontiguousarray(np.transpose(of_worlds, (2, 1, 0, 3)))
         (normal, uniform), self._drawn = self._drawn[0], self._drawn[1:]
         return normal, uniform
+
+    def held(self) -> dict[str, np.ndarray]:
+        """States of the generators, and numbers that were drawn ahead, (world, action, 2, mover), the last ones set."""
+        left, _, n, movers = self._drawn.shape
+        ahead = np.full((n, AHEAD, 2, movers), np.nan)
+        ahead[:, AHEAD - left :] = np.transpose(self._drawn, (2, 0, 1, 3))
+        return {"motion": _states(self._generators), "motion_ahead": ahead}
+
+    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        """Inverse of `held`.
+
+        Raises:
+            ValueError: only some worlds, and they are at another action than the others.
+        """
+        _set_states(self._generators, state["motion"], worlds)
+        ahead = np.asarray(state["motion_ahead"])
+        left = AHEAD - int(np.isnan(ahead[0]).any(axis=(1, 2)).sum()) if ahead.shape[-1] else 0
+        if len(worlds) == len(self._generators):
+            self._drawn = np.ascontiguousarray(np.transpose(ahead[:, AHEAD - left :], (1, 2, 0, 3)))
+            return
+        if left != len(self._drawn):
+            raise ValueError("state: objects move in step in all worlds: must be set for all worlds at once")
+        self._drawn[:, :, worlds] = np.transpose(ahead[worlds, AHEAD - left :], (1, 2, 0, 3))
+
+
+def _states(generators: Sequence[np.random.Generator]) -> np.ndarray:
+    return np.array([json.dumps(rng.bit_generator.state) for rng in generators])
+
+
+def _set_states(generators: Sequence[np.random.Generator], states: np.ndarray, worlds: np.ndarray) -> None:
+    for world in worlds:
+        generators[world].bit_generator.state = json.loads(str(states[world]))

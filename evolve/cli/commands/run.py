@@ -5,31 +5,26 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 from evolve.analysis.mishaps import mishaps_of, mishaps_told
 from evolve.cli.commands import INTERRUPTED
 from evolve.cli.commands.products import REPORT, Products, finished_products, open_page
-from evolve.cli.progress import Bar, Events, Lines, Silent, Watchers, watcher
 from evolve.cli.run_plan import RunPlan, steps_each
-from evolve.cli.start_from import starts_from
 from evolve.cli.tensorboard import TensorBoardWriter, require_tensorboard
-from evolve.config.assemble import assemble
 from evolve.config.lint import lint
 from evolve.config.run_config import ConfigError, RunConfig
 from evolve.genome.phenotype import repaired
+from evolve.runs.begin import RunRequest, prepare_run
+from evolve.runs.carry_on import Workers, carry_on, local_workers
+from evolve.runs.progress import Bar, Events, Lines, Silent, Tally, Watchers, watcher
+from evolve.runs.resume import resuming
 from evolve.search.dask_executor import DaskExecutor
-from evolve.search.local_executor import LocalExecutor
-from evolve.search.loop import evolve
 from evolve.search.scheduler import Scheduler
-from evolve.search.search import Search
-from evolve.search.successive_halving import finished
-from evolve.search.worker import evaluate_candidate, prepare_device
 from evolve.store.candidate import Candidate
-from evolve.store.directory import Run, next_directory
-from evolve.store.versions import altered, present, record_start, recorded
-from optics.numerics import device
+from evolve.store.directory import Run
 
 __all__ = ["resume", "start"]
 
@@ -39,30 +34,18 @@ def start(arguments: Namespace) -> int:
     scheduler = _scheduler(arguments)
     if arguments.tensorboard:
         require_tensorboard()
-    flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
-    starts = starts_from(arguments.start_from) if arguments.start_from else None
-    config = assemble(
-        arguments.task, arguments.preset, arguments.config, [*arguments.set, *flags], starts, arguments.scale
-    )
-    Search(config)  # an unknown optimizer, say, is refused before anything is written
-    device.make_ready()
-    if config.own_task is not None:
-        _try(config)
-    preset = arguments.preset.removesuffix(f"-{config.task}")
+    prepared = prepare_run(_request(arguments))
     if arguments.dry_run:
-        directory = arguments.out or next_directory(config.task_name, preset)
-        return _show(RunPlan.of(config, directory), arguments.json)
+        return _show(RunPlan.of(prepared.config, prepared.directory(arguments.out)), arguments.json)
     notes = (
-        [] if arguments.json or arguments.quiet else lint(config)
+        [] if arguments.json or arguments.quiet else lint(prepared.config)
     )  # looks at the world, which takes its time: nothing is begun yet
-    origin = starts.name.removeprefix("--from ") if starts else None
-    run = Run.create(arguments.out, config, origin) if arguments.out else Run.create_next(config, preset, origin)
-    if not arguments.json:
-        for note in notes:
-            print(f"note: {note}", file=sys.stderr)
-        print(f"{run.path}: {_plan(config)}", flush=True)
-    with run.lock():
-        return _carry(run, arguments, scheduler)
+    with prepared.begin(Run, arguments.out) as run:
+        if not arguments.json:
+            for note in notes:
+                _note(note)
+            print(f"{run.path}: {_plan(run.config)}", flush=True)
+        return _carry_on(run, arguments, scheduler)
 
 
 def resume(arguments: Namespace) -> int:
@@ -71,35 +54,33 @@ def resume(arguments: Namespace) -> int:
     if arguments.tensorboard:
         require_tensorboard()
     run = Run.open(arguments.directory, arguments.task)
-    device.make_ready()
-    with run.lock():
-        run.repair()
-        if run.notice and not arguments.quiet:
-            print(f"note: {run.notice}", file=sys.stderr)
-        if finished(run):
-            run.forget_trainings(candidate.id for candidate in run.candidates)
-            if not arguments.json:
-                print(f"{run.path}: all {run.config.candidates} candidates have been evaluated")
-            return _already_finished(run, arguments)
-        run.require_present_format()
-        if run.config.own_task is not None:
-            _try(run.config)
-        if not arguments.quiet:
-            _note_changes(run)
-        record_start(run.path, len(run.candidates))
+    with resuming(run, _silence if arguments.quiet else _note) as unfinished:
         if not arguments.json:
-            print(
-                f"{run.path}: {len(run.candidates)} of {run.config.candidates} candidates are on record",
-                flush=True,
-            )
-        return _carry(run, arguments, scheduler)
+            state = f"{len(run.candidates)} of {run.config.candidates} candidates are on record"
+            done = f"all {run.config.candidates} candidates have been evaluated"
+            print(f"{run.path}: {state if unfinished else done}", flush=True)
+        return _carry_on(run, arguments, scheduler) if unfinished else _already_finished(run, arguments)
 
 
-def _try(config: RunConfig) -> None:
-    """A task of one's own, before anything is written."""
-    from evolve.learning.task_trial import try_task
+def _request(arguments: Namespace) -> RunRequest:
+    """The settings that the command line names."""
+    flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
+    return RunRequest(
+        arguments.task,
+        arguments.preset,
+        arguments.config,
+        [*arguments.set, *flags],
+        arguments.scale,
+        arguments.start_from,
+    )
 
-    try_task(config)
+
+def _note(text: str) -> None:
+    print(f"note: {text}", file=sys.stderr)
+
+
+def _silence(text: str) -> None:
+    """The note is not shown."""
 
 
 def _show(plan: RunPlan, as_json: bool) -> int:
@@ -111,25 +92,38 @@ def _show(plan: RunPlan, as_json: bool) -> int:
     return 0
 
 
-def _carry(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> int:
-    """Carry a run whose lock is held to its end; on Ctrl-C say how to go on. Nothing needs saving: it is on record."""
-    try:
+class _Shown:
+    """The command's watchers: progress as its options choose it, and TensorBoard's files if requested."""
+
+    def __init__(self, arguments: Namespace) -> None:
+        self._arguments = arguments
+        self.tally: Tally | None = None
+
+    @contextmanager
+    def watched(self, run: Run, workers: int) -> Iterator[Watchers]:
         with (
-            _executor(run, scheduler) as executor,
-            _watcher(run, executor.count, arguments) as watch,
-            TensorBoardWriter(run) if arguments.tensorboard else nullcontext() as tensorboard,
+            _watcher(run, workers, self._arguments) as shown,
+            TensorBoardWriter(run) if self._arguments.tensorboard else nullcontext() as tensorboard,
         ):
-            evolve(run, executor, Watchers([watch, *([tensorboard] if tensorboard else [])]))
+            self.tally = shown.tally
+            yield Watchers([shown, *([tensorboard] if tensorboard else [])])
+
+
+def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> int:
+    """Carry a run whose lock is held to its end; on Ctrl-C say how to go on. Nothing needs saving: it is on record."""
+    shown = _Shown(arguments)
+    try:
+        carry_on(run, shown.watched, _workers(scheduler))
     except KeyboardInterrupt:
-        own = f" --task {arguments.task}" if run.config.own is not None else ""
+        own = f" --task {arguments.task}" if run.config.code is not None else ""
         print(
             f"\nevolve: interrupted; {len(run.candidates)} of {run.config.candidates} candidates are on record. "
             f"Continue with: evolve resume {run.path}{own}",
             file=sys.stderr,
         )
         return INTERRUPTED
-    if not arguments.json:
-        print(watch.tally.closing())
+    if shown.tally is not None and not arguments.json:
+        print(shown.tally.closing())
     return _finish(run, arguments)
 
 
@@ -152,10 +146,9 @@ def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lin
     return watcher(run, sys.stdout if arguments.json else sys.stderr, workers, arguments.json)
 
 
-def _executor(run: Run, scheduler: Scheduler | None) -> DaskExecutor | LocalExecutor:
-    if scheduler is not None:
-        return DaskExecutor(scheduler)
-    return LocalExecutor(evaluate_candidate, run.config.workers, prepare_device)
+def _workers(scheduler: Scheduler | None) -> Callable[[RunConfig], AbstractContextManager[Workers]]:
+    """Dask's if it has a scheduler, else this machine's processes."""
+    return local_workers if scheduler is None else lambda config: DaskExecutor(scheduler)
 
 
 def _scheduler(arguments: Namespace) -> Scheduler | None:
@@ -219,17 +212,3 @@ def _plan(config: RunConfig) -> str:
         f"{f' in up to {search.rungs} budget stages' if search.rungs > 1 else ''}, "
         f"{genes} genes open"
     )
-
-
-def _note_changes(run: Run) -> None:
-    """Say which software differs from when the run began, and whether settings do; numbers may differ with them."""
-    if altered(run.path):
-        print(
-            f"note: config.toml has changed since the last start. Candidates from {len(run.candidates)} on are "
-            "trained and evaluated with other settings than those before",
-            file=sys.stderr,
-        )
-    then, now = recorded(run.path), present()
-    changed = [f"{name} {now[name]} (was {then[name]})" for name in now if name in then and then[name] != now[name]]
-    if changed:
-        print(f"note: the software has changed since this run began: {', '.join(changed)}", file=sys.stderr)

@@ -10,8 +10,8 @@ from typing import Any
 
 from evolve.config.assemble import assemble, to_toml
 from evolve.config.formats import FORMAT
-from evolve.config.own_task import LABEL
 from evolve.config.run_config import SECTIONS, TASKS, RunConfig
+from evolve.config.task_code import LABEL
 from evolve.genome.genes import ALL_GENES, GENES, Gene
 from evolve.genome.interval import Interval
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis.mishaps import mishaps_of, mishaps_told
-from evolve.cli.output import as_it_is
+from evolve.runs.output import as_it_is
 from evolve.search.successive_halving import finished
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run

@@ -6,10 +6,10 @@ import json
 import sys
 from argparse import Namespace
 
-from evolve.cli.output import spelled
 from evolve.config.run_config import TASKS, SearchConfig
 from evolve.config.sources import preset_about, preset_names
 from evolve.genome.genes import CLUSTERS, GENES, Gene
+from evolve.runs.output import spelled
 
 __all__ = ["genes", "presets", "tasks"]
 

@@ -14,11 +14,12 @@ from evolve.analysis.episode import record
 from evolve.analysis.filmed_episode import film, moments
 from evolve.analysis.vision import vision
 from evolve.cli.main import main
+from evolve.learning.animal_task import animal_task
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
-from evolve.learning.worlds import own_task_for
 from evolve.report.footage import Footage, stage_of
 from evolve.store.directory import Run
+from sim.envs.prepared_task import PreparedTask
 from sim.scene.variation import DAYLIGHT, filter_to
 from tests.evolve.learning.test_task_module import small, written
 
@@ -130,7 +131,7 @@ def test_eyes_are_judged_by_the_scenes_of_the_task(path):
     run = Run.open(path, NAMED)
     seen = vision(run.best.phenotype, run.config)
     assert seen.psnr_db > 60  # a perfect lens against itself: the same rays
-    model, how, poses = moments(own_task_for(run.best.phenotype, run.config), 3, 0)
+    model, how, poses = moments(PreparedTask(animal_task(run.best.phenotype, run.config)), 3, 0)
     assert poses.n == 3
     assert how == {"spectra": None, "varied": {}}
     assert len(np.unique(poses.xpos[:, model.nbody - 1, 1])) == 3  # the ball, elsewhere in each

@@ -3,15 +3,12 @@
 main: test_main.py
 arguments: test_main.py
 waiting: test_products.py
-progress: test_progress.py
-output: test_output.py
 notes: test_notes.py
 run_plan: test_run_plan.py
 pace: test_pace.py, test_run_plan.py
-start_from: test_start_from.py
 tensorboard: test_tensorboard.py
 doctor: test_doctor.py
-commands.run: test_commands.py, test_run_plan.py, search/test_kill.py
+commands.run: test_commands.py, test_run_plan.py, search/test_kill.py, runs/test_two_faces.py
 commands.status: test_main.py, test_status_and_compare.py, test_commands.py, test_hostile_runs.py
 commands.tables: test_main.py
 commands.products: test_products.py, test_commands.py, test_main.py

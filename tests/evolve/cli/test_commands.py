@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-import evolve.cli.commands.run
+from evolve.runs import carry_on
 from evolve.store.directory import Run
 from tests.evolve.closed_form import tiny
 
@@ -102,7 +102,7 @@ def test_workers_and_seed_reach_the_run(call, tmp_path, monkeypatch):
         def __exit__(self, *_):
             """Nothing to end."""
 
-    monkeypatch.setattr(evolve.cli.commands.run, "LocalExecutor", Recorder)
+    monkeypatch.setattr(carry_on, "LocalExecutor", Recorder)
     code, _, _ = call("run", "detection", "--workers", 3, "--seed", 5, "--out", tmp_path / "run")
     assert (code, asked) == (130, [3])
     assert Run.open(tmp_path / "run").config.seed == 5

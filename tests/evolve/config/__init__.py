@@ -10,6 +10,8 @@ lint: test_lint.py
 relief_starts: test_relief_starts.py
 formats: test_formats.py
 square_eyes: test_square_eyes.py
-own_task: test_own_task.py
+task_choice: test_task_choice.py
+task_card: test_task_choice.py, test_run_config.py, test_lint.py
+task_code: test_task_choice.py
 numbering: test_numbering.py
 """

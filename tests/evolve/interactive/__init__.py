@@ -1,8 +1,8 @@
 """Which test covers which module of evolve/interactive.
 
-begin: test_run_from_python.py
+run_from_python: test_run_from_python.py
 opened_run: test_opened_run.py, test_run_from_python.py, learning/test_animals_in_turn.py
-carry_on: test_run_from_python.py
+callbacks: test_run_from_python.py
 table: test_opened_run.py
 eye_picture: test_opened_run.py
 summary: test_opened_run.py

@@ -14,7 +14,7 @@ from nbclient import NotebookClient
 
 import evolve
 from evolve.config.assemble import assemble
-from evolve.interactive import carry_on
+from evolve.runs import carry_on
 from evolve.search.local_executor import LocalExecutor
 from evolve.store.directory import Run
 from tests.evolve.closed_form import TINY, bowl
@@ -48,8 +48,6 @@ def test_record_is_the_commands(closed_form, call, finished, tmp_path, monkeypat
     assert isinstance(run, evolve.Run)
     import evolve.cli.commands.run as command
 
-    monkeypatch.setattr(command, "evaluate_candidate", bowl)
-    monkeypatch.setattr(command, "LocalExecutor", lambda evaluate, count, prepare: LocalExecutor(evaluate, count))
     monkeypatch.setattr(command, "_finish", lambda run, *rest: 0)
     assigned = [part for key, value in SETTINGS.items() for part in ("--set", f"{key}={str(value).lower()}")]
     code, _, err = call("run", "detection", *assigned, "--out", tmp_path / "other")
@@ -77,6 +75,7 @@ def test_a_callback_may_end_the_run_which_can_go_on(closed_form, tmp_path):
     assert record(run.path) == record(whole.path)
     starts = (run.path / "versions.json").read_bytes()
     run.resume()
+    assert isinstance(evolve.resume(run.path), evolve.Run)
     assert (run.path / "versions.json").read_bytes() == starts, "a finished run is left as it is"
 
 
@@ -111,6 +110,10 @@ def test_what_cannot_be_used_is_refused_before_anything_is_written(tmp_path):
         with pytest.raises(evolve.ConfigError, match=message):
             evolve.run("detection", **{"out": tmp_path / "run", **arguments})
     assert not (tmp_path / "run").exists()
+    with pytest.raises(evolve.ConfigError, match="directory = 5: must be a directory's path"):
+        evolve.resume(5)
+    with pytest.raises(evolve.ConfigError, match="task = 5: must be a task's name"):
+        evolve.resume(tmp_path, 5)
 
 
 def test_a_script_needs_no_guard(tmp_path):
@@ -119,7 +122,7 @@ def test_a_script_needs_no_guard(tmp_path):
     script.write_text(
         "from pathlib import Path\n"
         "import evolve\n"
-        "from evolve.interactive import carry_on\n"
+        "from evolve.runs import carry_on\n"
         "from evolve.search.local_executor import LocalExecutor\n"
         "from tests.evolve.closed_form import bowl\n"
         "with Path('began').open('a') as log: log.write('once\\n')\n"

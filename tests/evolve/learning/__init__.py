@@ -15,4 +15,5 @@ adam: test_adam.py
 tensor_file: test_policy.py, store/test_regular_files.py
 checkpoint: search/test_successive_halving.py
 training_stage: search/test_successive_halving.py
+animal_task: test_task_module.py, test_fitness.py
 """

@@ -57,7 +57,7 @@ def lived(named):
 def test_a_frozen_animal_is_the_runs_best(folder):
     """Its eyes, its memory and its policy, on the body it is given."""
     run = evolve.Run.open(folder / "prey")
-    frozen = run.frozen(executed_task(lived(f"{folder / EXAMPLE.name}:Prey")[0].own_task))
+    frozen = run.frozen(executed_task(lived(f"{folder / EXAMPLE.name}:Prey")[0].choice.named_code))
     best = run.best.phenotype
     assert len(frozen.task.mounts) == best.n_eyes
     assert frozen.task.eye.resolution == best.resolution
@@ -77,7 +77,7 @@ def test_the_other_evolves_before_it(folder):
     lives = [evaluate(animal, config, 3, folder / name) for name in ("one", "two")]
     assert lives[0].failure is None
     assert lives[0].returns == lives[1].returns
-    [prey] = executed_task(config.own_task).others
+    [prey] = executed_task(config.choice.named_code).others
     worlds = sim.make_vec_env(with_policy(config, prey.policy), n_envs=4, seed=0)
     idle = sim.make_vec_env(with_policy(config, None), n_envs=4, seed=0)
     with closing(worlds), closing(idle):
@@ -92,7 +92,7 @@ def test_the_other_evolves_before_it(folder):
 
 
 def with_policy(config, policy):
-    task = executed_task(config.own_task)
+    task = executed_task(config.choice.named_code)
     task = type(task)()
     task.others = (sim.Frozen(task.others[0].task, policy),)
     return task
@@ -105,7 +105,7 @@ def test_rays_of_frozen_animals_are_chosen_once(folder):
     assert given in text
     (folder / "auto.py").write_text(text.replace(given, "", 1))  # the predator's
     config, _ = lived(f"{folder / 'auto.py'}:Prey")
-    [predator] = executed_task(config.own_task).others
+    [predator] = executed_task(config.choice.named_code).others
     assert isinstance(predator.task.fidelity, sim.Fidelity)
     assert "moments" in predator.task.fidelity.levels[-1].why
 

@@ -14,7 +14,7 @@ from evolve.learning.policy import load_policy
 from evolve.learning.ppo import play
 from evolve.learning.training_stage import TrainingStage
 from evolve.search.successive_halving import trained_steps
-from sim.envs.assembly import vec_env_in
+from sim.envs.prepared_task import PreparedTask
 from tests.evolve.small_run import LEARNING, PHENOTYPE, small_config
 
 pytestmark = pytest.mark.usefixtures("short_episodes")
@@ -87,19 +87,19 @@ def test_training_looks_less_closely_than_evaluation(resolution, most, expected,
     def recorded(make):
         def made(*args, **kwargs):
             worlds = make(*args, **kwargs)
-            fidelities.append((worlds.simulation.mode, worlds.renderer.fidelity))
+            fidelities.append((worlds.simulation.task.mode, worlds.renderer.fidelity))
             return worlds
 
         return made
 
-    monkeypatch.setattr("evolve.learning.worlds.vec_env_in", recorded(vec_env_in))
+    monkeypatch.setattr(PreparedTask, "vec_env", recorded(PreparedTask.vec_env))
     config = small_config()
     learning = replace(config.learning, rays_per_receptor=most)
     config = replace(config, task="maze", eye=replace(config.eye, rays_per_receptor="auto"), learning=learning)
     animal = replace(PHENOTYPE, resolution=resolution)
     assert evaluate(animal, config, 5, tmp_path / "0.safetensors").failure is None
-    (_, checkpoints), (_, finals), (_, lessons) = fidelities
-    assert [mode for mode, _ in fidelities] == ["evaluation", "evaluation", "training"]
+    (_, lessons), (_, checkpoints), (_, finals) = fidelities
+    assert [mode for mode, _ in fidelities] == ["training", "evaluation", "evaluation"]
     assert finals.rays_per_receptor > 3
     assert lessons.rays_per_receptor == (expected or finals.rays_per_receptor)
     assert checkpoints == lessons == replace(finals, rays_per_receptor=lessons.rays_per_receptor)

@@ -15,11 +15,12 @@ from evolve.config.assemble import assemble, to_toml
 from evolve.config.run_config import ConfigError
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
+from evolve.learning.animal_task import animal_task
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import TrainingDiverged, load_policy
 from evolve.learning.task_module import executed_task
 from evolve.learning.task_trial import try_task
-from evolve.learning.worlds import own_task_for, worlds_of
+from evolve.learning.worlds import worlds_of
 from evolve.search import dask_worker
 from evolve.search.job import Job
 from evolve.search.worker import evaluate_candidate
@@ -65,15 +66,56 @@ def test_an_animal_lives_in_it_twice_alike(tmp_path):
     assert policy.features_extractor.felt.seen.item() in (8 + 128, 8 + 256)
 
 
+BATCH = """
+import numpy as np
+import sim
+from pathlib import Path
+
+class FindBalls(sim.BatchTask):
+    model = {model!r}
+    mounts = (sim.Mount("cart", offset=(0.26, 0, 0.12)),)
+    fidelity = sim.Fidelity(2, bands=4)
+    episode_steps = 20
+
+    def reset(self, worlds, chosen, rngs):
+        worlds.mocap_pos[chosen, 0, 1] = [rng.uniform(-2, 2) for rng in rngs]
+
+    def rewards(self, worlds):
+        return {{"near": -np.abs(worlds.mocap_pos[:, 0, 1] - worlds.qpos[:, 0]) / 10}}
+
+    def succeeded(self, worlds):
+        return np.abs(worlds.mocap_pos[:, 0, 1] - worlds.qpos[:, 0]) < 0.3
+
+    def feels(self, worlds):
+        return worlds.qvel
+"""
+
+
+def test_a_batch_task_evolves_as_the_same_task_of_one_world_at_a_time(tmp_path):
+    """With the same numbers: returns, and the policy's bytes."""
+    file = tmp_path / "balls.py"
+    file.write_text(BATCH.format(model=executed_task(small()[0].choice.named_code).model))
+    lives = []
+    for named in (f"{BALL}:FindBall", f"{file}:FindBalls"):
+        config, animal = small(named=named)
+        try_task(config)
+        lives.append(evaluate(animal, config, 3, tmp_path / named.rpartition(":")[2]))
+    single, batch = lives
+    assert single.failure is None
+    assert batch.returns == single.returns
+    assert batch.success_rate == single.success_rate
+    assert (tmp_path / "FindBalls").read_bytes() == (tmp_path / "FindBall").read_bytes()
+
+
 def test_eyes_are_the_animals_own_where_the_task_puts_them():
     config, animal = small("genome.elevation_deg.start=20", "genome.placement_range_deg.start=80")
-    task = own_task_for(animal, config)
+    task = animal_task(animal, config).task
     assert [mount.azimuth_deg for mount in task.mounts] == [40, -40]
     assert {mount.elevation_deg for mount in task.mounts} == {20}
     assert np.hypot(*task.mounts[0].offset[:2]) == pytest.approx(0.26)  # as far out, turned with the eye
     assert task.eye.resolution == animal.resolution
     assert task.eye.noise_sigma == config.eye.noise_sigma
-    plain = executed_task(config.own_task)
+    plain = executed_task(config.choice.named_code)
     assert len(plain.mounts) == 1  # what belongs to the class is as it was
 
 
@@ -153,7 +195,7 @@ def test_a_job_carries_the_text_as_it_was(tmp_path):
     config, animal = small(named=f"{file}:FindBall")
     job = Job(0, animal, config, 1, tmp_path / "policy")
     file.write_text("raise SystemError\n")
-    assert executed_task(job.arguments[1].own_task).episode_steps == 20
+    assert executed_task(job.arguments[1].choice.named_code).episode_steps == 20
 
 
 def test_dask_is_sent_the_text(tmp_path):
@@ -166,7 +208,7 @@ def test_dask_is_sent_the_text(tmp_path):
     given = []
 
     def live(phenotype, config, *rest, progress):
-        given.append(executed_task(config.own_task).episode_steps)
+        given.append(executed_task(config.choice.named_code).episode_steps)
         return Evaluation(fitness=1.0)
 
     dask_worker._evaluate(live, pickle.loads(pickle.dumps(order)), lambda *_: None)
@@ -223,6 +265,6 @@ def test_a_place_that_fails_is_named(tmp_path):
 
 def test_of_a_stranger_nothing_is_executed():
     config, animal = small()
-    stranger = dataclasses.replace(config, own=None)
+    stranger = dataclasses.replace(config, code=None)
     with pytest.raises(ConfigError, match="runs only if you name it"):
         worlds_of(animal, stranger, 1, 2)

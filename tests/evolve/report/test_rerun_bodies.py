@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from evolve.analysis.filmed_episode import film
+from evolve.learning.animal_task import animal_task
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
-from evolve.learning.worlds import own_task_for
-from sim.envs.task_vec_env import TaskVecEnv
+from sim.envs.prepared_task import PreparedTask
 from tests.evolve.learning.test_task_module import BALL, small
 from tests.evolve.report.read_back import frames, read_back, vectors, views
 
@@ -70,7 +70,7 @@ def moments(life, episode):
     """The model of the episode, and its data before each action, by MuJoCo that does the same once more."""
     config, animal, _ = life
     datas = []
-    with closing(TaskVecEnv(own_task_for(animal, config), 1, SEED)) as worlds:
+    with closing(PreparedTask(animal_task(animal, config)).vec_env(1, SEED)) as worlds:
         worlds.reset()
         data = worlds.worlds.datas[0]
         model = copy.copy(data.model)

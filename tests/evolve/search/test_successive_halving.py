@@ -6,13 +6,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from evolve.cli import progress
 from evolve.config.assemble import assemble
 from evolve.config.run_config import ConfigError, LearningConfig, SearchConfig
 from evolve.interactive.opened_run import OpenedRun
 from evolve.learning.checkpoint import load_checkpoint
 from evolve.learning.fitness import evaluate
 from evolve.learning.training_stage import TrainingStage
+from evolve.runs import progress
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
 from evolve.search.successive_halving import budgets, evaluations, finished, promoted, sizes, steps

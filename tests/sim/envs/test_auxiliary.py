@@ -8,11 +8,10 @@ from stable_baselines3 import PPO
 
 import optics
 import sim
-from sim.envs.world_poses import WorldPoses
 from sim.eyes.eyes import BODY_RADIUS
 from sim.eyes.sampling import directions_of
 from sim.render.optic_flow import receptor_centres
-from sim.tasks.user_task import grown
+from sim.tasks.user_tasks import with_evolved_eyes
 from sim.worlds.state import pose
 from tests.sim.envs.hunt import Predator, Prey
 from tests.sim.envs.test_eye_kinds import Looker
@@ -164,7 +163,7 @@ def test_a_frozen_policy_gets_what_its_own_task_has():
 
 
 def test_evolving_eyes_have_none():
-    assert grown(Told(), sim.Eyes()).auxiliary == ()
+    assert with_evolved_eyes(Told(), sim.Eyes()).auxiliary == ()
 
 
 def test_rhabdoms_own_worlds_are_told_what_mujocos_rays_meet():
@@ -172,7 +171,7 @@ def test_rhabdoms_own_worlds_are_told_what_mujocos_rays_meet():
     env.reset()
     for _ in range(3):
         observation = env.step(np.random.default_rng(0).uniform(-1, 1, (6, 2)))[0]
-    world, eye = env.simulation.world, EYES.eye()
+    world, eye = env.worlds.world, EYES.eye()
     data, azimuths = mujoco.MjData(world.model), EYES.azimuths()
     seen, near = [], []
     for k in range(6):
@@ -209,11 +208,11 @@ def test_positions_of_states_are_those_of_mujoco():
     env = sim.make_vec_env("tracking", EYES, n_envs=5, rays_per_receptor=1)
     env.reset()
     env.step(np.random.default_rng(1).uniform(-1, 1, (5, 2)))
-    world, datas = env.simulation.world, []
+    world, datas = env.worlds.world, []
     for k in range(5):
         datas.append(mujoco.MjData(world.model))
         pose(datas[-1], world, env.state, k)
-    found, expected = WorldPoses(world).of(env.state), sim.Poses.of(datas)
+    found, expected = env.worlds.poses(), sim.Poses.of(datas)
     for name in ("geom_xpos", "geom_xmat", "xpos", "xmat"):
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-12)
 

@@ -105,7 +105,7 @@ def lost(encounter):
     """What two animals are told when the prey's place is no number."""
     env = sim.make_parallel_env(encounter, seed=1)
     env.reset()
-    env._animals.worlds.datas[0].qvel[0] = np.nan
+    env._animals.simulation.physics.datas[0].qvel[0] = np.nan
     return env.step({name: np.zeros(2) for name in env.agents})
 
 

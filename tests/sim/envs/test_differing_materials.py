@@ -9,7 +9,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import sim
-from sim.envs.task_fidelity import fidelities_of
+from sim.tasks.task_fidelity import fidelities_of
 from tests.sim.envs.rail import EYE, OnRail
 
 MATERIALS = "plain", "dark", "stripes", "cubic", "glowing"
@@ -131,8 +131,8 @@ def test_depth_ids_and_shadows_are_of_the_one_that_is_drawn():
 def test_all_are_drawn_alike():
     task = with_ranges({"thing.material": ("plain", "dark", "stripes")})
     env = sim.make_vec_env(task, n_envs=600, seed=3)
-    env.worlds.reset(np.arange(600))
-    found = np.unique(env.worlds.varied["thing.material"], return_counts=True)
+    env.simulation.restart(np.arange(600))
+    found = np.unique(env.simulation.varied["thing.material"], return_counts=True)
     assert list(found[0]) == ["dark", "plain", "stripes"]
     assert (np.abs(found[1] - 200) < 4 * np.sqrt(600 * 2 / 9)).all(), "four standard deviations"
 

@@ -7,11 +7,11 @@ from gymnasium.utils.env_checker import check_env
 from scipy.stats import kstest
 
 import sim
-from sim.envs.task_fidelity import fidelities_of
 from sim.eyes.sampling import directions_of
 from sim.render.optic_flow import receptor_centres
 from sim.scene.variation import Variation
 from sim.scene.world_models import WorldModels
+from sim.tasks.task_fidelity import fidelities_of
 from tests.sim.envs.rail import EYE
 from tests.sim.envs.rooms import SHAPES, Room, room, with_ranges
 
@@ -153,7 +153,7 @@ def test_sizes_are_drawn_evenly_over_their_logarithm_and_anew():
     env.reset()
     found = [env.step(np.zeros((16, 1)))[3][w]["varied"]["thing.size"] for _ in range(12) for w in range(16)]
     assert kstest((np.log(found) - np.log(0.25)) / np.log(16), "uniform").pvalue > 0.01
-    worlds = np.reshape(env.worlds.varied["thing.size"], -1)
+    worlds = np.reshape(env.simulation.varied["thing.size"], -1)
     np.testing.assert_allclose([d.model.geom("thing").size[0] for d in env.worlds.datas], 0.3 * worlds)
 
 

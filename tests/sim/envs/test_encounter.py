@@ -125,7 +125,7 @@ def test_an_episode_ends_for_all_when_it_ends_for_one():
     done = np.zeros(6, bool)
     while not done.any():
         _, _, done, infos = env.step(np.zeros((6, 2)))
-    assert env.worlds.steps.max() < Prey.episode_steps
+    assert env.simulation.steps.max() < Prey.episode_steps
     assert all(info["TimeLimit.truncated"] for info, over in zip(infos, done, strict=True) if over)
     assert not any("episode" in info for info, over in zip(infos, done, strict=True) if not over)
 

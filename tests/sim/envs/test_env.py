@@ -96,7 +96,7 @@ def test_picture_follows_the_agent():
     assert first.dtype == np.uint8
     env.step(np.array([-1.0, 1.0]))  # turns on the spot: the body stays, the world turns
     second = env.render()
-    state, camera = env.state, env._batch._follow_camera
+    state, camera = env.state, env._batch._pictures._photographer.camera
     mirror = sim.mirror(camera.world.model, camera._data)
     ids = mirror.render_ids(_follow(state, 0), 480, 360)
     y, x = np.nonzero(ids == mirror.model.geom("agent").id)
@@ -115,7 +115,7 @@ def test_fields_are_drawn_on_the_eyes_level_and_end_where_sight_ends():
     objects = state.objects.copy()
     objects[0, :, :2] = [[3.0, 0.0], [-6.0, 0.0], [-6.0, 3.0]]
     state = dataclasses.replace(state, position=np.zeros((1, 2)), heading=np.zeros(1), objects=objects)
-    world = env._batch.simulation.world
+    world = env._batch.worlds.world
     bare, drawn = (FollowCamera(world, who).picture(state).astype(int) for who in (None, eyes))
     changed = np.abs(bare - drawn).max(axis=2) > 8
 
@@ -144,7 +144,7 @@ def test_slow_pictures_are_there_for_the_asking_and_show_the_same_fields():
     """Both draw the same overlay from depths of their own; what differs is noise on edges, see test_quick_camera.py."""
     env = sim.make_env("detection", EYES, rays_per_receptor=1)
     env.reset(seed=0)
-    world, state, size = env._batch.simulation.world, env.state, (144, 192)
+    world, state, size = env._batch.worlds.world, env.state, (144, 192)
     quick, slow = (FollowCamera(world, EYES, samples).picture(state, size=size).astype(int) for samples in (None, 12))
     bare = FollowCamera(world).picture(state, size=size).astype(int)
     assert np.abs(quick - slow).mean() < 2

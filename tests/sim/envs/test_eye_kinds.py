@@ -10,8 +10,8 @@ from stable_baselines3 import PPO
 
 import optics
 import sim
-from sim.envs.task_fidelity import fidelities_of
-from sim.tasks.user_task import grown
+from sim.tasks.task_fidelity import fidelities_of
+from sim.tasks.user_tasks import with_evolved_eyes
 from tests.sim.envs.hunt import Predator, Prey
 from tests.sim.envs.test_task_vec_env import Face
 
@@ -178,4 +178,4 @@ def test_what_does_not_go_together_is_refused(settings, said):
 
 def test_evolution_takes_one_kind():
     with pytest.raises(ValueError, match="Looker: eye and mounts have several kinds of eyes: must have one"):
-        grown(Looker(), sim.Eyes())
+        with_evolved_eyes(Looker(), sim.Eyes())

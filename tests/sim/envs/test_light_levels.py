@@ -82,8 +82,8 @@ def test_gymnasium_takes_it_too():
 @pytest.mark.parametrize(
     ("vary", "said"),
     [
-        ({"light": (0.5, 2)}, r"vary: light = \(0.5, 2\): must be at most 1, full daylight"),
-        ({"color_temperature": (3000, 5000)}, "vary: 'color_temperature': is for a sim.Task"),
+        ({"wall_east.size": (0.5, 2)}, "vary: wall_east.size: 'wall_east' is touched, and all worlds share one layout"),
+        ({"goal.start": ((0, 0, 0), (1, 1, 0))}, "vary: goal.start: must be left out, the task itself places"),
         ({"size": (1, 2)}, "vary: 'size': must be one of"),
     ],
 )

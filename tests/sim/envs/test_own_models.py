@@ -41,7 +41,7 @@ def test_each_world_falls_by_its_own_gravity_also_while_others_begin_anew():
     assert np.ptp(drawn) > 1
     for step in range(10):
         if step == 2:
-            env.worlds.steps[1] = 5  # this one begins anew at once
+            env.simulation.steps[1] = 5  # this one begins anew at once
         *_, done, _ = env.step(np.zeros((3, 1)))
         steps = np.where(done, 0, steps + Weighed.substeps)
         kept = gravities(env) == drawn
@@ -127,7 +127,7 @@ def test_what_comes_too_late_for_a_model_of_its_own_is_refused():
         env.step(np.array([[0.0], [1.0]]))
     assert "\n" not in str(refused.value)
     late = sim.make_vec_env(LateReset(), n_envs=32, seed=0)
-    assert late.worlds.rngs[0].uniform() > 0.4
+    assert late.simulation.streams.episodes[0].uniform() > 0.4
     with pytest.raises(RuntimeError, match=f"LateReset: {words.format('opt.timestep')}"):
         late.reset()
 

@@ -31,9 +31,9 @@ def test_everybody_acts_and_sees_with_its_own_eyes(env):
     assert observations["Prey"]["eyes"].shape == (1, 3, 3, 2, 8)
     assert observations["Predator"]["eyes"].shape == (1, 2, 3, 1, 12)
     assert infos["Prey"] == {"reward_terms": {}, "is_success": False}
-    before = env._animals.worlds.datas[0].qpos.copy()
+    before = env._animals.simulation.physics.datas[0].qpos.copy()
     observations, rewards, *_ = env.step({"Predator": np.array([0, 1]), "Prey": np.array([1, 0])})
-    moved = env._animals.worlds.datas[0].qpos - before
+    moved = env._animals.simulation.physics.datas[0].qpos - before
     assert moved[[0, 3]].min() > 0.04
     assert np.abs(moved[[1, 2]]).max() < 1e-6
     np.testing.assert_array_equal(observations["Predator"]["previous_action"], [0, 1])
@@ -48,7 +48,7 @@ def test_everybody_is_told_how_the_world_differs():
     env = sim.make_parallel_env(sim.Encounter(Dusk(), Predator()), seed=1)
     *_, infos = env.reset()
     *_, later = env.step({name: np.zeros(2) for name in env.agents})
-    level = env._animals.worlds.varied["light"][0]
+    level = env._animals.simulation.varied["light"][0]
     assert all(info["varied"] == {"light": level} for info in (*infos.values(), *later.values()))
 
 
@@ -74,7 +74,7 @@ def test_an_episode_ends_for_all():
     env = sim.make_parallel_env(sim.Encounter(Brave(), Predator()), seed=1)
     env.reset()
     while env.agents:
-        data = env._animals.worlds.datas[0]
+        data = env._animals.simulation.physics.datas[0]
         towards = np.sign(data.qpos[:2] - data.qpos[2:])
         _, _, terminated, truncated, infos = env.step({"Prey": np.zeros(2), "Predator": towards})
     assert terminated == {"Prey": False, "Predator": True}

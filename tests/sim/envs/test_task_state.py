@@ -146,7 +146,7 @@ def test_who_sleeps_is_in_no_state():
 
 
 def test_environments_are_not_pickled(env):
-    with pytest.raises(TypeError, match="TaskVecEnv cannot be pickled or copied: it holds compiled kernels"):
+    with pytest.raises(TypeError, match="EyesVecEnv cannot be pickled or copied: it holds compiled kernels"):
         pickle.dumps(env)
     with pytest.raises(TypeError, match="EyesVecEnv cannot be pickled"):
         pickle.dumps(sim.make_vec_env("detection", sim.Eyes(n_eyes=1, resolution=(1, 1)), n_envs=1))

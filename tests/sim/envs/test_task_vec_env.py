@@ -163,8 +163,11 @@ def test_nothing_happens_before_the_first_reset():
     for early in (lambda: env.step(np.zeros((2, 1))), env.get_images, env.get_state):
         with pytest.raises(RuntimeError, match="call reset first"):
             early()
-    with pytest.raises(RuntimeError, match="state: is for rhabdom's own tasks"):
-        _ = sim.make_env(Face()).state
+    single = sim.make_env(Face())
+    with pytest.raises(RuntimeError, match="call reset first"):
+        _ = single.state
+    single.reset()
+    assert single.state[0].qpos.shape == (1,)
 
 
 def test_actions_and_physics_that_are_not_finite():

@@ -10,8 +10,10 @@ import pytest
 
 import sim
 from sim.envs.registration import IDS
-from sim.envs.simulation import EPISODE_STEPS, NO_ACTION, UNSTABLE
+from sim.physics.sliding_agents import UNSTABLE
 from sim.tasks.reward import EVALUATION, TERMS, TRAINING
+from sim.tasks.simulation import NO_ACTION
+from sim.worlds.catalog import EPISODE_STEPS
 from tests.sim.envs.test_task_vec_env import Face
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "tasks.md").read_text()

@@ -8,8 +8,9 @@ import pytest
 import optics
 import sim
 from sim.envs.observation import Memory
-from sim.envs.simulation import EPISODE_STEPS, MAX_TURN
+from sim.physics.sliding_agents import MAX_TURN
 from sim.render.receptor_noise import FEW
+from sim.worlds.catalog import EPISODE_STEPS
 
 EYES = sim.Eyes(n_eyes=2, resolution=(4, 5), fov_deg=60, noise_sigma=0.05)
 QUIET = dataclasses.replace(EYES, noise_sigma=0.0)
@@ -195,7 +196,7 @@ def test_a_broken_world_restarts_and_says_why():
     state = venv.state
     velocity = state.velocity.copy()
     velocity[1] = np.nan
-    venv.simulation._state = dataclasses.replace(state, velocity=velocity)
+    venv.simulation.state = dataclasses.replace(state, velocity=velocity)
     observation, reward, done, infos = venv.step(actions(3, 0))
     assert done.tolist() == [False, True, False]
     assert infos[1]["failure"] == "unstable physics"
@@ -213,7 +214,7 @@ def test_worlds_that_hold_nan_end_and_the_others_go_on_as_if_alone(broken):
         venv.reset()
     damaged = getattr(venvs[0].state, broken).copy()
     damaged[1] = np.nan
-    venvs[0].simulation._state = dataclasses.replace(venvs[0].state, **{broken: damaged})
+    venvs[0].simulation.state = dataclasses.replace(venvs[0].state, **{broken: damaged})
     (ours, reward, done, infos), (theirs, other, _, _) = (venv.step(actions(3, 0)) for venv in venvs)
     assert done.tolist() == [False, True, False]
     assert infos[1]["failure"] == "unstable physics"

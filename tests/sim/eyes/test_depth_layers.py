@@ -9,9 +9,10 @@ import pytest
 
 import optics
 import sim
-from sim.envs.simulation import Simulation
 from sim.eyes.depth_layers import DepthLayers
 from sim.scene.variant import variant
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 
 NEAR, FAR = 0.3, 20.0  # [m]
 
@@ -24,7 +25,7 @@ def close_by():
     focus = eyes.eye().sensor_distance
     eyes = dataclasses.replace(eyes, optics=optics.Pupil(2.5e-3, thin_lens_focal_length=focus))
     world = sim.build_world("detection")
-    simulation = Simulation(world, 1, 0, "training", 1)
+    simulation = Simulation(task_of(world), 1, 0)
     state = simulation.reset()
     simulation.close()
     objects = state.objects.copy()

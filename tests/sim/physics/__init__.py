@@ -1,8 +1,13 @@
 """What tests hold of physics, module by module.
 
-physics: test_physics.py, worlds/test_world.py
 free_motion: test_physics.py
 local_contacts: test_local_contacts.py
 mujoco_batch: test_local_contacts.py
 controls: test_controls.py
+agent_motion: test_physics.py
+sliding_agents: tasks/test_task.py, envs/test_features.py
+mujoco_worlds: envs/test_task_state.py, envs/test_broken_worlds.py, envs/test_own_models.py
+array_worlds: envs/test_batch_task.py
+varied_looks: envs/test_features.py, envs/test_light_levels.py
+physics: envs/test_features.py
 """

@@ -7,11 +7,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.envs.simulation import Simulation
 from sim.physics import mujoco_batch
+from sim.physics.agent_motion import SUBSTEPS, AgentPhysics
 from sim.physics.local_contacts import LocalContacts
 from sim.physics.mujoco_batch import POOLED
-from sim.physics.physics import SUBSTEPS, Physics
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.worlds.agent_model import AgentModel
 from sim.worlds.world import _add_agent, _empty_world, build_world
 
@@ -22,12 +23,12 @@ def world():
 
 
 def begun(world, n, seed=0):
-    return Simulation(world, n, seed, "training", 1).reset()
+    return Simulation(task_of(world), n, seed).reset()
 
 
 def begun_at_walls(world, n):
     """Worlds whose agents have walked into walls and corners for a while."""
-    simulation = Simulation(world, n, 0, "training", 1)
+    simulation = Simulation(task_of(world), n, 0)
     simulation.reset()
     rng = np.random.default_rng(0)
     for _ in range(40):
@@ -44,13 +45,13 @@ def assert_same_bits(ours, theirs):
 def redone(monkeypatch):
     """How many agents were stepped in the whole world, call by call."""
     counts = []
-    simulate = Physics._simulate
+    simulate = AgentPhysics._simulate
 
     def noted(self, agents, velocity):
         counts.append(len(velocity))
         return simulate(self, agents, velocity)
 
-    monkeypatch.setattr(Physics, "_simulate", noted)
+    monkeypatch.setattr(AgentPhysics, "_simulate", noted)
     return counts
 
 
@@ -60,7 +61,7 @@ def test_agents_among_a_few_geoms_do_what_they_do_among_all(task, threads, redon
     """Bit for bit, and hardly anyone is done again; so many agents that threads share them."""
     world = build_world(task)
     state, command = begun_at_walls(world, 2 * POOLED)
-    few, all_of_them = Physics(world, threads), Physics(world, 1)
+    few, all_of_them = AgentPhysics(world, threads), AgentPhysics(world, 1)
     all_of_them.local_contacts = None
     redone.clear()
     ours = few.step(state, command)
@@ -74,12 +75,12 @@ def test_agents_among_a_few_geoms_do_what_they_do_among_all(task, threads, redon
 def test_agents_among_too_many_geoms_are_stepped_in_the_whole_world(redone):
     world = build_world("maze")
     state, command = begun_at_walls(world, 64)
-    cramped = Physics(world, 1)
+    cramped = AgentPhysics(world, 1)
     cramped.local_contacts._slots = cramped.local_contacts._slots[:1]
     redone.clear()
     ours = cramped.step(state, command)
     assert 0 < sum(redone) < 64  # those in corners
-    assert_same_bits(ours, Physics(world, 1).step(state, command))
+    assert_same_bits(ours, AgentPhysics(world, 1).step(state, command))
 
 
 @pytest.mark.parametrize("noticed", [True, False])
@@ -87,11 +88,11 @@ def test_agents_that_stray_to_what_their_models_lack_are_done_again(monkeypatch,
     """With room for no geom at all, every agent at a wall strays into it; unnoticed, they would go through."""
     world = build_world("maze")
     state, command = begun_at_walls(world, 64)
-    without_room = Physics(world, 1)
+    without_room = AgentPhysics(world, 1)
     without_room.local_contacts._slots = without_room.local_contacts._slots[:0]
     if not noticed:
         monkeypatch.setattr(LocalContacts, "strayed", lambda _, position, path, few: np.zeros(len(few), bool))
-    ours, theirs = without_room.step(state, command), Physics(world, 1, closed_form=False).step(state, command)
+    ours, theirs = without_room.step(state, command), AgentPhysics(world, 1, closed_form=False).step(state, command)
     assert (np.abs(ours.path - theirs.path).max() < 1e-12) == noticed
     assert np.array_equal(ours.contact, theirs.contact) == noticed
 
@@ -99,11 +100,11 @@ def test_agents_that_stray_to_what_their_models_lack_are_done_again(monkeypatch,
 def test_an_agent_that_breaks_down_at_a_wall_is_what_the_whole_world_makes_of_it():
     world = build_world("maze")
     state, command = begun_at_walls(world, 64)
-    touching = np.flatnonzero(Physics(world, 1).step(state, command).contact)
+    touching = np.flatnonzero(AgentPhysics(world, 1).step(state, command).contact)
     velocity = state.velocity.copy()
     velocity[touching[::2]] = [[1e9, -1e9]]
     state = dataclasses.replace(state, velocity=velocity)
-    ours, theirs = (Physics(world, 1, closed_form).step(state, command) for closed_form in (True, False))
+    ours, theirs = (AgentPhysics(world, 1, closed_form).step(state, command) for closed_form in (True, False))
     assert theirs.unstable.sum() == len(touching[::2])
     np.testing.assert_array_equal(ours.unstable, theirs.unstable)
     np.testing.assert_allclose(ours.path, theirs.path, rtol=0, atol=1e-12)
@@ -113,13 +114,13 @@ def test_an_agent_that_breaks_down_at_a_wall_is_what_the_whole_world_makes_of_it
 def test_a_model_that_was_altered_has_no_parts(change):
     """Another number anywhere, and agents at walls are stepped in the whole of it."""
     world = build_world("maze")
-    assert Physics(world, 1).local_contacts is not None
+    assert AgentPhysics(world, 1).local_contacts is not None
     if change.startswith("opt."):
         was = getattr(world.model.opt, change[4:])
         setattr(world.model.opt, change[4:], type(was)(was / 2))
     else:
         getattr(world.model, change)[1] += 1
-    assert Physics(world, 1).local_contacts is None
+    assert AgentPhysics(world, 1).local_contacts is None
 
 
 def test_a_world_with_nothing_to_touch_is_crossed_in_closed_form():
@@ -129,21 +130,21 @@ def test_a_world_with_nothing_to_touch_is_crossed_in_closed_form():
     model = spec.compile()
     world = dataclasses.replace(field, model=model, objects=(), alone=AgentModel.of(spec, model))
     state = begun(field, 4)
-    motion = Physics(world, 1).step(state, np.full((4, 2), 3.0))
+    motion = AgentPhysics(world, 1).step(state, np.full((4, 2), 3.0))
     assert not motion.contact.any()
     np.testing.assert_array_less(state.position, motion.path[:, -1])
 
 
 def test_threads_change_nothing(world):
     state, command = begun_at_walls(world, POOLED)
-    one, two = (Physics(world, threads, closed_form=False) for threads in (1, 2))
+    one, two = (AgentPhysics(world, threads, closed_form=False) for threads in (1, 2))
     assert_same_bits(one.step(state, command), two.step(state, command))
     assert two._step_batch._pool is not None
 
 
 def test_fewer_worlds_than_are_worth_it_start_no_threads(world):
     state, command = begun_at_walls(world, POOLED - 1)
-    physics = Physics(world, 2, closed_form=False)
+    physics = AgentPhysics(world, 2, closed_form=False)
     physics.step(state, command)
     assert physics._step_batch._pool is None
 
@@ -152,7 +153,8 @@ def test_mujocos_clock_outlives_physics_in_two_threads(world):
     """Each saves and restores it; a race would leave the process without."""
     state, command = begun(world, 64), np.zeros((64, 2))
     stepping = [
-        threading.Thread(target=step_often, args=(Physics(world, 1, closed_form=False), state, command)) for _ in "12"
+        threading.Thread(target=step_often, args=(AgentPhysics(world, 1, closed_form=False), state, command))
+        for _ in "12"
     ]
     before = mujoco_batch._clock().value
     for thread in stepping:
@@ -170,7 +172,7 @@ def step_often(physics, state, command):
 
 def test_mujocos_clock_runs_on_after_physics(world):
     """It is stopped during a rollout, whose data count their steps without timing them, and for nobody else."""
-    ours = Physics(world, 1, closed_form=False)
+    ours = AgentPhysics(world, 1, closed_form=False)
     ours.step(begun(world, 1), np.ones((1, 2)))
     step = mujoco.mjtTimer.mjTIMER_STEP
     assert ours._step_batch._data[0].timer[step].number >= SUBSTEPS

@@ -7,9 +7,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.envs.simulation import Simulation
-from sim.physics import physics
-from sim.physics.physics import SUBSTEPS, Physics
+from sim.physics import agent_motion
+from sim.physics.agent_motion import SUBSTEPS, AgentPhysics
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.worlds.world import SPEED_GAIN, TIME_CONSTANT, build_world
 
 
@@ -19,13 +20,13 @@ def world():
 
 
 def begun(world, n, seed=0):
-    return Simulation(world, n, seed, "training", 1).reset()
+    return Simulation(task_of(world), n, seed).reset()
 
 
 def test_speed_follows_the_servos_closed_form(world):
     """dv/dt = (gain ctrl - v)/τ. The explicit-implicit scheme is of first order: error ~ dt/τ/2 = 3 %."""
     state = dataclasses.replace(begun(world, 1), position=np.zeros((1, 2)))
-    motion = Physics(world, 1).step(state, np.array([[10.0, 0.0]]))
+    motion = AgentPhysics(world, 1).step(state, np.array([[10.0, 0.0]]))
     t = SUBSTEPS * world.model.opt.timestep
     expected = SPEED_GAIN * 10.0 * (1 - np.exp(-t / TIME_CONSTANT))
     assert motion.velocity[0, 0] == pytest.approx(expected, rel=0.04)
@@ -35,7 +36,7 @@ def test_speed_follows_the_servos_closed_form(world):
 def test_batch_equals_single_data(world):
     state = begun(world, 5, seed=3)
     command = np.random.default_rng(1).uniform(-10, 10, (5, 2))
-    motion = Physics(world, 2).step(state, command)
+    motion = AgentPhysics(world, 2).step(state, command)
     for i in range(5):
         data = mujoco.MjData(world.model)
         data.qpos[:3] = [*state.position[i], state.heading[i]]
@@ -50,8 +51,8 @@ def test_batch_equals_single_data(world):
 def test_free_motion_is_what_mujoco_does(task):
     """Everywhere, near walls and away from them, to rounding: 1e-12 m on metres over ten substeps."""
     world = build_world(task)
-    moving, simulating = Physics(world, 1), Physics(world, 1, closed_form=False)
-    simulation = Simulation(world, 32, 0, "training", 1)
+    moving, simulating = AgentPhysics(world, 1), AgentPhysics(world, 1, closed_form=False)
+    simulation = Simulation(task_of(world), 32, 0)
     simulation.reset()
     rng = np.random.default_rng(0)
     free = 0
@@ -71,12 +72,12 @@ def test_free_motion_is_what_mujoco_does(task):
 def test_what_physics_leaves_out_changes_no_bit(task, monkeypatch):
     """Islands and, in small models, boxes of boxes: agents at walls and in corners move as in all of MuJoCo."""
     world = build_world(task)
-    lean = Physics(world, 1, closed_form=False)
+    lean = AgentPhysics(world, 1, closed_form=False)
     assert lean._model.opt.disableflags != world.model.opt.disableflags
-    monkeypatch.setattr(physics, "_without_detours", copy.copy)
-    whole = Physics(world, 1, closed_form=False)
+    monkeypatch.setattr(agent_motion, "_without_detours", copy.copy)
+    whole = AgentPhysics(world, 1, closed_form=False)
     assert whole._model.opt.disableflags == world.model.opt.disableflags
-    simulation = Simulation(world, 32, 0, "training", 1)
+    simulation = Simulation(task_of(world), 32, 0)
     simulation.reset()
     rng, touched = np.random.default_rng(0), 0
     for _ in range(40):
@@ -91,11 +92,11 @@ def test_what_physics_leaves_out_changes_no_bit(task, monkeypatch):
 
 def test_an_agent_that_moves_freely_through_a_wall_would_be_noticed(world):
     """Blind to the walls, the same motion departs from MuJoCo: the test above can fail."""
-    physics = Physics(world, 1)
+    physics = AgentPhysics(world, 1)
     physics.free_motion = dataclasses.replace(physics.free_motion, lower=np.empty((0, 2)), upper=np.empty((0, 2)))
     state = dataclasses.replace(begun(world, 1), position=np.array([[10.5, 0.0]]), velocity=np.array([[9.0, 0.0]]))
     command = np.array([[10.0, 0.0]])
-    apart = physics.step(state, command).path - Physics(world, 1).step(state, command).path
+    apart = physics.step(state, command).path - AgentPhysics(world, 1).step(state, command).path
     assert np.abs(apart).max() > 0.1
 
 
@@ -108,17 +109,17 @@ def test_models_move_in_closed_form_as_far_as_they_are_linear(field, linear):
     world = build_world("detection")
     getattr(world.model, field)[0] = 0.3
     world.model.qpos_spring[:] = world.model.qpos0  # at rest where the agent starts, and nowhere else
-    assert (Physics(world, 1).free_motion is not None) == linear
-    assert Physics(world, 1).local_contacts is None
+    assert (AgentPhysics(world, 1).free_motion is not None) == linear
+    assert AgentPhysics(world, 1).local_contacts is None
     state = dataclasses.replace(begun(world, 4), position=np.array([[3.0, 1.0]] * 4))
     command = np.random.default_rng(0).uniform(-10, 10, (4, 2))
-    ours, mujocos = (Physics(world, 1, closed_form).step(state, command) for closed_form in (True, False))
+    ours, mujocos = (AgentPhysics(world, 1, closed_form).step(state, command) for closed_form in (True, False))
     np.testing.assert_allclose(ours.path, mujocos.path, rtol=0, atol=1e-12)
 
 
 def test_walls_hold_and_are_felt(world):
     state = begun(world, 1)
-    physics = Physics(world, 1)
+    physics = AgentPhysics(world, 1)
     contacts = []
     for _ in range(20):
         motion = physics.step(state, np.array([[10.0, 0.0]]))
@@ -133,20 +134,20 @@ def test_one_broken_world_is_named_and_the_others_go_on(world):
     state = begun(world, 4)
     velocity = state.velocity.copy()
     velocity[2, 0] = np.nan
-    motion = Physics(world, 2).step(dataclasses.replace(state, velocity=velocity), np.full((4, 2), 3.0))
+    motion = AgentPhysics(world, 2).step(dataclasses.replace(state, velocity=velocity), np.full((4, 2), 3.0))
     assert motion.unstable.tolist() == [False, False, True, False]
     assert np.isfinite(motion.path).all()
-    whole = Physics(world, 2).step(state, np.full((4, 2), 3.0))
+    whole = AgentPhysics(world, 2).step(state, np.full((4, 2), 3.0))
     others = [0, 1, 3]
     np.testing.assert_array_equal(motion.path[others], whole.path[others])
 
 
 def test_a_broken_world_ends_its_episode_with_a_reason(world):
-    simulation = Simulation(world, 3, 0, "training", 1)
+    simulation = Simulation(task_of(world), 3, 0)
     state = simulation.reset()
     velocity = state.velocity.copy()
     velocity[1] = 1e12
-    simulation._state = dataclasses.replace(state, velocity=velocity)
+    simulation.state = dataclasses.replace(state, velocity=velocity)
     step = simulation.step(np.zeros((3, 2)))
     assert step.failure == {1: "unstable physics"}
     assert step.terminated.tolist() == [False, True, False]
@@ -162,7 +163,7 @@ def test_objects_that_collide_are_refused(world):
         <sensor><touch site="s"/></sensor></mujoco>"""
     )
     with pytest.raises(ValueError, match="'goal' collides"):
-        Physics(dataclasses.replace(world, model=spec.compile(), objects=("goal",)), 1)
+        AgentPhysics(dataclasses.replace(world, model=spec.compile(), objects=("goal",)), 1)
 
 
 @pytest.mark.parametrize(("speed", "broken"), [(50.0, False), (400.0, True)])
@@ -170,14 +171,14 @@ def test_what_no_actuator_can_do_is_a_breakdown(world, speed, broken):
     """Agents are driven at 10 m/s at most. One that is ten times as fast, and rising, was thrown by something."""
     state = dataclasses.replace(begun(world, 1), position=np.zeros((1, 2)), velocity=np.array([[0.0, speed]]))
     command = np.array([[0.0, 10.0]])
-    motion = Physics(world, 1, closed_form=False).step(state, command)
+    motion = AgentPhysics(world, 1, closed_form=False).step(state, command)
     assert motion.unstable.tolist() == [broken]
     assert (np.abs(motion.velocity) < 100).all()
 
 
 def test_a_world_that_broke_down_touches_nothing(world):
     """Whatever its sensors say: its agent is where it was before, and pays for no contact."""
-    physics = Physics(world, 1, closed_form=False)
+    physics = AgentPhysics(world, 1, closed_form=False)
     state = dataclasses.replace(begun(world, 2), position=np.zeros((2, 2)))
     states, sensors = physics._step_batch([physics._model] * 2, *physics._start_of(state, np.full((2, 2), 3.0)))
     sensors[:] = 1.0

@@ -19,8 +19,7 @@ fidelity_trials: test_fidelity.py, eyes/test_depth_layers.py
 prepared_scene: test_batched_renderer.py, test_fidelity.py
 memory_budget: test_memory_budget.py, test_sample_choice.py
 receptor_noise: test_receptor_noise.py
-noisy_signals: test_noisy_signals.py
-pending_frame: test_pending_frame.py, test_noisy_signals.py
+pending_frame: test_pending_frame.py, envs/test_eyes_of_kind.py
 model_renderer: test_model_renderer.py
 renderable: test_model_renderer.py, test_edge_rays.py
 model_fidelity: test_model_fidelity.py, test_model_light.py

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import sim
-from sim.envs.simulation import Simulation
 from sim.render.world_scene import WorldScene
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.tracing import model_scene, spheres
 from sim.tracing.model_lights import Lights
 from sim.tracing.movers import Movers
@@ -31,7 +32,7 @@ CLOSE_BY = np.array([[[1.5, 0.7], [1.5, -0.7], [2.6, 0.0]], [[1.8, -0.8], [1.4, 
 def begun(task, n, seed=0):
     """A world and a state in which the agents look at what there is."""
     world = build_world(task, seed=seed, eyes=EYES)
-    state = Simulation(world, n, seed, "training", 1).reset()
+    state = Simulation(task_of(world), n, seed).reset()
     if not world.objects:
         return world, state
     objects = state.objects.copy()

@@ -9,9 +9,10 @@ import pytest
 
 import optics
 import sim
-from sim.envs.simulation import Simulation
 from sim.render.fidelity_choice import SHARE_OF_LIGHT
 from sim.render.sample_choice import PERFECT_LENS_RAYS, PUPIL_RAYS
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from tests.sim.tracing.area_views import sees_object, views
 
 DETECTION = sim.Eyes(n_eyes=2, resolution=(9, 11))
@@ -36,7 +37,7 @@ CASES = {
 
 def lived_through(world, n=16):
     """States that agents get into, which the trials know nothing of."""
-    simulation = Simulation(world, n, 3, "training", 1)
+    simulation = Simulation(task_of(world), n, 3)
     simulation.reset()
     rng = np.random.default_rng(5)
     for _ in range(12):

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import sim
-from sim.envs.simulation import Simulation
 from sim.render import one_ray
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 
 EYES = sim.Eyes(n_eyes=2, resolution=(24, 36), fov_deg=60, placement_range_deg=50, bands=3, noise_sigma=0)
 RAYS = 64
@@ -24,7 +25,7 @@ CLOSE_BY = np.array([[1.5, 0.7], [1.5, -0.7], [2.6, 0.0]])
 @cache
 def scene(task):
     world = sim.build_world(task, seed=3)
-    state = Simulation(world, 1, 3, "training", 1).reset()
+    state = Simulation(task_of(world), 1, 3).reset()
     if world.objects:
         objects = state.objects.copy()
         objects[0, :, :2] = CLOSE_BY + np.array([-6.0, 1.0])

@@ -9,9 +9,10 @@ import pytest
 
 import optics
 import sim
-from sim.envs.simulation import Simulation
 from sim.eyes import eyes, receptive_fields
 from sim.scene.variant import variant
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.tracing import lighting, spheres
 
 EYES = sim.Eyes(n_eyes=2, resolution=(5, 7), fov_deg=60, placement_range_deg=70, bands=3, noise_sigma=0)
@@ -33,7 +34,7 @@ def random_world(task, seed):
     """One agent that looks at something near: at an object where there are any."""
     world = sim.build_world(task, seed=seed)
     rng = np.random.default_rng(seed)
-    simulation = Simulation(world, 1, seed, "training", 1)
+    simulation = Simulation(task_of(world), 1, seed)
     state = simulation.reset()
     simulation.close()
     position, heading = state.position + rng.uniform(-0.7, 0.7, (1, 2)), state.heading

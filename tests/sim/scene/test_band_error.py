@@ -7,8 +7,9 @@ import pytest
 
 import optics
 import sim
-from sim.envs.simulation import Simulation
 from sim.scene.band_error import band_error, measured
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.worlds.foraging import ULTRAVIOLET, petal
 
 PETALS = [petal(share) for share in ULTRAVIOLET.values()]
@@ -76,7 +77,7 @@ class TestLampsWithLines:
     def signals(renderer, bands, receptors="rgb", **spectra):
         asked = {"wall": GREY, "floor": GREY, "light_0": "FL2", **spectra}
         world = sim.build_world("detection", spectra={name: one for name, one in asked.items() if one is not None})
-        simulation = Simulation(world, 1, 3, "training", 1)
+        simulation = Simulation(task_of(world), 1, 3)
         state = simulation.reset()
         simulation.close()
         eyes = sim.Eyes(1, (3, 3), fov_deg=80, bands=bands, receptors=receptors, noise_sigma=0)
@@ -92,7 +93,7 @@ class TestLampsWithLines:
         assert few.max() > 0.05
 
     def test_samples_at_the_centres_miss_lines(self, monkeypatch):
-        monkeypatch.setattr("sim.render.prepared_scene.with_band_averaged_lights", lambda world, eye: world)
+        monkeypatch.setattr("sim.tracing.model_scene.lights_in_bands", lambda model, spectra, eye: (spectra, []))
         few, many = (self.signals("batched", bands) for bands in (4, 64))
         assert (few > 1.9 * many)[many > 0.1].any()
 

@@ -11,8 +11,8 @@ from scipy.stats import kstest
 import optics
 import sim
 from optics.spectra.spectrum import cie_1931, daylight
-from sim.envs.task_fidelity import fidelities_of
 from sim.scene.variation import DAYLIGHT, Variation, filter_to
+from sim.tasks.task_fidelity import fidelities_of
 from tests.sim.envs.test_task_vec_env import CART, Face
 
 NM = np.arange(380.0, 781.0, 5.0)
@@ -32,7 +32,7 @@ class Lit(Face):
 def first_look(task, n=4, seed=0):
     with contextlib.closing(sim.make_vec_env(task, n_envs=n, seed=seed)) as env:
         seen = env.reset()["eyes"]
-        return seen, env.worlds.varied, env.observation_space["eyes"], env.reset_infos
+        return seen, env.simulation.varied, env.observation_space["eyes"], env.reset_infos
 
 
 def steady(data, rng):
@@ -110,7 +110,7 @@ def test_worlds_differ_by_seed_and_number_and_from_episode_to_episode():
         env.reset()
         found = []
         for _ in range(7):
-            found.append(env.worlds.varied["light"][0])
+            found.append(env.simulation.varied["light"][0])
             env.step(np.zeros((n, 1)))
         return found
 
@@ -125,10 +125,10 @@ def test_worlds_that_go_back_are_lit_as_they_were():
     env = sim.make_vec_env(Lit(light=(0.1, 1.0), color_temperature=(2500, 9000)), n_envs=3)
     env.reset()
     env.step(np.zeros((3, 1)))
-    state, lit = env.get_state(), {name: values.copy() for name, values in env.worlds.varied.items()}
+    state, lit = env.get_state(), {name: values.copy() for name, values in env.simulation.varied.items()}
     then = [env.step(np.zeros((3, 1)))[0]["eyes"] for _ in range(5)]
     env.set_state(state, [0, 2])
-    assert all(env.worlds.varied[name][2] == lit[name][2] for name in lit)
+    assert all(env.simulation.varied[name][2] == lit[name][2] for name in lit)
     for expected in then:
         np.testing.assert_array_equal(env.step(np.zeros((3, 1)))[0]["eyes"][[0, 2]], expected[[0, 2]])
 

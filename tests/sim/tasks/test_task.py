@@ -5,11 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sim.envs.info import infos_of
-from sim.envs.simulation import EPISODE_STEPS, MAX_TURN, Simulation
+from sim.physics.sliding_agents import MAX_TURN
 from sim.tasks.placement import Places
+from sim.tasks.reach import first_reached
+from sim.tasks.registry import task_of
 from sim.tasks.reward import EVALUATION, TRAINING
-from sim.tasks.task import first_reached, task_of
+from sim.tasks.simulation import Simulation
+from sim.worlds.catalog import EPISODE_STEPS
 from sim.worlds.layout import CLEARANCE, REACH, SEPARATION
 from sim.worlds.world import build_world
 
@@ -46,8 +48,8 @@ def test_weights_are_the_papers():
 
 
 def test_training_ends_at_goal_and_adversary(field):
-    simulation = Simulation(field, 3, 0, "training", 1)
-    simulation._state = facing(simulation, np.array([0, 1, 2]), 2.5)
+    simulation = Simulation(task_of(field), 3, 0)
+    simulation.state = facing(simulation, np.array([0, 1, 2]), 2.5)
     step = simulation.step(np.tile(AHEAD, (3, 1)))
     assert step.terminated.all()
     assert not step.truncated.any()
@@ -59,10 +61,10 @@ def test_training_ends_at_goal_and_adversary(field):
 def test_a_world_of_goals_alone(field):
     """No adversary: the nearest goal counts, and reaching one ends the episode as usual."""
     goals = dataclasses.replace(field, objects=("goal",))
-    simulation = Simulation(goals, 2, 0, "training", 1)
+    simulation = Simulation(task_of(goals), 2, 0)
     state = facing(simulation, np.array([0, 0]), 2.5)
     away = dataclasses.replace(state, heading=np.array([0.0, np.pi]), velocity=state.velocity * [[1], [-1]])
-    simulation._state = away
+    simulation.state = away
     step = simulation.step(np.tile(AHEAD, (2, 1)))
     assert step.reward_terms["goal"].tolist() == [1, 0]
     assert step.reward_terms["adversary"].tolist() == [0, 0]
@@ -72,17 +74,17 @@ def test_a_world_of_goals_alone(field):
 
 def test_passing_by_within_reach_counts_though_the_action_ends_beyond(field):
     """2 m per action: at its end the agent is 1.05 m behind the goal, in between it went through it."""
-    simulation = Simulation(field, 1, 0, "training", 1)
+    simulation = Simulation(task_of(field), 1, 0)
     state = facing(simulation, np.array([0]), 0.93)
-    simulation._state = dataclasses.replace(state, position=state.position + np.array([0.0, 0.6]))
+    simulation.state = dataclasses.replace(state, position=state.position + np.array([0.0, 0.6]))
     step = simulation.step(AHEAD[None])
     assert np.linalg.norm(step.state.position - step.state.objects[:, 0, :2]) > REACH
     assert step.success[0]
 
 
 def test_evaluation_respawns_and_goes_on(field):
-    simulation = Simulation(field, 2, 0, "evaluation", 1)
-    simulation._state = before = facing(simulation, np.array([0, 1]), 2.5)
+    simulation = Simulation(task_of(field, "evaluation"), 2, 0)
+    simulation.state = before = facing(simulation, np.array([0, 1]), 2.5)
     step = simulation.step(np.tile(AHEAD, (2, 1)))
     assert not step.done.any()
     assert step.reward_terms["goal"].tolist() == [10, 0]
@@ -95,12 +97,12 @@ def test_evaluation_respawns_and_goes_on(field):
 
 
 def test_progress_is_the_change_of_distance(field, maze):
-    simulation = Simulation(field, 4, 1, "training", 1)
+    simulation = Simulation(task_of(field), 4, 1)
     before = simulation.reset()
     step = simulation.step(np.random.default_rng(0).uniform(-1, 1, (4, 2)))
     distances = [np.linalg.norm(s.objects[:, 0, :2] - s.position, axis=-1) for s in (before, step.state)]
     np.testing.assert_allclose(step.reward_terms["progress"], -0.25 * (distances[1] - distances[0]))
-    simulation = Simulation(maze, 4, 1, "evaluation", 1)
+    simulation = Simulation(task_of(maze, "evaluation"), 4, 1)
     simulation.reset()
     total = np.zeros(4)
     for _ in range(3):
@@ -111,27 +113,27 @@ def test_progress_is_the_change_of_distance(field, maze):
 
 
 def test_maze_is_left_through_its_goal_region(maze):
-    simulation = Simulation(maze, 1, 0, "training", 1)
+    simulation = Simulation(task_of(maze), 1, 0)
     state = simulation.reset()
     x0, y0, x1, y1 = maze.goal_region
     inside = np.array([[(x0 + x1) / 2, (y0 + y1) / 2]])
-    simulation._state = dataclasses.replace(state, position=inside)
+    simulation.state = dataclasses.replace(state, position=inside)
     assert simulation.step(np.array([[-1.0, 0.0]])).success[0]
-    simulation._state = state
+    simulation.state = state
     assert not simulation.step(np.array([[-1.0, 0.0]])).success[0]
 
 
 def test_contact_is_penalised(field):
-    simulation = Simulation(field, 1, 0, "training", 1)
+    simulation = Simulation(task_of(field), 1, 0)
     state = simulation.reset()
-    simulation._state = dataclasses.replace(state, position=np.array([[10.7, 0.0]]), heading=np.zeros(1))
+    simulation.state = dataclasses.replace(state, position=np.array([[10.7, 0.0]]), heading=np.zeros(1))
     step = simulation.step(AHEAD[None])
-    assert step.contact[0]
+    assert simulation.felt[0]["contact"][0]
     assert step.reward_terms["contact"][0] == -1
 
 
 def test_time_limit_truncates_and_does_not_terminate(field):
-    simulation = Simulation(field, 1, 0, "evaluation", 1)
+    simulation = Simulation(task_of(field, "evaluation"), 1, 0)
     simulation.reset()
     for _ in range(EPISODE_STEPS):
         step = simulation.step(np.array([[-1.0, 0.0]]))
@@ -140,7 +142,7 @@ def test_time_limit_truncates_and_does_not_terminate(field):
 
 
 def test_actions_steer(field):
-    simulation = Simulation(field, 2, 0, "training", 1)
+    simulation = Simulation(task_of(field), 2, 0)
     before = simulation.reset()
     step = simulation.step(np.array([[-1.0, 0.5], [-1.0, -1.0]]))
     turned = (step.state.heading - before.heading + np.pi) % (2 * np.pi) - np.pi
@@ -176,7 +178,7 @@ def test_starts_are_apart_and_varied(field):
         assert gaps.min() >= SEPARATION
         assert np.linalg.norm(objects - agent, axis=-1).min() >= CLEARANCE
     assert len({tuple(objects[0]) for _, objects in starts}) > 20
-    headings = Simulation(field, 64, 0, "training", 1).reset().heading
+    headings = Simulation(task_of(field), 64, 0).reset().heading
     assert np.ptp(headings) > 5.0
 
 
@@ -187,7 +189,7 @@ def test_too_small_a_field_is_refused(field):
 
 def test_tracked_objects_wander_inside_and_apart():
     world = build_world("tracking")
-    simulation = Simulation(world, 16, 0, "evaluation", 1)
+    simulation = Simulation(task_of(world, "evaluation"), 16, 0)
     states = [simulation.reset()]
     stay = np.tile([-1.0, 0.0], (16, 1))
     for _ in range(100):
@@ -206,7 +208,7 @@ def test_tracked_objects_wander_inside_and_apart():
 
 def test_unknown_mode_and_task_are_refused(field):
     with pytest.raises(ValueError, match="mode"):
-        Simulation(field, 1, 0, "testing", 1)
+        Simulation(task_of(field, "testing"), 1, 0)
     with pytest.raises(ValueError, match="task"):
         task_of(dataclasses.replace(field, task="chess"))
 
@@ -215,8 +217,8 @@ def test_unknown_mode_and_task_are_refused(field):
 def test_a_step_in_which_everybody_arrives_is_a_step_like_others(field, n):
     """With goals alone: nothing is left that nobody has reached."""
     goals = dataclasses.replace(field, objects=("goal",))
-    simulation = Simulation(goals, n, 0, "training", 1)
-    simulation._state = facing(simulation, np.zeros(n, int), 2.5)
+    simulation = Simulation(task_of(goals), n, 0)
+    simulation.state = facing(simulation, np.zeros(n, int), 2.5)
     step = simulation.step(np.tile(AHEAD, (n, 1)))
     assert step.success.all()
     assert step.terminated.all()
@@ -225,12 +227,12 @@ def test_a_step_in_which_everybody_arrives_is_a_step_like_others(field, n):
 @pytest.mark.parametrize("adversary_first", [False, True])
 def test_one_action_may_reach_both_and_says_which_was_first(field, adversary_first):
     """An action takes an agent up to 2 m; in evaluation both are paid for."""
-    simulation = Simulation(field, 1, 0, "evaluation", 1)
+    simulation = Simulation(task_of(field, "evaluation"), 1, 0)
     state = simulation.reset()
     objects = state.objects.copy()
     near, far = (1, 0) if adversary_first else (0, 1)
     objects[0, near, :2], objects[0, far, :2], objects[0, 2, :2] = (0, 0), (2, 0), (-6, -6)
-    simulation._state = dataclasses.replace(
+    simulation.state = dataclasses.replace(
         state,
         objects=objects,
         position=np.array([[-0.2, 0.5]]),
@@ -240,6 +242,4 @@ def test_one_action_may_reach_both_and_says_which_was_first(field, adversary_fir
     step = simulation.step(AHEAD[None])
     assert step.reward_terms["goal"] == 10
     assert step.reward_terms["adversary"] == -10
-    assert step.adversary_first.tolist() == [adversary_first]
-    info = infos_of(step)[0]
-    assert info.get("adversary_first", False) is adversary_first
+    assert step.info[0].get("adversary_first", False) is adversary_first

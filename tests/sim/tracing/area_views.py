@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 
 import sim
-from sim.envs.simulation import Simulation
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.worlds import layout, materials
 from sim.worlds.layout import Starts
 from sim.worlds.state import WorldState
@@ -53,7 +54,7 @@ def views(world, n=VIEWS, seed=0) -> WorldState:
     """Agents anywhere, looking anywhere: a body's width off the walls at least, half of them at an object 0.8 to 4 m
     away, where there are objects."""
     rng = np.random.default_rng(seed)
-    state = Simulation(build_world("detection"), n, seed, "training", 1).reset()
+    state = Simulation(task_of(build_world("detection")), n, seed).reset()
     objects = state.objects[:, : len(world.objects)]
     spots = np.concatenate([world.agent_spawn, world.object_spawn])
     position = spots[rng.integers(len(spots), size=n)] + rng.uniform(-0.6, 0.6, (n, 2))

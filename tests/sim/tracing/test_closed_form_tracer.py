@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import sim
-from sim.envs.simulation import Simulation
 from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.tracing.closed_form_tracer import components_of, reflected_components_of
 from sim.tracing.reflectance_atlas import bake
 from sim.tracing.wall_intersection import Cells
@@ -26,7 +27,7 @@ FOUR_RAYS = sim.Fidelity(4, EYES.bands)
 def scattered(world, n, seed=0):
     """A state with agents in random directions and places, objects about them."""
     rng = np.random.default_rng(seed)
-    state = Simulation(world, n, seed, "training", 1).reset()
+    state = Simulation(task_of(world), n, seed).reset()
     places = world.agent_spawn if not world.objects else np.concatenate([world.agent_spawn, world.object_spawn])
     shift = rng.uniform(-0.6, 0.6, (n, 2))
     position = places[rng.integers(len(places), size=n)] + shift
@@ -102,7 +103,7 @@ def furnished(n_boxes, *, grid, floor="t", extra="", seed=0):
 def around(world, n, seed):
     """Agents on the world's spots, the goal anywhere near."""
     rng = np.random.default_rng(seed)
-    template = Simulation(build_world("detection"), n, 0, "training", 1).reset()
+    template = Simulation(task_of(build_world("detection")), n, 0).reset()
     goal = np.concatenate([rng.uniform(-3, 3, (n, 1, 2)), np.full((n, 1, 1), 0.5)], axis=-1)
     position = world.agent_spawn[rng.integers(len(world.agent_spawn), size=n)]
     return dataclasses.replace(template, position=position, heading=rng.uniform(-3, 3, n), objects=goal)

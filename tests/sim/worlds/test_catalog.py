@@ -9,7 +9,9 @@ import pytest
 import sim
 from evolve.config.run_config import TASKS as CONFIGURABLE
 from sim.envs.registration import IDS
-from sim.tasks.task import FindGoal, FindWay, task_of
+from sim.tasks.find_goal import FindGoal
+from sim.tasks.find_way import FindWay
+from sim.tasks.registry import task_of
 from sim.worlds.catalog import TASKS
 
 

@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 
 import sim
-from sim.envs.simulation import LEAST_RETURN, MAX_SPEED, Simulation
-from sim.physics.physics import Physics
-from sim.tasks.task import HEADING_SPREAD
+from sim.physics.agent_motion import AgentPhysics
+from sim.tasks.find_way import HEADING_SPREAD
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import LEAST_RETURN, Simulation
 from sim.worlds import maze
 from sim.worlds.catalog import COURSES
 from sim.worlds.course import MOST_FALL, Course
 from sim.worlds.layout import CELL
 from sim.worlds.navigation import DRAWN
+from sim.worlds.world import MAX_SPEED
 
 STRAIGHT = """
 ##########
@@ -77,8 +79,8 @@ def test_ways_part_and_join_again(name):
 def test_agents_start_along_the_way_in_training_and_in_the_west_in_evaluation(name):
     world = sim.build_world("navigation", course=name)
     x_min, *_ = world.goal_region
-    training = Simulation(world, 256, 0, "training", 1).reset()
-    evaluation = Simulation(world, 256, 0, "evaluation", 1).reset()
+    training = Simulation(task_of(world), 256, 0).reset()
+    evaluation = Simulation(task_of(world, "evaluation"), 256, 0).reset()
     assert np.ptp(evaluation.position[:, 0]) == 0
     assert len(np.unique(training.position[:, 0])) >= 5
     assert training.position[:, 0].max() < x_min
@@ -96,7 +98,7 @@ def test_agents_start_along_the_way_in_training_and_in_the_west_in_evaluation(na
 def test_free_cells_are_free_and_walls_are_walls():
     """Also where walls that nobody sees have been left out."""
     world, course = sim.build_world("navigation"), DRAWN["short"]
-    physics = Physics(world, 1)
+    physics = AgentPhysics(world, 1)
     centers = course.places([tuple(cell) for cell in np.argwhere(~course.walls)])
     in_wall = [((physics.free_motion.lower < c) & (physics.free_motion.upper > c)).all(axis=1).any() for c in centers]
     assert not any(in_wall)
@@ -134,7 +136,7 @@ def test_most_mazes_are_no_courses():
 def test_a_course_of_ones_own():
     course = Course(STRAIGHT, episode_steps=20)
     world = sim.build_world("navigation", course=course)
-    simulation = Simulation(world, 2, 0, "evaluation", 1)
+    simulation = Simulation(task_of(world, "evaluation"), 2, 0)
     simulation.reset()
     for action in range(20):
         step = simulation.step(np.tile([-1.0, 0.0], (2, 1)))

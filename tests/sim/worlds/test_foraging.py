@@ -9,7 +9,8 @@ import optics
 import sim
 from optics.spectra.bands import SpectralBands
 from optics.spectra.spectrum import ILLUMINANTS, illuminant
-from sim.envs.simulation import Simulation
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.worlds.foraging import ULTRAVIOLET, petal
 from sim.worlds.state import pose
 from sim.worlds.world import build_world
@@ -26,7 +27,7 @@ def world():
 
 def before_the_eyes(world, n=1, swapped=False):
     """Agents that face the goal, an adversary beside it; `swapped`: each where the other was."""
-    state = Simulation(world, n, 0, "training", 1).reset()
+    state = Simulation(task_of(world), n, 0).reset()
     objects = state.objects.copy()
     objects[:, :, :2] = np.array([[1.6, 0.9], [1.6, -0.9], [4.0, 0.0]])
     if swapped:
@@ -118,7 +119,7 @@ def test_one_pigment_is_enough_in_whatever_place_of_a_mosaic(world):
 def test_both_tracers_agree_ray_by_ray(world, eyes):
     n = 16
     rng = np.random.default_rng(0)
-    state = Simulation(world, n, 0, "training", 1).reset()
+    state = Simulation(task_of(world), n, 0).reset()
     position = state.objects[:, 0, :2] + 2 * rng.standard_normal((n, 2))
     state = dataclasses.replace(state, position=position, heading=rng.uniform(-np.pi, np.pi, n))
     ours, theirs = (
@@ -176,9 +177,9 @@ def test_lights_and_walls_take_spectra_in_any_task():
 
 
 def test_episodes_are_played_by_detections_rules(world):
-    simulation = Simulation(world, 1, 0, "training", 1)
+    simulation = Simulation(task_of(world), 1, 0)
     state = simulation.reset()
-    simulation._state = dataclasses.replace(state, position=state.objects[:, 0, :2] - [1.05, 0], heading=np.zeros(1))
+    simulation.state = dataclasses.replace(state, position=state.objects[:, 0, :2] - [1.05, 0], heading=np.zeros(1))
     step = simulation.step(np.array([[1.0, 0.0]]))
     assert step.terminated[0]
     assert step.success[0]

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import sim
-from sim.envs.simulation import Simulation
 from sim.eyes.eyes import BODY_RADIUS, eye_positions
-from sim.physics.physics import Physics
+from sim.physics.agent_motion import AgentPhysics
 from sim.scene.color import decode_srgb
 from sim.scene.surfaces import image
+from sim.tasks.registry import task_of
+from sim.tasks.simulation import Simulation
 from sim.worlds import detection, materials, maze
 from sim.worlds.layout import CELL
 from sim.worlds.striped_walls import merge_walls
@@ -176,12 +177,12 @@ def test_several_mazes_are_different_and_apart():
     starts = [three.agent_spawn[np.abs(three.agent_spawn[:, 1] - c) < height / 2] - [0, c] for c in centers]
     assert {tuple(s) for s in starts[0]} == {tuple(s) for s in one.agent_spawn}
     assert len({tuple(map(tuple, s)) for s in starts}) > 1
-    physics = Physics(three, 1)
+    physics = AgentPhysics(three, 1)
     for border in (centers[:2] + centers[1:]) / 2:
         for x in np.arange(-38.9, 39, 0.5):
             inside = (physics.free_motion.lower < [x, border - 0.1]) & (physics.free_motion.upper > [x, border - 0.1])
             assert inside.all(axis=1).any()
-    begun = {round(Simulation(three, 1, seed, "training", 1).reset().position[0, 1] / height) for seed in range(9)}
+    begun = {round(Simulation(task_of(three), 1, seed).reset().position[0, 1] / height) for seed in range(9)}
     assert begun == {-1, 0, 1}
 
 

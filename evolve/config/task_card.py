@@ -1,0 +1,72 @@
+"""The properties of a task that are known without executing it. Settings, lint, tables and titles read them here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from evolve.config.task_code import LABEL
+from evolve.genome.genes import TILT
+from sim.worlds.catalog import TASKS
+
+__all__ = ["CARDS", "OF_COURSES", "OF_SLIDING_AGENTS", "TaskCard", "card_of", "tasks_with"]
+
+# Settings that only some tasks have. A sliding agent has a speed, a turn and contact with walls.
+OF_SLIDING_AGENTS = ("world.least_light", "learning.first_speed", "learning.contact_ramp", "learning.least_return")
+OF_MAZES = ("world.mazes", "world.unseen")
+OF_COURSES = ("world.course", "world.evaluation_course")
+OPTIONAL_GENES = (TILT,)  # of some tasks only
+
+
+@dataclass(frozen=True)
+class TaskCard:
+    """name: in directories and tables · title: in headings
+    aim: completes "Eyes and brains evolved ..."
+    settings: of those that only some tasks have · genes: the same
+    grey: whether its world reflects all wavelengths alike; None: unknown
+    has_file: whether it is a class in a user's file
+    """
+
+    name: str
+    title: str
+    aim: str
+    settings: tuple[str, ...] = ()
+    genes: tuple[str, ...] = ()
+    grey: bool | None = None
+    has_file: bool = False
+
+    def has_gene(self, name: str) -> bool:
+        """Whether animals in this task have this gene."""
+        return name not in OPTIONAL_GENES or name in self.genes
+
+
+def _built_in(name: str, *settings: str) -> TaskCard:
+    known = (*OF_SLIDING_AGENTS, *settings)
+    return TaskCard(name, name.capitalize(), f"to {TASKS[name]}", known, grey=name != "foraging")
+
+
+CARDS = {
+    card.name: card
+    for card in (
+        _built_in("navigation", *OF_COURSES),
+        _built_in("detection"),
+        _built_in("tracking"),
+        _built_in("maze", *OF_MAZES),
+        _built_in("foraging"),
+    )
+}
+
+
+def card_of(task: Any) -> TaskCard | None:
+    """Of a built-in task by its name, or of a user task, "FILE.py:CLASS"; None: it is neither."""
+    if not isinstance(task, str):
+        return None
+    if LABEL.fullmatch(task) is not None:
+        name = task.rpartition(":")[2]
+        return TaskCard(name, name, f"for {task}, a task of one’s own", genes=(TILT,), has_file=True)
+    return CARDS.get(task)
+
+
+def tasks_with(setting: str) -> list[str]:
+    """Names of the built-in tasks that have this setting."""
+    return [name for name, card in CARDS.items() if setting in card.settings]

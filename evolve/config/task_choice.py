@@ -1,0 +1,90 @@
+"""The choice of a task: a built-in one by its name, or a user's by file and class."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from evolve.config.checks import ConfigError, quoted
+from evolve.config.task_card import TaskCard, card_of
+from evolve.config.task_code import TaskCode, names_code
+from sim.worlds.catalog import TASKS
+
+__all__ = ["TaskChoice"]
+
+
+@dataclass(frozen=True)
+class TaskChoice:
+    """label: in config.toml: a built-in task's name, or FILE.py:CLASS
+    sha256: of the file, "" if there is none · code: of a user's task, if the user has named it: only then may it run
+    """
+
+    label: str
+    sha256: str = ""
+    code: TaskCode | None = None
+
+    @classmethod
+    def named(cls, said: str) -> TaskChoice:
+        """The task that a command names. A file is read, and not executed.
+
+        Raises:
+            ConfigError: no such file or class, or no Python.
+        """
+        if not names_code(said):
+            return cls(said)
+        code = TaskCode.read(said)
+        return cls(code.label, code.sha256, code)
+
+    @property
+    def settings(self) -> dict[str, str]:
+        """What config.toml says of it."""
+        return {"task": self.label, **({"task_sha256": self.sha256} if self.sha256 else {})}
+
+    @property
+    def card(self) -> TaskCard:
+        """Its properties.
+
+        Raises:
+            ConfigError: there is no such task, or its hash is missing or belongs to no file.
+        """
+        if (card := card_of(self.label)) is None:
+            raise ConfigError(
+                f"task = {quoted(self.label)}: must be one of {', '.join(TASKS)}, or FILE.py:CLASS, one of your own",
+                "task",
+            )
+        if re.fullmatch("[0-9a-f]{64}" if card.has_file else "", self.sha256 or "") is None:
+            needs = "the SHA-256 of the file, 64 digits" if card.has_file else "empty, as no file belongs to this task"
+            raise ConfigError(f"task_sha256 = {self.sha256!r:.80}: must be {needs}", "task_sha256", "task")
+        return card
+
+    @property
+    def named_code(self) -> TaskCode | None:
+        """The code of a user's task; None: a built-in task needs none.
+
+        Raises:
+            ConfigError: the user has not named it, so it must not run.
+        """
+        if self.sha256 and self.code is None:
+            raise ConfigError(
+                f"this run evolves {self.label}, whose code runs only if you name it: add --task {self.label} "
+                "(or the file's path where it is now)"
+            )
+        return self.code
+
+    def read(self, named: str) -> TaskCode:
+        """The code of this task, which the user names as "FILE.py:CLASS".
+
+        Raises:
+            ConfigError: this task has no code, the class has another name, or the file has changed.
+        """
+        if not self.sha256:
+            raise ConfigError(f"--task {named}: this run's task, {self.label}, is rhabdom's own: leave it out")
+        code = TaskCode.read(named)
+        if code.name != self.card.name:
+            raise ConfigError(f"--task {named}: this run evolves {self.label}, not {code.name}")
+        if code.sha256 != self.sha256:
+            raise ConfigError(
+                f"--task {named}: {code.file.name} has changed since the run began (SHA-256 {code.sha256[:12]}..., was "
+                f"{self.sha256[:12]}...): bring the old text back, or begin a new run"
+            )
+        return code

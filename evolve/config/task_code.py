@@ -1,0 +1,83 @@
+"""The code of a user's task, as text: a class of a Python file. It is read and hashed here, and executed only by
+`evolve.learning.task_module`."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from evolve.config.checks import ConfigError
+from optics.numerics.arguments import did_you_mean
+
+__all__ = ["LABEL", "TaskCode", "names_code"]
+
+LABEL = re.compile(r"[^\n\r/\\]+\.py:[A-Za-z_]\w*")
+LARGEST_FILE = 2_000_000  # bytes
+
+
+@dataclass(frozen=True)
+class TaskCode:
+    """FILE.py:CLASS as it was read.
+
+    name: of the class · file: where it was · text: of the whole file
+    """
+
+    name: str
+    file: Path
+    text: str = field(repr=False)
+
+    @property
+    def label(self) -> str:
+        """What a run's config calls it, wherever the file is."""
+        return f"{self.file.name}:{self.name}"
+
+    @property
+    def sha256(self) -> str:
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    @classmethod
+    def read(cls, named: str) -> TaskCode:
+        """From "FILE.py:CLASS"; the file is parsed, and not executed.
+
+        Raises:
+            ConfigError: one line: no such file or class, or no Python.
+        """
+        place, _, name = named.partition(".py:") if ".py:" in named else (named.removesuffix(".py"), "", "")
+        file = Path(f"{place}.py")
+        try:
+            content = file.read_bytes()
+        except OSError as error:
+            raise ConfigError(f"task = {named!r}: {file} cannot be read ({error.strerror})", "task") from error
+        if len(content) > LARGEST_FILE:
+            raise ConfigError(f"task = {named!r}: {file} has {len(content):,} bytes: must be Python text", "task")
+        text, classes = _parsed(file, content)
+        if name not in classes:
+            known = did_you_mean(name, classes) if name else ""
+            has = f"it has {', '.join(classes)}" if classes else "it has none"
+            raise ConfigError(
+                f"task = {named!r}: must be FILE.py:CLASS, a class of {file}{known or f': {has}'}", "task"
+            )
+        return cls(name, file.resolve(), text)
+
+
+def names_code(said: Any) -> bool:
+    """Whether a user who specifies this task means a Python file."""
+    return isinstance(said, str) and (said.endswith(".py") or ".py:" in said)
+
+
+def _parsed(file: Path, content: bytes) -> tuple[str, list[str]]:
+    """The text, and the names of its classes."""
+    try:
+        text = content.decode("utf-8").replace("\r\n", "\n")
+        tree = ast.parse(text, str(file))
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{file}: is not UTF-8 text", "task") from error
+    except SyntaxError as error:
+        raise ConfigError(f"{file}, line {error.lineno}: {error.msg}", "task") from error
+    except (ValueError, RecursionError) as error:  # null bytes; brackets within brackets
+        raise ConfigError(f"{file}: is no Python: {error}", "task") from error
+    return text, [node.name for node in tree.body if isinstance(node, ast.ClassDef)]

@@ -1,0 +1,67 @@
+"""A user's functions, called with every candidate that has been evaluated."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from typing import Any
+
+from evolve.config.checks import ConfigError, quoted
+from evolve.runs.carry_on import carry_on
+from evolve.runs.output import voices
+from evolve.runs.progress import Watchers, watcher
+from evolve.store.candidate import Candidate
+from evolve.store.directory import Run
+
+__all__ = ["Callback", "Callbacks"]
+
+Callback = Callable[[Run, Candidate], Any]
+
+
+@dataclass(frozen=True)
+class CallbackWatcher:
+    """Calls back with each candidate that has been evaluated and is on record."""
+
+    run: Run
+    callbacks: Sequence[Callback]
+
+    def training(self, candidate_id: int, steps: int, planned: int) -> None:
+        """Nothing is called while a candidate trains."""
+
+    def evaluated(self, candidate: Candidate) -> None:
+        for callback in self.callbacks:
+            callback(self.run, candidate)
+
+
+@dataclass(frozen=True)
+class Callbacks:
+    """The watchers of a run from Python: a progress bar or lines on stderr, if `progress`, and the callbacks.
+
+    Raises:
+        ConfigError: the callbacks are not a list of functions.
+    """
+
+    callbacks: Sequence[Callback] = ()
+    progress: bool = True
+
+    def __post_init__(self) -> None:
+        given: Any = self.callbacks
+        if not isinstance(given, Sequence) or not all(map(callable, given)):
+            raise ConfigError(f"callbacks = {quoted(given)}: must be a list of functions of a run and a candidate")
+
+    def carry_on(self, run: Run) -> None:
+        """Carry a run, whose lock is held, to its end. An exception in a callback ends it; it can be resumed then.
+
+        Raises:
+            RunError: the record cannot be written, or this search does not propose what is on record.
+            ExecutorError: no candidate can be evaluated.
+        """
+        with voices(patient=True):
+            carry_on(run, self._watched)
+
+    @contextmanager
+    def _watched(self, run: Run, workers: int) -> Iterator[Watchers]:
+        with watcher(run, sys.stderr, workers) if self.progress else nullcontext() as shown:
+            yield Watchers([*([shown] if shown else []), CallbackWatcher(run, self.callbacks)])

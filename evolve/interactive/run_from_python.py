@@ -1,0 +1,115 @@
+"""`evolve.run` and `evolve.resume`: a run to its end."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import NoneType
+from typing import Any
+
+import numpy as np
+
+from evolve.config.checks import ConfigError, quoted
+from evolve.interactive.callbacks import Callback, Callbacks
+from evolve.interactive.opened_run import OpenedRun
+from evolve.runs.begin import RunRequest, prepare_run
+
+__all__ = ["resume", "run"]
+
+
+def run(
+    task: str | None = None,
+    preset: str = "paper",
+    settings: Mapping[str, Any] | None = None,
+    *,
+    config: Path | str | None = None,
+    scale: str | None = None,
+    start_from: str | None = None,
+    out: Path | str | None = None,
+    callbacks: Sequence[Callback] = (),
+    progress: bool = True,
+) -> OpenedRun:
+    """Evolve, as the command `evolve run` does, and return the run when it has ended.
+
+    The record is the same, whoever began the run: `evolve status`, `resume` and `report` know it too.
+
+    task: to evolve for, or "FILE.py:CLASS", one of your own; may be missing where the preset names one
+    preset: settings to start from: "quick" (minutes), "paper" (a day), or an experiment
+    settings: by their dotted names, {"search.generations": 2, "seed": 1}; they override all others
+    config: TOML file of settings, which override the preset's
+    scale: of an experiment: "laptop" or "paper"
+    start_from: "RUN:ID", an animal of another run
+    out: run directory; runs/TASK-PRESET-N if None
+    callbacks: each called as callback(run, candidate) after every evaluated candidate; an exception ends the run
+    progress: whether to print how it goes, to stderr
+
+    Raises:
+        ConfigError: a setting or an argument that cannot be used; one line.
+        RunError: the directory holds something already, or cannot be written.
+        BackendError: Dr.Jit has no LLVM that it can use.
+    """
+    _check(task=task, preset=preset, settings=settings, config=config, scale=scale, start_from=start_from, out=out)
+    watchers = Callbacks(callbacks, progress)
+    assignments = [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
+    file = None if config is None else Path(config)
+    with prepare_run(RunRequest(task, preset, file, assignments, scale, start_from)).begin(OpenedRun, out) as begun:
+        watchers.carry_on(begun)
+    return begun
+
+
+def resume(
+    directory: Path | str,
+    task: str | None = None,
+    *,
+    callbacks: Sequence[Callback] = (),
+    progress: bool = True,
+) -> OpenedRun:
+    """Carry an interrupted run to its end, as the command `evolve resume` does, and return it. A finished run stays as
+    it is.
+
+    directory: of the run; the command may have begun it, or Python
+    task: "FILE.py:CLASS", if the run evolves a user task: its code runs only if you name it
+    callbacks: each called as callback(run, candidate) after every evaluated candidate; an exception ends the run
+    progress: whether to print how it goes, to stderr
+
+    Raises:
+        ConfigError: an argument or the config cannot be used, or the user task has not been named, has changed or
+            fails; one line.
+        RunError: there is no run, its record is damaged or cannot be written, or its format is a former one.
+        LockedError: another process works on it.
+        BackendError: Dr.Jit has no LLVM that it can use.
+    """
+    _check(directory=directory, task=task)
+    opened = OpenedRun.open(directory, task)
+    opened.resume(callbacks, progress)
+    return opened
+
+
+RIGHT: Mapping[str, tuple[Any, str]] = {
+    "task": ((str, NoneType), "a task's name, or 'FILE.py:CLASS'"),
+    "preset": (str, "a preset's name: 'quick', 'paper' or an experiment's"),
+    "scale": ((str, NoneType), "'laptop' or 'paper'"),
+    "settings": ((Mapping, NoneType), "names and values, {'search.generations': 2}"),
+    "config": ((str, os.PathLike, NoneType), "a file's path"),
+    "start_from": ((str, NoneType), "'RUN:ID'"),
+    "out": ((str, os.PathLike, NoneType), "a directory's path"),
+    "directory": ((str, os.PathLike), "a directory's path"),
+}
+
+
+def _check(**given: Any) -> None:
+    """ConfigError for what is none of its kind."""
+    for name, value in given.items():
+        kinds, right = RIGHT[name]
+        if not isinstance(value, kinds):
+            raise ConfigError(f"{name} = {quoted(value)}: must be {right}")
+
+
+def _toml(value: Any) -> str:
+    """A setting as `--set` takes it: JSON writes numbers, texts, true and false as TOML does; NumPy's are those."""
+    try:
+        return json.dumps(value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value)
+    except TypeError:
+        raise ConfigError(f"settings hold {quoted(value)}: must be numbers, texts, true or false") from None

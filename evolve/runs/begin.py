@@ -1,0 +1,93 @@
+"""Beginning a run: its settings are assembled and tried, then its directory is created."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from evolve.config.assemble import assemble
+from evolve.config.run_config import RunConfig
+from evolve.learning.task_trial import try_task
+from evolve.runs.start_from import starts_from
+from evolve.search.search import Search
+from evolve.store.directory import Run, next_directory
+from optics.numerics import device
+
+__all__ = ["PreparedRun", "RunRequest", "prepare_run"]
+
+RunT = TypeVar("RunT", bound=Run)
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """The choices from which the settings of a new run are assembled.
+
+    task: name, or "FILE.py:CLASS" for a user task; None if the preset or the file names one
+    preset: settings to start from
+    config: TOML file, which overrides the preset
+    assignments: single settings, "KEY=VALUE", which override the file
+    scale: of an experiment
+    start_from: "RUN:ID", an animal of another run
+    """
+
+    task: str | None = None
+    preset: str = "paper"
+    config: Path | None = None
+    assignments: Sequence[str] = ()
+    scale: str | None = None
+    start_from: str | None = None
+
+
+@dataclass(frozen=True)
+class PreparedRun:
+    """A run that can begin; nothing has been written yet.
+
+    preset: its part of the directory's name
+    origin: the animal from which the genes start, "RUN:ID"; None without one
+    """
+
+    config: RunConfig
+    preset: str
+    origin: str | None
+
+    def directory(self, out: Path | str | None = None) -> Path:
+        """The directory that `begin` would create now."""
+        return next_directory(self.config.task_name, self.preset) if out is None else Path(out)
+
+    @contextmanager
+    def begin(self, kind: type[RunT], out: Path | str | None = None) -> Iterator[RunT]:
+        """Create the run and keep its lock while the context lasts.
+
+        kind: class of the run
+        out: its directory; runs/TASK-PRESET-N if None
+
+        Raises:
+            RunError: the directory holds something already, or cannot be written.
+            LockedError: another process creates a run there.
+        """
+        if out is None:
+            run = kind.create_next(self.config, self.preset, self.origin)
+        else:
+            run = kind.create(out, self.config, self.origin)
+        with run.lock():
+            yield run
+
+
+def prepare_run(request: RunRequest) -> PreparedRun:
+    """Assemble the settings of a run and check that it can begin on this machine. Nothing is written.
+
+    Raises:
+        ConfigError: a setting cannot be used, the optimizer is unknown, or the user task fails; one line.
+        RunError: the animal to start from does not exist.
+        BackendError: Dr.Jit has no LLVM that it can use.
+    """
+    starts = starts_from(request.start_from) if request.start_from else None
+    config = assemble(request.task, request.preset, request.config, request.assignments, starts, request.scale)
+    Search(config)  # refuses an unknown optimizer
+    device.make_ready()
+    try_task(config)
+    origin = starts.name.removeprefix("--from ") if starts else None
+    return PreparedRun(config, request.preset.removesuffix(f"-{config.task}"), origin)

@@ -1,0 +1,63 @@
+"""Resuming an interrupted run: everything between opening it and training the next candidate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from evolve.learning.task_trial import try_task
+from evolve.search.successive_halving import finished
+from evolve.store.directory import Run
+from evolve.store.versions import altered, present, record_start, recorded
+from optics.numerics import device
+
+__all__ = ["resuming"]
+
+
+def _ignore(note: str) -> None:
+    """The note is not shown."""
+
+
+@contextmanager
+def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
+    """Repair a run and keep its lock while the context lasts; yields whether candidates remain to be evaluated. If
+    they do, the run has been checked and this start is on record. If not, only left-over trainings have been removed.
+
+    note: called with each remark on lost policies or lines, and on settings or software that have changed
+
+    Raises:
+        LockedError: another process works on it.
+        RunError: its record is damaged or cannot be written, its config.toml has changed since the run was opened, or
+            its format is a former one.
+        ConfigError: its user task has not been named, or fails.
+        BackendError: Dr.Jit has no LLVM that it can use.
+    """
+    device.make_ready()
+    with run.lock():
+        run.repair()
+        if run.notice:
+            note(run.notice)
+        if finished(run):
+            run.forget_trainings(candidate.id for candidate in run.candidates)
+            yield False
+            return
+        run.require_present_format()
+        try_task(run.config)
+        for change in _changes(run):
+            note(change)
+        record_start(run.path, len(run.candidates))
+        yield True
+
+
+def _changes(run: Run) -> Iterator[str]:
+    """Settings and software that differ from those with which the run began; numbers may differ with them."""
+    if altered(run.path):
+        yield (
+            f"config.toml has changed since the last start. Candidates from {len(run.candidates)} on are "
+            "trained and evaluated with other settings than those before"
+        )
+    then, now = recorded(run.path), present()
+    changed = [f"{name} {now[name]} (was {then[name]})" for name in now if name in then and then[name] != now[name]]
+    if changed:
+        yield f"the software has changed since this run began: {', '.join(changed)}"

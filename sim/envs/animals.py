@@ -1,0 +1,168 @@
+"""All agents of many worlds: those who learn, and those whose policies are frozen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.envs.renderers import AgentRenderers
+from sim.envs.senses import Arrays, Senses
+from sim.render.pending_frame import PendingFrame
+from sim.tasks.encounter import Frozen
+from sim.tasks.outcome import NOWHERE, Step
+from sim.tasks.per_world import PerWorld
+from sim.tasks.simulation import Simulation
+
+Pending = list[dict[str, PendingFrame]]  # of all who look, by kind of eyes
+
+
+@dataclass(frozen=True)
+class Advanced:
+    """An action has been taken: what it led to, and frames that are being rendered."""
+
+    step: Step
+    pending: Pending
+
+
+class Animals:
+    """Worlds, and observations of the agents in them.
+
+    renderers: of every agent's eyes; None for those who look at nothing
+    memory: frames in the observations of those who learn
+    learners: senses of those who learn · seeing: of all who look, learners first
+    """
+
+    def __init__(self, simulation: Simulation, renderers: Sequence[AgentRenderers | None], memory: int) -> None:
+        self.simulation, task = simulation, simulation.task
+        frozen: Sequence[Frozen] = task.frozen if isinstance(task, PerWorld) else ()
+        number = simulation.learners
+        self.learners = [Senses(simulation, k, of, memory) for k, of in enumerate(renderers[:number]) if of is not None]
+        self._frozen = [
+            (other, None if of is None else Senses(simulation, k, of, other.memory))
+            for k, (other, of) in enumerate(zip(frozen, renderers[number:], strict=True), start=number)
+        ]
+        self.seeing = [*self.learners, *(senses for _, senses in self._frozen if senses is not None)]
+        for other, senses in self._frozen:
+            if senses is not None:
+                _require_fit(other, senses)
+
+    def seed(self, seed: int) -> None:
+        """Begin all chance again."""
+        self.simulation.seed(seed)
+        for senses in self.seeing:
+            senses.restart()
+
+    def reset(self) -> list[Arrays]:
+        """Begin all episodes; observations of those who learn."""
+        everyone = np.arange(self.simulation.n)
+        pending = self.begin_again(everyone)
+        return self.remember(_waited(pending), everyone)
+
+    def advance(self, actions: Sequence[np.ndarray]) -> Advanced:
+        """One action further; actions (world, number) of each that learns."""
+        simulation = self.simulation
+        failed = simulation.move(np.concatenate(self._everyones(actions), axis=1))
+        first = 0
+        for agent, senses in zip(simulation.agents, self._of_agents, strict=True):
+            if senses is not None:
+                senses.action = simulation.taken[:, first : first + agent.n_actions]
+            first += agent.n_actions
+        pending = self.launch() if simulation.task.renders_early else None
+        step = simulation.judge(failed)
+        pending = pending or self.launch()
+        if any(senses.tells for senses in self.seeing):
+            poses = simulation.poses()
+            for senses in self.seeing:
+                senses.tell(poses, NOWHERE)
+        return Advanced(step, pending)
+
+    def seen(self, advanced: Advanced) -> list[Arrays]:
+        """Frames after the action; worlds that the task changed meanwhile are rendered again."""
+        frames, changed = _waited(advanced.pending), advanced.step.changed
+        if len(changed):
+            _put(frames, changed, _waited(self.launch(changed)))
+        return frames
+
+    def begin_again(self, worlds: np.ndarray) -> Pending:
+        """Start new episodes in these worlds, and begin to render them."""
+        self.simulation.restart(worlds)
+        for senses in self.seeing:
+            senses.action = senses.action.copy()
+            senses.action[worlds] = senses.agent.first_action
+        poses = self.simulation.poses()
+        for senses in self.seeing:
+            senses.tell(poses, worlds)
+        everyone = len(worlds) == self.simulation.n
+        return [senses.begin(poses, None if everyone else worlds) for senses in self.seeing]
+
+    def remember(self, seen: Sequence[Arrays], fresh: np.ndarray) -> list[Arrays]:
+        """Observations of those who learn; fresh: worlds that have just begun."""
+        known = [senses.observation(frames, fresh) for senses, frames in zip(self.seeing, seen, strict=True)]
+        return known[: len(self.learners)]
+
+    @staticmethod
+    def replace(seen: Sequence[Arrays], worlds: np.ndarray, pending: Pending) -> None:
+        """New episodes' frames take the place of the last ones in these worlds."""
+        _put(seen, worlds, _waited(pending))
+
+    def state(self) -> Arrays:
+        """All that the future depends on; each array's first axis is the world."""
+        found = self.simulation.held()
+        for number, senses in enumerate(self.seeing):
+            found |= {self._key(number, name): array for name, array in senses.state().items()}
+        return found
+
+    def bring_back(self, state: Mapping[str, np.ndarray], chosen: np.ndarray) -> None:
+        """These worlds as they were."""
+        self.simulation.hold(state, chosen)
+        for number, senses in enumerate(self.seeing):
+            now = senses.state()
+            for name, array in now.items():
+                array[chosen] = state[self._key(number, name)][chosen]
+            senses.bring_back(now)
+
+    @property
+    def _of_agents(self) -> list[Senses | None]:
+        return [*self.learners, *(senses for _, senses in self._frozen)]
+
+    def launch(self, worlds: np.ndarray | None = None) -> Pending:
+        """Begin to render these worlds (None: all); all eyes are begun before any is waited for."""
+        poses = self.simulation.poses()
+        return [senses.begin(poses, worlds) for senses in self.seeing]
+
+    def _everyones(self, actions: Sequence[np.ndarray]) -> list[np.ndarray]:
+        found = list(actions)
+        for agent, (other, senses) in zip(self.simulation.agents[len(actions) :], self._frozen, strict=True):
+            shape = self.simulation.n, agent.n_actions
+            found.append(np.zeros(shape, np.float32) if senses is None else other.actions(senses.now, shape))
+        return found
+
+    def _key(self, number: int, name: str) -> str:
+        return name if number == 0 else f"{self.seeing[number].agent.name}.{name}"
+
+
+def _waited(pending: Pending) -> list[Arrays]:
+    return [{name: frame.wait() for name, frame in kinds.items()} for kinds in pending]
+
+
+def _put(seen: Sequence[Arrays], worlds: np.ndarray, fresh: Sequence[Arrays]) -> None:
+    for frames, new in zip(seen, fresh, strict=True):
+        for name, of_kind in frames.items():
+            of_kind[worlds] = new[name]
+
+
+def _require_fit(other: Frozen, senses: Senses) -> None:
+    """Its policy takes what its eyes see, where it says what it takes.
+
+    Raises:
+        ValueError: it takes something else.
+    """
+    learnt = getattr(other.policy, "observation_space", None)
+    if learnt is None:
+        return
+    spaces_of = [getattr(space, "spaces", {}) for space in (learnt, senses.observation_space)]
+    wanted, here = ({name: space.shape for name, space in of.items()} for of in spaces_of)
+    if wanted != here:
+        raise ValueError(f"policy of {senses.agent.name!r} takes {wanted}, its task gives {here}: must be alike")

@@ -1,0 +1,107 @@
+"""Whether a batch task keeps to the protocol: what environments rely on, tried out in a few worlds."""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+
+from sim.tasks.batch_task import BatchTask
+from sim.tasks.simulation import Simulation
+
+__all__ = ["check_batch_task"]
+
+SEED = 0
+
+
+def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
+    """Play random actions in a few worlds, and compare what the task does with the description of `sim.BatchTask`, as
+    Gymnasium's `check_env` does for environments.
+
+    n_envs: number of worlds, at least 2 · steps: actions
+
+    Checked are: settings; shapes, finite numbers and worlds of everything that methods return; that `reset` changes
+    only the worlds that it was given; that a world's episode depends on neither its neighbours nor their number; that
+    the same seed repeats an episode; that `judge` moves nothing in worlds that it does not name; and that a state that
+    was stored can be restored.
+
+    Raises:
+        ValueError: one line: which method, which array, which world, and what would be right.
+        RuntimeError: a method fails.
+    """
+    if not isinstance(task, BatchTask):
+        raise ValueError(f"task = {task!r:.80}: must be a sim.BatchTask")
+    if n_envs < 2:
+        raise ValueError(f"n_envs = {n_envs!r}: must be at least 2, to tell worlds apart")
+    with (
+        contextlib.closing(Simulation(task, n_envs, SEED)) as many,
+        contextlib.closing(Simulation(task, 1, SEED)) as one,
+    ):
+        trace = _played(many, steps)
+        _require_equal(
+            "the same seed", trace, _played(many, steps), "must repeat every episode: draw from `rngs` alone"
+        )
+        single = _played(one, steps)
+        own = [{name: array[:1] for name, array in moment.items()} for moment in trace]
+        _require_equal("world 0", own, single, "must not depend on other worlds or on their number")
+        _require_own_reset(many)
+        _require_restored(many, steps)
+
+
+def _actions(simulation: Simulation, steps: int) -> list[np.ndarray]:
+    """The same for each world, whatever the number of worlds."""
+    size = sum(agent.n_actions for agent in simulation.agents)
+    random = np.random.default_rng(SEED)
+    return [np.tile(random.uniform(-1, 1, size), (simulation.n, 1)).astype(np.float32) for _ in range(steps)]
+
+
+def _played(simulation: Simulation, steps: int) -> list[dict[str, np.ndarray]]:
+    simulation.seed(SEED)
+    simulation.reset()
+    return [_step(simulation, action) for action in _actions(simulation, steps)]
+
+
+def _step(simulation: Simulation, action: np.ndarray) -> dict[str, np.ndarray]:
+    failed = simulation.move(action)
+    before = simulation.poses().geom_xpos
+    step = simulation.judge(failed)
+    if simulation.task.renders_early:
+        moved = np.flatnonzero((simulation.poses().geom_xpos != before).any(axis=(1, 2)))
+        if unnamed := sorted({*moved.tolist()} - {*step.changed.tolist()}):
+            raise ValueError(
+                f"judge: moved bodies of world {unnamed[0]}, which is not in Outcome.changed: must name it, or set "
+                "renders_early = False"
+            )
+    found = {"reward": step.reward, "terminated": step.terminated, "success": step.success}
+    felt = {f"feels {name}": array.copy() for known in simulation.felt for name, array in known.items()}
+    if step.done.any():
+        simulation.restart(np.flatnonzero(step.done.reshape(simulation.learners, -1).any(axis=0)))
+    return {**found, **felt, "places": simulation.poses().geom_xpos}
+
+
+def _require_own_reset(simulation: Simulation) -> None:
+    before = simulation.held()
+    last = simulation.n - 1
+    simulation.restart(np.array([last]))
+    for name, array in simulation.held().items():
+        others = [w for w in range(last) if before[name][w].tobytes() != array[w].tobytes()]  # NaN equals itself so
+        if others:
+            raise ValueError(
+                f"reset: was given world {last} and changed {name} of world {others[0]}: must leave it alone"
+            )
+
+
+def _require_restored(simulation: Simulation, steps: int) -> None:
+    _played(simulation, 1)
+    stored = simulation.held()
+    first = [_step(simulation, action) for action in _actions(simulation, steps)]
+    simulation.hold(stored, np.arange(simulation.n))
+    again = [_step(simulation, action) for action in _actions(simulation, steps)]
+    _require_equal("a restored state", first, again, "must lead where it led before: keep episodes in worlds' arrays")
+
+
+def _require_equal(what: str, one: list[dict[str, np.ndarray]], other: list[dict[str, np.ndarray]], right: str) -> None:
+    for time, (a, b) in enumerate(zip(one, other, strict=True)):
+        for name, array in a.items():
+            if not np.array_equal(array, b[name]):
+                raise ValueError(f"{what}: {name} differs after action {time}: {right}")

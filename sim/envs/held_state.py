@@ -1,0 +1,42 @@
+"""States of environments, as `get_state` returns them, checked before they are restored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sim.physics.mujoco_worlds import MODELS
+
+
+def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+    """A state as `like`, of the same shapes. An only world's model may be its own in one of them: it was changed on the
+    way.
+
+    Raises:
+        ValueError: it has other entries, or an entry of another shape.
+    """
+    optional = {MODELS} if len(like["steps"]) == 1 else set()
+    if not isinstance(state, Mapping) or (state.keys() ^ like.keys()) - optional:
+        raise ValueError(f"state: must be what get_state returns, with the entries {', '.join(like)}")
+    for name, array in like.items():
+        if name not in state:
+            continue
+        if np.shape(state[name]) != array.shape:
+            raise ValueError(f"state: {name} has shape {np.shape(state[name])}: must be {array.shape}")
+    return state
+
+
+def chosen_worlds(worlds: Any, n: int) -> np.ndarray:
+    """Numbers of worlds; None: all.
+
+    Raises:
+        ValueError: they are no numbers of worlds.
+    """
+    if worlds is None:
+        return np.arange(n)
+    chosen = np.atleast_1d(np.asarray(worlds))
+    if chosen.ndim != 1 or chosen.dtype.kind not in "iu" or ((chosen < 0) | (chosen >= n)).any():
+        raise ValueError(f"worlds = {worlds!r:.80}: must be numbers of worlds, from 0 to {n - 1}")
+    return chosen

@@ -1,0 +1,106 @@
+"""A task made ready for several environments: its scenes are built and its fidelities chosen once."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import replace
+
+import drjit as dr
+
+from sim.envs.renderers import renderers_for, scenes_for
+from sim.envs.vec_env import EyesVecEnv
+from sim.render.edge_rays import FIRST
+from sim.render.fidelity import EDGES, RAYS, Fidelity
+from sim.render.fidelity_choice import chosen_fidelity
+from sim.scene.variation import Variation
+from sim.tasks.batch_task import Agent, BatchTask
+from sim.tasks.built_in import AgentTask
+from sim.tasks.simulation import Simulation
+from sim.tasks.task_fidelity import fidelities_among
+
+__all__ = ["PreparedTask"]
+
+Fidelities = Mapping[str, Fidelity]  # by kind of eyes
+
+
+class PreparedTask:
+    """A task, its scenes, and the fidelity of all eyes.
+
+    task: what is done · fidelities: of every agent's eyes by kind; None for agents that look at nothing
+
+    Raises:
+        ValueError: what the task's settings, model and eyes raise.
+    """
+
+    def __init__(self, task: BatchTask) -> None:
+        self.task, agents = task, task.agents()
+        layout = isinstance(task, AgentTask) and not (task.vary and Variation(task.vary).of_looks)
+        self._scenes = scenes_for(task) if layout and isinstance(task, AgentTask) else None
+        self.fidelities: list[Fidelities | None] = [
+            self._fidelities(number, agent) if agent.learns or agent.policy is not None else None
+            for number, agent in enumerate(agents)
+        ]
+
+    def _fidelities(self, number: int, agent: Agent) -> Fidelities:
+        if self._scenes is None:
+            return fidelities_among(self.task, number)
+        return {
+            kind.name: kind.fidelity
+            if isinstance(kind.fidelity, Fidelity)
+            else chosen_fidelity(self._scenes[kind.name])
+            for kind in agent.kinds
+        }
+
+    @property
+    def fidelity(self) -> Fidelity:
+        """Of the first learner's first kind of eyes."""
+        first = self.fidelities[0]
+        assert first is not None
+        return next(iter(first.values()))
+
+    def at_most(self, rays_per_receptor: float) -> PreparedTask:
+        """The same task, whose learners' eyes trace no more rays per receptor than this."""
+        found = copy.copy(self)
+        found.fidelities = [
+            {name: _at_most(fidelity, rays_per_receptor) for name, fidelity in of.items()}
+            if of and agent.learns
+            else of
+            for agent, of in zip(self.task.agents(), self.fidelities, strict=True)
+        ]
+        return found
+
+    def in_mode(self, mode: str) -> PreparedTask:
+        """The same task in another mode."""
+        found = copy.copy(self)
+        found.task = self.task.in_mode(mode)
+        return found
+
+    def elsewhere(self, task: BatchTask) -> PreparedTask:
+        """The same eyes, with the same fidelities, in another layout."""
+        found = copy.copy(self)
+        found.task = task
+        found._scenes = None if self._scenes is None or not isinstance(task, AgentTask) else scenes_for(task)
+        return found
+
+    def vec_env(
+        self,
+        n_envs: int,
+        seed: int | None,
+        memory: int = 1,
+        *,
+        least_return: float | None = None,
+        episode_steps: int | None = None,
+        render_mode: str | None = None,
+    ) -> EyesVecEnv:
+        """A batched environment; arguments as `sim.make_vec_env` has them."""
+        threads = min(dr.thread_count(), n_envs)
+        simulation = Simulation(self.task, n_envs, seed, threads, least_return, episode_steps)
+        return EyesVecEnv(simulation, renderers_for(simulation, self.fidelities, self._scenes), memory, render_mode)
+
+
+def _at_most(fidelity: Fidelity, rays_per_receptor: float) -> Fidelity:
+    """Of rays; if these are fewer than those that look for edges, the same everywhere."""
+    rays = min(fidelity.rays_per_receptor, rays_per_receptor)
+    samples = RAYS if fidelity.samples == EDGES and rays < FIRST else fidelity.samples
+    return replace(fidelity, rays_per_receptor=rays, samples=samples)

@@ -1,0 +1,75 @@
+"""Renderers of every agent's eyes, for the worlds of a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from sim.render.batched_renderer import BatchedRenderer
+from sim.render.eye_renderer import EyeRenderer
+from sim.render.fidelity import AREAS, Fidelity
+from sim.render.labels import Labels
+from sim.render.prepared_scene import PreparedScene
+from sim.render.world_scene import WorldScene
+from sim.tasks.batch_task import Agent
+from sim.tasks.built_in import AgentTask
+from sim.tasks.eye_kinds import EYES, EyeKind
+from sim.tasks.simulation import Simulation
+
+__all__ = ["AgentRenderers", "renderers_for", "scenes_for"]
+
+
+@dataclass(frozen=True)
+class AgentRenderers:
+    """Of one agent. eyes: by kind · auxiliary: of depth, ids and flow, in the same order, where these are wanted"""
+
+    eyes: Mapping[str, EyeRenderer]
+    auxiliary: tuple[Labels, ...] = ()
+
+
+def scenes_for(task: AgentTask) -> dict[str, WorldScene]:
+    """The task's world made ready for each kind of its eyes."""
+    kinds = task.eyes if isinstance(task.eyes, Mapping) else {EYES: task.eyes}
+    return {name: WorldScene(task.world, eyes) for name, eyes in kinds.items() if eyes is not None}
+
+
+def renderers_for(
+    simulation: Simulation,
+    fidelities: Sequence[Mapping[str, Fidelity] | None],
+    scenes: Mapping[str, WorldScene] | None,
+) -> list[AgentRenderers | None]:
+    """Of all agents; None for those that look at nothing.
+
+    fidelities: of every agent's eyes by kind · scenes: of a built-in layout by kind of eyes; None: of other models
+    """
+    return [
+        None if of is None else _of_agent(simulation, agent, of, scenes)
+        for agent, of in zip(simulation.agents, fidelities, strict=True)
+    ]
+
+
+def _of_agent(
+    simulation: Simulation, agent: Agent, fidelities: Mapping[str, Fidelity], scenes: Mapping[str, WorldScene] | None
+) -> AgentRenderers:
+    eyes: dict[str, EyeRenderer] = {}
+    for kind in agent.kinds:
+        fidelity = fidelities[kind.name]
+        if scenes is None:
+            renderer = EyeRenderer(_scene_of_model(simulation, kind, fidelity), simulation.n, fidelity)
+        else:
+            renderer = BatchedRenderer.of(scenes[kind.name], simulation.n, fidelity)
+        eyes[kind.name] = renderer
+    return AgentRenderers(eyes, tuple(renderer.labels for renderer in eyes.values()) if agent.auxiliary else ())
+
+
+def _scene_of_model(simulation: Simulation, kind: EyeKind, fidelity: Fidelity) -> PreparedScene:
+    """A model as these eyes see it; rays are traced by Mitsuba."""
+    task, physics = simulation.task, simulation.physics
+    return PreparedScene(
+        physics.model,
+        replace(kind.eye, bands=fidelity.bands),
+        kind.mounts,
+        spectra=task.spectra,
+        varied=physics.varied,
+        tracer="auto" if fidelity.samples == AREAS else "mitsuba",
+    )

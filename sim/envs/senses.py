@@ -1,0 +1,131 @@
+"""Observations of one agent in all worlds: noisy signals of its eyes, what it feels, and what it did last."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from sim.envs.auxiliary import Auxiliary
+from sim.envs.eyes_of_kind import EyesOfKind
+from sim.envs.renderers import AgentRenderers
+from sim.render.eye_renderer import EyeRenderer
+from sim.render.pending_frame import PendingFrame
+from sim.scene.poses import Poses
+from sim.tasks.simulation import Simulation
+
+Arrays = dict[str, np.ndarray]  # by name; the first axis is the world
+
+
+class Senses:
+    """Of one agent of these worlds.
+
+    number: of the agent · renderers: of its eyes · memory: frames in an observation
+    sights: its eyes, by their kind · action: what it did last, (world, number) float32
+    observation_space, action_space: of one world
+    """
+
+    def __init__(self, simulation: Simulation, number: int, renderers: AgentRenderers, memory: int) -> None:
+        self._simulation, self._number, self.agent = simulation, number, simulation.agents[number]
+        self.sights = {
+            name: EyesOfKind(simulation, renderer, keys, memory)
+            for (name, renderer), keys in zip(
+                renderers.eyes.items(), simulation.streams.noise_keys[number], strict=True
+            )
+        }
+        prefixes = [f"{name}_" if len(self.sights) > 1 else "" for name in self.sights]
+        self._auxiliary = [
+            Auxiliary(renderer, self.agent.auxiliary, prefix)
+            for prefix, renderer in zip(prefixes, renderers.auxiliary, strict=False)
+        ]
+        self._told: Arrays = {}
+        self.action_space = spaces.Box(-1.0, 1.0, (self.agent.n_actions,), np.float32)
+        self.observation_space = self._space()
+        self.action = np.tile(self.agent.first_action, (simulation.n, 1))
+
+    @property
+    def renderer(self) -> EyeRenderer:
+        """Its eyes of the first kind."""
+        return next(iter(self.sights.values())).renderer
+
+    def restart(self) -> None:
+        """Draw noise from its beginning, as the worlds' seed has it."""
+        for sight, keys in zip(self.sights.values(), self._simulation.streams.noise_keys[self._number], strict=True):
+            sight.restart(keys)
+
+    def begin(self, poses: Poses, worlds: np.ndarray | None = None) -> dict[str, PendingFrame]:
+        """Begin to render these worlds (None: all) with eyes of every kind."""
+        return {name: sight.begin(poses, worlds) for name, sight in self.sights.items()}
+
+    def tell(self, poses: Poses, fresh: np.ndarray) -> None:
+        """Update what an observation holds beside signals; fresh: worlds whose episode has just begun. In these alone,
+        if there are any."""
+        for auxiliary in self._auxiliary:
+            for name, array in auxiliary.look(poses, fresh).items():
+                if len(fresh) and name in self._told:
+                    self._told[name][fresh] = array[fresh]
+                else:
+                    self._told[name] = array
+
+    @property
+    def tells(self) -> bool:
+        """Whether observations hold more than signals of receptors."""
+        return bool(self._auxiliary)
+
+    def observation(self, seen: Arrays, fresh: np.ndarray) -> Arrays:
+        """With new frames of all worlds; fresh: those that have just begun."""
+        remembered = {name: sight.memory.remember(seen[name], fresh) for name, sight in self.sights.items()}
+        return {**remembered, **self.beside(slice(None))}
+
+    def preview(self, seen: Arrays, worlds: np.ndarray) -> Arrays:
+        """Frames of these worlds with the new ones of all worlds; nothing is remembered."""
+        return {name: sight.memory.preview(seen[name][worlds], worlds) for name, sight in self.sights.items()}
+
+    def beside(self, worlds: Any) -> Arrays:
+        """Copies of what it knows in these worlds beside its eyes' signals."""
+        known = {**self._told, "previous_action": self.action, **self._simulation.felt[self._number]}
+        return {name: array[worlds].copy() for name, array in known.items()}
+
+    @property
+    def begun(self) -> bool:
+        """Whether it has seen anything yet."""
+        return all(sight.memory.begun for sight in self.sights.values())
+
+    @property
+    def now(self) -> Arrays:
+        """Its present observation."""
+        return {**{name: sight.memory.held for name, sight in self.sights.items()}, **self.beside(slice(None))}
+
+    def state(self) -> Arrays:
+        """All that its future observations depend on, beside its worlds."""
+        parts = {
+            _part(k, name, what): array
+            for k, (name, sight) in enumerate(self.sights.items())
+            for what, array in sight.state().items()
+        }
+        return {**parts, **{name: array.copy() for name, array in self._told.items()}, "action": self.action.copy()}
+
+    def bring_back(self, state: Arrays) -> None:
+        """Inverse of `state`."""
+        for k, (name, sight) in enumerate(self.sights.items()):
+            sight.bring_back(*(state[_part(k, name, what)] for what in ("remembered", "noise")))
+        self.action = state["action"]
+        self._told = {name: state[name] for name in self._told}
+        for auxiliary in self._auxiliary:
+            auxiliary.go_on_from(self._simulation.poses())
+
+    def _space(self) -> spaces.Dict:
+        found: dict[str, spaces.Space[Any]] = {name: sight.space for name, sight in self.sights.items()}
+        for auxiliary in self._auxiliary:
+            found |= auxiliary.spaces
+        found["previous_action"] = spaces.Box(-1.0, 1.0, self.action_space.shape, np.float32)
+        for name, felt in self._simulation.felt[self._number].items():
+            low, high = self._simulation.task.feel_ranges.get(name, (-np.inf, np.inf))
+            found[name] = spaces.Box(low, high, felt.shape[1:], np.float32)
+        return spaces.Dict(found)
+
+
+def _part(number: int, kind: str, what: str) -> str:
+    """Name of a kind's part of a state."""
+    return what if number == 0 else f"{kind}.{what}"

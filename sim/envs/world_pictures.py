@@ -1,0 +1,109 @@
+"""Pictures of worlds for people: the model with all agents' eyes in it, or the signals of their eyes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+
+from sim.envs.animals import Animals
+from sim.envs.follow_camera import FollowCamera
+from sim.envs.retina_images import one_above_another, side_by_side
+from sim.envs.senses import Senses
+from sim.eyes.eyes import Eyes
+from sim.physics.mujoco_worlds import MujocoWorlds
+from sim.pictures.eye_marks import with_eyes
+from sim.pictures.quick_camera import QuickCamera
+from sim.scene.cameras import Viewpoint
+from sim.scene.poses import Poses
+from sim.tasks.built_in import AgentTask
+
+PICTURE = (360, 480)  # pixels (height, width)
+RIMS = 0.15  # of the model's extent: how far the rims of fields of view are drawn
+
+
+class WorldPictures:
+    """Pictures as `render_mode` has them: "rgb_array", "eyes" of those who learn, or None."""
+
+    def __init__(self, animals: Animals, render_mode: str | None) -> None:
+        self._animals, self._mode = animals, render_mode
+        self._photographer: Callable[[int], np.ndarray] | None = None
+
+    def taken(self) -> list[np.ndarray]:
+        """(y, x, 3) uint8: one of every world, or of the eyes of each that learns in every world; none without mode."""
+        if self._mode == "eyes":
+            learners = self._animals.learners
+            return [picture for senses in learners for picture in _of_all_kinds(senses)]
+        if self._mode == "rgb_array":
+            self._photographer = self._photographer or self._made()
+            return [self._photographer(world) for world in range(self._animals.simulation.n)]
+        return []
+
+    def _made(self) -> Callable[[int], np.ndarray]:
+        task = self._animals.simulation.task
+        return _Follower(self._animals) if isinstance(task, AgentTask) else _ModelCameras(self._animals)
+
+
+class _Follower:
+    """A camera behind the agent."""
+
+    def __init__(self, animals: Animals) -> None:
+        self._simulation = animals.simulation
+        task = self._simulation.task
+        assert isinstance(task, AgentTask)
+        eyes = task.eyes if isinstance(task.eyes, Eyes | None) else next(iter(task.eyes.values()))
+        self.camera = FollowCamera(task.world, eyes)
+
+    def __call__(self, world: int) -> np.ndarray:
+        return self.camera.picture(self._simulation.state, world)
+
+
+class _ModelCameras:
+    """The task's own camera, or one that looks at the whole model."""
+
+    def __init__(self, animals: Animals) -> None:
+        self._animals, self._simulation = animals, animals.simulation
+        self._cameras: dict[int, tuple[bytes, QuickCamera]] = {}
+
+    def __call__(self, world: int) -> np.ndarray:
+        physics = self._simulation.physics
+        assert isinstance(physics, MujocoWorlds)
+        return self._picture(self._camera_of(world, physics), physics.datas[world])
+
+    def _camera_of(self, world: int, physics: MujocoWorlds) -> QuickCamera:
+        """One for all; where bodies differ, each world's own, made again with its episode and no earlier: a camera's
+        materials have all eyes' kernels recorded once more."""
+        bodies = physics.bodies
+        model = bodies.models[world]
+        looks = model.geom_size.tobytes() + model.geom_rgba.tobytes() + model.geom_matid.tobytes()
+        place = world if bodies.varied else 0
+        known, camera = self._cameras.get(place, (b"", None))
+        if camera is None or looks != known:
+            camera = QuickCamera(model, self._animals.learners[0].renderer.spectra)
+            self._cameras[place] = looks, camera
+        return camera
+
+    def _picture(self, camera: QuickCamera, data: mujoco.MjData) -> np.ndarray:
+        model = self._simulation.physics.model
+        named = self._simulation.task.camera or _overview(model)
+        picture, view = camera.picture(data, named, PICTURE[1], PICTURE[0]), camera.mirror.viewpoint(named)
+        reach, poses = RIMS * float(model.stat.extent), Poses.of([data])
+        for renderer in (sight.renderer for senses in self._animals.seeing for sight in senses.sights.values()):
+            pupils, frames = renderer.eye_frames(poses)
+            picture = with_eyes(picture, view, (pupils[0], frames[0]), renderer.eye.fov_deg, reach)
+        return picture
+
+
+def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
+    """A picture of each world: a row for each kind of eyes."""
+    rows = [
+        [side_by_side(frame, sight.renderer.eye) for frame in sight.memory.newest] for sight in senses.sights.values()
+    ]
+    return [one_above_another(pictures) for pictures in zip(*rows, strict=True)]
+
+
+def _overview(model: mujoco.MjModel) -> Viewpoint:
+    """From the side, above."""
+    centre, extent = np.array(model.stat.center), float(model.stat.extent)
+    return Viewpoint.looking_at(centre + extent * np.array([-0.9, -1.6, 1.2]), centre, 45.0)

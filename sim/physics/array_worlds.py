@@ -1,0 +1,111 @@
+"""Worlds of any MuJoCo model whose state is arrays: what a batch task reads and writes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from sim.physics.mujoco_worlds import MujocoWorlds
+from sim.scene.variation import Drawn
+
+__all__ = ["ArrayWorlds"]
+
+_ALL = mujoco.mjtState.mjSTATE_INTEGRATION
+# Parts of MuJoCo's state that are arrays of their own, and fields of MjModel that say how large they are.
+_WRITABLE = {"time": "TIME", "qpos": "QPOS", "qvel": "QVEL", "act": "ACT", "ctrl": "CTRL", "userdata": "USERDATA"}
+_MOCAP = {"mocap_pos": ("MOCAP_POS", 3), "mocap_quat": ("MOCAP_QUAT", 4)}
+
+
+class ArrayWorlds(MujocoWorlds):
+    """`n` worlds of one model, as arrays whose first axis is the world.
+
+    qpos, qvel, act, ctrl, mocap_pos, mocap_quat, userdata, time: may be written to, in `reset` and `act`
+    All other arrays of mjData (`xpos`, `geom_xpos`, `site_xpos`, `sensordata`, `cvel` ...) are read-only: stacked when
+    they are first read after a step.
+    """
+
+    qpos: np.ndarray
+    qvel: np.ndarray
+    act: np.ndarray
+    ctrl: np.ndarray
+    userdata: np.ndarray
+    time: np.ndarray
+    mocap_pos: np.ndarray
+    mocap_quat: np.ndarray
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._stacked: dict[str, np.ndarray] = {}
+        self._rows = np.zeros((self.n, mujoco.mj_stateSize(self.model, _ALL)))
+        start = 0
+        # In the order in which MuJoCo lays out a state.
+        for part in (getattr(mujoco.mjtState, name) for name in _parts()):
+            if not int(part) & int(_ALL):
+                continue
+            size = mujoco.mj_stateSize(self.model, part)
+            for name, kind in _WRITABLE.items():
+                if part == getattr(mujoco.mjtState, f"mjSTATE_{kind}"):
+                    setattr(self, name, self._rows[:, start : start + size])
+            for name, (kind, width) in _MOCAP.items():
+                if part == getattr(mujoco.mjtState, f"mjSTATE_{kind}"):
+                    setattr(self, name, self._rows[:, start : start + size].reshape(self.n, -1, width))
+            start += size
+        self._pull(range(self.n))
+
+    @property
+    def state(self) -> ArrayWorlds:  # type: ignore[override]
+        return self
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        """An array of mjData, stacked over worlds."""
+        if name.startswith("_") or not isinstance(getattr(mujoco.MjData, name, None), property):
+            raise AttributeError(f"ArrayWorlds has no attribute {name!r}, and neither has mjData")
+        if name not in self._stacked:
+            found = np.stack([np.asarray(getattr(data, name)) for data in self.datas])
+            found.flags.writeable = False
+            self._stacked[name] = found
+        return self._stacked[name]
+
+    def begin(self, world: int, drawn: Mapping[str, Drawn]) -> None:
+        super().begin(world, drawn)
+        self._pull([world])
+
+    def settle(self, worlds: np.ndarray) -> None:
+        self._push(worlds)
+        super().settle(worlds)
+
+    def step(self, skipped: Collection[int]) -> dict[int, str]:
+        moving = [world for world in range(self.n) if world not in skipped]
+        self._push(moving)
+        broken = super().step(skipped)
+        for world in broken:
+            self.require_places(world)
+        self._pull(range(self.n))
+        return broken
+
+    def held(self) -> dict[str, np.ndarray]:
+        self._push(range(self.n))
+        return super().held()
+
+    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        super().hold(state, worlds)
+        self._pull(worlds)
+
+    def _push(self, worlds: Collection[int] | np.ndarray) -> None:
+        for world in worlds:
+            mujoco.mj_setState(self.bodies.models[world], self.datas[world], self._rows[world], _ALL)
+        self._stacked.clear()
+
+    def _pull(self, worlds: Collection[int] | np.ndarray) -> None:
+        for world in worlds:
+            mujoco.mj_getState(self.bodies.models[world], self.datas[world], self._rows[world], _ALL)
+        self._stacked.clear()
+
+
+def _parts() -> list[str]:
+    """Names of the single parts of a state, in MuJoCo's order."""
+    kinds = {name: int(getattr(mujoco.mjtState, name)) for name in dir(mujoco.mjtState) if name.startswith("mjSTATE_")}
+    return sorted((name for name, bits in kinds.items() if bits.bit_count() == 1), key=lambda name: kinds[name])

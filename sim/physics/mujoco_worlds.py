@@ -1,0 +1,147 @@
+"""Worlds of any MuJoCo model, each with its own mjData, stepped on several threads."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Collection, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from sim.scene.poses import Poses
+from sim.scene.variation import Drawn, Variation
+from sim.scene.world_models import WorldModels
+
+__all__ = ["MujocoWorlds"]
+
+MODELS = "models"  # entry of a state for worlds with models of their own
+_ALL = mujoco.mjtState.mjSTATE_INTEGRATION
+_UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+
+
+class MujocoWorlds:
+    """`n` worlds of one model; see `sim.physics.physics.Physics`.
+
+    given: what the model was compiled from · substeps: of physics in one action
+    datas: mjData of every world · bodies: their models, where these differ
+    """
+
+    def __init__(
+        self,
+        given: Any,
+        model: mujoco.MjModel,
+        n: int,
+        threads: int = 1,
+        substeps: int = 1,
+        variation: Variation | None = None,
+    ) -> None:
+        self.model, self.n, self.substeps = model, n, substeps
+        self.seconds = substeps * float(model.opt.timestep)
+        self.bodies = WorldModels(given, model, n, variation)
+        self.varied: Mapping[str, tuple[str, ...]] = self.bodies.varied
+        self.datas = [mujoco.MjData(model) for model in self.bodies.models]
+        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self._watched = b""
+        self.chance: Any = None
+
+    @property
+    def state(self) -> list[mujoco.MjData]:
+        """Data of all worlds as they are now; not a copy."""
+        return self.datas
+
+    def begin(self, world: int, drawn: Mapping[str, Drawn]) -> None:
+        data, model = self.datas[world], self.bodies.models[world]
+        self.bodies.begin(world, drawn)
+        mujoco.mj_resetData(model, data)
+        self.bodies.place(data, drawn)
+
+    def settle(self, worlds: np.ndarray) -> None:
+        for world in worlds:
+            mujoco.mj_forward(self.bodies.models[world], self.datas[world])
+
+    def adopt_changed_model(self) -> bool:
+        if self.bodies.differs():
+            self.bodies.separate()
+            self.datas = [mujoco.MjData(model) for model in self.bodies.models]
+            return True
+        # What eyes are made for: as the first `reset` leaves it, which may paint or light what stands still. If worlds
+        # share the model, it is theirs: what is changed of it outside, is changed for all of them.
+        if not self.bodies.varied:
+            self.model = copy.copy(self.bodies.models[0]) if self.bodies.own else self.bodies.models[0]
+        return False
+
+    def watch(self) -> None:
+        self._watched = self.bodies.noted()
+
+    def check(self, whose: str) -> None:
+        self.bodies.require_unchanged(self._watched, whose)
+
+    def step(self, skipped: Collection[int]) -> dict[int, str]:
+        moving = [world for world in range(self.n) if world not in skipped]
+        for _ in (self._pool.map if self._pool else map)(self._move, moving):
+            pass
+        return {world: words for world in moving if (words := _broken(self.datas[world])) is not None}
+
+    def require_places(self, world: int) -> None:
+        """Reset a world whose bodies are nowhere: rendering it would end all worlds."""
+        data = self.datas[world]
+        if not _has_place(data):
+            mujoco.mj_resetData(data.model, data)
+            mujoco.mj_forward(data.model, data)
+
+    def poses(self) -> Poses:
+        return Poses.of(self.datas)
+
+    def held(self) -> dict[str, np.ndarray]:
+        if self.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
+            raise RuntimeError("get_state: the model has <flag sleep>, and who sleeps is in no state: must be disabled")
+        physics = np.empty((self.n, mujoco.mj_stateSize(self.model, _ALL)))
+        for row, data in zip(physics, self.datas, strict=True):
+            mujoco.mj_getState(self.model, data, row, _ALL)
+        held = [np.frombuffer(self.bodies.held(i), np.uint8) for i in range(self.n) if self.bodies.own]
+        return {"physics": physics, **({MODELS: np.stack(held)} if held else {})}
+
+    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        for i in worlds:
+            if MODELS in state:
+                self.bodies.own = True
+                self.bodies.hold(i, np.asarray(state[MODELS][i], np.uint8).tobytes())
+            data, model, row = self.datas[i], self.bodies.models[i], np.ascontiguousarray(state["physics"][i])
+            mujoco.mj_resetData(model, data)
+            mujoco.mj_setState(model, data, row, _ALL)
+            mujoco.mj_forward(model, data)
+            mujoco.mj_setState(model, data, row, _ALL)  # the solver's warm start, which mj_forward has moved
+
+    def close(self) -> None:
+        if self._pool:
+            self._pool.shutdown()
+
+    def _move(self, world: int) -> None:
+        data = self.datas[world]
+        mujoco.mj_step(data.model, data, self.substeps)
+        mujoco.mj_forward(data.model, data)
+
+
+def _broken(data: mujoco.MjData) -> str | None:
+    """How its physics broke down, if it did. MuJoCo has begun it anew by then, unless its model forbids that."""
+    warned = data.warning.number
+    if warned.any() and any(warned[int(kind)] for kind in _UNSTABLE):
+        return (
+            "physics is unstable: positions, speeds or accelerations are huge or not finite; a shorter timestep or "
+            "the integrator implicitfast may help"
+        )
+    if warned[int(mujoco.mjtWarning.mjWARN_BADCTRL)]:  # MuJoCo has taken all controls of the world for 0
+        return "controls are huge or not finite: what `act` writes must be numbers, of 1e10 at most"
+    if not _has_place(data):
+        return "physics is unstable: places of bodies are not finite; what `act` writes must be"
+    return None
+
+
+def _has_place(data: mujoco.MjData) -> bool:
+    """Whether everything that is seen is somewhere."""
+    # NaN and infinity survive any sum, and one test of a sum costs less than one of every term.
+    total = np.add.reduce
+    return math.isfinite(total(data.xpos, None) + total(data.xmat, None) + total(data.geom_xpos, None))

@@ -1,0 +1,180 @@
+"""Agents that slide over a floor among walls, and objects that are moved by their task: the built-in worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sim.physics.agent_motion import AgentPhysics, Agents, Motion
+from sim.physics.varied_looks import varied_looks
+from sim.scene.moved_bodies import MovedBodies, ReferencePose
+from sim.scene.poses import Poses
+from sim.scene.variation import Drawn, Variation
+from sim.worlds.state import WorldState, wrap_angle
+from sim.worlds.world import MAX_SPEED, World
+
+__all__ = ["MAX_TURN", "UNSTABLE", "SlidingAgents"]
+
+MAX_TURN = np.pi / 4  # [rad] change of heading per action; chosen
+UNSTABLE = "unstable physics"
+
+
+class SlidingAgents:
+    """`n` worlds of one layout. Each has an agent on two slide joints, and objects that collide with nothing.
+
+    world: layout, model and places to start from
+    before, state: all worlds before and after the last action · motion: of the agents during that action
+    chance: random streams of the worlds
+    """
+
+    def __init__(self, world: World, n: int, threads: int = 1, variation: Variation | None = None) -> None:
+        self.world, self.n, self.model = world, n, world.model
+        self.agents = AgentPhysics(world, threads)
+        self.seconds = self.agents.seconds
+        self._looks = None if variation is None else varied_looks(world.model, n, variation)
+        self.varied: Mapping[str, tuple[str, ...]] = {} if self._looks is None else self._looks.varied
+        self._heights = np.array([world.model.body(name).pos[2] for name in world.objects])
+        bodies = [int(world.model.body(name).id) for name in ("agent", *world.objects)]
+        self._reference = ReferencePose(world.model, bodies)
+        self._state: WorldState | None = None
+        self._command = np.zeros((n, 2))
+        self.before: WorldState | None = None
+        self.motion: Motion | None = None
+        self.chance: Any = None
+
+    @property
+    def state(self) -> WorldState:
+        """All worlds as they are now.
+
+        Raises:
+            RuntimeError: before the first reset.
+        """
+        if self._state is None:
+            raise RuntimeError("the worlds have not begun: call reset first")
+        return self._state
+
+    @state.setter
+    def state(self, state: WorldState | None) -> None:
+        self._state = state
+
+    def begin(self, world: int, drawn: Mapping[str, Drawn]) -> None:
+        if self._looks is not None:
+            self._looks.begin(world, drawn)
+
+    def place(
+        self, worlds: np.ndarray, agents: np.ndarray, headings: np.ndarray, objects: np.ndarray, courses: np.ndarray
+    ) -> None:
+        """Start episodes.
+
+        agents: (world, 2) [m] · headings: (world,) [rad] · objects: (world, k, 2) [m]
+        courses: headings of the objects, (world, k) [rad]
+        """
+        n, k = len(worlds), len(self.world.objects)
+        centres = np.empty((n, k, 3))
+        centres[:, :, :2], centres[:, :, 2] = objects, self._heights
+        fresh = WorldState(
+            position=agents,
+            heading=headings,
+            velocity=np.zeros((n, 2)),
+            objects=centres,
+            object_heading=courses,
+            start=agents.copy(),
+            steps=np.zeros(n, int),
+            goals_reached=np.zeros(n, int),
+            adversaries_reached=np.zeros(n, int),
+        )
+        others = fresh.take(np.zeros(self.n, int)) if self._state is None else self._state
+        self._state = fresh if n == self.n else others.put(worlds, fresh)
+
+    def steer(self, actions: np.ndarray) -> None:
+        """Command forward speed and change of heading, (n, 2) in [-1, 1], for the next step."""
+        self._command = actions
+
+    def move_objects(self, objects: np.ndarray, courses: np.ndarray) -> None:
+        """Where the objects are after the next step, (n, k, 3) [m], and their headings (n, k) [rad]."""
+        self._moved = objects, courses
+
+    def put_objects(self, objects: np.ndarray) -> None:
+        """Put objects elsewhere after an action, (n, k, 3) [m]."""
+        self._state = replace(self.state, objects=objects)
+
+    def count(self, goals: np.ndarray, adversaries: np.ndarray) -> None:
+        """Add to the numbers of goals and adversaries that each agent has reached, (n,) each."""
+        state = self.state
+        self._state = replace(
+            state,
+            goals_reached=state.goals_reached + goals,
+            adversaries_reached=state.adversaries_reached + adversaries,
+        )
+
+    def settle(self, worlds: np.ndarray) -> None:
+        """Nothing is left to compute."""
+
+    def adopt_changed_model(self) -> bool:
+        return False
+
+    def watch(self) -> None:
+        """Nothing can be changed."""
+
+    def check(self, whose: str) -> None:
+        """Nothing can be changed."""
+
+    def step(self, skipped: Collection[int]) -> dict[int, str]:
+        self.before = before = self.state
+        heading, velocity = _steered(before.heading, self._command)
+        self.motion = motion = self.agents.step(Agents(before.position, heading, before.velocity), velocity)
+        objects, courses = self._moved
+        after = replace(
+            before,
+            position=motion.path[:, -1].copy(),
+            heading=heading,
+            velocity=motion.velocity,
+            objects=objects,
+            object_heading=courses,
+            steps=before.steps + 1,
+        )
+        broken: dict[int, str] = {}
+        if motion.unstable.any() or not after.all_finite:
+            worlds = np.flatnonzero(motion.unstable | ~after.finite)
+            after, broken = after.repaired(), dict.fromkeys(worlds.tolist(), UNSTABLE)
+        self._state = after
+        return broken
+
+    def poses(self) -> Poses:
+        state = self.state
+        positions = np.empty((state.n, 1 + state.objects.shape[1], 3))
+        positions[:, 0, :2], positions[:, 0, 2] = (
+            state.position,
+            self._reference.poses.xpos[0, self._reference.bodies[0], 2],
+        )
+        positions[:, 1:] = state.objects
+        rotations = np.repeat(self._reference.poses.xmat[:, self._reference.bodies], state.n, axis=0)
+        rotations[:, 0, 0, 0] = rotations[:, 0, 1, 1] = np.cos(state.heading)
+        rotations[:, 0, 1, 0] = np.sin(state.heading)
+        rotations[:, 0, 0, 1] = -rotations[:, 0, 1, 0]
+        found = MovedBodies(self._reference, positions, rotations, None if self._looks is None else self._looks.models)
+        vars(found)["state"] = state
+        return found
+
+    def held(self) -> dict[str, np.ndarray]:
+        return {name: array.copy() for name, array in vars(self.state).items()}
+
+    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        names = vars(self.state)
+        self._state = self.state.put(worlds, WorldState(**{name: np.asarray(state[name])[worlds] for name in names}))
+
+    def close(self) -> None:
+        self.agents.close()
+
+
+def _steered(heading: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Headings [rad] (n,) after turning, and commanded velocities [m/s] (n, 2)."""
+    speed, turn = actions.astype(np.float64).T
+    heading = wrap_angle(heading + MAX_TURN * turn)
+    speed = MAX_SPEED * (speed + 1.0) / 2.0
+    velocity = np.empty((len(heading), 2))
+    velocity[:, 0], velocity[:, 1] = np.cos(heading) * speed, np.sin(heading) * speed
+    return heading, velocity

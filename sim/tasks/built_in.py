@@ -1,0 +1,161 @@
+"""What the built-in tasks share: the sliding agent, its contact sense, its weights, and a random stream per purpose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from sim.eyes.eyes import BODY_RADIUS, Eyes
+from sim.eyes.mounts import Mount, ring
+from sim.physics.sliding_agents import SlidingAgents
+from sim.render.fidelity import Fidelity
+from sim.scene.variation import Variation
+from sim.tasks.batch_task import Agent, BatchTask
+from sim.tasks.outcome import NOWHERE, Outcome, RewardTerms
+from sim.tasks.random_streams import StreamsByPurpose
+from sim.tasks.reward import MODES, TERMS, RewardWeights, reward_terms
+from sim.worlds.catalog import EPISODE_STEPS
+from sim.worlds.world import World
+
+__all__ = ["STANDING", "AgentEvents", "AgentTask", "mounts_of_agent"]
+
+OUTSIDE = 1e-6  # of the radius: how far above the skin a pupil is, so that rounding does not put it below
+STANDING = (-1.0, 0.0)  # the "previous action" of an agent that has not moved yet: no speed, no turn
+
+
+@dataclass(frozen=True)
+class AgentEvents:
+    """What happened during one action, per world.
+
+    progress: [m], in the task's sense (n,) · goal, adversary: reached (n,) bool
+    adversary_first: an adversary was reached, and before any goal (n,) bool
+    reached: objects that were reached (n, k) bool · terminated: (n,) bool
+    """
+
+    progress: np.ndarray
+    goal: np.ndarray
+    adversary: np.ndarray
+    adversary_first: np.ndarray
+    reached: np.ndarray
+    terminated: np.ndarray
+
+    @property
+    def any(self) -> np.ndarray:
+        """Something was reached, (n,) bool."""
+        return self.goal | self.adversary
+
+    def within(self, worlds: np.ndarray) -> AgentEvents:
+        """The same in these worlds, (n,) bool; nothing happened in the others."""
+        return AgentEvents(
+            progress=np.where(worlds, self.progress, 0.0),
+            goal=self.goal & worlds,
+            adversary=self.adversary & worlds,
+            adversary_first=self.adversary_first & worlds,
+            reached=self.reached & worlds[:, None],
+            terminated=self.terminated & worlds,
+        )
+
+
+class AgentTask(BatchTask):
+    """A task of an agent that slides among walls, in one of the built-in worlds.
+
+    world: its layout · mode: "training" or "evaluation": the weights of the reward
+    eyes: on the agent's equator; of several kinds by name; None: nobody looks
+    fidelity: how finely they see, or "auto"
+    """
+
+    feel_ranges: Mapping[str, tuple[float, float]] = {"contact": (0.0, 1.0)}
+
+    def __init__(
+        self,
+        world: World,
+        mode: str = "training",
+        eyes: Eyes | Mapping[str, Eyes] | None = None,
+        fidelity: Fidelity | str = "auto",
+    ) -> None:
+        self.world, self.model, self.mode, self.name, self.eyes = world, world.model, mode, world.task, eyes
+        self.spectra, self.episode_steps = world.spectra, world.episode_steps or EPISODE_STEPS
+        self.fidelity = fidelity
+        if isinstance(eyes, Eyes):
+            self.eye, self.mounts = eyes.eye(), mounts_of_agent(eyes)
+        elif eyes is not None:
+            self.eye = {name: of_kind.eye() for name, of_kind in eyes.items()}
+            self.mounts = {name: mounts_of_agent(of_kind) for name, of_kind in eyes.items()}
+
+    @property
+    def weights(self) -> RewardWeights:
+        """Of the reward's terms."""
+        return MODES[self.mode]
+
+    def n_actions(self, model: mujoco.MjModel) -> int:
+        """Forward speed, and change of heading."""
+        return 2
+
+    def physics(self, n: int, threads: int, variation: Variation | None) -> SlidingAgents:
+        return SlidingAgents(self.world, n, threads, variation)
+
+    def streams(self, seed: Any, n: int) -> StreamsByPurpose:
+        return StreamsByPurpose(seed, n, [len(agent.kinds) for agent in self.agents()])
+
+    def agents(self) -> tuple[Agent, ...]:
+        (agent,) = super().agents()
+        return (replace(agent, first_action=np.array(STANDING, np.float32)),)
+
+    def act(self, worlds: SlidingAgents, actions: np.ndarray) -> None:
+        """Forward speed and change of heading; objects move, if they do."""
+        worlds.steer(actions)
+        worlds.move_objects(*self.moved(worlds))
+
+    def moved(self, worlds: SlidingAgents) -> tuple[np.ndarray, np.ndarray]:
+        """Objects (n, k, 3) [m] and their headings (n, k) [rad] after the next action; here: as they are."""
+        return worlds.state.objects, worlds.state.object_heading
+
+    def feels(self, worlds: SlidingAgents) -> Mapping[str, np.ndarray]:
+        """Whether the agent touched a wall during the last action; not at the beginning of an episode."""
+        touched = np.zeros(worlds.n, bool) if worlds.motion is None else worlds.motion.contact
+        return {"contact": (touched & (worlds.state.steps > 0)).astype(np.float32)[:, None]}
+
+    def first_info(self, worlds: SlidingAgents, chosen: np.ndarray) -> Sequence[Mapping[str, Any]]:
+        state = worlds.state
+        places = zip(state.position[chosen].tolist(), state.heading[chosen].tolist(), strict=True)
+        return [{"position": (x, y), "heading": heading} for (x, y), heading in places]
+
+    def weighted(self, worlds: SlidingAgents, events: AgentEvents, failed: Mapping[int, str]) -> Outcome:
+        """The outcome of an action with these events."""
+        if failed:
+            well = np.ones(worlds.n, bool)
+            well[list(failed)] = False
+            events = events.within(well)
+        assert worlds.motion is not None
+        terms = reward_terms(self.weights, events.progress, events.goal, events.adversary, worlds.motion.contact)
+        terminated = events.terminated | ~well if failed else events.terminated
+        changed = NOWHERE
+        if events.any.any():
+            worlds.count(events.goal, events.adversary)
+            changed = self.put_elsewhere(worlds, events)
+        state = worlds.state
+        places = zip(*state.position.T.tolist(), state.heading.tolist(), strict=True)
+        info: list[dict[str, Any]] = [{"position": (x, y), "heading": heading} for x, y, heading in places]
+        for world in np.flatnonzero(events.adversary_first):
+            info[world]["adversary_first"] = True
+        return Outcome(
+            terms=RewardTerms(TERMS, terms),
+            terminated=terminated,
+            success=state.goals_reached > 0,
+            failure=failed,
+            changed=changed,
+            info=info,
+        )
+
+    def put_elsewhere(self, worlds: SlidingAgents, events: AgentEvents) -> np.ndarray:
+        """Put objects that were reached elsewhere, if the episode goes on; returns the worlds that changed."""
+        return NOWHERE
+
+
+def mounts_of_agent(eyes: Eyes) -> tuple[Mount, ...]:
+    """Places of these eyes on the agent's equator."""
+    return ring("agent", eyes.n_eyes, eyes.placement_range_deg, BODY_RADIUS * (1 + OUTSIDE))

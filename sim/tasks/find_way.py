@@ -1,0 +1,51 @@
+"""Navigation and maze: get far from the start and into the goal region."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from sim.physics.sliding_agents import SlidingAgents
+from sim.tasks.built_in import AgentEvents, AgentTask
+from sim.tasks.outcome import Outcome
+from sim.worlds.state import wrap_angle
+
+__all__ = ["HEADING_SPREAD", "FindWay"]
+
+HEADING_SPREAD = math.radians(20)  # [rad] either way, of headings along a course; chosen
+
+
+class FindWay(AgentTask):
+    """Progress is the increase of the distance from the start. Reaching the goal region ends the episode, in evaluation
+    too: there is no object that could respawn elsewhere.
+    """
+
+    def reset(self, worlds: SlidingAgents, chosen: np.ndarray, rngs: Sequence[np.random.Generator]) -> None:
+        n = len(chosen)
+        starts = (self.world.training_starts if self.mode == "training" else None) or self.world.starts
+        agents, headings = np.empty((n, 2)), np.empty(n)
+        for row, rng in enumerate(rngs):
+            place = rng.integers(len(starts.position))
+            agents[row] = starts.position[place]
+            if starts.heading is None:
+                headings[row] = rng.uniform(-np.pi, np.pi)
+            else:
+                headings[row] = wrap_angle(starts.heading[place] + rng.uniform(-HEADING_SPREAD, HEADING_SPREAD))
+        worlds.place(chosen, agents, headings, np.empty((n, 0, 2)), np.empty((n, 0)))
+
+    def judge(self, worlds: SlidingAgents, failed: Mapping[int, str]) -> Outcome:
+        assert worlds.before is not None
+        assert worlds.motion is not None
+        region, path = self.world.goal_region, worlds.motion.path
+        if region is None:
+            raise ValueError(f"world {self.world.task!r} has no goal_region")
+        start = worlds.before.start
+        was, is_now = (np.linalg.norm(s.position - start, axis=-1) for s in (worlds.before, worlds.state))
+        inside = path[..., 0] >= region[0]
+        for side in (path[..., 0] <= region[2], path[..., 1] >= region[1], path[..., 1] <= region[3]):
+            inside &= side
+        goal, nothing = inside.any(axis=1), np.zeros(worlds.n, bool)
+        nowhere = np.zeros((worlds.n, 0), bool)
+        return self.weighted(worlds, AgentEvents(is_now - was, goal, nothing, nothing, nowhere, goal), failed)

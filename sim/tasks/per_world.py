@@ -1,0 +1,195 @@
+"""Tasks of one world at a time, as a batch task: plain Python methods are called world by world."""
+
+from __future__ import annotations
+
+import copy
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Self
+
+import mujoco
+import numpy as np
+
+from sim.physics.mujoco_worlds import MujocoWorlds
+from sim.physics.physics import Physics
+from sim.scene.variation import Variation
+from sim.tasks import batch_task, simulation
+from sim.tasks import task as task_module
+from sim.tasks.batch_task import Agent, BatchTask
+from sim.tasks.encounter import Encounter, cast, name_of, of_world, require_own_actuators
+from sim.tasks.eye_kinds import auxiliary_of, kinds_of
+from sim.tasks.outcome import Outcome, RewardTerms
+from sim.tasks.task import Task, named_terms
+from sim.tasks.task_settings import compiled
+
+__all__ = ["PerWorld"]
+
+_OURS = (__file__, task_module.__file__, batch_task.__file__, simulation.__file__)
+
+
+@dataclass
+class _OfWorld:
+    """One action in one world, for one learner."""
+
+    terms: dict[str, float] = field(default_factory=dict)
+    terminated: bool = False
+    success: bool = False
+
+
+class PerWorld(BatchTask):
+    """A `sim.Task` with its others, or a `sim.Encounter` whose animals all learn.
+
+    learners: tasks of those who learn · frozen: the others · animals: tasks of all, learners first
+
+    Raises:
+        ValueError: a setting is missing or wrong, or the animals cannot be in one world.
+    """
+
+    renders_early = False  # methods of a user may move anything
+
+    def __init__(self, task: Task | Encounter) -> None:
+        self.task = task
+        self.learners, self.frozen = cast(task)
+        self.animals = (*self.learners, *(other.task for other in self.frozen))
+        self.name = " and ".join(map(name_of, self.animals))
+        self._sizes: dict[int, int] = {}  # of what each animal feels, once it is known
+        self._whose = ["" if len(self.animals) == 1 else f"{name_of(animal)}: " for animal in self.animals]
+        self.model = compiled(self.animals[0])
+        for animal in self.animals[1:]:
+            compiled(animal, self.model)
+        require_own_actuators(self.animals, self.model)
+        first = self.animals[0]
+        self.substeps, self.episode_steps, self.mode = first.substeps, first.episode_steps, first.mode
+        for name in ("spectra", "vary", "camera"):
+            setattr(self, name, of_world(self.animals, name))
+
+    def in_mode(self, mode: str) -> Self:
+        found = super().in_mode(mode)
+        if found is not self:
+            found.learners = tuple(_in_mode(animal, mode) for animal in self.learners)
+            found.frozen = tuple(replace(other, task=_in_mode(other.task, mode)) for other in self.frozen)
+            found.animals = (*found.learners, *(other.task for other in found.frozen))
+        return found
+
+    def physics(self, n: int, threads: int, variation: Variation | None) -> Physics:
+        return MujocoWorlds(self.animals[0].model, self.model, n, threads, self.substeps, variation)
+
+    def agents(self) -> tuple[Agent, ...]:
+        policies = [None] * len(self.learners) + [other.policy for other in self.frozen]
+        found = []
+        for number, (animal, policy) in enumerate(zip(self.animals, policies, strict=True)):
+            size, learns = animal.n_actions(self.model), number < len(self.learners)
+            first = np.zeros(size, np.float32)
+            auxiliary = auxiliary_of(animal.auxiliary, f"{type(animal).__name__}: auxiliary")
+            found.append(Agent(name_of(animal), size, kinds_of(animal), auxiliary, first, learns, policy))
+        return tuple(found)
+
+    def reset(self, worlds: MujocoWorlds, chosen: np.ndarray, rngs: Sequence[np.random.Generator]) -> None:
+        for world, rng in zip(chosen, rngs, strict=True):
+            try:
+                for animal in self.animals:
+                    animal.reset(worlds.datas[world], rng)
+            except Exception as error:
+                raise RuntimeError(_told(error)) from error
+
+    def take(self, worlds: MujocoWorlds, actions: np.ndarray, failed: Mapping[int, str]) -> Mapping[int, str]:
+        found, first = dict[int, str](), 0
+        for animal in self.animals:
+            own = actions[:, first : first + animal.n_actions(self.model)]
+            first += own.shape[1]
+            for world, data in enumerate(worlds.datas):
+                if world not in failed and world not in found:
+                    try:
+                        animal.act(data, own[world])
+                    except Exception as error:
+                        found[world] = _told(error)
+        return found
+
+    def judge(self, worlds: MujocoWorlds, failed: Mapping[int, str]) -> Outcome:
+        """The episode ends for all animals as soon as it ends for any of them."""
+        failure, over = dict(failed), np.zeros(worlds.n, bool)
+        judged: list[list[_OfWorld]] = []
+        felt: list[list[np.ndarray | None]] = [[None] * worlds.n for _ in self.animals]
+        for world in range(worlds.n):
+            if world not in failure:
+                try:
+                    outcomes, over[world] = self._judged(worlds.datas[world])
+                    for own, now in zip(felt, self._felt(worlds.datas[world]), strict=True):
+                        own[world] = now
+                    judged.append(outcomes)
+                    continue
+                except Exception as error:
+                    failure[world] = _told(error)
+            worlds.require_places(world)
+            # Not truncated: nothing might have come after it that a learner could count with.
+            worth = [{"failure": animal.failure_reward} if animal.failure_reward else {} for animal in self.learners]
+            judged.append([_OfWorld(terms, terminated=True) for terms in worth])
+        rows = [outcome for of_learner in zip(*judged, strict=True) for outcome in of_learner]
+        return Outcome(
+            terms=RewardTerms.of_rows([row.terms for row in rows]),
+            terminated=np.array([row.terminated for row in rows]),
+            success=np.array([row.success for row in rows]),
+            failure=failure,
+            over=over,
+            feels=[_stacked(own) for own in felt],
+        )
+
+    def all_feel(self, worlds: MujocoWorlds, chosen: np.ndarray) -> list[Mapping[str, np.ndarray]]:
+        try:
+            of_worlds = [self._felt(worlds.datas[world]) for world in chosen]
+            return [_stacked(list(own)) for own in zip(*of_worlds, strict=True)]
+        except Exception as error:
+            raise RuntimeError(_told(error)) from error
+
+    def _judged(self, data: mujoco.MjData) -> tuple[list[_OfWorld], bool]:
+        """Of every learner; and whether the episode ends."""
+        outcomes, over = [], False
+        for animal, whose in zip(self.learners, self._whose, strict=False):
+            terms = named_terms(animal, data, whose)
+            ended, done = bool(animal.terminated(data)), bool(animal.succeeded(data))
+            outcomes.append(_OfWorld(terms, terminated=ended, success=done))
+            over |= ended
+        return outcomes, over | any(other.task.terminated(data) for other in self.frozen)
+
+    def _felt(self, data: mujoco.MjData) -> list[np.ndarray]:
+        """What every animal of a world feels.
+
+        Raises:
+            ValueError: it is no row of finite numbers, or not as many as before.
+        """
+        found = []
+        for number, (animal, whose) in enumerate(zip(self.animals, self._whose, strict=True)):
+            felt = np.asarray(animal.feels(data), np.float32)
+            if felt.ndim != 1 or not np.isfinite(felt).all():
+                raise ValueError(f"{whose}feels returned {felt!r:.100}: must be finite numbers, (k,)")
+            size = self._sizes.get(number) or self._sizes.setdefault(number, len(felt))
+            if len(felt) != (size or len(felt)):
+                raise ValueError(f"{whose}feels returned {len(felt)} numbers: must be {size}, as before")
+            self._sizes[number] = len(felt)
+            found.append(felt)
+        return found
+
+
+def _in_mode(task: Task, mode: str) -> Task:
+    found = copy.copy(task)
+    found.mode = mode
+    return found
+
+
+def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
+    """One row for each world; NaN where nothing new is known."""
+    size = next((len(row) for row in felt if row is not None), 0)
+    if not size:
+        return {}
+    return {"feels": np.array([np.full(size, np.nan, np.float32) if row is None else row for row in felt])}
+
+
+def _told(error: Exception) -> str:
+    """Where in the user's file it happened, if it did there, and what."""
+    for frame in traceback.extract_tb(error.__traceback__):
+        if frame.filename not in _OURS:
+            place = f"{frame.name}, line {frame.lineno} of {Path(frame.filename).name}"
+            return f"{place}: {type(error).__name__}: {error}"
+    return str(error)

@@ -1,0 +1,44 @@
+"""When an agent comes within reach of objects, and how far it is from them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.worlds.layout import REACH
+from sim.worlds.state import WorldState
+
+__all__ = ["distance_to_nearest", "first_reached"]
+
+
+def distance_to_nearest(state: WorldState, goals: int) -> np.ndarray:
+    """Distance on the ground from the agent's centre to the nearest goal's [m], (n,); goals are the first objects."""
+    x = state.objects[:, :goals, 0] - state.position[:, :1]
+    y = state.objects[:, :goals, 1] - state.position[:, 1:]
+    nearest: np.ndarray = np.sqrt(np.minimum.reduce(x * x + y * y, axis=1))
+    return nearest
+
+
+def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: np.ndarray) -> np.ndarray:
+    """First substep at which the agent is within REACH of each object, (n, k); the number of substeps if never.
+
+    path (n, substep, 2): the agent at the *end* of each substep; objects (n, k, 3) move evenly from before to after.
+    """
+    substeps = path.shape[1]
+    # Worlds come last, side by side, as there are many of them: NumPy's inner loop is over that axis.
+    agent = path.T.copy()[:, :, None]  # (x | y, substep, 1, n)
+    place = _on_the_ground(objects_after)
+    if objects_after is not objects_before:
+        before = _on_the_ground(objects_before)
+        t = (np.arange(substeps) + 1.0)[:, None, None] / substeps
+        place = before + t * (place - before)
+    apart = agent - place
+    apart *= apart
+    near = apart[0] + apart[1] < REACH**2
+    if not near.any():
+        return np.full(objects_after.shape[:2], substeps)
+    return np.where(near.any(axis=0), near.argmax(axis=0), substeps).T
+
+
+def _on_the_ground(objects: np.ndarray) -> np.ndarray:
+    """Objects (n, k, 3) as (x | y, 1, k, n)."""
+    return objects.T[:2].copy()[:, None]

@@ -1,0 +1,116 @@
+"""How finely eyes in a task see: as the task says, or as a few moments of its episodes require."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+import optics
+from sim.eyes.allowed_error import allowed_error
+from sim.render.fidelity import Fidelity
+from sim.render.model_fidelity import choose_model_fidelity
+from sim.scene.poses import Poses
+from sim.scene.variation import Variation
+from sim.tasks.batch_task import BatchTask
+from sim.tasks.encounter import Frozen, among, cast
+from sim.tasks.eye_kinds import EYES, several
+from sim.tasks.per_world import PerWorld
+from sim.tasks.simulation import Simulation
+from sim.tasks.task import Task
+
+AUTO = "auto"
+WORLDS, LATER = 6, 12  # episodes that are looked into: at their beginnings, and so many random actions later
+
+
+def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
+    """Of each kind of the first agent's eyes: the task's own, or, for "auto", what `sim.choose_model_fidelity` finds.
+    The same task gets the same fidelity.
+
+    Raises:
+        ValueError: it is neither, and what the task's model and eyes raise.
+    """
+    batch = PerWorld(task) if isinstance(task, Task) else task
+    kinds = batch.agents()[0].kinds
+    for kind in kinds:
+        if not isinstance(kind.fidelity, Fidelity) and kind.fidelity != AUTO:
+            said = f"fidelity = {kind.fidelity!r}"
+            raise ValueError(f"{type(task).__name__}: {said}: must be a sim.Fidelity, or {AUTO!r}")
+    found = {kind.name: kind.fidelity for kind in kinds if isinstance(kind.fidelity, Fidelity)}
+    if len(found) < len(kinds):
+        with contextlib.closing(Simulation(batch, WORLDS, 0)) as worlds:
+            poses, model, variation, varied = (
+                _moments(worlds),
+                worlds.physics.model,
+                worlds.variation,
+                worlds.physics.varied,
+            )
+        for kind in kinds:
+            if kind.name not in found:
+                tolerance = None if variation is None else _in_brightest(variation, kind.eye)
+                found[kind.name] = choose_model_fidelity(
+                    model, kind.eye, kind.mounts, poses, tolerance, spectra=batch.spectra, varied=varied
+                )
+    return found
+
+
+def fidelity_of(task: Task) -> Fidelity:
+    """Of a task with eyes of one kind.
+
+    Raises:
+        ValueError: see `fidelities_of`.
+    """
+    (found,) = fidelities_of(task).values()
+    return found
+
+
+def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
+    """Of one of the agents, by what it sees of the others.
+
+    Raises:
+        ValueError: see `fidelities_of`.
+    """
+    if not isinstance(task, PerWorld):
+        return fidelities_of(task)
+    others = [Frozen(animal) for k, animal in enumerate(task.animals) if k != number]
+    return fidelities_of(among(task.animals[number], others))
+
+
+def with_settled_others(task: Task) -> Task:
+    """The same task, whose others see as finely as they want to: so that it need not be found out in every environment
+    anew.
+
+    Raises:
+        ValueError: see `fidelities_of`.
+    """
+    _, frozen = cast(task)
+    batch, settled = PerWorld(task), []
+    for number, other in enumerate(frozen, start=1):
+        body = copy.copy(other.task)
+        if other.policy is not None:
+            found = fidelities_among(batch, number)
+            body.fidelity = found if several(body) else found[EYES]
+        settled.append(replace(other, task=body))
+    return among(task, settled)
+
+
+def _in_brightest(variation: Variation, eye: optics.Eye) -> float:
+    """Error allowed to a signal, if lights are brighter in some episodes, and errors with them."""
+    most = variation.extremes(np.asarray(eye.spectral_bands.wavelengths)).max()
+    return allowed_error(eye, None) / max(float(most), 1.0)
+
+
+def _moments(worlds: Simulation) -> Poses:
+    random = np.random.default_rng(0)
+    worlds.reset()
+    first = worlds.poses()
+    for _ in range(min(LATER, worlds.episode_steps - 1)):
+        commanded: Sequence[np.ndarray] = [random.uniform(-1, 1, (WORLDS, agent.n_actions)) for agent in worlds.agents]
+        step = worlds.step(np.concatenate(commanded, axis=1))
+        ended = step.done.reshape(worlds.learners, WORLDS).any(axis=0)
+        if ended.any():
+            worlds.restart(np.flatnonzero(ended))
+    return Poses.joined(first, worlds.poses())

@@ -1,0 +1,194 @@
+"""A batch task does what the same task does world by world; whatever breaks the protocol is named."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sim
+from sim.tasks.outcome import Outcome, RewardTerms
+from sim.tasks.per_world import PerWorld
+from sim.tasks.registry import task_of
+
+FILE = Path(__file__).parents[3] / "examples/find_ball.py"
+
+
+def _example():
+    specification = importlib.util.spec_from_file_location("find_ball", FILE)
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module.FindBall
+
+
+FindBall = _example()
+
+
+class FindBalls(sim.BatchTask):
+    """`examples/find_ball.py`, for arrays of worlds."""
+
+    model, mounts, fidelity = FindBall.model, FindBall.mounts, FindBall.fidelity
+    episode_steps = FindBall.episode_steps
+
+    def reset(self, worlds, chosen, rngs):
+        worlds.mocap_pos[chosen, 0, 1] = [rng.uniform(-2, 2) for rng in rngs]
+
+    def rewards(self, worlds):
+        return {"near": -self.off(worlds) / 10}
+
+    def succeeded(self, worlds):
+        return self.off(worlds) < 0.3
+
+    def feels(self, worlds):
+        return worlds.qvel
+
+    def off(self, worlds):
+        return np.abs(worlds.mocap_pos[:, 0, 1] - worlds.qpos[:, 0])
+
+
+def test_it_is_the_same_task_bit_for_bit():
+    """Over two episodes and a half, in several worlds."""
+    single, batch = (sim.make_vec_env(task, n_envs=5, seed=3, memory=2) for task in (FindBall(), FindBalls()))
+    seen, same = single.reset(), batch.reset()
+    random = np.random.default_rng(0)
+    for _ in range(50):
+        assert seen.keys() == same.keys()
+        for name, array in seen.items():
+            np.testing.assert_array_equal(same[name], array)
+        actions = random.uniform(-1, 1, (5, 1)).astype(np.float32)
+        seen, *rest = single.step(actions)
+        same, *others = batch.step(actions)
+        np.testing.assert_array_equal(others[0], rest[0])
+        np.testing.assert_array_equal(others[1], rest[1])
+        assert [info["is_success"] for info in others[2]] == [info["is_success"] for info in rest[2]]
+
+
+def test_arrays_are_mujocos():
+    env = sim.make_vec_env(FindBalls(), n_envs=3, seed=0)
+    env.reset()
+    env.step(np.array([[1.0], [0.0], [-1.0]]))
+    worlds = env.worlds
+    for world, data in enumerate(worlds.datas):
+        np.testing.assert_array_equal(worlds.qpos[world], data.qpos)
+        np.testing.assert_array_equal(worlds.mocap_pos[world], data.mocap_pos)
+        np.testing.assert_array_equal(worlds.geom_xpos[world], data.geom_xpos)
+    with pytest.raises(ValueError, match="read-only"):
+        worlds.geom_xpos[0] = 0
+    with pytest.raises(AttributeError, match="neither has mjData"):
+        _ = worlds.nothing
+
+
+@pytest.mark.parametrize("mode", ["training", "evaluation"])
+@pytest.mark.parametrize("task", sim.TASKS)
+def test_the_built_in_tasks_keep_to_the_protocol(task, mode):
+    sim.check_batch_task(task_of(sim.build_world(task), mode))
+
+
+def test_tasks_of_one_world_at_a_time_keep_to_it():
+    sim.check_batch_task(FindBalls())
+    sim.check_batch_task(PerWorld(FindBall()))
+
+
+class WrongShape(FindBalls):
+    def rewards(self, worlds):
+        return {"near": np.zeros(3)}
+
+
+class NoMapping(FindBalls):
+    def rewards(self, worlds):
+        return np.zeros(worlds.n)
+
+
+class WrongEnd(FindBalls):
+    def terminated(self, worlds):
+        return False
+
+
+class NotFinite(FindBalls):
+    def feels(self, worlds):
+        felt = worlds.qvel.copy()
+        felt[2] = np.nan
+        return felt
+
+
+class Neighbour(FindBalls):
+    """Puts the ball of the next world elsewhere, too."""
+
+    def reset(self, worlds, chosen, rngs):
+        super().reset(worlds, chosen, rngs)
+        worlds.mocap_pos[chosen - 1, 0, 1] += 0.3
+
+
+class OwnChance(FindBalls):
+    """Draws from a generator of its own."""
+
+    chance = np.random.default_rng(0)
+
+    def reset(self, worlds, chosen, rngs):
+        worlds.mocap_pos[chosen, 0, 1] = self.chance.uniform(-2, 2, len(chosen))
+
+
+class Crowd(FindBalls):
+    """A world's reward depends on the others."""
+
+    def rewards(self, worlds):
+        return {"near": -self.off(worlds) + self.off(worlds).mean()}
+
+
+class Mover(FindBalls):
+    """Moves the ball while it judges, and does not say so."""
+
+    def judge(self, worlds, failed):
+        for data in worlds.datas[:2]:
+            data.mocap_pos[0, 1] += 0.1
+            data.geom_xpos[2, 1] += 0.1
+        return super().judge(worlds, failed)
+
+
+class WrongWorld(FindBalls):
+    def judge(self, worlds, failed):
+        nothing = np.zeros(worlds.n, bool)
+        return Outcome(RewardTerms(["near"], np.zeros((1, worlds.n))), nothing, nothing, changed=np.array([7]))
+
+
+@pytest.mark.parametrize(
+    ("task", "said"),
+    [
+        (WrongShape, r"WrongShape: rewards: 'near' has shape \(3,\): must be \(4,\), one entry for each world"),
+        (NoMapping, "NoMapping: rewards returned .*: must be arrays by name"),
+        (WrongEnd, r"WrongEnd: terminated has shape \(\): must be \(4,\)"),
+        (NotFinite, r"NotFinite: feels: 'feels' is \[nan\] in world 2: must be finite"),
+        (Neighbour, "reset: was given world 3 and changed physics of world 2: must leave it alone"),
+        (OwnChance, "the same seed: .* differs after action 0: must repeat every episode"),
+        (Crowd, "world 0: reward differs after action 0: must not depend on other worlds"),
+        (Mover, "judge: moved bodies of world 0, which is not in Outcome.changed"),
+        (WrongWorld, "judge: changed names world 7: must be within 0 and 3"),
+    ],
+)
+def test_what_breaks_the_protocol_is_named(task, said):
+    with pytest.raises(ValueError, match=said):
+        sim.check_batch_task(task())
+
+
+def test_a_reward_that_is_not_finite_ends_its_own_world():
+    class Broken(FindBalls):
+        failure_reward = -5.0
+
+        def rewards(self, worlds):
+            return {"near": np.where(np.arange(worlds.n) == 1, np.nan, 1.0)}
+
+    env = sim.make_vec_env(Broken(), n_envs=3, seed=0)
+    env.reset()
+    with pytest.warns(UserWarning, match="rewards: 'near' is nan"):
+        _, reward, done, infos = env.step(np.zeros((3, 1)))
+    assert done.tolist() == [False, True, False]
+    assert reward.tolist() == [1, -5, 1]
+    assert infos[1]["failure"] == "rewards: 'near' is nan: must be a finite number"
+    assert not infos[1]["TimeLimit.truncated"]
+
+
+def test_bad_arguments_of_the_checker():
+    with pytest.raises(ValueError, match=r"task = .*: must be a sim.BatchTask"):
+        sim.check_batch_task(FindBall())
+    with pytest.raises(ValueError, match="n_envs = 1: must be at least 2"):
+        sim.check_batch_task(FindBalls(), n_envs=1)
