@@ -28,6 +28,7 @@ class Spheres:
     radii: [m], (k,)
     frames: rotation from the sphere's frame to the world's, (k, 3, 3)
     textured: which have a texture, (k,)
+    names: of the geoms
     bsdfs: one Mitsuba BSDF each; kept here, since a BSDFPtr does not keep its objects alive
     geoms: ids of the geoms, (k,)
     """
@@ -35,6 +36,7 @@ class Spheres:
     radii: np.ndarray
     frames: np.ndarray
     textured: np.ndarray
+    names: tuple[str, ...]
     bsdfs: tuple[MitsubaObject, ...]
     geoms: tuple[int, ...]
 
@@ -48,7 +50,7 @@ class SphereRows:
     def __init__(self, spheres: Spheres, n_envs: int) -> None:
         self._spheres = spheres
         self._rows = aligned(n_envs * max(len(spheres), 1) * 4, np.float32).reshape(n_envs, -1, 4)
-        self._turned = [(g, f) for g, f, t in zip(spheres.geoms, spheres.frames, spheres.textured, strict=True) if t]
+        self._textured = np.flatnonzero(spheres.textured)
 
     def fill(self, poses: Poses) -> None:
         """With these worlds'.
@@ -58,12 +60,12 @@ class SphereRows:
         """
         if len(self._spheres):
             self._rows[..., :3] = poses.geom_places(self._spheres.geoms)
-        for geom, frame in self._turned:
-            (turn,) = np.moveaxis(poses.geom_turns([geom]), 1, 0)
+        for k in self._textured:
+            turn, frame = poses.geom_turns([self._spheres.geoms[k]])[:, 0], self._spheres.frames[k]
             if np.abs(turn - frame).max() > TURNED:
                 raise ValueError(
-                    f"geom {geom} has a texture and has turned: closed forms keep it as the model has it; use "
-                    "tracer = 'mitsuba'"
+                    f"geom {self._spheres.names[k]!r} has a texture and has turned: closed forms keep it as the model "
+                    "has it: must be seen with tracer = 'mitsuba'"
                 )
 
     def arrays(self) -> Array:

@@ -164,6 +164,7 @@ def _spheres(data: mujoco.MjData, geoms: Sequence[int], bsdfs_of: dict[int, Mits
         radii=model.geom_size[geoms, 0],
         frames=data.geom_xmat[geoms].reshape(-1, 3, 3).copy(),
         textured=np.array([shapes.is_textured(model, geom) for geom in geoms], bool),
+        names=tuple(model.geom(geom).name or str(geom) for geom in geoms),
         bsdfs=tuple(bsdfs_of[geom] for geom in geoms),
         geoms=tuple(geoms),
     )

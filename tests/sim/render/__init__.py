@@ -2,11 +2,11 @@
 
 one_ray: test_one_ray.py
 batched_renderer: test_batched_renderer.py, test_one_ray.py, test_reference_renderer.py
-eye_renderer: test_batched_renderer.py, test_model_renderer.py
+eye_renderer: test_eye_renderer.py, test_batched_renderer.py, test_model_renderer.py
 ray_kernel: test_batched_renderer.py, test_one_ray.py
 eye_rays: test_batched_renderer.py, test_model_renderer.py
 area_kernel: test_area_kernel.py
-light_factors: envs/test_light_levels.py, scene/test_variation.py
+light_factors: test_eye_renderer.py, envs/test_light_levels.py
 labels: test_labels.py
 world_scene: test_batched_renderer.py
 reference_renderer: test_reference_renderer.py

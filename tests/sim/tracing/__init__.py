@@ -2,9 +2,9 @@
 
 tracer: test_closed_form_tracer.py
 closed_form_tracer: test_closed_form_tracer.py, worlds/test_foraging.py
-eye_places: test_closed_form_tracer.py, render/test_model_renderer.py
+eye_places: test_upright_scene.py, render/test_model_renderer.py
 eye_ray: render/test_batched_renderer.py
-upright_scene: test_closed_form_tracer.py
+upright_scene: test_upright_scene.py, test_closed_form_tracer.py
 spheres: render/test_batched_renderer.py
 walls: test_closed_form_tracer.py
 wall_intersection: test_closed_form_tracer.py
