@@ -23,7 +23,7 @@ from sim.tracing.eye_ray import EyeRay
 from sim.tracing.reflectance_atlas import Atlas, bake
 from sim.tracing.spheres import SphereRows
 from sim.tracing.upright_scene import UprightScene
-from sim.tracing.wall_intersection import Footprints, footprints_of
+from sim.tracing.wall_intersection import CellTables, Footprints, footprints_of
 from sim.tracing.walls import ALIGNED, NoClosedForm
 
 # Singular values below this share of the largest are rounding: eight times float32's 1.2e-7.
@@ -80,11 +80,22 @@ class _Hit:
 
 
 @dataclass(frozen=True)
+class ClosedFormTables:
+    """What kernels read of any world. texels: reflectance, an array per component · faces: see `face_rows`
+    cells: of walls that stand on a grid; None: each wall is solved
+    """
+
+    texels: list[Array]
+    faces: Array
+    cells: CellTables | None
+
+
+@dataclass(frozen=True)
 class ClosedFormSurroundings:
-    """centres: of the spheres that are seen, in one lane's world (Point3f) · inputs: arrays that the kernel reads"""
+    """centres: of the spheres that are seen, in one lane's world (Point3f) · tables: what the kernel reads of any"""
 
     centres: list[Array]
-    inputs: dict[str, Array]
+    tables: ClosedFormTables
 
 
 class ClosedForm:
@@ -126,26 +137,18 @@ class ClosedForm:
         self.sphere_textures = [
             (atlas.to_texels[len(geoms) + k], atlas.places[len(geoms) + k]) for k in range(len(visible))
         ]
-        self._static = self._inputs()
-
-    @property
-    def inputs(self) -> dict[str, Array]:
-        """Arrays that the kernel reads."""
-        return self._static
-
-    def _inputs(self) -> dict[str, Array]:
         texels = self.components.reflectance.astype(np.float32)
-        tables = {f"texels_{k}": np.ascontiguousarray(column) for k, column in enumerate(texels.T)}
-        tables |= {"faces": self.faces.astype(np.float32).ravel(), **self.footprints.tables}
-        return {name: floats(table) for name, table in tables.items()}
+        self.inputs = ClosedFormTables(
+            [floats(np.ascontiguousarray(column)) for column in texels.T], floats(self.faces), self.footprints.tables
+        )
 
     def buffers(self, n_envs: int) -> SphereRows:
         """For so many worlds."""
         return SphereRows(self.world.spheres, n_envs)
 
-    def around(self, scenes: None, rows: Array, inputs: dict[str, Array], world: Array) -> ClosedFormSurroundings:
+    def around(self, scenes: None, rows: Array, tables: ClosedFormTables, world: Array) -> ClosedFormSurroundings:
         """What a lane in this world reads."""
-        return ClosedFormSurroundings(spheres.centres_in(rows, len(self.world.spheres), world), inputs)
+        return ClosedFormSurroundings(spheres.centres_in(rows, len(self.world.spheres), world), tables)
 
     def all_bodies(self, centres: list[Array], stand: Array) -> list[Array]:
         """Centres of the spheres that are seen, and of the eyes' own body, if that is one; stand: where it is."""
@@ -156,29 +159,29 @@ class ClosedForm:
     def radiance(self, seen: EyeRay, there: ClosedFormSurroundings, samples: Array) -> tuple[list[Array], Array]:
         """What comes along each ray, one array per component, and from how far [m]; the first two of samples: each
         ray's own on the unit square, wanted for light that bounces (`lighting.onwards`)."""
-        centres, inputs = there.centres, there.inputs
+        centres, tables = there.centres, there.tables
         bodies = self.all_bodies(centres, seen.body)
-        hit = self._hit(seen.ray, centres, inputs)
-        light = self._irradiance(hit, bodies, inputs)
+        hit = self._hit(seen.ray, centres, tables)
+        light = self._irradiance(hit, bodies, tables)
         if self.light == lighting.BOUNCE:
             onwards = lighting.onwards(hit.point, hit.normal, mi.Point2f(samples.x, samples.y))
-            second_hit = self._hit(onwards, bodies, inputs)
-            second = zip(second_hit.reflectance, self._irradiance(second_hit, bodies, inputs), strict=True)
+            second_hit = self._hit(onwards, bodies, tables)
+            second = zip(second_hit.reflectance, self._irradiance(second_hit, bodies, tables), strict=True)
             light = [dr.select(hit.lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
         return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
 
     def returned(self, ray: Array, shade: Array, radius: float, more: Irradiance | None = None) -> list[Array]:
         """Light that walls and floor send back along each ray, per component: direct light in the shade of one sphere,
         and what else arrives there, if that is known."""
-        hit = self._hit(ray, [], self._static)
-        light = self._irradiance(hit, [shade], self._static, [radius])
+        hit = self._hit(ray, [], self.inputs)
+        light = self._irradiance(hit, [shade], self.inputs, [radius])
         if more:
             light = [e + other for e, other in zip(light, more(hit.point, hit.normal), strict=True)]
         return [dr.select(hit.lit, r * e, 0) for r, e in zip(hit.reflectance, light, strict=True)]
 
-    def _hit(self, ray: Array, centres: list[Array], inputs: dict[str, Array]) -> _Hit:
+    def _hit(self, ray: Array, centres: list[Array], tables: ClosedFormTables) -> _Hit:
         """Where rays meet walls, floor or bodies first; those without a centre are not there."""
-        t, face, normal = self.footprints.hit(ray, inputs)
+        t, face, normal = self.footprints.hit(ray, tables.cells)
         on_floor, t_floor = self._floor_hit(ray)
         floor_first = on_floor & (t_floor < t)
         t = dr.select(floor_first, t_floor, t)
@@ -189,7 +192,7 @@ class ClosedForm:
         t, which = spheres.nearest(self._bodies, centres, ray, t)
         on_sphere = which < len(centres)
         point = ray(dr.select(seen | on_sphere, t, 0))
-        offset, columns, rows, x, y = self._face_texel(face, point, inputs)
+        offset, columns, rows, x, y = self._face_texel(face, point, tables)
         if centres:
             sphere_normal, uv = spheres.normal_and_uv(self._bodies, centres, which, point)
             normal = dr.select(on_sphere, sphere_normal, normal)
@@ -199,7 +202,7 @@ class ClosedForm:
                 for mine, other in zip(found, (offset, columns, rows, x, y), strict=True)
             )
         lit = (seen | on_sphere) & (t > 0) & (dr.dot(normal, ray.d) < 0)
-        return _Hit(t, point, normal, lit, self._interpolate(offset, columns, rows, x, y, inputs))
+        return _Hit(t, point, normal, lit, self._interpolate(offset, columns, rows, x, y, tables))
 
     def _floor_hit(self, ray: Array) -> tuple[Array, Array]:
         """Whether and where a ray from above meets the floor."""
@@ -210,7 +213,7 @@ class ClosedForm:
         return inside & (ray.d.z < 0) & (t > 0), t
 
     def _irradiance(
-        self, hit: _Hit, bodies: list[Array], inputs: dict[str, Array], radii: list[float] | None = None
+        self, hit: _Hit, bodies: list[Array], tables: ClosedFormTables, radii: list[float] | None = None
     ) -> list[Array]:
         """Per component: sum over the lights of level · cos θ, where nothing is in the way; radii: of the bodies, None:
         their own."""
@@ -223,19 +226,19 @@ class ClosedForm:
             shadow = mi.Ray3f(start, towards)
             cosine = dr.dot(hit.normal, towards)
             shines = hit.lit & (cosine > 0) & ~spheres.blocks(radii, bodies, shadow)
-            shines &= ~self.footprints.blocks(start, light.direction, inputs)
+            shines &= ~self.footprints.blocks(start, light.direction, tables.cells)
             cosine = dr.select(shines, cosine, 0)
             total = [dr.fma(cosine, float(factor), sum_so_far) for factor, sum_so_far in zip(level, total, strict=True)]
         return total
 
-    def _face_texel(self, face: Array, point: Array, inputs: dict[str, Array]) -> tuple[Array, ...]:
+    def _face_texel(self, face: Array, point: Array, tables: ClosedFormTables) -> tuple[Array, ...]:
         """Texture of a face and where in it a point is: first texel, columns, rows, column and row."""
-        columns = dr.gather(mi.Vector4f, inputs["faces"], face * 3)
-        place = dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 2)
+        columns = dr.gather(mi.Vector4f, tables.faces, face * 3)
+        place = dr.gather(mi.Vector4f, tables.faces, face * 3 + 2)
         x = _affine(columns, point)
         y = mi.Float(0)
         if not self.one_dimensional:
-            y = _affine(dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 1), point)
+            y = _affine(dr.gather(mi.Vector4f, tables.faces, face * 3 + 1), point)
         return place.x, place.y, place.z, x, y
 
     def _sphere_texel(self, which: Array, uv: Array) -> tuple[Array, ...]:
@@ -247,7 +250,7 @@ class ClosedForm:
         return found
 
     def _interpolate(
-        self, offset: Array, columns: Array, rows: Array, x: Array, y: Array, inputs: dict[str, Array]
+        self, offset: Array, columns: Array, rows: Array, x: Array, y: Array, tables: ClosedFormTables
     ) -> list[Array]:
         """Reflectance per component, interpolated bilinearly in a texture that repeats."""
         x0, x1, fx = _neighbours(x, columns)
@@ -257,7 +260,7 @@ class ClosedForm:
             y0, y1, fy = _neighbours(y, rows)
             taps = [(first + r * columns, c, wx * wy) for first, c, wx in taps for r, wy in ((y0, 1 - fy), (y1, fy))]
         index = [(mi.UInt32(first + column), weight) for first, column, weight in taps]
-        return [sum(w * dr.gather(mi.Float, inputs[f"texels_{k}"], i) for i, w in index) for k in range(n)]
+        return [sum(w * dr.gather(mi.Float, tables.texels[k], i) for i, w in index) for k in range(n)]
 
 
 def _check_tops(scene: UprightScene) -> None:

@@ -35,7 +35,9 @@ def lit_by_rays(scene, disk, radius, centres, others):
     found = []
     for light in rays.lights:
         start = mi.Point3f(points.reshape(-1, 3).T.astype(np.float32))
-        free = ~np.array(rays.footprints.blocks(start, light.direction, rays.inputs)).astype(bool).reshape(WORLDS, -1)
+        free = ~np.array(rays.footprints.blocks(start, light.direction, rays.inputs.cells)).astype(bool).reshape(
+            WORLDS, -1
+        )
         for k in others:
             way = centres[:, None, k] - points
             ahead = way @ light.direction
