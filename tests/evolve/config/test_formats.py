@@ -12,7 +12,7 @@ from evolve.config.formats import FORMAT, LAST_OF_FORMER
 from evolve.config.run_config import ConfigError
 from evolve.store.directory import Run, RunError
 
-RECORDS = Path(__file__).parents[3] / "docs/results/records"
+RECORDS = Path(__file__).parents[3] / "experiments/records"
 FORMER = 'task = "navigation"\n[world]\nmazes = 3\n[learning]\nrays_per_eye = 32.0\ngamma = 0.5\n'
 
 
