@@ -19,6 +19,7 @@ def rows(physics=100.0, sight=300.0, both=70.0, worlds=64):
     return [alone, steps_per_second.Row("ant", worlds, {"physics": physics, "sight": sight, "both": both})]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["detection", "ant", "humanoid"])
 def test_every_part_is_measured(name, tmp_path, capsys):
     found = steps_per_second.measure(name, sizes=(1, 3))

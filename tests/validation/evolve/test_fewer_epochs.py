@@ -71,6 +71,7 @@ def test_time_is_spread_as_passes_are():
     assert (spared > 0).all()
 
 
+@pytest.mark.slow
 def test_a_life_is_trained_with_the_passes_asked_for(monkeypatch):
     """One rollout, then another after learning has slowed down."""
     small = ("learning.total_steps=64", "learning.n_envs=4", "learning.n_steps=8", "learning.batch_size=16")
