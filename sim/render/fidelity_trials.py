@@ -24,7 +24,6 @@ from sim.render.random_views import RandomViews, near_views, on_objects, random_
 from sim.render.ray_kernel import SECOND
 from sim.render.world_scene import WorldScene
 from sim.scene.device_arrays import floats
-from sim.scene.moved_bodies import MovedBodies
 from sim.scene.variant import variant
 from sim.tracing import lighting
 from sim.tracing.areas.area_tracer import AreaTracer
@@ -269,16 +268,13 @@ class FidelityTrials:
             if light == lighting.BOUNCE:
                 samples = mi.Vector4f([floats(np.tile(column, len(views))) for column in _in_fours(trial).T])
             buffers = tracer.buffers(len(views))
-            buffers.fill(self._poses(views))
+            buffers.fill(self._scene.poses_at(views.position, views.heading, views.objects))
             lanes = dr.arange(mi.UInt32, rays * len(views)) // rays
             there = tracer.around(tracer.scene, buffers.arrays(), tracer.inputs, lanes)
             components, t = tracer.radiance(seen, there, samples)
             z = t * cosine
             dr.eval(components, z)
             return components, z
-
-    def _poses(self, views: RandomViews) -> MovedBodies:
-        return self._scene.poses_at(views.position, views.heading, views.objects)
 
 
 def _objects(scene: WorldScene) -> list[int]:

@@ -273,10 +273,8 @@ class ModelTracer:
         found = [mi.Spectrum(0) for _ in self._bands]
         if self._scene.has_sky:
             nothing = met.active & ~met.seen
-            found = [
-                e + self._heaven(there.still, met.direction, nothing, b)
-                for e, b in zip(found, self._bands, strict=True)
-            ]
+            sky = (self._heaven(there.still, met.direction, nothing, band) for band in self._bands)
+            found = [e + light for e, light in zip(found, sky, strict=True)]
         if there.tables.glows is not None:
             k = dr.gather(mi.UInt32, there.tables.glowing, met.which, met.seen)
             glows = met.seen & (k < len(there.tables.glows))
