@@ -16,7 +16,7 @@ model_renderer      ModelRenderer: eyes mounted on any MuJoCo model
 renderable          which fidelities an eye can have
 reference_renderer  ReferenceRenderer: Mitsuba's integrators, slowly
 fidelity            Fidelity: how finely, and why
-fidelity_choice     choose: as little work as noise allows, of what a scene offers
+fidelity_choice     cheapest: as little work as noise allows, of what a scene offers
 world_fidelity      choose_fidelity: what a built-in world offers
 fidelity_stages     its bands, depth layers and light
 sample_choice       its rays or areas

@@ -84,7 +84,7 @@ class Stages(Protocol):
         """How many; allowed: their error, and their error where no light is left out."""
 
 
-def choose(stages: Stages) -> Fidelity:
+def cheapest(stages: Stages) -> Fidelity:
     """The cheapest level of each stage whose predicted error is allowed; a FidelityWarning says where there is none."""
     allowed, shares = stages.allowed, stages.shares
     depth, depth_level = stages.depth(allowed * (shares.depth if shares else 1))

@@ -23,7 +23,7 @@ from sim.eyes.mounts import Mount, mounts_of
 from sim.render.edge_rays import edges_pay
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.fidelity import EDGES, RAYS, Fidelity, Level
-from sim.render.fidelity_choice import Samples, Shares, choose
+from sim.render.fidelity_choice import Samples, Shares, cheapest
 from sim.render.prepared_scene import Placed, PreparedScene
 from sim.scene import source
 from sim.scene.appearances import Varied
@@ -89,7 +89,7 @@ def choose_model_fidelity(
         varied=varied,
         tracer=ModelTracer.name,
     )
-    return choose(ModelStages(scene, placed, allowed, light))
+    return cheapest(ModelStages(scene, placed, allowed, light))
 
 
 class ModelStages:

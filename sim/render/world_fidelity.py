@@ -10,7 +10,7 @@ from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.render import fidelity_stages as stages
 from sim.render.fidelity import Fidelity, Level
-from sim.render.fidelity_choice import Samples, Shares, choose
+from sim.render.fidelity_choice import Samples, Shares, cheapest
 from sim.render.fidelity_trials import FidelityTrials
 from sim.render.sample_choice import fewest_samples
 from sim.render.world_scene import WorldScene
@@ -47,7 +47,7 @@ def choose_fidelity(
 
 def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fidelity:
     """What `choose_fidelity` gives for a scene that has been prepared, with the bands that it has."""
-    return choose(WorldStages(scene, tolerance))
+    return cheapest(WorldStages(scene, tolerance))
 
 
 class WorldStages:
