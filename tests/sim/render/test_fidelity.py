@@ -152,6 +152,7 @@ def test_light_is_followed_as_far_as_it_matters():
     assert "light that is reflected twice is worth" in wide.why
 
 
+@pytest.mark.slow
 def test_light_is_followed_where_objects_alone_need_it():
     """An object's own light is mostly reflected: what direct light lacks would pass over all receptors, and does not
     over those that see an object."""
@@ -164,6 +165,7 @@ def test_light_is_followed_where_objects_alone_need_it():
     assert without < SHARES.light * chosen.tolerance < missing
 
 
+@pytest.mark.slow
 def test_the_same_pick_every_time_whatever_the_number_of_worlds():
     eyes = behind_lens(DETECTION, 0.25)
     world = sim.build_world("detection")
