@@ -39,6 +39,9 @@ class SlidingAgents:
         self._heights = np.array([world.model.body(name).pos[2] for name in world.objects])
         bodies = [int(world.model.body(name).id) for name in ("agent", *world.objects)]
         self._reference = ReferencePose(world.model, bodies)
+        rest = self._reference.poses
+        self._height = float(rest.xpos[0, bodies[0], 2])
+        self._turns = np.repeat(rest.xmat[:, bodies], n, axis=0)
         self._state: WorldState | None = None
         self._command = np.zeros((n, 2))
         self.before: WorldState | None = None
@@ -146,18 +149,11 @@ class SlidingAgents:
     def poses(self) -> Poses:
         state = self.state
         positions = np.empty((state.n, 1 + state.objects.shape[1], 3))
-        positions[:, 0, :2], positions[:, 0, 2] = (
-            state.position,
-            self._reference.poses.xpos[0, self._reference.bodies[0], 2],
-        )
-        positions[:, 1:] = state.objects
-        rotations = np.repeat(self._reference.poses.xmat[:, self._reference.bodies], state.n, axis=0)
-        rotations[:, 0, 0, 0] = rotations[:, 0, 1, 1] = np.cos(state.heading)
-        rotations[:, 0, 1, 0] = np.sin(state.heading)
-        rotations[:, 0, 0, 1] = -rotations[:, 0, 1, 0]
-        found = MovedBodies(self._reference, positions, rotations, None if self._looks is None else self._looks.models)
-        vars(found)["state"] = state
-        return found
+        positions[:, 0, :2], positions[:, 0, 2], positions[:, 1:] = state.position, self._height, state.objects
+        rotations, (cos, sin) = self._turns.copy(), (np.cos(state.heading), np.sin(state.heading))
+        rotations[:, 0, 0, 0] = rotations[:, 0, 1, 1] = cos
+        rotations[:, 0, 1, 0], rotations[:, 0, 0, 1] = sin, -sin
+        return MovedBodies(self._reference, positions, rotations, None if self._looks is None else self._looks.models)
 
     def held(self) -> dict[str, np.ndarray]:
         return {name: array.copy() for name, array in vars(self.state).items()}

@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.scene.device_arrays import aligned, floats, in_fours, three
+from sim.scene.device_arrays import SharedBuffer, floats, in_fours, three
 from sim.scene.poses import Poses
 from sim.tracing.eye_places import EyePlaces, LevelStand
 from sim.tracing.eye_ray import EyeRay
@@ -49,7 +49,7 @@ class EyeRays(Protocol):
         """Put the eyes of these worlds where the kernel reads them."""
 
     def array(self) -> Array:
-        """What the kernel reads; it shares the buffer's memory."""
+        """What the kernel reads."""
 
     def directions(self, ways: np.ndarray) -> Directions:
         """Of samples (ray, 3) in an eye's frame."""
@@ -63,7 +63,8 @@ class UprightEyes:
 
     def __init__(self, stand: LevelStand, n_envs: int) -> None:
         self._stand, self._radius = stand, stand.radius
-        self._rows = aligned(n_envs * 4, np.float32).reshape(n_envs, 4)
+        self._shared = SharedBuffer(n_envs * 4)
+        self._rows = self._shared.values.reshape(n_envs, 4)
 
     def fill(self, poses: Poses) -> None:
         """See EyeRays."""
@@ -72,7 +73,7 @@ class UprightEyes:
 
     def array(self) -> Array:
         """See EyeRays."""
-        return mi.Float(self._rows.reshape(-1))
+        return self._shared.array
 
     def directions(self, ways: np.ndarray) -> Directions:
         """See EyeRays."""
@@ -102,7 +103,8 @@ class FreeEyes:
 
     def __init__(self, places: EyePlaces, n_envs: int) -> None:
         self._places = places
-        self._rows = aligned(n_envs * len(places) * EYE_ROWS * 4, np.float32).reshape(n_envs, len(places), EYE_ROWS, 4)
+        self._shared = SharedBuffer(n_envs * len(places) * EYE_ROWS * 4)
+        self._rows = self._shared.values.reshape(n_envs, len(places), EYE_ROWS, 4)
 
     def fill(self, poses: Poses) -> None:
         """See EyeRays."""
@@ -111,7 +113,7 @@ class FreeEyes:
 
     def array(self) -> Array:
         """See EyeRays."""
-        return mi.Float(self._rows.reshape(-1))
+        return self._shared.array
 
     def directions(self, ways: np.ndarray) -> Directions:
         """See EyeRays."""

@@ -19,7 +19,7 @@ import numpy as np
 import optics
 from optics.numerics.autodiff import Array
 from sim.render.pending_frame import FrameSlot, PendingFrame
-from sim.scene.device_arrays import aligned
+from sim.scene.device_arrays import SharedBuffer
 from sim.scene.frozen_kernels import garbage_kept
 from sim.scene.variant import variant
 
@@ -76,13 +76,13 @@ class Normals:
 
 
 class _Kernel:
-    """Recorded once per width; keys and frame numbers come in buffers of its own, always at the same alignment."""
+    """Recorded once per width; keys and frame numbers come in buffers of its own."""
 
     def __init__(self, worlds: int, draws: int) -> None:
-        self._key_buffer, self._frame_buffer = aligned(worlds, np.uint64), aligned(worlds, np.uint32)
         self._slot = FrameSlot()
         with variant():
             index: Array = dr.uint32_array_t(dr.detached_t(mi.Float))
+            self._keys, self._frames = SharedBuffer(worlds, dr.uint64_array_t(index)), SharedBuffer(worlds, index)
             self._lanes = dr.arange(index, worlds * draws)
             dr.eval(self._lanes)
 
@@ -102,10 +102,9 @@ class _Kernel:
         """Draw under these keys; frame_of: makes of the device's arrays what is waited for."""
 
         def launch() -> Callable[[], np.ndarray]:
-            self._key_buffer[:], self._frame_buffer[:] = keys, frames
-            module = sys.modules[type(self._lanes).__module__]
+            self._keys.values[:], self._frames.values[:] = keys, frames
             with variant(), garbage_kept():
-                parts = self._normals(module.UInt64(self._key_buffer), module.UInt32(self._frame_buffer), self._lanes)
+                parts = self._normals(self._keys.array, self._frames.array, self._lanes)
             return lambda: frame_of(parts)
 
         return self._slot.begin(launch)

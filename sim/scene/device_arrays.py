@@ -28,6 +28,20 @@ def aligned(n: int, dtype: type) -> np.ndarray:
     return raw[first : first + n * size].view(dtype)
 
 
+class SharedBuffer:
+    """Numbers of NumPy's that kernels read where they are. Dr.Jit gets them once: to hand them over at every launch
+    takes longer than to render a small world.
+
+    values: flat; to be written only while no kernel that reads them is under way · array: the same, on the device
+    """
+
+    def __init__(self, n: int, kind: Any = None) -> None:
+        kind = mi.Float if kind is None else kind
+        dtypes = {dr.VarType.Float32: np.float32, dr.VarType.UInt32: np.uint32, dr.VarType.UInt64: np.uint64}
+        self.values = aligned(n, dtypes[dr.type_v(kind)])
+        self.array: Array = kind(self.values)
+
+
 def floats(values: np.ndarray) -> Array:
     """A copy of them, flat, float32."""
     return mi.Float(as_floats(values))

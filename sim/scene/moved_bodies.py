@@ -24,6 +24,7 @@ class ReferencePose:
         self.poses, self.bodies, self.n_bodies = Poses.of(data), list(bodies), model.nbody
         self.body_of = {"geom": model.geom_bodyid.copy(), "site": model.site_bodyid, "camera": model.cam_bodyid}
         self._local = {(kind, i): self._in_body(kind, i) for kind in _PREFIX for i in self.moved(kind)}
+        self._slots: dict[tuple[int, ...], np.ndarray | None] = {}
 
     def moved(self, kind: str) -> list[int]:
         """Ids of the things of a kind that the bodies carry."""
@@ -32,6 +33,16 @@ class ReferencePose:
     def local(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
         """Origin (3,) [m] and rotation (3, 3) of a thing in the frame of its body."""
         return self._local[kind, index]
+
+    def slots(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray | None:
+        """Places, in `bodies`, of bodies whose frames these geoms have; None if any has another. Most have."""
+        key = tuple(map(int, geoms))
+        if key not in self._slots:
+            bodies = [int(self.body_of["geom"][geom]) for geom in key]
+            local = [self._local.get(("geom", geom)) for geom in key]
+            alike = all(at is not None and not at[0].any() and np.array_equal(at[1], np.eye(3)) for at in local)
+            self._slots[key] = np.array([self.bodies.index(body) for body in bodies]) if alike else None
+        return self._slots[key]
 
     def _in_body(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
         prefix = _PREFIX[kind]
@@ -75,9 +86,13 @@ class MovedBodies(Poses):
         return len(self.positions)
 
     def geom_places(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
+        if (slots := self.reference.slots(geoms)) is not None:
+            return self.positions[:, slots]
         return np.stack([self._frame("geom", int(geom))[0] for geom in geoms], axis=1)
 
     def geom_turns(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
+        if (slots := self.reference.slots(geoms)) is not None:
+            return self.rotations[:, slots]
         return np.stack([self._frame("geom", int(geom))[1] for geom in geoms], axis=1)
 
     def take(self, worlds: np.ndarray) -> MovedBodies:

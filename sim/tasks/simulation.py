@@ -148,12 +148,13 @@ class Simulation:
         reward = outcome.terms.total
         self._returns += reward
         terminated = outcome.terminated
-        ends = (self.steps >= self.episode_steps) | terminated.reshape(self.learners, self.n).any(axis=0)
+        given_up = np.zeros(self.rows, bool)
+        if self.least_return > -math.inf:
+            given_up = (self._returns <= self.least_return) & ~terminated
+        ends = (self.steps >= self.episode_steps) | self._any_learner(terminated | given_up)
         if outcome.over is not None:
             ends = ends | outcome.over
-        given_up = (self._returns <= self.least_return) & ~terminated
-        ends = ends | given_up.reshape(self.learners, self.n).any(axis=0)
-        truncated = np.tile(ends, self.learners) & ~terminated
+        truncated = (ends if self.learners == 1 else np.tile(ends, self.learners)) & ~terminated
         return Step(
             state=self.physics.state,
             terms=outcome.terms,
@@ -166,6 +167,10 @@ class Simulation:
             failure=outcome.failure,
             info=outcome.info,
         )
+
+    def _any_learner(self, rows: np.ndarray) -> np.ndarray:
+        """Worlds in which this holds for one of the learners."""
+        return rows if self.learners == 1 else np.asarray(rows.reshape(self.learners, self.n).any(axis=0))
 
     def poses(self) -> Poses:
         """Where everything is now."""
@@ -235,8 +240,12 @@ class Simulation:
     def _feel(self, felt: Sequence[Mapping[str, np.ndarray]], worlds: np.ndarray) -> None:
         for known, now in zip(self.felt, felt, strict=True):
             for name, array in now.items():
-                fresh = ~np.isnan(array).any(axis=1)
-                known[name][worlds[fresh]] = array[fresh]
+                unknown = np.isnan(array)
+                if unknown.any():
+                    fresh = ~unknown.any(axis=1)
+                    known[name][worlds[fresh]] = array[fresh]
+                else:
+                    known[name][worlds] = array
 
     def _felt_keys(self) -> list[tuple[str, int, str]]:
         """Name of an entry in `held`, number of the agent, and name of what it feels: none, if that is nothing."""

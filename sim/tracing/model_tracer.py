@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.scene.device_arrays import aligned, whole_numbers
+from sim.scene.device_arrays import SharedBuffer, whole_numbers
 from sim.scene.poses import Poses
 from sim.scene.variant import MitsubaObject, computed
 from sim.scene.variant import variant as in_variant
@@ -77,9 +77,8 @@ class RowBuffers:
     def __init__(self, scene: ModelScene, n_envs: int) -> None:
         self._scene = scene
         sizes = scene.movers.n_rows, max(len(scene.lights), 1) * LIGHT_ROWS, scene.paint.n_rows
-        self._movers, self._lights, self._paint = (
-            aligned(n_envs * n * 4, np.float32).reshape(n_envs, n * 4) for n in sizes
-        )
+        self._shared = [SharedBuffer(n_envs * n * 4) for n in sizes]
+        self._movers, self._lights, self._paint = (shared.values.reshape(n_envs, -1) for shared in self._shared)
 
     def fill(self, poses: Poses) -> None:
         """With these worlds'."""
@@ -92,8 +91,8 @@ class RowBuffers:
             self._lights[:] = scene.lights.rows(poses).reshape(poses.n, -1)
 
     def arrays(self) -> Rows:
-        """On the device; they share the buffers' memory."""
-        return Rows(*(mi.Float(rows.reshape(-1)) for rows in (self._movers, self._lights, self._paint)))
+        """On the device."""
+        return Rows(*(shared.array for shared in self._shared))
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.scene.device_arrays import aligned, three
+from sim.scene.device_arrays import SharedBuffer, three
 from sim.scene.poses import Poses
 from sim.scene.variant import MitsubaObject
 
@@ -49,8 +49,11 @@ class SphereRows:
 
     def __init__(self, spheres: Spheres, n_envs: int) -> None:
         self._spheres = spheres
-        self._rows = aligned(n_envs * max(len(spheres), 1) * 4, np.float32).reshape(n_envs, -1, 4)
-        self._textured = np.flatnonzero(spheres.textured)
+        self._shared = SharedBuffer(n_envs * max(len(spheres), 1) * 4)
+        self._rows = self._shared.values.reshape(n_envs, -1, 4)
+        textured = np.flatnonzero(spheres.textured)
+        self._textured = [spheres.geoms[k] for k in textured]
+        self._frames, self._names = spheres.frames[textured], [spheres.names[k] for k in textured]
 
     def fill(self, poses: Poses) -> None:
         """With these worlds'.
@@ -60,17 +63,16 @@ class SphereRows:
         """
         if len(self._spheres):
             self._rows[..., :3] = poses.geom_places(self._spheres.geoms)
-        for k in self._textured:
-            turn, frame = poses.geom_turns([self._spheres.geoms[k]])[:, 0], self._spheres.frames[k]
-            if np.abs(turn - frame).max() > TURNED:
-                raise ValueError(
-                    f"geom {self._spheres.names[k]!r} has a texture and has turned: closed forms keep it as the model "
-                    "has it: must be seen with tracer = 'mitsuba'"
-                )
+        if self._textured and (off := np.abs(poses.geom_turns(self._textured) - self._frames)).max() > TURNED:
+            name = self._names[int(off.max(axis=(0, 2, 3)).argmax())]
+            raise ValueError(
+                f"geom {name!r} has a texture and has turned: closed forms keep it as the model has it: must be seen "
+                "with tracer = 'mitsuba'"
+            )
 
     def arrays(self) -> Array:
-        """On the device; it shares the buffer's memory."""
-        return mi.Float(self._rows.reshape(-1))
+        """On the device."""
+        return self._shared.array
 
 
 def centres_in(rows: Array, n: int, world: Array) -> list[Array]:
