@@ -152,7 +152,6 @@ def test_light_is_followed_as_far_as_it_matters():
     assert "light that is reflected twice is worth" in wide.why
 
 
-@pytest.mark.slow
 def test_light_is_followed_where_objects_alone_need_it():
     """An object's own light is mostly reflected: what direct light lacks would pass over all receptors, and does not
     over those that see an object."""
