@@ -15,6 +15,7 @@ from sim.envs.one_environment import OneEnvironment
 from sim.envs.renderers import AgentRenderers, Renderer
 from sim.envs.senses import Arrays, Senses
 from sim.envs.world_pictures import WorldPictures
+from sim.tasks.batch_task import BatchTask
 from sim.tasks.encounter import Encounter
 from sim.tasks.outcome import Step
 from sim.tasks.simulation import LEAST_RETURN, Simulation
@@ -64,6 +65,11 @@ class EyesVecEnv(OneEnvironment):
             RuntimeError: before the first reset.
         """
         return self.simulation.state
+
+    @property
+    def batch_task(self) -> BatchTask:
+        """The task, for arrays of all worlds."""
+        return self.simulation.task
 
     @property
     def eyes(self) -> Any:
