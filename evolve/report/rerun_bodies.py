@@ -1,4 +1,4 @@
-"""The model of a task of somebody's own for rerun: its bodies with all that is seen of them, and the eyes."""
+"""A task's model for rerun: its bodies with all that eyes see of them, and the eyes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import sim
-from evolve.analysis.filmed_scene import FilmedScene
+from evolve.analysis.episode_scene import EpisodeScene
 from evolve.report.rerun_stream import RerunStream, camera_frames
 from sim.scene.solids import Solid
 
@@ -16,7 +16,7 @@ __all__ = ["EYES", "draw_bodies"]
 BODIES, EYES = ("world", "bodies"), ("world", "eyes")
 
 
-def draw_bodies(to: RerunStream, scene: FilmedScene, eyes: sim.Eyes) -> None:
+def draw_bodies(to: RerunStream, scene: EpisodeScene, eyes: sim.Eyes) -> None:
     """What there is, and where it is before each action."""
     for body in sorted({solid.body for solid in scene.solids}):
         _place(to, (*BODIES, scene.bodies[body]), scene.positions[:, body], scene.rotations[:, body])

@@ -44,16 +44,18 @@ def scenes_for(task: AgentTask) -> dict[str, PreparedScene]:
 
 def renderers_for(
     simulation: Simulation,
+    agents: Sequence[Agent],
     fidelities: Sequence[Mapping[str, Fidelity] | None],
     scenes: Mapping[str, PreparedScene] | None,
 ) -> list[AgentRenderers | None]:
     """Of all agents; None for those that look at nothing.
 
+    agents: of the simulation, maybe with other eyes
     fidelities: of every agent's eyes by kind · scenes: of a built-in layout by kind of eyes; None: of other models
     """
     return [
         None if of is None else _of_agent(simulation, agent, of, scenes)
-        for agent, of in zip(simulation.agents, fidelities, strict=True)
+        for agent, of in zip(agents, fidelities, strict=True)
     ]
 
 
@@ -109,6 +111,12 @@ class _InWorld:
     def begin(self, poses: Any, light: np.ndarray | None = None) -> PendingFrame:
         return self._lit(self.inner, self._state(poses), light)
 
+    def signals(self, poses: Any, light: np.ndarray | None = None) -> np.ndarray:
+        return self.begin(poses, light).wait()
+
+    def receptor_radiance(self, poses: Any) -> np.ndarray:
+        return self.inner.receptor_radiance(self._state(poses))
+
     def begin_some(self, poses: Any, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
         state = self._state(poses)
         if len(worlds) <= FEW < state.n:
@@ -152,5 +160,5 @@ class _InWorld:
         return renderer._launched(renderer._sums, state).then(filtered)
 
     def _state(self, poses: Any) -> WorldState:
-        state: WorldState = poses.state
+        state: WorldState = getattr(poses, "state", poses)
         return state

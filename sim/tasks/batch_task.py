@@ -20,6 +20,7 @@ from sim.tasks.eye_kinds import EyeKind, auxiliary_of, kinds_of
 from sim.tasks.outcome import Outcome, RewardTerms
 from sim.tasks.random_streams import RandomStreams, StreamsByWorld
 from sim.tasks.task_settings import TaskSettings, compiled
+from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["Agent", "BatchTask"]
 
@@ -131,6 +132,14 @@ class BatchTask(TaskSettings):
         """Whether an episode counts as solved after one more action with this `info`; before: the same without this
         action; None: undecided. Here: as `succeeded` says after the last action."""
         return bool(info["is_success"])
+
+    def azimuths(self) -> np.ndarray:
+        """Directions of the first agent's first kind of eyes [rad], (eye,), in the frame of what they are on."""
+        return np.radians([mount.azimuth_deg for mount in self.agents()[0].kinds[0].mounts])
+
+    def ground_plan(self, place: np.ndarray) -> GroundPlan | None:
+        """The surroundings of this place (2,) [m] from above; None: pictures show the task instead."""
+        return None
 
     # What follows is needed only by tasks with a physics, agents or random streams of their own.
 

@@ -21,6 +21,7 @@ from sim.tasks.random_streams import StreamsByPurpose
 from sim.tasks.reward import MODES, TERMS, RewardWeights, reward_terms
 from sim.tracing.lighting import DIRECT
 from sim.worlds.catalog import EPISODE_STEPS
+from sim.worlds.ground_plan import GroundPlan
 from sim.worlds.world import MAX_SPEED, World
 
 __all__ = ["STANDING", "AgentTask", "Events", "mounts_of_agent"]
@@ -114,6 +115,12 @@ class AgentTask(BatchTask):
         if info.get("adversary_first"):
             return False
         return True if info["reward_terms"]["goal"] > 0 else None
+
+    def azimuths(self) -> np.ndarray:
+        return self.eyes.azimuths() if isinstance(self.eyes, Eyes) else super().azimuths()
+
+    def ground_plan(self, place: np.ndarray) -> GroundPlan:
+        return GroundPlan.of(self.world, place)
 
     def physics(self, n: int, threads: int, variation: Variation | None) -> SlidingAgents:
         return SlidingAgents(self.world, n, threads, variation)
