@@ -137,8 +137,8 @@ def test_paths_and_names_exist(document):
         ("in optics/direct_sum.py", ["optics/direct_sum.py"]),
         ("`textbook_of_optics.py`", ["textbook_of_optics.py"]),
         ("`tests/optics/methods/test_*.py`, `tests/optics/test_no_*.py`", ["tests/optics/test_no_*.py"]),
-        ("`python -m validation.B0_planner --cases 9`", []),
-        ("    python -m validation.B0_planer", ["validation.B0_planer"]),
+        ("`python -m validation.optics.psf_error_prediction --cases 9`", []),
+        ("    python -m validation.optics.aliassing", ["validation.optics.aliassing"]),
         ("`optics.psf`, `sim.BatchedRenderer(world)`, `optics.torch.PointSpread`", []),
         ("`optics.psff`", ["optics.psff"]),
         ("`sim.Fidelity.light`, `Fidelity.light`, `Eye.kernel`, `Pupil.area`", []),
@@ -151,7 +151,7 @@ def test_paths_and_names_exist(document):
         ("`Sight`, `lit_in_bands`, `STEEPEST_SINE`", ["STEEPEST_SINE", "Sight", "lit_in_bands"]),
         ("`mirror(model)`, `mirrord(model)`", ["mirrord"]),
         ("`mujoco.Renderer`, `MjData.timer`, `config.toml`, `evolve genes`", []),
-        ("[B9](validation/B9.md), https://host/optics/none.py", []),  # links: see above
+        ("[none](validation/none.md), https://host/optics/none.py", []),  # links: see above
     ],
 )
 def test_names_that_do_not_exist_are_noticed(text, wrong):

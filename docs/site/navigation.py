@@ -50,7 +50,7 @@ def _resolved(nav: list[Entry], docs: Path, named: set[str]) -> list[Entry]:
 
 
 def _title(page: Path) -> str:
-    """The first clause of the page's heading: "B1: aliasing beyond the critical distance"."""
+    """The first clause of the page's heading: "050: Every picture by Dr.Jit"."""
     heading = re.search(r"^# (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     if heading is None:
         return page.stem

@@ -39,6 +39,7 @@ EXAMPLES = {
     "report": "  evolve report runs/first --open\n",
     "export": "  evolve export runs/first --candidate 12 --out frames\n",
     "list": "  evolve list\n  evolve list /data/runs --json\n",
+    "validate": "  evolve validate --list\n  evolve validate psf_error_prediction aliasing\n",
     "config": "  evolve config show detection --preset quick\n  evolve config schema > settings.schema.json\n",
     "completion": "  evolve completion bash > ~/.local/share/bash-completion/completions/evolve\n",
 }
@@ -240,7 +241,9 @@ def _add_voice(command: argparse.ArgumentParser) -> None:
 
 def _add_tables(commands: Commands) -> None:
     """Commands that say what there is, and whether it works."""
-    _command(commands, "validate", "checks.validate", "compare the optics with closed forms; this needs a checkout")
+    validate = _command(commands, "validate", "checks.validate", "run the proofs of a checkout, which assert and draw")
+    validate.add_argument("proofs", nargs="*", metavar="NAME", help="proofs to run (default: all)")
+    validate.add_argument("--list", action="store_true", help="list the proofs by name, and run none")
     doctor = _command(commands, "doctor", "checks.doctor", "say what is installed and whether it works")
     tasks = _command(commands, "tasks", "tables.tasks", "list the tasks")
     presets = _command(commands, "presets", "tables.presets", "list the presets")

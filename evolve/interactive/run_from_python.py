@@ -14,7 +14,7 @@ import numpy as np
 from evolve.config.checks import ConfigError, quoted
 from evolve.interactive.callbacks import Callback, Callbacks
 from evolve.interactive.opened_run import OpenedRun
-from evolve.runs.begin import RunRequest, prepare
+from evolve.runs.begin import RunRequest, prepare_run
 
 __all__ = ["resume", "run"]
 
@@ -54,7 +54,7 @@ def run(
     watchers = Callbacks(callbacks, progress)
     assignments = [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
     file = None if config is None else Path(config)
-    with prepare(RunRequest(task, preset, file, assignments, scale, start_from)).begin(OpenedRun, out) as begun:
+    with prepare_run(RunRequest(task, preset, file, assignments, scale, start_from)).begin(OpenedRun, out) as begun:
         watchers.carry_on(begun)
     return begun
 

@@ -11,7 +11,9 @@ __all__ = ["first_step_size", "mean_passes", "schedule"]
 # Choice: units of a hidden layer up to which the step size is what is asked for
 # (docs/decisions/065-steps-of-large-brains.md).
 UNITS_AT_FULL_STEP = 64
-SMALL_STEP = 0.5  # choice: share of the first step size that is small enough to make fewer (docs/validation/E3.md)
+SMALL_STEP = (
+    0.5  # choice: share of the first step size that is small enough to make fewer (docs/validation/fewer_epochs.md)
+)
 
 
 def first_step_size(asked: float, neurons: int) -> float:

@@ -16,7 +16,7 @@ from evolve.search.search import Search
 from evolve.store.directory import Run, next_directory
 from optics.numerics import device
 
-__all__ = ["PreparedRun", "RunRequest", "prepare"]
+__all__ = ["PreparedRun", "RunRequest", "prepare_run"]
 
 RunT = TypeVar("RunT", bound=Run)
 
@@ -76,7 +76,7 @@ class PreparedRun:
             yield run
 
 
-def prepare(request: RunRequest) -> PreparedRun:
+def prepare_run(request: RunRequest) -> PreparedRun:
     """Assemble the settings of a run and check that it can begin on this machine. Nothing is written.
 
     Raises:

@@ -21,7 +21,7 @@ SHORT = 8 * DEGREE  # samples, of which the middle ones lie far from both ends
 FINE, FINE_TOLERANCE, ORDER = 3.1, 1e-4, 8
 FEWEST, PER_DECADE = 2.25, 0.425
 # Cells of whole cycles average away most of what fewer samples fold onto other frequencies: (cycles, tolerance, fewer),
-# of which each holds from the first two on. validation/cell_samples.py has the errors.
+# of which each holds from the first two on. validation/optics/cell_samples.py has the errors.
 FEWER = ((2.0, 1e-2, 0.5), (1.0, 1e-3, 0.25))
 
 

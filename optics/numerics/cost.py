@@ -1,7 +1,7 @@
 """What operations cost: the numbers by which every method predicts its time, and the planner chooses.
 
-Of warm calls on two cores, rounded to what decides between methods. `python -m validation.fit_costs` times the
-operations and prints what it finds beside these numbers.
+Of warm calls on two cores, rounded to what decides between methods. `python -m validation.benchmarks.fit_costs` times
+the operations and prints what it finds beside these numbers.
 """
 
 from __future__ import annotations

@@ -24,14 +24,14 @@ from sim.worlds.catalog import EPISODE_STEPS
 from sim.worlds.ground_plan import GroundPlan
 from sim.worlds.world import MAX_SPEED, World
 
-__all__ = ["STANDING", "AgentTask", "Events", "mounts_of_agent"]
+__all__ = ["STANDING", "AgentEvents", "AgentTask", "mounts_of_agent"]
 
 OUTSIDE = 1e-6  # of the radius: how far above the skin a pupil is, so that rounding does not put it below
 STANDING = (-1.0, 0.0)  # the "previous action" of an agent that has not moved yet: no speed, no turn
 
 
 @dataclass(frozen=True)
-class Events:
+class AgentEvents:
     """What happened during one action, per world.
 
     progress: [m], in the task's sense (n,) · goal, adversary: reached (n,) bool
@@ -51,9 +51,9 @@ class Events:
         """Something was reached, (n,) bool."""
         return self.goal | self.adversary
 
-    def within(self, worlds: np.ndarray) -> Events:
+    def within(self, worlds: np.ndarray) -> AgentEvents:
         """The same in these worlds, (n,) bool; nothing happened in the others."""
-        return Events(
+        return AgentEvents(
             progress=np.where(worlds, self.progress, 0.0),
             goal=self.goal & worlds,
             adversary=self.adversary & worlds,
@@ -151,7 +151,7 @@ class AgentTask(BatchTask):
         places = zip(state.position[chosen].tolist(), state.heading[chosen].tolist(), strict=True)
         return [{"position": (x, y), "heading": heading} for (x, y), heading in places]
 
-    def weighted(self, worlds: SlidingAgents, events: Events, failed: Mapping[int, str]) -> Outcome:
+    def weighted(self, worlds: SlidingAgents, events: AgentEvents, failed: Mapping[int, str]) -> Outcome:
         """The outcome of an action with these events."""
         if failed:
             well = np.ones(worlds.n, bool)
@@ -178,7 +178,7 @@ class AgentTask(BatchTask):
             info=info,
         )
 
-    def put_elsewhere(self, worlds: SlidingAgents, events: Events) -> np.ndarray:
+    def put_elsewhere(self, worlds: SlidingAgents, events: AgentEvents) -> np.ndarray:
         """Put objects that were reached elsewhere, if the episode goes on; returns the worlds that changed."""
         return NOWHERE
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sim.physics.sliding_agents import SlidingAgents
-from sim.tasks.built_in import AgentTask, Events
+from sim.tasks.built_in import AgentEvents, AgentTask
 from sim.tasks.object_motion import wander
 from sim.tasks.outcome import NOWHERE, Outcome
 from sim.tasks.placement import Places, free_spot
@@ -71,23 +71,23 @@ class FindGoal(AgentTask):
     def judge(self, worlds: SlidingAgents, failed: Mapping[int, str]) -> Outcome:
         return self.weighted(worlds, self._events(worlds), failed)
 
-    def _events(self, worlds: Any) -> Events:
+    def _events(self, worlds: Any) -> AgentEvents:
         before, after, path = worlds.before, worlds.state, worlds.motion.path
         goals, never, ends = self.goals, path.shape[1], self.mode == "training"
         progress = distance_to_nearest(before, goals) - distance_to_nearest(after, goals)
         first = first_reached(path, before.objects, after.objects)
         nothing = np.zeros(worlds.n, bool)
         if (first == never).all():
-            return Events(progress, nothing, nothing, nothing, np.zeros(first.shape, bool), nothing)
+            return AgentEvents(progress, nothing, nothing, nothing, np.zeros(first.shape, bool), nothing)
         goal_at, adversary_at = (of.min(axis=1, initial=never) for of in (first[:, :goals], first[:, goals:]))
         goal, adversary = goal_at < never, adversary_at < never
         adversary_first = adversary & (adversary_at < goal_at)
         if ends:
             goal, adversary = goal & ~adversary_first, adversary_first
         terminated = goal | adversary if ends else nothing
-        return Events(progress, goal, adversary, adversary_first, first < never, terminated)
+        return AgentEvents(progress, goal, adversary, adversary_first, first < never, terminated)
 
-    def put_elsewhere(self, worlds: SlidingAgents, events: Events) -> np.ndarray:
+    def put_elsewhere(self, worlds: SlidingAgents, events: AgentEvents) -> np.ndarray:
         if self.mode == "training":
             return NOWHERE
         objects = worlds.state.objects.copy()

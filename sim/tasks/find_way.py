@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from sim.physics.sliding_agents import SlidingAgents
-from sim.tasks.built_in import AgentTask, Events
+from sim.tasks.built_in import AgentEvents, AgentTask
 from sim.tasks.outcome import Outcome
 from sim.worlds.state import wrap_angle
 
@@ -48,4 +48,4 @@ class FindWay(AgentTask):
             inside &= side
         goal, nothing = inside.any(axis=1), np.zeros(worlds.n, bool)
         nowhere = np.zeros((worlds.n, 0), bool)
-        return self.weighted(worlds, Events(is_now - was, goal, nothing, nothing, nowhere, goal), failed)
+        return self.weighted(worlds, AgentEvents(is_now - was, goal, nothing, nothing, nowhere, goal), failed)

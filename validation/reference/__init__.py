@@ -2,6 +2,17 @@
 
 Nothing here imports the package. Each function names its formula and source. Time factor exp(-iωt); fields leave the
 carrier exp(ikz) out, so that their phase stays small; lengths in m, aberrations in waves.
+
+waves                plane waves, Gaussian beams, edges
+circular             circular apertures: Airy's pattern, and the axis
+rayleigh_sommerfeld  the exact integral of a circular pupil with an ideal lens
+richards_wolf        the vector focus
+defocus              light near a focus: Lommel's functions
+aberrations          Zernike's polynomials and Strehl ratios
+apertures            Fourier transforms of openings
+gratings             orders, efficiencies, self-images
+lenses               focal lengths of lenses, zone plates and pinholes
+measures             the distance of two results, and orders of convergence
 """
 
 from validation.reference.aberrations import (

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
 import time
+import tomllib
 from argparse import Namespace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from optics.numerics import backend
@@ -13,6 +17,24 @@ from optics.numerics import backend
 __all__ = ["doctor", "validate"]
 
 CHECKOUT = Path(__file__).resolve().parents[3]
+
+
+@dataclass(frozen=True)
+class _Proof:
+    """module: that runs it; old: the module's name when proofs had codes, such as "B0_planner", or ""."""
+
+    module: str
+    old: str
+
+    @property
+    def name(self) -> str:
+        return self.module.rpartition(".")[2]
+
+    @property
+    def question(self) -> str:
+        """The first line of its docstring."""
+        source = (CHECKOUT / self.module.replace(".", "/")).with_suffix(".py").read_text(encoding="utf-8")
+        return (ast.get_docstring(ast.parse(source)) or "").split("\n")[0]
 
 
 def doctor(arguments: Namespace) -> int:
@@ -23,19 +45,51 @@ def doctor(arguments: Namespace) -> int:
 
 
 def validate(arguments: Namespace) -> int:
-    """Run every validation script; each asserts against closed forms and draws. 1 if any fails."""
-    scripts = sorted((CHECKOUT / "validation").glob("[A-Z][0-9]*_*.py"))
-    if not scripts:
-        print("evolve: error: validate needs a checkout of rhabdom: its scripts are not installed", file=sys.stderr)
+    """Run the proofs of `validation`, all or those named; each asserts and draws. 1 if any fails."""
+    listed = CHECKOUT / "validation" / "proofs.toml"
+    if not listed.is_file():
+        print("evolve: error: validate needs a checkout of rhabdom: its proofs are not installed", file=sys.stderr)
         return 2
-    from evolve.runs.progress import clock  # not at the top: the doctor works on every system
-
+    paths = tomllib.loads(listed.read_text(encoding="utf-8"))["proofs"]
+    known = [_Proof(f"validation.{path.replace('/', '.')}", old) for path, old in paths.items()]
+    proofs = [_found(name, {proof.name: proof for proof in known}) for name in arguments.proofs] or known
+    if arguments.list:
+        print("\n".join(f"{proof.name:<26}{proof.question}" for proof in proofs))
+        return 0
     backend.require()
-    print(f"{len(scripts)} scripts, most of which take seconds and some minutes", flush=True)
+    return _run(proofs)
+
+
+def _found(name: str, proofs: Mapping[str, _Proof]) -> _Proof:
+    """The proof of that name, or of that code, which is then told its name.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    if name in proofs:
+        return proofs[name]
+    for proof in proofs.values():
+        if proof.old and name in (proof.old, proof.old.partition("_")[0]):
+            print(f"{name} is now called {proof.name}", file=sys.stderr)
+            return proof
+    from evolve.config.checks import ConfigError  # not at the top: the doctor works on every system
+    from optics.numerics.arguments import did_you_mean
+
+    raise ConfigError(
+        f"validate {name}: there is no such proof{did_you_mean(name, proofs)} (see evolve validate --list)"
+    )
+
+
+def _run(proofs: list[_Proof]) -> int:
+    """Run one after another; 1 if any fails."""
+    from evolve.runs.progress import clock
+
+    if len(proofs) > 1:
+        print(f"{len(proofs)} proofs, most of which take seconds and some minutes", flush=True)
     failed, began = [], time.monotonic()
-    for number, script in enumerate(scripts, start=1):
-        print(f"{number}/{len(scripts)} {script.stem}, after {clock(time.monotonic() - began)}", flush=True)
-        child = subprocess.run([sys.executable, "-m", f"validation.{script.stem}"], cwd=CHECKOUT, check=False)
-        failed += [script.stem] if child.returncode else []
-    print(f"failed: {', '.join(failed)}" if failed else f"all {len(scripts)} passed")
+    for number, proof in enumerate(proofs, start=1):
+        print(f"{number}/{len(proofs)} {proof.name}, after {clock(time.monotonic() - began)}", flush=True)
+        child = subprocess.run([sys.executable, "-m", proof.module], cwd=CHECKOUT, check=False)
+        failed += [proof.name] if child.returncode else []
+    print(f"failed: {', '.join(failed)}" if failed else f"all {len(proofs)} passed")
     return 1 if failed else 0

@@ -17,7 +17,7 @@ from evolve.cli.tensorboard import TensorBoardWriter, require_tensorboard
 from evolve.config.lint import lint
 from evolve.config.run_config import ConfigError, RunConfig
 from evolve.genome.phenotype import repaired
-from evolve.runs.begin import RunRequest, prepare
+from evolve.runs.begin import RunRequest, prepare_run
 from evolve.runs.carry_on import Workers, carry_on, local_workers
 from evolve.runs.progress import Bar, Events, Lines, Silent, Tally, Watchers, watcher
 from evolve.runs.resume import resuming
@@ -34,7 +34,7 @@ def start(arguments: Namespace) -> int:
     scheduler = _scheduler(arguments)
     if arguments.tensorboard:
         require_tensorboard()
-    prepared = prepare(_request(arguments))
+    prepared = prepare_run(_request(arguments))
     if arguments.dry_run:
         return _show(RunPlan.of(prepared.config, prepared.directory(arguments.out)), arguments.json)
     notes = (

@@ -1,6 +1,7 @@
-"""`evolve validate` runs every validation script of the checkout, and tells which failed."""
+"""`evolve validate` runs the proofs of the checkout, and tells which failed."""
 
 import re
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,26 +10,68 @@ import pytest
 from evolve.cli.commands import checks
 
 ROOT = Path(__file__).parents[3]
+PROOFS = tomllib.loads((ROOT / "validation/proofs.toml").read_text())["proofs"]
+NAMES = [path.rpartition("/")[2] for path in PROOFS]
 
 
-@pytest.mark.parametrize("failing", [(), ("validation.B1_aliasing",)])
-def test_validate_runs_every_script_and_names_those_that_fail(call, monkeypatch, failing):
-    ran = []
+@pytest.fixture
+def ran(monkeypatch):
+    """Modules that would have run, and those that are to fail."""
+    modules, failing = [], []
 
     def run(command, cwd, check):
         assert Path(cwd) == ROOT
-        ran.append(command[-1])
+        modules.append(command[-1])
         return SimpleNamespace(returncode=int(command[-1] in failing))
 
     monkeypatch.setattr(checks.backend, "require", lambda: None)
     monkeypatch.setattr(checks.subprocess, "run", run)
+    return SimpleNamespace(modules=modules, failing=failing)
+
+
+@pytest.mark.parametrize("failing", [False, True])
+def test_validate_runs_every_proof_and_names_those_that_fail(call, ran, failing):
+    ran.failing += ["validation.optics.aliasing"] * failing
     code, out, _ = call("validate")
-    scripts = {f"validation.{path.stem}" for path in (ROOT / "validation").glob("*.py") if path.stem[1:2].isdigit()}
-    assert set(ran) == scripts
-    assert len(scripts) > 10
-    assert code == bool(failing)
-    assert all(re.search(rf"\d+/{len(scripts)} {name.partition('.')[2]}, after \d+:\d\d\n", out) for name in scripts)
-    assert out.splitlines()[-1] == ("failed: B1_aliasing" if failing else f"all {len(scripts)} passed")
+    assert ran.modules == [f"validation.{path.replace('/', '.')}" for path in PROOFS]
+    assert all((ROOT / "validation" / f"{path}.py").is_file() for path in PROOFS)
+    assert len(PROOFS) > 20
+    assert code == failing
+    assert all(re.search(rf"\d+/{len(NAMES)} {name}, after \d+:\d\d\n", out) for name in NAMES)
+    assert out.splitlines()[-1] == ("failed: aliasing" if failing else f"all {len(NAMES)} passed")
+
+
+def test_validate_runs_those_named_and_takes_old_codes(call, ran):
+    code, _, err = call("validate", "thin_element", "B0", "F1_mutants")
+    assert code == 0
+    assert ran.modules == [
+        "validation.optics.thin_element",
+        "validation.optics.psf_error_prediction",
+        "validation.mutants.mutation_testing",
+    ]
+    assert err == "B0 is now called psf_error_prediction\nF1_mutants is now called mutation_testing\n"
+
+
+def test_every_old_code_leads_to_one_proof():
+    codes = [old.partition("_")[0] for old in PROOFS.values() if old]
+    assert len(set(codes)) == len(codes) == 24
+
+
+def test_validate_lists_names_first_and_runs_nothing(call, ran):
+    code, out, err = call("validate", "--list")
+    assert (code, err, ran.modules) == (0, "", [])
+    assert [line.split()[0] for line in out.splitlines()] == NAMES
+    assert "psf_error_prediction      Does the predicted error hold?" in out
+    assert all(len(line.split()) > 3 for line in out.splitlines())
+
+
+def test_an_unknown_proof_ends_in_one_line(call, ran):
+    code, _, err = call("validate", "psf_error_predictions")
+    assert (code, ran.modules) == (2, [])
+    assert err == (
+        "evolve: error: validate psf_error_predictions: there is no such proof; did you mean 'psf_error_prediction'? "
+        "(see evolve validate --list)\n"
+    )
 
 
 def test_validate_needs_a_checkout(call, monkeypatch, tmp_path):

@@ -51,7 +51,8 @@ def test_paper_scale_has_the_published_budget_and_laptop_a_tenth_of_it_at_most(p
     assert paper.learning.total_steps == 1_000_000
     steps = [config.candidates * config.learning.total_steps for config in (laptop, paper)]
     assert steps[0] < steps[1] / 10
-    # Fewer steps than it takes to tell good eyes from bad give selection nothing to see (docs/validation/E0.md).
+    # Fewer steps than it takes to tell good eyes from bad give selection nothing to see
+    # (docs/validation/learning_curves.md).
     assert laptop.learning.total_steps >= 130_000
 
 

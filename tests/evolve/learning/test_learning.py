@@ -1,8 +1,8 @@
 """Learning in sim's own worlds, as far as seconds allow.
 
-Telling goal from adversary takes PPO some 100,000 steps (validation/E0_learning.py), longer than a test may. What is
-held instead: that signals and encoder suffice to tell them apart, which one receptor does not, and that PPO learns to
-reach objects at all.
+Telling goal from adversary takes PPO some 100,000 steps (validation/evolve/learning_curves.py), longer than a test
+may. What is held instead: that signals and encoder suffice to tell them apart, which one receptor does not, and that
+PPO learns to reach objects at all.
 """
 
 import numpy as np

@@ -10,7 +10,7 @@ import pytest
 import optics
 from tests.optics.device_types import Float64
 from validation import reference
-from validation.cases import draw_case
+from validation.optics.random_cases import draw_case
 
 WAVELENGTH = 550e-9
 LENS, FOCUS = optics.Pupil(1e-3, thin_lens_focal_length=4e-3), 4e-3

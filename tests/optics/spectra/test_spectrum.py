@@ -5,7 +5,7 @@ import pytest
 
 from optics import Spectrum, illuminant, reflectance
 from optics.spectra.spectrum import ILLUMINANTS, REFLECTANCES, cie_1931, cone_fundamentals, daylight
-from validation import freeze_spectra
+from validation.optics import freeze_spectra
 
 VISIBLE = np.arange(380.0, 781.0, 5.0)
 

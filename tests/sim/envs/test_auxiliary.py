@@ -11,7 +11,7 @@ import sim
 from sim.eyes.eyes import BODY_RADIUS
 from sim.eyes.sampling import directions_of
 from sim.render.optic_flow import receptor_centres
-from sim.tasks.task import grown
+from sim.tasks.user_tasks import with_evolved_eyes
 from sim.worlds.state import pose
 from tests.sim.envs.hunt import Predator, Prey
 from tests.sim.envs.test_eye_kinds import Looker
@@ -163,7 +163,7 @@ def test_a_frozen_policy_gets_what_its_own_task_has():
 
 
 def test_evolving_eyes_have_none():
-    assert grown(Told(), sim.Eyes()).auxiliary == ()
+    assert with_evolved_eyes(Told(), sim.Eyes()).auxiliary == ()
 
 
 def test_rhabdoms_own_worlds_are_told_what_mujocos_rays_meet():

@@ -1,0 +1,60 @@
+"""The chart of populations: its rows are what they say, and its phase and scale those of Fresnel's integral."""
+
+import sys
+
+import numpy as np
+import pytest
+
+import optics
+from validation.peers import population_speed
+from validation.reference import relative_l2
+
+
+def test_rows_of_a_small_population(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(population_speed, "TOLERANCES", (0.01,))
+    monkeypatch.setattr(population_speed, "GOAL", 0.0)
+    monkeypatch.setattr(population_speed, "FEW", 2)
+    monkeypatch.setattr(population_speed, "AGAIN", 1)
+    monkeypatch.setattr(
+        sys,
+        "argv",
+        ["population_speed", "--eyes", "10", "--without-peers", "--out", str(tmp_path), "--docs", str(tmp_path)],
+    )
+    assert population_speed.main() == 0
+    assert "all bounds hold" in capsys.readouterr().out
+    page = (tmp_path / "population_speed.md").read_text()
+    assert page.startswith("# Whole populations")
+    assert page.count("\npsf ") == 3
+    assert (tmp_path / "population_speed.png").stat().st_size > 10_000
+
+
+def test_errors_that_exceed_what_was_predicted_are_broken(monkeypatch):
+    monkeypatch.setattr(population_speed, "TOLERANCES", (0.01,))
+    monkeypatch.setattr(population_speed, "FEW", 1)
+    monkeypatch.setattr(population_speed, "AGAIN", 1)
+    population = population_speed.eyes(4)
+    wrong = {i: 1.1 * population_speed.exact(population[i]) for i in range(4)}
+    _, broken = population_speed.ours(population, wrong)
+    assert any("predicted errors hold for 0.000" in line for line in broken)
+
+
+@pytest.mark.parametrize("parts", [1, 4])
+def test_what_peers_are_given_is_the_field(parts):
+    """Its Fourier sum to the focal plane is Fresnel's picture, but for the edge."""
+    [pupil] = population_speed.eyes(1)
+    field, pitch = population_speed.pupil_field(pupil, 256, parts)
+    at = (np.arange(population_speed.N) - population_speed.N // 2) * population_speed.DX
+    places = (np.arange(256) - 128) * pitch
+    waves = np.exp(-2j * np.pi * np.outer(at, places) / (population_speed.WAVE * population_speed.Z))
+    out = waves @ field @ waves.T
+    image = population_speed.finished(out * population_speed._scale(field, pitch, out), pupil)
+    fresnel = optics.psf(
+        pupil,
+        [population_speed.WAVE],
+        population_speed.Z,
+        dx=population_speed.DX,
+        shape=(population_speed.N, population_speed.N),
+        method="fresnel",
+    ).psf[0]
+    assert relative_l2(image, fresnel) < 0.02
+    assert relative_l2(image, np.roll(fresnel, 1, axis=0)) > 0.05

@@ -1,0 +1,208 @@
+"""Steps per second of worlds and models, and what of a step is sight (D4)
+
+Two of rhabdom's own tasks and two of Gymnasium's models (ant, humanoid; MIT), each with two eyes of 15 x 15 receptors
+of 60°, 4 rays each in direct light, 4 bands, noise included. Actions are random, and episodes begin anew as they end.
+Steps per CPU second of one thread, the median of a few rounds in one process, in which physics and rules alone, sight
+alone, and whole steps take turns: other work on the machine hardly changes what is compared. Numbers of steps say as
+much about the machine as about the code; the last two columns are ratios: sight's share of physics and sight, and how
+long a whole step takes in terms of both, one after the other.
+
+Bounds, for every model at 64 worlds or more: a world is seen at least twice as fast as alone (2.7 to 3.7 times were
+measured, since a launch is paid once), and a whole step takes no more than 1.25 times as long as its parts (1.17 at
+most were measured: what comes between takes turns in the caches).
+
+    python -m validation.benchmarks.steps_per_second [--only ant] [--out DIR] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+import drjit as dr
+import numpy as np
+
+import optics
+import sim
+from sim.envs.vec_env import EyesVecEnv
+from validation.pages.page import Page, parser
+
+SIZES = (1, 16, 64, 256)
+LARGE = 64  # worlds, from where the bounds hold
+PAYS, OVERHEAD = 2.0, 1.25
+ROUNDS, SECONDS = 7, 0.15  # of each measurement
+RESOLUTION, FOV_DEG = (15, 15), 60.0
+PARTS = ("physics", "sight", "both")
+
+
+class Body(sim.Task):
+    """One of Gymnasium's models, whose episodes last as long as nothing breaks; what it is worth is not asked."""
+
+    eye, fidelity = optics.Eye(resolution=RESOLUTION, fov_deg=FOV_DEG), sim.Fidelity(4, bands=4)
+    episode_steps = 1000
+
+    def __init__(self, file: str, left: sim.Mount) -> None:
+        spec = find_spec("gymnasium")
+        assert spec is not None
+        assert spec.origin is not None
+        self.model = Path(spec.origin).parent / "envs" / "mujoco" / "assets" / file
+        self.mounts = sim.both_sides([left])
+
+    def rewards(self, data: object) -> dict[str, float]:
+        return {"none": 0.0}
+
+
+@dataclass(frozen=True)
+class Row:
+    """Steps of one world per CPU second, by part; worlds: at once."""
+
+    name: str
+    worlds: int
+    rates: dict[str, float]
+
+    @property
+    def overhead(self) -> float:
+        """How long a whole step takes, in terms of physics and sight one after the other."""
+        return 1 / self.rates["both"] / (1 / self.rates["physics"] + 1 / self.rates["sight"])
+
+    @property
+    def share(self) -> float:
+        """Of physics and sight together, what is sight."""
+        return 1 / self.rates["sight"] / (1 / self.rates["physics"] + 1 / self.rates["sight"])
+
+
+def environments() -> dict[str, Callable[[int], EyesVecEnv]]:
+    """Makers, by name, of so many worlds."""
+    eyes = sim.Eyes(n_eyes=2, resolution=RESOLUTION, fov_deg=FOV_DEG)
+    ours = {
+        name: lambda n, name=name: sim.make_vec_env(name, eyes, n, fidelity=sim.Fidelity(4, bands=4))
+        for name in ("detection", "navigation")
+    }
+    left = {
+        "ant": sim.Mount("torso", azimuth_deg=35, elevation_deg=-10, offset=(0.22, 0.15, 0.1)),
+        "humanoid": sim.Mount("torso", azimuth_deg=20, offset=(0.1, 0.04, 0.2)),
+    }
+    theirs = {name: lambda n, name=name: sim.make_vec_env(Body(f"{name}.xml", left[name]), n_envs=n) for name in left}
+    return {**ours, **theirs}
+
+
+def parts_of(env: EyesVecEnv) -> dict[str, Callable[[], object]]:
+    """What is measured: one step of all worlds each."""
+    random = np.random.default_rng(0)
+
+    def action() -> np.ndarray:
+        return random.uniform(-1, 1, (env.num_envs, *env.action_space.shape)).astype(np.float32)
+
+    simulation = env.simulation
+
+    def judged() -> None:
+        step = simulation.judge(simulation.move(action()))
+        if step.done.any():
+            simulation.restart(np.flatnonzero(step.done))
+
+    return {
+        "physics": judged,
+        "sight": lambda: [frame.wait() for kinds in env.animals.launch() for frame in kinds.values()],
+        "both": lambda: env.step(action()),
+    }
+
+
+def timed(part: Callable[[], object], steps: int) -> float:
+    """CPU seconds of one step."""
+    began = time.process_time()
+    for _ in range(steps):
+        part()
+    return (time.process_time() - began) / steps
+
+
+def measured(name: str, env: EyesVecEnv) -> Row:
+    """Parts take turns."""
+    with contextlib.closing(env), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        env.reset()
+        parts = parts_of(env)
+        for part in parts.values():  # kernels are recorded
+            for _ in range(3):
+                part()
+        steps = {what: max(1, int(SECONDS / max(timed(part, 2), 1e-6))) for what, part in parts.items()}
+        rounds = [{what: timed(part, steps[what]) for what, part in parts.items()} for _ in range(ROUNDS)]
+    medians = {what: float(np.median([one[what] for one in rounds])) for what in parts}
+    return Row(name, env.num_envs, {what: env.num_envs / seconds for what, seconds in medians.items()})
+
+
+def measure(only: str = "", sizes: Sequence[int] = SIZES) -> list[Row]:
+    rows = []
+    for name, make in environments().items():
+        if only not in name:
+            continue
+        for n in sizes:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", sim.MirrorWarning)
+                rows.append(measured(name, make(n)))
+            print(line(rows[-1]), flush=True)
+    return rows
+
+
+def line(row: Row) -> str:
+    rates = " ".join(f"{row.rates[part]:9.0f}" for part in PARTS)
+    return f"{row.name:<12} {row.worlds:6d} {rates} {row.share:7.0%} {row.overhead:9.2f}"
+
+
+def table(rows: list[Row]) -> str:
+    head = f"{'model':<12} {'worlds':>6} {'physics':>9} {'sight':>9} {'both':>9} {'sight':>7} {'step/sum':>9}"
+    return "\n".join([head, *map(line, rows)])
+
+
+def broken_bounds(rows: list[Row]) -> list[str]:
+    alone = {row.name: row for row in rows if row.worlds == 1}
+    broken = []
+    for row in (row for row in rows if row.worlds >= LARGE):
+        faster = row.rates["sight"] / alone[row.name].rates["sight"]
+        if faster < PAYS:
+            broken.append(f"{row.name}, {row.worlds} worlds: sight is {faster:.1f} times as fast as of one world")
+        if row.overhead > OVERHEAD:
+            broken.append(f"{row.name}, {row.worlds} worlds: a step takes {row.overhead:.2f} times its parts")
+    return broken
+
+
+def draw_figure(rows: list[Row], path: Path) -> None:
+    """Steps against worlds at once, a panel for each model."""
+    from matplotlib.figure import Figure
+
+    names = list(dict.fromkeys(row.name for row in rows))
+    figure = Figure(figsize=(2.6 * len(names) + 1, 3.8), layout="constrained")
+    panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
+    for axes, name in zip(panels, names, strict=True):
+        mine = [row for row in rows if row.name == name]
+        for part, colour in zip(PARTS, ("#999999", "#0072B2", "#000000"), strict=True):
+            rates = [row.rates[part] for row in mine]
+            axes.loglog([row.worlds for row in mine], rates, "o-", ms=4, color=colour, label=part)
+        axes.set(xlabel="worlds at once", title=name)
+    panels[0].set_ylabel("steps of a world per CPU second")
+    panels[0].legend(frameon=False)
+    figure.suptitle("Many worlds at once are stepped faster than one, and sight takes about half of a step or more")
+    figure.savefig(path, dpi=110)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    dr.set_thread_count(1)
+    asked = parser(__doc__)
+    asked.add_argument("--only", default="", help="models with this in their names")
+    options: argparse.Namespace = asked.parse_args(arguments)
+    rows = measure(options.only)
+    if not rows:
+        print("no such model: see --only", file=sys.stderr)
+        return 2
+    page = Page("steps_per_second", __doc__, table(rows), broken_bounds(rows))
+    return page.publish(options, lambda path: draw_figure(rows, path))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

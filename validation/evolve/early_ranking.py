@@ -1,0 +1,288 @@
+"""Does little training tell who will be good? (E2)
+
+Budget ladders (`search.rungs`, `evolve.search.successive_halving`) train the whole generation a little and only the
+better part on. That saves time only if the order after little training is the order after all of it. Here animals are
+drawn from the genome, with one to four eyes of 1 x 1 to 15 x 15 receptors behind a perfect lens. They learn detection
+up a ladder of four rungs as a run would train them, except that none is held back. The table compares their order on
+each rung with that on the last (Spearman's rank correlation, and its 90 % confidence interval from a bootstrap over
+animals).
+
+"32 episodes" is what a run sees: the fitness on each rung, from its own evaluation episodes. "128 episodes" measures
+the policy of each rung longer, in other worlds; the last line compares the two measurements on the last rung.
+
+The second table gives what halving (or quartering) these animals as one generation would have cost in CPU seconds,
+relative to training all of them to the end. It also gives the place, in the order of the last rung by 128 episodes,
+of the animal that the ladder declares the best.
+
+Result: half of the training predicted the result of the whole (0.86). Less training predicted little; 16 animals are
+too few to say more: an eighth did better (0.64) than a quarter (-0.33), and neither interval is narrow. A ladder of
+two rungs saves a fifth of the time; lower rungs save more and may lose the best. Ladders are off by default.
+Thirty-two episodes measure fitness well enough (0.99 with the result of 128). Fitness from six episodes, of an
+earlier learner that had not learnt the task by the end, predicted nothing about the result of 48 episodes (0.02).
+
+Trainings are stored (`docs/validation/data/early_ranking.csv`), because they take minutes each; the page comes from the
+store.
+
+    python -m validation.evolve.early_ranking [--train N] [--out DIR] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import rankdata
+
+import sim
+from evolve.config.assemble import assemble
+from evolve.config.run_config import RunConfig, SearchConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.learning.fitness import evaluate
+from evolve.learning.policy import load_policy
+from evolve.learning.ppo import play
+from evolve.learning.training_stage import TrainingStage
+from evolve.search.successive_halving import budgets, promoted
+from evolve.search.worker import prepare_device
+from evolve.store.atomic_files import write_whole
+from validation.pages.page import Page, parser
+from validation.pages.work_precision_chart import MUTED, OURS, OURS_TOO
+
+STORED = Path("docs/validation/data/early_ranking.csv")
+TOTAL = 163_840  # steps of a whole training: 40 rollouts
+RUNGS = 4
+FEW = 32  # episodes of each rung's own evaluation, a run's default
+MANY = 128  # episodes of the longer look
+HOLDS = 0.8  # rank correlation at which a rung can be trusted
+LADDERS = ((2, 0.5), (2, 0.25), (3, 0.5), (4, 0.5))  # (rungs, part that goes on)
+UNSEEN = 10_000  # added to an animal's number: the longer look is into worlds it never saw
+RAYS = 96  # of an eye, and at least one per receptor
+
+
+@dataclass(frozen=True)
+class Row:
+    """One animal on one rung. steps: trained, fewer than the budget where it stopped early; fitness: of FEW
+    episodes; fitness_many: of MANY; cpu_seconds: of this rung."""
+
+    animal: int
+    eyes: int
+    height: int
+    width: int
+    budget: int
+    steps: int
+    fitness: float
+    fitness_many: float
+    cpu_seconds: float
+
+
+def animals(count: int) -> list[Phenotype]:
+    """The first `count` of a sequence of random animals."""
+    found = []
+    for number in range(count):
+        chance = np.random.default_rng([2, number])
+        found.append(
+            Phenotype(
+                n_eyes=int(chance.integers(1, 5)),
+                placement_range_deg=float(chance.uniform(30, 120)),
+                fov_deg=float(chance.uniform(20, 90)),
+                resolution=(int(chance.integers(1, 16)), int(chance.integers(1, 16))),
+                relative_aperture=None,
+                relief=None,
+                refractive_index=None,
+                memory_frames=int(chance.integers(1, 6)),
+                neurons=int(chance.integers(16, 65)),
+            )
+        )
+    return found
+
+
+def config(animal: Phenotype) -> RunConfig:
+    """A run of detection whose ladder has RUNGS rungs; rays enough for this animal's eyes."""
+    rays = max(1, RAYS // (animal.resolution[0] * animal.resolution[1]))
+    settings = (f"learning.total_steps={TOTAL}", f"learning.eval_interval={TOTAL // 2 ** (RUNGS - 1)}")
+    optics = ("eye.optics=false", f"eye.rays_per_receptor={rays}")
+    return assemble(
+        "detection", assignments=[*settings, *optics, f"search.rungs={RUNGS}", f"evaluation.episodes={FEW}"]
+    )
+
+
+def climbed(number: int, animal: Phenotype) -> list[Row]:
+    """An animal's rows, from the first rung to the last."""
+    run, rows = config(animal), []
+    worlds = sim.make_vec_env(
+        run.task,
+        animal.eyes(run.eye),
+        MANY,
+        UNSEEN + number,
+        memory=animal.memory_frames,
+        mode="evaluation",
+        rays_per_receptor=run.eye.rays_per_receptor,
+    )
+    with tempfile.TemporaryDirectory() as folder, closing(worlds):
+        policy = Path(folder) / "policy"
+        kept = tuple(Path(folder) / f"rung-{rung}" for rung in range(RUNGS))
+        ends = budgets(run.search, run.learning)
+        for rung in range(RUNGS):
+            began = time.process_time()
+            outcome = evaluate(animal, run, number, policy, stretch=TrainingStage(ends[: rung + 1], kept[: rung + 1]))
+            spent = time.process_time() - began
+            if outcome.failure is not None:
+                raise RuntimeError(f"animal {number}: {outcome.failure}")
+            many = float(play(load_policy(policy), worlds, UNSEEN + number).returns.mean())
+            place = (number, animal.n_eyes, *animal.resolution, ends[rung], outcome.steps)
+            rows.append(Row(*place, outcome.fitness, many, round(spent, 1)))
+    return rows
+
+
+def read_rows(path: Path) -> list[Row]:
+    """What is stored; [] without a file."""
+    if not path.exists():
+        return []
+    kinds = {f.name: {"int": int, "float": float}[str(f.type)] for f in fields(Row)}
+    with path.open(encoding="utf-8", newline="") as file:
+        return [Row(**{name: kinds[name](value) for name, value in row.items()}) for row in csv.DictReader(file)]
+
+
+def write_rows(rows: Sequence[Row], path: Path) -> None:
+    """All rows, whole or not at all."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, [f.name for f in fields(Row)], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(row) for row in rows)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, text.getvalue().encode())
+
+
+def store(count: int, path: Path) -> None:
+    """Train the animals that the file does not have yet."""
+    rows = read_rows(path)
+    for number, animal in enumerate(animals(count)):
+        if any(row.animal == number for row in rows):
+            continue
+        rows += climbed(number, animal)
+        write_rows(rows, path)
+        for row in rows[-RUNGS:]:
+            print(row, flush=True)
+
+
+def columns(rows: Sequence[Row], name: str) -> np.ndarray:
+    """One column of the rows, (animal, rung)."""
+    values = [getattr(row, name) for row in sorted(rows, key=lambda row: (row.animal, row.budget))]
+    return np.array(values).reshape(-1, RUNGS)
+
+
+def correlation(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
+    """Spearman's rank correlation, and the ends of its 90 % interval."""
+    draws = np.random.default_rng(0).integers(len(a), size=(2000, len(a)))
+    (whole,), drawn = _of_ranks(a[None], b[None]), _of_ranks(a[draws], b[draws])
+    low, high = np.quantile(drawn[np.isfinite(drawn)], [0.05, 0.95])
+    return float(whole), float(low), float(high)
+
+
+def _of_ranks(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Pearson's correlation of the ranks of each row; NaN where a row is all the same."""
+    x, y = (rankdata(values, axis=1) - (values.shape[1] + 1) / 2 for values in (a, b))
+    with np.errstate(invalid="ignore"):
+        return (x * y).sum(axis=1) / np.sqrt((x**2).sum(axis=1) * (y**2).sum(axis=1))
+
+
+@dataclass(frozen=True)
+class Halving:
+    """A ladder, climbed by the stored animals as one generation. cost: CPU seconds, in parts of all whole trainings.
+    place: of the animal that it declares the best in the order of whole trainings by MANY episodes, 1 the best."""
+
+    rungs: int
+    promoted: float
+    cost: float
+    place: int
+
+
+def halving(rows: Sequence[Row], rungs: int, share: float, by: str = "fitness") -> Halving:
+    """A ladder whose budgets are stored ones: the share that goes on is 1/2, or 1/4 with every other rung. `by` decides
+    who goes on: "fitness" or "fitness_many"."""
+    fitness, many, spent = (columns(rows, name) for name in (by, "fitness_many", "cpu_seconds"))
+    search = replace(SearchConfig(), population=len(fitness), rungs=rungs, promoted=share)
+    stride = round(-np.log2(share))
+    stored = [RUNGS - 1 - stride * above for above in range(rungs - 1, -1, -1)]
+    reached, total, below = set(range(len(fitness))), 0.0, 0
+    for rung, place in enumerate(stored):
+        total += spent[sorted(reached), below : place + 1].sum()
+        below = place + 1
+        told = [(number, float(fitness[number, place])) for number in sorted(reached)]
+        reached = promoted(search, rung, told) or reached
+    best = max(reached, key=lambda number: (fitness[number, -1], -number))
+    place = 1 + int((many[:, -1] > many[best, -1]).sum())
+    return Halving(rungs, share, total / spent.sum(), place)
+
+
+def table(rows: Sequence[Row]) -> str:
+    """A line per rung, then a line per ladder."""
+    fitness, many, spent = (columns(rows, name) for name in ("fitness", "fitness_many", "cpu_seconds"))
+    lines = [f"{len(fitness)} animals", f"{'steps':>9}{'CPU time':>10}{f'{FEW} episodes':>26}{f'{MANY} episodes':>26}"]
+    share = spent.cumsum(axis=1).sum(axis=0) / spent.sum()
+    for rung, budget in enumerate(columns(rows, "budget")[0]):
+        cells = "".join(_shown(correlation(measured[:, rung], measured[:, -1])) for measured in (fitness, many))
+        last = _shown(correlation(fitness[:, -1], many[:, -1])) + f"  ({FEW} against {MANY} episodes)"
+        lines.append(f"{budget:9,}{share[rung]:10.0%}" + (cells if rung < RUNGS - 1 else last))
+    lines += ["", f"{'ladder':26}{'CPU time':>10}{f'place of its best, by {FEW} episodes':>36}{f'by {MANY}':>8}"]
+    for rungs, share in LADDERS:
+        by_few, by_many = (halving(rows, rungs, share, by) for by in ("fitness", "fitness_many"))
+        name = f"{rungs} rungs, {share:g} goes on"
+        lines.append(f"{name:26}{by_few.cost:10.0%}{by_few.place:36}{by_many.place:8}")
+    return "\n".join(lines)
+
+
+def verdicts(rows: Sequence[Row]) -> list[str]:
+    """Every bound that the stored trainings break, in words."""
+    many = columns(rows, "fitness_many")
+    return [] if len(many) >= 16 else [f"{len(many)} animals are too few"]
+
+
+def _shown(found: tuple[float, float, float]) -> str:
+    return f"{found[0]:12.2f} [{found[1]:5.2f}, {found[2]:4.2f}]"
+
+
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """Fitness on each rung over fitness on the last, by MANY episodes."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot
+
+    many, ends = columns(rows, "fitness_many"), columns(rows, "budget")[0]
+    figure, axes = pyplot.subplots(1, RUNGS - 1, figsize=(9, 3.2), layout="constrained", sharey=True)
+    for rung, one in enumerate(axes):
+        one.plot(many[:, rung], many[:, -1], "o", ms=4, color=OURS if rung == RUNGS - 2 else OURS_TOO)
+        rho = float(_of_ranks(many[None, :, rung], many[None, :, -1])[0])
+        one.annotate(f"rank correlation {rho:.2f}", (0.03, 0.93), xycoords="axes fraction", fontsize=8, color=MUTED)
+        one.set(xlabel=f"fitness after {ends[rung]:,} steps")
+        one.spines[["top", "right"]].set_visible(False)
+    axes[0].set(ylabel=f"fitness after {ends[-1]:,} steps")
+    figure.savefig(path, dpi=150)
+    pyplot.close(figure)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train what is asked for, then make the page of all that is stored."""
+    options_parser = parser(__doc__ or "")
+    options_parser.add_argument("--train", type=int, default=0, metavar="N", help="animals that must be stored")
+    options_parser.add_argument("--stored", type=Path, default=STORED, help="file of the stored trainings")
+    options = options_parser.parse_args(arguments)
+    if options.train:
+        prepare_device()
+        store(options.train, options.stored)
+    rows = read_rows(options.stored)
+    return Page("early_ranking", __doc__ or "", table(rows), verdicts(rows)).publish(
+        options, lambda path: draw(rows, path)
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

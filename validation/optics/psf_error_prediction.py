@@ -1,0 +1,266 @@
+"""Does the predicted error hold? Random pupils, distances, windows, tolerances and reliefs (B0)
+
+Cases are drawn at random: Fresnel number 0.01 to 1000, NA 0.01 to 0.7, reliefs up to 40 µm (none, ideal lens,
+B-spline, both, height map), circles, rings, slits, regular polygons and stars, windows of 17 to 257 samples a side, a
+quarter of them with pitches of 0.3 to 4 times λz/2R, tolerances 1e-5 (float32) or 1e-8 (float64) to 3e-2.
+The actual error is the relative L2 of intensity against the direct Rayleigh-Sommerfeld sum in float64. That sum is
+asked for a thousandth of the tolerance or a thirtieth of the prediction, whichever is less. A case whose direct sum
+would take more than 5 s is drawn again, and counted.
+
+Bounds: actual <= predicted in 99 % of the cases, and never above 3 times; predicted <= 30 times actual in 80 %, so
+that no time goes into digits that nobody asked for. With --methods every method runs on every case. The chosen one
+must then take at most twice the time of the fastest one whose actual error meets the tolerance, in 80 % of the cases.
+
+Where no method can meet the tolerance, an `AccuracyError` says what can. The table counts those cases by reason.
+
+    python -m validation.optics.psf_error_prediction [--cases N] [--seed N] [--methods N] [--out DIR] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import optics
+from optics.point_spread.planner import METHODS
+from validation.optics.random_cases import WAVELENGTH, Case, draw_case
+from validation.pages.page import Page, parser
+from validation.reference import relative_l2
+
+SLOWEST_REFERENCE = 5.0  # [s]
+REFERENCE_DIGITS = 1e-3
+HOLDS, WORST, CLOSE, WITHIN, TWICE = 0.99, 3.0, 30.0, 0.8, 2.0
+REASONS = {
+    "no reference: the direct sum is unsure of itself": "no reference",
+    "too dark for rounding": "dark",
+    "too slow or too large": "the limits are",
+    "light too near to grazing": "grazing",
+    "caught by the spot check": "a check against",
+    "tolerance below the dtype's": " carries ",
+}
+
+
+@dataclass(frozen=True)
+class Run:
+    """seconds: best of the calls. error: actual, known to within `unsure`, what the reference predicts of itself."""
+
+    method: str
+    error: float
+    predicted: float
+    seconds: float
+    unsure: float = 0.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """runs: the chosen method's first, then the others'. refusal: why there are none."""
+
+    case: Case
+    runs: tuple[Run, ...]
+    refusal: str = ""
+
+    @property
+    def chosen(self) -> Run:
+        return self.runs[0]
+
+    @property
+    def ratio(self) -> float:
+        """Actual over predicted, the reference's own error granted."""
+        return self.chosen.error / (self.chosen.predicted + self.chosen.unsure)
+
+    @property
+    def slowdown(self) -> float:
+        """Time over that of the fastest method that meets the tolerance."""
+        return self.chosen.seconds / min(run.seconds for run in self.runs if run.error <= self.case.tolerance)
+
+
+def measure(count: int, seed: int = 0, methods: int = 0) -> tuple[list[Row], int]:
+    """`count` cases, every method on the first `methods`; and how many were left out, their direct sum too slow."""
+    rng = np.random.default_rng(seed)
+    rows: list[Row] = []
+    skipped = 0
+    while len(rows) < count:
+        case = draw_case(rng)
+        row = _row(case, len(rows) < methods) if _affordable(case, REFERENCE_DIGITS * case.tolerance) else None
+        skipped += row is None
+        rows += [row] if row else []
+    return rows, skipped
+
+
+def _row(case: Case, methods: bool) -> Row | None:
+    """None where the direct sum, asked for much less than is predicted, would take too long."""
+    try:
+        chosen = _timed(case, "auto", 3 if methods else 1)
+    except optics.AccuracyError as error:
+        return Row(case, (), str(error))
+    tolerance = min(REFERENCE_DIGITS * case.tolerance, chosen[0].plan.predicted_error / 30)
+    if not _affordable(case, tolerance):
+        return None
+    try:
+        exact = optics.psf(case.pupil, [WAVELENGTH], case.distance, **_reference(case, tolerance))
+    except optics.AccuracyError as error:
+        return Row(case, (), f"no reference: {error}")
+    runs = [_run(chosen, exact)]
+    for method in set(METHODS) - {runs[0].method} if methods else ():
+        try:
+            plan = optics.plan(case.pupil, WAVELENGTH, case.distance, **_asked(case, method))
+            if plan.seconds < 0.3 + 10 * runs[0].seconds:  # else it is no rival
+                runs.append(_run(_timed(case, method, 3), exact))
+        except optics.AccuracyError:
+            continue
+    return Row(case, tuple(runs))
+
+
+def _reference(case: Case, tolerance: float) -> dict[str, Any]:
+    asked = {"method": "rayleigh_sommerfeld", "dtype": "float64", "tolerance": max(tolerance, 3e-12)}
+    return {**case.window, **asked}
+
+
+def _affordable(case: Case, tolerance: float) -> bool:
+    try:
+        plan = optics.plan(case.pupil, WAVELENGTH, case.distance, **_reference(case, tolerance))
+    except optics.AccuracyError:
+        return False
+    return plan.seconds <= SLOWEST_REFERENCE
+
+
+def _asked(case: Case, method: str) -> dict[str, Any]:
+    return {**case.window, "tolerance": case.tolerance, "dtype": case.dtype, "method": method}
+
+
+def _timed(case: Case, method: str, calls: int) -> tuple[optics.PSFResult, float]:
+    """The PSF, and the time of a warm call: after a first one that may compile."""
+    result, seconds = case.psf(method), []
+    for _ in range(calls - 1):
+        start = time.perf_counter()
+        case.psf(method)
+        seconds.append(time.perf_counter() - start)
+    return result, min(seconds, default=0.0)
+
+
+def _run(timed: tuple[optics.PSFResult, float], exact: optics.PSFResult) -> Run:
+    result, seconds = timed
+    plan, error = result.plan, relative_l2(result.psf, exact.psf)
+    return Run(plan.method, error, plan.predicted_error, seconds, exact.plan.predicted_error)
+
+
+def reason(refusal: str) -> str:
+    """What kind of refusal it is; "" for none."""
+    known = (name for name, words in REASONS.items() if words in refusal)
+    return next(known, "other: " + re.sub(r"\d\S*", "#", refusal)) if refusal else ""
+
+
+def shares(rows: Sequence[Row]) -> dict[str, float]:
+    """What the bounds are about."""
+    answered = [row for row in rows if row.runs]
+    ratios = np.array([row.ratio for row in answered])
+    # A refusal's rivals are not timed; a chosen method above the tolerance counts as too slow.
+    timed = [row for row in answered if row.chosen.seconds]
+    fast = [row.chosen.error <= row.case.tolerance and row.slowdown <= TWICE for row in timed]
+    return {
+        "holds": float(np.mean(ratios <= 1)),
+        "worst": float(ratios.max()),
+        "close": float(np.mean(ratios >= 1 / CLOSE)),
+        "fast": float(np.mean(fast)) if fast else np.nan,
+    }
+
+
+def broken_bounds(rows: Sequence[Row], percentages: bool = True) -> list[str]:
+    """Every bound that does not hold, in words. percentages: whether the cases are enough for those."""
+    found, answered = shares(rows), [row for row in rows if row.runs]
+    broken = [
+        f"error {row.chosen.error:.2g}, predicted {row.chosen.predicted:.2g} by {row.chosen.method}: {row.case}"
+        for row in answered
+        if not row.ratio <= WORST
+    ]
+    broken += [f"refused for no known reason: {row.refusal}" for row in rows if reason(row.refusal).startswith("other")]
+    if not percentages:
+        return broken
+    if not found["holds"] >= HOLDS:
+        broken.append(f"actual <= predicted in {found['holds']:.1%} of the cases, must be {HOLDS:.0%}")
+    if not found["close"] >= WITHIN:
+        broken.append(f"predicted <= {CLOSE:g} actual in {found['close']:.1%} of the cases, must be {WITHIN:.0%}")
+    if found["fast"] < WITHIN:
+        broken.append(f"chosen within {TWICE:g}x of the fastest in {found['fast']:.1%}, must be {WITHIN:.0%}")
+    return broken
+
+
+def table(rows: Sequence[Row], skipped: int) -> str:
+    answered = [row for row in rows if row.runs]
+    lines = [
+        f"{'chosen method':<24}{'cases':>6}{'holds':>8}{'worst':>8}{'median':>8}{'within 30x':>12}{'fast enough':>13}"
+    ]
+    groups = {name: [row for row in answered if row.chosen.method == name] for name in METHODS}
+    for name, group in [*groups.items(), ("all", answered)]:
+        if group:
+            found = shares(group)
+            fast = "" if np.isnan(found["fast"]) else f"{found['fast']:.1%}"
+            median = float(np.median([row.ratio for row in group]))
+            lines.append(
+                f"{name:<24}{len(group):>6}{found['holds']:>8.1%}{found['worst']:>8.2f}{median:>8.2f}"
+                f"{found['close']:>12.1%}{fast:>13}"
+            )
+    lines.append(
+        "worst, median: actual over predicted error; fast enough: within 2x of the fastest that meets the tolerance"
+    )
+    refused = Counter(reason(row.refusal) for row in rows if not row.runs)
+    lines += [f"refused, {name}: {count}" for name, count in refused.most_common()]
+    lines.append(f"drawn anew, direct sum above {SLOWEST_REFERENCE:g} s: {skipped}")
+    return "\n".join(lines)
+
+
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """Predicted against actual error, coloured by method."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.6, 6.4), layout="constrained")
+    axes = figure.subplots()
+    colors = dict(zip(METHODS, _COLORS, strict=False))
+    ends = np.array([1e-13, 1e-1])
+    axes.fill_between(ends, ends, ends * CLOSE, color="#009E73", alpha=0.10, lw=0)
+    axes.loglog(ends, ends, color="black", lw=1)
+    axes.loglog(ends, ends * CLOSE, color="black", lw=0.8, ls=":")
+    for method, color in colors.items():
+        found = [row.chosen for row in rows if row.runs and row.chosen.method == method]
+        if found:
+            errors, predicted = [max(run.error, 1e-13) for run in found], [run.predicted for run in found]
+            axes.loglog(errors, predicted, ".", color=color, ms=7, alpha=0.75, mew=0, label=f"{method} ({len(found)})")
+    slanted = {"rotation": 37.5, "rotation_mode": "anchor", "fontsize": 8.5}
+    axes.text(2e-10, 1.1e-10, "predicted = actual", **slanted, va="top")
+    axes.text(1e-11, 4.5e-10, "predicted = 30 times actual", **slanted, va="bottom")
+    axes.text(1e-4, 6e-7, "a point down here is an error\nlarger than was predicted", fontsize=8.5, color="#B00020")
+    axes.set(xlabel="actual error (relative L2 of intensity)", ylabel="predicted error", xlim=ends, ylim=(1e-11, 1e-1))
+    found = shares(rows)
+    axes.set_title(
+        f"{len(rows)} random cases: the predicted error holds in {found['holds']:.1%}, "
+        f"and is within 30 times the actual one in {found['close']:.1%}",
+        fontsize=10,
+    )
+    axes.legend(frameon=False, fontsize=8.5, loc="lower right", title="chosen method (cases)")
+    figure.savefig(path, dpi=110)
+
+
+_COLORS = ("#0072B2", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#555555", "#56B4E9", "#8B5A2B", "#B8A900", "#B00020")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    options_parser = parser(__doc__)
+    options_parser.add_argument("--cases", type=int, default=1000)
+    options_parser.add_argument("--seed", type=int, default=0)
+    options_parser.add_argument("--methods", type=int, default=0, help="time every method on so many of the cases")
+    options = options_parser.parse_args(arguments)
+    rows, skipped = measure(options.cases, options.seed, options.methods)
+    page = Page("psf_error_prediction", __doc__, table(rows, skipped), broken_bounds(rows, options.cases >= 200))
+    return page.publish(options, lambda path: draw(rows, path))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

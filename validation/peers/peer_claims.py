@@ -1,0 +1,79 @@
+"""What other codes' tests and textbooks assert, asked of this package (D3)
+
+Test suites of prysm, poppy and hcipy assert closed forms, and textbooks have tables. Each claim is asked here in this
+package's own words: what the source says, what we find, and by how much the two may differ. Where a suite has a
+bound, it is that one; where the exact integral differs from a paraxial claim, the bound is wider and says so. Most
+claims are paraxial: the systems are slow ones of f/100, and lengths are in units of λf/D.
+
+What is listed below the table has no counterpart here, for the reason beside it.
+
+    python -m validation.peers.peer_claims [--out DIR] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from validation.pages.page import Page, parser
+from validation.peers.claims.claim import Case
+from validation.peers.claims.suite_claims import of_hcipy, of_poppy, of_prysm
+from validation.peers.claims.textbook_aberrations import of_strehl_ratios, of_wavefronts
+from validation.peers.claims.textbook_apertures import of_circles, of_openings, on_the_axis
+from validation.peers.claims.unexpressed import UNEXPRESSED
+
+FEWEST = 50
+
+
+def cases() -> Iterator[Case]:
+    for family in (of_prysm, of_hcipy, of_poppy, of_circles, of_openings, on_the_axis, of_strehl_ratios, of_wavefronts):
+        yield from family()
+
+
+def answered(asked: list[Case]) -> tuple[list[float], str, list[str]]:
+    """Differences over their bounds, the table, and what does not hold."""
+    shares, broken, lines = [], [], []
+    source = ""
+    for case in asked:
+        ours = case.ours()
+        off = abs(ours - case.theirs)
+        shares.append(off / case.bound if case.bound else float(off > 0) * 2)
+        if off > case.bound:
+            broken.append(f"{case.source}: {case.says}: {case.theirs:.4g} there, {ours:.4g} here")
+        if case.source != source:
+            lines.append(case.source)
+            source = case.source
+        lines.append(f"  {case.says:<70}{case.theirs:>9.4f}{ours:>9.4f}{case.bound:>9.0e}")
+    head = f"{'':<72}{'theirs':>9}{'ours':>9}{'bound':>9}"
+    named = [f"{where}\n  {why}" for where, why in UNEXPRESSED]
+    foot = f"{len(asked)} claims, {len(asked) - len(broken)} hold"
+    return shares, "\n".join([head, *lines, "", foot, "", "not expressed here:", *named]), broken
+
+
+def draw(path: Path, shares: list[float]) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
+    axes.semilogy([max(share, 1e-6) for share in shares], "o", ms=4)
+    axes.axhline(1.0, color="black", lw=1)
+    axes.set(xlabel="claim", ylabel="difference over its bound", title="Others' tests and textbooks")
+    axes.grid(True, alpha=0.3)
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def main() -> int:
+    chosen = parser(__doc__).parse_args()
+    asked = list(cases())
+    shares, table, broken = answered(asked)
+    if len(asked) < FEWEST:
+        broken.append(f"{len(asked)} claims: at least {FEWEST} are asked")
+    return Page("peer_claims", __doc__, table, broken).publish(chosen, lambda path: draw(path, shares))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,236 @@
+"""The mirror against MuJoCo's own renderer, on models that others made (C0)
+
+Every model is put into five random poses. Each pose is seen twice: from a random direction, and by one of the model's
+own cameras, if it has one (fixed or tracking). In each picture, the geom seen through the centre of every pixel is
+compared with MuJoCo's segmentation renderer. Where they agree, depth is compared with MuJoCo's ray caster. (The
+renderer draws round things as polygons, here of 96 slices; the ray caster knows their exact shapes.)
+
+Bounds: at least 99.5 % of the pixels of every model show the same geom, and of those at least 99.9 % have the same
+depth to 1e-3. The rest are pixels at the limb of what the mirror tessellates. The mirror names what a model has that
+it lacks, and the last column counts these in words.
+
+The models are those in dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium that
+compile by themselves. They are not part of rhabdom: `pip install 'rhabdom[validation]'`, or, where pins conflict,
+`pip install --no-deps --target DIR dm_control gymnasium-robotics` and DIR in PYTHONPATH.
+
+    python -m validation.sim.scene_against_mujoco [--only WORD] [--out DIR] [--docs DIR]
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import sys
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+import sim
+from sim.scene.cameras import Viewpoint
+from sim.scene.mirror import VISIBLE_GROUPS, Mirror, MirrorWarning
+from validation.pages.page import Page, parser
+from validation.sim.mujoco_pictures import Shot, draw
+
+POSES, WIDTH, HEIGHT = 5, 240, 180
+SAME_GEOM, SAME_DEPTH, DEPTH_TOLERANCE = 0.995, 0.999, 1e-3
+# Package, where in it, and which of its files are whole models.
+COLLECTIONS = (
+    ("dm_control", "suite", "*.xml"),
+    ("dm_control", "locomotion", "walkers/assets/**/*.xml"),
+    ("dm_control", "locomotion", "soccer/assets/**/*.xml"),
+    ("dm_control", "third_party", "**/*.xml"),
+    ("gymnasium_robotics", "envs/assets", "*/*.xml"),
+    ("gymnasium", "envs/mujoco/assets", "*.xml"),
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One model: shares of pixels (all, and the worst picture), and what the mirror said that it lacks."""
+
+    name: str
+    geoms: int
+    same_geom: float
+    worst_picture: float
+    same_depth: float
+    lacks: str
+
+
+def model_files() -> Iterator[tuple[str, Path]]:
+    """(name, path) of every file that may be a model."""
+    for package, folder, pattern in COLLECTIONS:
+        found = importlib.util.find_spec(package)
+        for root in (found.submodule_search_locations or []) if found else []:
+            for path in sorted((Path(root) / folder).glob(pattern)):
+                if "touch_sensors" in path.name:
+                    continue  # the same hands with more sites
+                yield f"{package}/{path.relative_to(root)}".removesuffix(".xml"), path
+
+
+def poses(model: mujoco.MjModel, rng: np.random.Generator) -> Iterator[Shot]:
+    """Every joint anywhere in its range, mocap bodies moved and turned; seen from anywhere above the horizon, and by
+    the model's cameras one after the other."""
+    data = mujoco.MjData(model)
+    for i in range(POSES):
+        mujoco.mj_resetData(model, data)
+        for joint in range(model.njnt):
+            move(model, data.qpos, joint, rng)
+        data.mocap_pos += rng.normal(0, 0.1 * model.stat.extent, data.mocap_pos.shape)
+        if model.nmocap:
+            data.mocap_quat[:] = [_quat(rng) for _ in range(model.nmocap)]
+        mujoco.mj_forward(model, data)
+        state = data.qpos.copy(), data.mocap_pos.copy(), data.mocap_quat.copy()
+        moving = data.xipos[1:] if model.nbody > 1 else data.xipos
+        distance = rng.uniform(0.7, 1.5) * model.stat.extent
+        free = np.array([*np.median(moving, axis=0), distance, rng.uniform(-180, 180), rng.uniform(-70, -10)])
+        yield Shot(*state, -1, free)
+        if model.ncam:
+            yield Shot(*state, i % model.ncam, free)
+
+
+def _quat(rng: np.random.Generator) -> np.ndarray:
+    quat = rng.normal(size=4)
+    return quat / np.linalg.norm(quat)
+
+
+def move(model: mujoco.MjModel, qpos: np.ndarray, joint: int, rng: np.random.Generator) -> None:
+    """A joint to anywhere in its range."""
+    kind, at = mujoco.mjtJoint(int(model.jnt_type[joint])), model.jnt_qposadr[joint]
+    if kind == mujoco.mjtJoint.mjJNT_FREE:
+        qpos[at : at + 3] += rng.uniform(-0.1, 0.1, 3) * model.stat.extent
+        qpos[at + 3 : at + 7] = _quat(rng)
+    elif kind == mujoco.mjtJoint.mjJNT_BALL:
+        qpos[at : at + 4] = _quat(rng)
+    elif model.jnt_limited[joint]:
+        qpos[at] = rng.uniform(*model.jnt_range[joint])
+    else:
+        qpos[at] += rng.uniform(-1, 1) * (np.pi if kind == mujoco.mjtJoint.mjJNT_HINGE else 0.1 * model.stat.extent)
+
+
+def compare(name: str, model: mujoco.MjModel) -> Row:
+    """Raises RuntimeError where MuJoCo cannot draw."""
+    shots = list(poses(model, np.random.default_rng(0)))
+    pictures = draw(model, shots, WIDTH, HEIGHT)
+    if pictures is None:
+        raise RuntimeError(f"{name}: MuJoCo's renderer found no OpenGL (MUJOCO_GL=egl or osmesa)")
+    data = mujoco.MjData(model)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", MirrorWarning)
+        mirror = sim.mirror(model)
+    shares, same_depth = [], []
+    for shot, drawn in zip(shots, pictures[0], strict=True):
+        shot.apply(data)
+        mujoco.mj_forward(model, data)
+        mirror.sync(data)
+        same, close = _agreement(mirror, data, shot, drawn)
+        shares.append(same.mean())
+        same_depth.append(close)
+    lacks = "; ".join(str(w.message).removeprefix("not mirrored: ") for w in said if w.category is MirrorWarning)
+    deep = np.concatenate(same_depth)
+    depth = float(deep.mean()) if len(deep) else 1.0
+    return Row(name, len(mirror.geoms), float(np.mean(shares)), float(np.min(shares)), depth, lacks)
+
+
+def _agreement(mirror: Mirror, data: mujoco.MjData, shot: Shot, drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whether each pixel shows the same geom, and whether those that do, and that the ray caster sees too, are at the
+    same depth."""
+    view = _viewpoint(mirror, shot)
+    seen, depth = mirror.render_ids(view, WIDTH, HEIGHT), mirror.render_depth(view, WIDTH, HEIGHT)
+    cast, distance = _cast(mirror, data, view)
+    same = seen == drawn
+    both = same & (seen >= 0) & (cast == seen)
+    return same, np.abs(depth[both] - distance[both]) <= DEPTH_TOLERANCE * distance[both]
+
+
+def _viewpoint(mirror: Mirror, shot: Shot) -> Viewpoint:
+    if shot.camera >= 0:
+        return mirror.viewpoint(shot.camera)
+    return Viewpoint.looking_at(*shot.origin_and_target(), mirror.model.vis.global_.fovy)
+
+
+def _cast(mirror: Mirror, data: mujoco.MjData, view: Viewpoint) -> tuple[np.ndarray, np.ndarray]:
+    """Geom ids (y, x) and depth [m] by mj_multiRay."""
+    rays = view.rays(WIDTH, HEIGHT).reshape(-1, 3)
+    length = np.linalg.norm(rays, axis=1)
+    n = len(rays)
+    ids, distance = np.full(n, -1, np.int32), np.full(n, -1.0)
+    groups = np.array([1, 1, 1, 0, 0, 0], np.uint8)
+    unit = np.ascontiguousarray(rays / length[:, None]).ravel()
+    mujoco.mj_multiRay(mirror.model, data, view.position, unit, groups, True, -1, ids, distance, None, n, 1e9)
+    return ids.reshape(HEIGHT, WIDTH), (distance / length).reshape(HEIGHT, WIDTH)
+
+
+def measure(only: str = "") -> tuple[list[Row], list[str]]:
+    """Rows of the models with `only` in their names, and the files that are no models by themselves."""
+    rows, fragments = [], []
+    for name, path in model_files():
+        if only not in name:
+            continue
+        try:
+            model = mujoco.MjModel.from_xml_path(str(path))
+        except ValueError:
+            fragments.append(name)
+            continue
+        if not np.isin(model.geom_group, VISIBLE_GROUPS).any():
+            fragments.append(name)
+            continue
+        rows.append(compare(name, model))
+        print(_line(rows[-1]), flush=True)
+    return rows, fragments
+
+
+def broken_bounds(rows: list[Row]) -> list[str]:
+    """Every bound that does not hold, in words."""
+    words = [f"{r.name}: {r.same_geom:.3%} of pixels show the same geom" for r in rows if r.same_geom < SAME_GEOM]
+    return words + [f"{r.name}: {r.same_depth:.3%} have the same depth" for r in rows if r.same_depth < SAME_DEPTH]
+
+
+def _line(row: Row) -> str:
+    shares = f"{row.same_geom:9.3%} {row.worst_picture:9.3%} {row.same_depth:9.3%}"
+    return f"{row.name:<66} {row.geoms:5d} {shares}  {row.lacks}"
+
+
+def table(rows: list[Row], fragments: list[str]) -> str:
+    head = f"{'model':<66} {'geoms':>5} {'same id':>9} {'worst':>9} {'depth':>9}  not mirrored"
+    worst = f"{'the worst':<66} {'':5} {min(r.same_geom for r in rows):9.3%} {min(r.worst_picture for r in rows):9.3%} "
+    worst += f"{min(r.same_depth for r in rows):9.3%}"
+    count = f"{len(rows)} models; {len(fragments)} more files are parts of models"
+    return "\n".join([head, *map(_line, rows), worst, count])
+
+
+def draw_figure(rows: list[Row], path: Path) -> None:
+    """What is missing to full agreement, per model."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 0.16 * len(rows) + 1.5), layout="constrained")
+    axes, y = figure.subplots(), np.arange(len(rows))
+    for values, bar, color, label in (
+        ([r.same_geom for r in rows], SAME_GEOM, "#0072B2", "another geom than MuJoCo's renderer"),
+        ([r.same_depth for r in rows], SAME_DEPTH, "#D55E00", "of these, another depth than its ray caster"),
+    ):
+        axes.plot(np.maximum(1 - np.array(values), 1e-6), y, "o", ms=3, color=color, label=label)
+        axes.axvline(1 - bar, color=color, lw=1, ls=":")
+    axes.set_yticks(y, [r.name for r in rows], fontsize=5)
+    axes.set(xscale="log", xlabel="share of pixels (dotted: the bars)", ylim=(len(rows), -1))
+    axes.legend(frameon=False, fontsize=8)
+    figure.savefig(path, dpi=110)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    asked = parser(__doc__)
+    asked.add_argument("--only", default="", help="models with this in their names")
+    options: argparse.Namespace = asked.parse_args(arguments)
+    rows, fragments = measure(options.only)
+    if not rows:
+        print("no models found: pip install 'rhabdom[validation]', or another --only", file=sys.stderr)
+        return 2
+    page = Page("scene_against_mujoco", __doc__, table(rows, fragments), broken_bounds(rows))
+    return page.publish(options, lambda path: draw_figure(rows, path))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
