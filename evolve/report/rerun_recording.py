@@ -16,7 +16,7 @@ import numpy as np
 
 from evolve.analysis.episode import Episode
 from evolve.report.picture import display
-from evolve.report.rerun_bodies import EYES, draw_bodies
+from evolve.report.rerun_bodies import EYES, draw_bodies, draw_goal_region
 from evolve.report.rerun_layout import layout
 from evolve.report.rerun_stream import RerunStream, require_rerun
 from evolve.store.atomic_files import unfinished
@@ -55,6 +55,8 @@ def write_recording(episode: Episode, path: Path) -> Path:
 def _write(to: RerunStream, episode: Episode) -> None:
     to.always(("world",), to.rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     draw_bodies(to, episode.scene, episode.eyes)
+    if episode.plan is not None:
+        draw_goal_region(to, episode.plan)
     _look(to, episode)
     _count(to, episode)
     _end(to, episode)

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from evolve.analysis.filmed_episode import film
+from evolve.analysis.recorder import Recorder
 from evolve.learning.animal_task import animal_task
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
@@ -57,7 +57,7 @@ def life(tmp_path_factory):
 @pytest.fixture(scope="module")
 def episode(life):
     config, animal, policy = life
-    return film(animal, config, policy, 0, SEED, 8)
+    return Recorder(animal, config, policy).play(0, SEED)
 
 
 @pytest.fixture(scope="module")
