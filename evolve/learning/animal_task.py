@@ -45,7 +45,8 @@ def animal_task(
 def azimuths(phenotype: Phenotype, config: RunConfig) -> np.ndarray:
     """Directions of the animal's eyes [rad], (eye,), in the frame of what they are on. No world is built.
 
-    Raises: as `animal_task`.
+    Raises:
+        ConfigError, ValueError: as `animal_task`.
     """
     if (code := config.choice.named_code) is not None:
         return batched(embodied(executed_task(code), phenotype, config)).azimuths()

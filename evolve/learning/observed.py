@@ -45,7 +45,8 @@ class Entry:
         """Inverse of `record`.
 
         Raises:
-            TypeError, ValueError: it is no such entry.
+            TypeError: it is no list.
+            ValueError: it is no such entry.
         """
         name, size, low, high = stored
         if not isinstance(name, str):

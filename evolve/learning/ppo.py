@@ -78,7 +78,7 @@ class AdaptingPPO(PPO):
     policy: EyePolicy
 
     def __init__(self, worlds: VecEnv, brain: Brain, config: LearningConfig, seed: int) -> None:
-        self.config, self.task = config, task_of(worlds)
+        self.config, self.task = config, batch_task_of(worlds)
         torch.set_num_threads(1)
         seed = int(np.random.SeedSequence(seed).generate_state(1)[0])  # SB3 takes 32 bits
         super().__init__(
@@ -236,7 +236,7 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
     observation = worlds.reset()
     returns = np.zeros(worlds.num_envs)
     playing = np.ones(worlds.num_envs, bool)
-    task = task_of(worlds)
+    task = batch_task_of(worlds)
     verdicts: list[bool | None] = [None] * worlds.num_envs
     while playing.any():
         action, _ = policy.predict(observation, deterministic=True)
@@ -250,7 +250,7 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
     return Episodes(returns, np.array([VERDICTS[verdict] for verdict in verdicts]))
 
 
-def task_of(worlds: VecEnv) -> BatchTask:
+def batch_task_of(worlds: VecEnv) -> BatchTask:
     """The task of these worlds."""
     task: BatchTask = worlds.get_attr("batch_task")[0]
     return task

@@ -203,7 +203,7 @@ def test_it_opens_with_the_world_the_eyes_and_how_it_ended(columns, episode, tmp
     shown = views(episode, tmp_path)
     there = {entity for entity, _ in columns}
     elsewhere = {origin for origins in shown.values() for origin in origins} - there
-    assert elsewhere <= {"/world", "/action"}, "or what is below them"
+    assert elsewhere <= {"/world", "/action", "/feels"}, "or what is below them"
     assert shown["TextLog"] == {"/outcome"}
     eyes = {entity for entity, _ in columns if entity.startswith("/world/eyes/")}
     assert eyes

@@ -56,12 +56,13 @@ def test_pictures_are_there_of_every_eye_at_every_time(columns, episode):
 
 
 def test_eyes_are_cameras_that_look_where_the_eyes_look(columns, episode):
-    """A point straight ahead of an eye is on its camera's axis: R (0, 0, 1) = (cos azimuth, sin azimuth, 0)."""
+    """A point straight ahead of an eye is on its camera's axis: R (0, 0, 1) = (cos, sin, 0) of heading + azimuth."""
     for name, azimuth in zip(("left", "right"), np.radians([30, -30]), strict=True):
-        (frame,) = frames(columns, f"/world/eyes/{name}")
-        np.testing.assert_allclose(frame @ [0, 0, 1], [np.cos(azimuth), np.sin(azimuth), 0], atol=1e-6)
-        np.testing.assert_allclose(frame @ [0, -1, 0], [0, 0, 1], atol=1e-6, err_msg="up")
-        assert np.linalg.det(frame) == pytest.approx(1, abs=1e-6)
+        turned, angle = frames(columns, f"/world/eyes/{name}"), episode.heading + azimuth
+        ahead = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+        np.testing.assert_allclose(turned @ [0, 0, 1], ahead, atol=1e-6)
+        np.testing.assert_allclose(turned @ [0, -1, 0], [[0, 0, 1]] * len(turned), atol=1e-6, err_msg="up")
+        np.testing.assert_allclose(np.linalg.det(turned), 1, atol=1e-5)
         camera = columns[f"/world/eyes/{name}", "Pinhole:image_from_camera"][0][0]
         assert camera[0] == pytest.approx(5 / (2 * np.tan(np.radians(33) / 2)), rel=1e-6)
 
