@@ -38,7 +38,7 @@ from experiments.fitness_landscape import (
 from experiments.glass import blur, power
 from experiments.means import LAST
 from experiments.page import Figure, Page, markdown_table, new_figure, parser, save, told
-from experiments.store import Origin, read_rows, write_rows
+from experiments.store import RECORDS, Origin, read_rows, write_rows
 
 __all__ = ["CASES", "Check", "Searched", "Told", "page", "searched"]
 
@@ -240,7 +240,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _made(chosen: Namespace) -> None:
     data = chosen.docs / "data"
-    run = Run.open(chosen.docs / "records" / RECORD)
+    run = Run.open(RECORDS / RECORD)
     lives = [*lenses(read_rows(Trained, data / f"{sharp_lenses.NAME}.csv")), *WIDE, *holes(run)]
     landscape, stored = fitted(lives), data / f"{NAME}.csv"
     if chosen.compute:

@@ -15,9 +15,10 @@ from typing import Any, TypeVar, get_type_hints
 from evolve.store.atomic_files import write_whole
 from evolve.store.versions import present
 
-__all__ = ["DATA", "Origin", "read_rows", "write_rows"]
+__all__ = ["DATA", "RECORDS", "Origin", "read_rows", "write_rows"]
 
 DATA = Path("docs/results/data")
+RECORDS = Path(__file__).parent / "records"  # of runs: their settings, and a line per candidate
 Row = TypeVar("Row")
 
 

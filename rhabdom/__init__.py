@@ -13,14 +13,9 @@ command    the command `evolve`
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rhabdom.importing import NAMES, come_first
-
-if TYPE_CHECKING:
-    import evolve
-    import optics
-    import sim
 
 __all__ = ["__version__", "evolve", "optics", "sim"]
 

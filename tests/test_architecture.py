@@ -36,6 +36,13 @@ def imported_at(path: Path) -> dict[str, bool]:
     return found
 
 
+def test_rhabdom_imports_no_package_that_imports_it():
+    """Not for type checking either: `__init__.pyi` says the types."""
+    above = {"optics", "sim", "evolve"}
+    circles = {path.name: above & imported_at(path).keys() for path in (ROOT / "rhabdom").glob("*.py")}
+    assert not any(circles.values()), circles
+
+
 @pytest.mark.parametrize("package", PACKAGES)
 def test_importing_a_package_loads_nothing_heavy(package):
     heavy = ("torch", "mitsuba", "drjit", "mujoco", "nevergrad", "stable_baselines3", "colour", "matplotlib", "scipy")

@@ -6,7 +6,7 @@ expect, and the picture if asked. `optics.point_spread.planner` chooses.
 textbook             the angular spectrum in plain NumPy: start here
 carrier              the phase of a sphere, split off fields and put back
 problem              Problem: what is to be computed, in numbers
-sampling             Sampling: what every method offers
+method_sampling      Sampling: what every method offers
 rayleigh_sommerfeld  the direct sum: the reference
 angular_spectrum     by transforms on grids, whole or with its paraxial part split off
 pixelated_spectrum   the same for pupils made of pixels

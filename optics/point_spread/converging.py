@@ -11,8 +11,8 @@ import numpy as np
 
 from optics.elements.beam import Beam
 from optics.elements.ray_field import SCALAR, RayField, Weights
+from optics.methods.method_sampling import WithField
 from optics.methods.problem import Problem
-from optics.methods.sampling import WithField
 from optics.methods.smythe import ALONG_X, smythe
 from optics.methods.vector_sum import VectorSum
 from optics.numerics.accuracy import AccuracyError, Plan

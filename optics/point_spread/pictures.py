@@ -10,8 +10,8 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from optics.methods.geometric import NoDerivativesError
+from optics.methods.method_sampling import Sampling, WithField
 from optics.methods.problem import Problem
-from optics.methods.sampling import Sampling, WithField
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field

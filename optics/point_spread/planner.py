@@ -33,10 +33,10 @@ from optics.methods.fresnel import fraunhofer, fresnel
 from optics.methods.geometric import geometric, pinhole
 from optics.methods.hankel import hankel
 from optics.methods.low_rank import low_rank
+from optics.methods.method_sampling import Sampling
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
-from optics.methods.sampling import Sampling
 from optics.numerics.accuracy import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Option, Plan
 from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, WINDOW_SAMPLE
 

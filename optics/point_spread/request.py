@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
+from optics.methods.method_sampling import Sampling
 from optics.methods.problem import Problem
-from optics.methods.sampling import Sampling
 from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.arguments import one_of
 from optics.numerics.autodiff import Scalar

@@ -24,8 +24,8 @@ from optics.numerics.arguments import complexes, finite, in_range, shown, vacuum
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum, predicted_seconds
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import Precision, precision
-from optics.propagation.sampling import TransformSampling, blur_left, blurred_back, most_spare, sampling
 from optics.propagation.transfer_function import EVERYTHING, Passage, TransferFunction, evanescent
+from optics.propagation.transform_sampling import TransformSampling, blur_left, blurred_back, most_spare, sampling
 
 __all__ = ["PROPAGATION_METHODS", "WRAP_RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
 

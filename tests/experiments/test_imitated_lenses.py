@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,10 +12,10 @@ from experiments import imitated_lenses
 from experiments.designed import Design
 from experiments.fitness_landscape import SPREAD, Landscape, Life, behind_glass, fitted, holes, opening
 from experiments.imitated_lenses import Check, Told, page, searched
-from experiments.store import Origin
+from experiments.store import RECORDS, Origin
 
 TRUE = Landscape(5.0, 300.0, 0.3, 2.5, 1.2, 1.5)
-RECORD = Path(__file__).parents[2] / "docs/results/records" / imitated_lenses.RECORD
+RECORD = RECORDS / imitated_lenses.RECORD
 
 
 @pytest.fixture

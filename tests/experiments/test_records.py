@@ -16,10 +16,10 @@ from experiments import candidates
 from experiments.candidates import Row, complete, rows_of
 from experiments.designed import Trained
 from experiments.evolved import stored
-from experiments.store import Origin, read_rows, write_rows
+from experiments.store import RECORDS, Origin, read_rows, write_rows
 
 RESULTS = Path(__file__).parents[2] / "docs/results"
-RECORDS = sorted((RESULTS / "records").iterdir())
+RUNS = sorted(RECORDS.iterdir())
 PAGES = {
     "bending_light": {
         "lens": ("lens-003-0", "lens-003-1", "lens-003-2"),
@@ -40,7 +40,7 @@ PAGES = {
 OPTICAL = ("image_quality", "above_noise", "above_noise_of_hole", "strehl", "psnr_db", "ssim")
 
 
-@pytest.mark.parametrize("record", RECORDS, ids=lambda path: path.name)
+@pytest.mark.parametrize("record", RUNS, ids=lambda path: path.name)
 def test_record_is_a_run(record):
     run = Run.open(record)
     assert run.notice is None
@@ -63,7 +63,7 @@ class Nobody:
         return iter(())
 
 
-@pytest.mark.parametrize("record", RECORDS, ids=lambda path: path.name)
+@pytest.mark.parametrize("record", RUNS, ids=lambda path: path.name)
 def test_search_still_proposes_what_is_on_record(record, tmp_path):
     """So that a record goes on where it ends: the loop asks for the first animal that is missing, and for no other."""
     run = Run.open(shutil.copytree(record, tmp_path / "run"))
@@ -83,7 +83,7 @@ def test_search_still_proposes_what_is_on_record(record, tmp_path):
 @pytest.mark.parametrize("page", PAGES)
 def test_pages_hold_what_is_on_record(page, tmp_path, monkeypatch):
     """Optical measures of each run's last generation alone: one eye takes seconds."""
-    runs = [(group, Run.open(RESULTS / "records" / name)) for group, names in PAGES[page].items() for name in names]
+    runs = [(group, Run.open(RECORDS / name)) for group, names in PAGES[page].items() for name in names]
     late = {id(c.phenotype) for _, run in runs for c in run.generation(complete(run)[-1])}
     seen = candidates._seen
     monkeypatch.setattr(candidates, "_seen", lambda config, animal: seen(config, animal) if id(animal) in late else {})

@@ -13,7 +13,7 @@ from evolve.config.run_config import ConfigError
 from evolve.store.directory import Run, RunError
 from tests.evolve.first_form import of_first_form
 
-RECORDS = Path(__file__).parents[3] / "docs/results/records"
+RECORDS = Path(__file__).parents[3] / "experiments/records"
 FORMER = 'task = "navigation"\n[world]\nmazes = 3\n[learning]\nrays_per_eye = 32.0\ngamma = 0.5\n'
 
 

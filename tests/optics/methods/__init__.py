@@ -13,7 +13,7 @@ problem: point_spread/test_planner.py
 pupil_sampling: test_textbook.py, elements/test_pixel_relief.py
 rayleigh_sommerfeld: test_textbook.py, test_oracles_circular.py
 rays: test_geometric.py
-sampling: point_spread/test_planner.py
+method_sampling: point_spread/test_planner.py
 scalar_theory: test_scalar_theory.py
 sine_samples: test_sine_samples.py
 smythe: point_spread/test_vector_focus.py

@@ -2,7 +2,7 @@
 
 planes: test_system.py
 propagate: test_propagate.py
-sampling: test_sampling.py
+transform_sampling: test_transform_sampling.py
 system: test_system.py
 transfer_function: test_propagate.py
 """

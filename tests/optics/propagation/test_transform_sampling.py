@@ -7,8 +7,8 @@ import pytest
 
 import optics
 from optics.numerics.grid import Grid
-from optics.propagation.sampling import blurred_back, sampling
 from optics.propagation.transfer_function import EVERYTHING, Passage
+from optics.propagation.transform_sampling import blurred_back, sampling
 
 WAVELENGTH = 550e-9
 # [m] of room: blur falls to a fifth (disk near the window) ... a thirtieth of what it is with next to none, which moves
