@@ -46,7 +46,8 @@ def azimuths(phenotype: Phenotype, config: RunConfig) -> np.ndarray:
     """Directions of the animal's eyes [rad], (eye,), in the frame of what they are on. No world is built.
 
     Raises:
-        ConfigError, ValueError: as `animal_task`.
+        ConfigError: as `animal_task`.
+        ValueError: as `animal_task`.
     """
     if (code := config.choice.named_code) is not None:
         return batched(embodied(executed_task(code), phenotype, config)).azimuths()
