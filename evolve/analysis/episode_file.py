@@ -14,6 +14,7 @@ import numpy as np
 
 from evolve.analysis.episode import Episode, Pictures
 from evolve.analysis.episode_scene import EpisodeScene
+from evolve.config.checks import check_values
 from evolve.config.formats import task_then
 from evolve.config.run_config import EyeConfig, WorldConfig
 from evolve.genome.phenotype import Phenotype
@@ -84,7 +85,7 @@ def load_episode(path: Path | str) -> Episode:
 
 
 def _of_second_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
-    rest["world"] = WorldConfig(**rest["world"])
+    rest["world"] = _checked_world(rest["world"])
     rest["commands"] = tuple(Command(**command) for command in rest["commands"])
     rest["beside"] = _taken(arrays, "beside_")
     solids = tuple(_solid(solid, number, arrays) for number, solid in enumerate(rest.pop("solids")))
@@ -100,7 +101,7 @@ def _of_first_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
     """Episodes of built-in tasks, whose world is built again."""
     if "course" not in rest.setdefault("world", {}):
         rest["task"] = task_then(rest["task"])
-    rest["world"] = WorldConfig(**rest["world"])
+    rest["world"] = _checked_world(rest["world"])
     where, eyes = rest["world"].evaluation, rest["phenotype"].eyes(rest["eye"])
     world = build_world(rest["task"], seed=where["world_seed"], mazes=where["mazes"], course=where["course"])
     task, position, heading = task_of(world, "evaluation", eyes=eyes), arrays["position"], arrays["heading"]
@@ -126,6 +127,13 @@ def _of_first_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
         scene=EpisodeScene.of(world.model, solids_of(world.model), poses, mounts_of_agent(eyes)),
         plan=task.ground_plan(position[0]),
     )
+
+
+def _checked_world(stored: Mapping[str, Any]) -> WorldConfig:
+    """Settings of the world, within their ranges: a world of a billion mazes is never built."""
+    world = WorldConfig(**stored)
+    check_values(world, prefix="world.")
+    return world
 
 
 def _solved(goal: np.ndarray, adversary: np.ndarray, adversary_first: np.ndarray | None) -> bool:

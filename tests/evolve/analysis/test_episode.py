@@ -233,6 +233,14 @@ def test_a_maze_is_that_which_was_walked_through(episode, tmp_path):
     assert load_episode(tmp_path / "old.npz").world == WorldConfig()
 
 
+def test_files_of_worlds_out_of_range_are_refused(episode, tmp_path):
+    """By the setting's name, before anything is built."""
+    columns, rest = of_first_form(dataclasses.replace(episode, task="maze", world=WorldConfig(mazes=10**9)))
+    np.savez(tmp_path / "large.npz", rest=np.array(json.dumps(rest)), **columns)
+    with pytest.raises(ValueError, match=r"large\.npz holds no episode: world\.mazes = 1000000000: must be"):
+        load_episode(tmp_path / "large.npz")
+
+
 def test_archives_that_would_fill_the_memory_are_refused(tmp_path, monkeypatch):
     """By their directory, before anything is unpacked; and what is no file at all."""
     bomb = tmp_path / "bomb.npz"
