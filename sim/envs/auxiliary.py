@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from gymnasium import spaces
 
-from sim.render.model_renderer import ModelRenderer
+from sim.render.labels import Labels
 from sim.render.optic_flow import flow_between
 from sim.scene.poses import Poses
 from sim.tasks.eye_kinds import AUXILIARY
@@ -30,7 +30,7 @@ class Auxiliary:
             was not before the eye then
     """
 
-    def __init__(self, renderer: ModelRenderer, names: Sequence[str], prefix: str = "") -> None:
+    def __init__(self, renderer: Labels, names: Sequence[str], prefix: str = "") -> None:
         self._renderer, self._names, self._prefix = renderer, tuple(names), prefix
         frame, geoms = (len(renderer.mounts), *renderer.eye.resolution), renderer.model.ngeom
         known: dict[str, spaces.Box] = {

@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from sim.envs.observation import ROUNDING, SIGMAS, Memory
-from sim.envs.renderers import Renderer
+from sim.render.eye_renderer import EyeRenderer
 from sim.render.pending_frame import PendingFrame
 from sim.render.receptor_noise import NoiseModel, Normals
 from sim.scene.poses import Poses
@@ -21,7 +21,7 @@ class EyesOfKind:
     space: of one world's observation of them
     """
 
-    def __init__(self, simulation: Simulation, renderer: Renderer, keys: np.ndarray, memory: int) -> None:
+    def __init__(self, simulation: Simulation, renderer: EyeRenderer, keys: np.ndarray, memory: int) -> None:
         self.renderer, self._simulation = renderer, simulation
         self._wavelengths = np.asarray(renderer.eye.spectral_bands.wavelengths)
         self.memory, self._noise = Memory(memory), NoiseModel.of(renderer.eye)

@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import drjit as dr
 
-from sim.envs.renderers import Renderer, renderers_for, scenes_for
+from sim.envs.renderers import renderers_for, scenes_for
 from sim.envs.vec_env import EyesVecEnv
 from sim.render.edge_rays import FIRST
+from sim.render.eye_renderer import EyeRenderer
 from sim.render.fidelity import EDGES, RAYS, Fidelity
 from sim.render.fidelity_choice import chosen_fidelity
 from sim.scene.variation import Variation
@@ -102,7 +103,7 @@ class PreparedTask:
         renderers = renderers_for(simulation, simulation.agents, self.fidelities, self._scenes)
         return EyesVecEnv(simulation, renderers, memory, render_mode)
 
-    def renderer(self, simulation: Simulation) -> Renderer:
+    def renderer(self, simulation: Simulation) -> EyeRenderer:
         """Of the first agent's eyes in these worlds, which may be of the same task with other eyes."""
         (first,) = renderers_for(simulation, self.task.agents()[:1], self.fidelities[:1], self._scenes)
         assert first is not None

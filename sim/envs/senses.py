@@ -9,7 +9,8 @@ from gymnasium import spaces
 
 from sim.envs.auxiliary import Auxiliary
 from sim.envs.eyes_of_kind import EyesOfKind
-from sim.envs.renderers import AgentRenderers, Renderer
+from sim.envs.renderers import AgentRenderers
+from sim.render.eye_renderer import EyeRenderer
 from sim.render.pending_frame import PendingFrame
 from sim.scene.poses import Poses
 from sim.tasks.simulation import Simulation
@@ -44,7 +45,7 @@ class Senses:
         self.action = np.tile(self.agent.first_action, (simulation.n, 1))
 
     @property
-    def renderer(self) -> Renderer:
+    def renderer(self) -> EyeRenderer:
         """Its eyes of the first kind."""
         return next(iter(self.sights.values())).renderer
 

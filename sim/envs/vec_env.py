@@ -12,9 +12,10 @@ import numpy as np
 from sim.envs import held_state
 from sim.envs.animals import Advanced, Animals
 from sim.envs.one_environment import OneEnvironment
-from sim.envs.renderers import AgentRenderers, Renderer
+from sim.envs.renderers import AgentRenderers
 from sim.envs.senses import Arrays, Senses
 from sim.envs.world_pictures import WorldPictures
+from sim.render.eye_renderer import EyeRenderer
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.encounter import Encounter
 from sim.tasks.outcome import Step
@@ -82,7 +83,7 @@ class EyesVecEnv(OneEnvironment):
         return self.simulation.physics
 
     @property
-    def renderer(self) -> Renderer:
+    def renderer(self) -> EyeRenderer:
         """The eyes of the agent that learns; of the first, if several do, and of the first kind it has."""
         return self._learners[0].renderer
 

@@ -56,6 +56,20 @@ class RayLight:
     plane: np.ndarray
 
 
+@dataclass(frozen=True)
+class CameraInputs:
+    """What kernels read of a mirror, the same for every picture.
+
+    samples: of a pixel, in twos [pixels] · weights: of the suns, in fours · closed: of each shape, whether a
+    camera within looks out of it · bsdfs: unused; BSDFs among the inputs make the recording collect their textures
+    """
+
+    samples: Array
+    weights: Array
+    closed: Array
+    bsdfs: Array
+
+
 class CameraRays:
     """Traces rays of cameras through one mirror, in the pose that the mirror has when it is asked."""
 
@@ -71,13 +85,12 @@ class CameraRays:
                 [_sun_weight(light) if k in self._suns else [0.0] * 4 for k, light in enumerate(self._lights)]
             )
             samples = np.pad(SAMPLES, ((0, CODES - len(SAMPLES)), (0, 0)))
-            self._inputs: dict[str, Any] = {
-                "samples": floats(samples),
-                "weights": floats(np.append(weights, np.zeros(4))),
-                "closed": whole_numbers(_closed(mirror)),
-                # BSDFs among the inputs make the recording collect their textures.
-                "bsdfs": mi.BSDFPtr([shape.bsdf() for shape in scene.shapes()]),
-            }
+            self._inputs = CameraInputs(
+                floats(samples),
+                floats(np.append(weights, np.zeros(4))),
+                whole_numbers(_closed(mirror)),
+                mi.BSDFPtr([shape.bsdf() for shape in scene.shapes()]),
+            )
             self._outside: Any = dr.freeze(lambda *args: self._trace(False, *args))
             self._inside: Any = dr.freeze(lambda *args: self._trace(True, *args))
 
@@ -99,12 +112,12 @@ class CameraRays:
         return int(self._outside.n_recordings + self._inside.n_recordings)
 
     def _trace(
-        self, inside: bool, scene: MitsubaObject, codes: Array, pose: Array, inputs: dict[str, Array]
+        self, inside: bool, scene: MitsubaObject, codes: Array, pose: Array, inputs: CameraInputs
     ) -> tuple[Array, ...]:
-        ray, axes = _ray(codes, pose, inputs["samples"])
+        ray, axes = _ray(codes, pose, inputs.samples)
         si = scene.ray_intersect(ray, WANTED, COHERENT)
         if inside:
-            si = _looked_out_of(scene, si, ray, inputs["closed"])
+            si = _looked_out_of(scene, si, ray, inputs.closed)
         si.wavelengths = mi.Spectrum(*WAVELENGTHS_NM)
         light = self._direct_light(scene, si, codes, pose, inputs)
         rgb = [sum(float(w) * light[b] for b, w in enumerate(row)) for row in SRGB]
@@ -112,9 +125,7 @@ class CameraRays:
         plane = [dr.select(si.is_valid() & (away != 0), dr.dot(si.n, axis) / away, 0) for axis in axes.directions]
         return *rgb, *plane
 
-    def _direct_light(
-        self, scene: MitsubaObject, si: Array, codes: Array, pose: Array, inputs: dict[str, Array]
-    ) -> Array:
+    def _direct_light(self, scene: MitsubaObject, si: Array, codes: Array, pose: Array, inputs: CameraInputs) -> Array:
         bsdf, valid = si.bsdf(), si.is_valid()
         reflected = bsdf.eval_diffuse_reflectance(si, valid) * dr.inv_pi if self._matt else None
         seen_from = dr.dot(si.n, si.to_world(si.wi))
@@ -122,7 +133,7 @@ class CameraRays:
         for k, light in enumerate(self._lights):
             if k in self._suns:
                 towards = mi.Vector3f(*list(dr.gather(mi.Vector4f, pose, mi.UInt32(_VIEW + k)))[:3])
-                weight = mi.Spectrum(dr.gather(mi.Vector4f, inputs["weights"], mi.UInt32(k)))
+                weight = mi.Spectrum(dr.gather(mi.Vector4f, inputs.weights, mi.UInt32(k)))
                 reaches, shadow = valid, si.spawn_ray(towards)
             else:
                 drawn = mi.Point2f(mi.sample_tea_float32(codes, 2 * k), mi.sample_tea_float32(codes, 2 * k + 1))

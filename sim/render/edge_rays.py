@@ -10,6 +10,7 @@ and fills no neighbour.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -18,55 +19,55 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.eyes.sampling import BoxSampling, beyond_rim_of
-from sim.render.model_wavefront import ModelWavefront
+from sim.render.ray_kernel import Frame, KernelInputs, RayKernel
 from sim.scene.device_arrays import as_whole_numbers
-from sim.scene.poses import Poses
-from sim.scene.variant import MitsubaObject
 
+Launch = Callable[[Any, KernelInputs], Callable[[], np.ndarray]]  # starts a frozen kernel; that waits for it
 FIRST = 4  # rays through every receptor's square
 
 
 class EdgeRays:
-    """What `ModelWavefront.light` finds with `fine`'s rays, from fewer.
+    """What `RayKernel.sums` finds with so many rays, from fewer.
 
-    wavefront: of a sensor with FIRST rays per receptor
+    kernel: follows the rays
     sampling: of the receptors · rays: per receptor, at edges
     signals: what a component is worth to each type of receptor, (channel, component)
     noticed: rays whose signals differ by no more are alike
     """
 
     def __init__(
-        self, wavefront: ModelWavefront, sampling: BoxSampling, rays: float, signals: np.ndarray, noticed: float
+        self, kernel: RayKernel, sampling: BoxSampling, rays: float, signals: np.ndarray, noticed: float
     ) -> None:
         fine = sampling.sensor(rays)
-        self._wavefront, self._rays, self._noticed = wavefront, fine.rays_per_receptor, noticed
+        self._kernel, self._rays, self._noticed = kernel, fine.rays_per_receptor, noticed
         self._beyond = beyond_rim_of(sampling.eye.resolution)
         self._signals = [[float(worth) for worth in channel] for channel in signals]
         self._coarse: Any = dr.freeze(lambda *args: self._look_once(*args))
         self._fine: Any = dr.freeze(lambda *args: self._look_again(*args))
         first = np.concatenate([sampling.sensor(FIRST).directions, sampling.beyond_rim(FIRST)])
-        self._first, self._along = wavefront.look(first), wavefront.look(fine.directions)
+        self._first, self._along = kernel.inputs(first), kernel.inputs(fine.directions)
 
-    def launch(self, poses: Poses, eyes: np.ndarray) -> Callable[[], np.ndarray]:
+    def launch(self, launch: Launch) -> Callable[[], np.ndarray]:
         """Start to look; what is returned waits for it: sums over FIRST rays, flat (component, world, eye, receptor),
-        as if so many were traced everywhere."""
-        found = self._wavefront.launch(self._coarse, self._first, poses, eyes)
-        return lambda: self._refined(found())
+        as if so many were traced everywhere. launch: starts a frozen kernel in worlds that stay as they are until
+        then."""
+        found = launch(self._coarse, self._first)
+        return lambda: self._refined(found(), launch)
 
     @property
     def recordings(self) -> int:
         """How often the kernels were recorded."""
         return int(self._coarse.n_recordings + self._fine.n_recordings)
 
-    def _refined(self, found: np.ndarray) -> np.ndarray:
+    def _refined(self, found: np.ndarray, launch: Launch) -> np.ndarray:
         cells = found.reshape(len(found), -1, self._beyond.size)  # (component or spread, view, receptor or beyond)
         receptors = np.count_nonzero(~self._beyond)
         light, spread = cells[:-1, :, :receptors].reshape(len(found) - 1, -1), cells[-1, :, :receptors].ravel()
         edges = np.flatnonzero((spread > self._noticed) | self._beside_edges(cells[:-1]))
         if len(edges):
             lanes = (self._rays * edges[:, None] + np.arange(self._rays)).ravel()
-            look = {**self._along, "lanes": mi.UInt32(as_whole_numbers(lanes))}
-            light[:, edges] = self._wavefront.again(self._fine, look)() * (FIRST / self._rays)
+            inputs = replace(self._along, lanes=mi.UInt32(as_whole_numbers(lanes)))
+            light[:, edges] = launch(self._fine, inputs)() * (FIRST / self._rays)
         return light.ravel()
 
     def _beside_edges(self, light: np.ndarray) -> np.ndarray:
@@ -84,11 +85,9 @@ class EdgeRays:
             found[:, *other] |= apart
         return found[:, 1:-1, 1:-1].ravel()
 
-    def _look_once(
-        self, still: MitsubaObject, meshes: list[MitsubaObject], buffers: dict[str, Array], look: dict[str, Array]
-    ) -> tuple[Array, ...]:
+    def _look_once(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
         """Sums over each receptor's rays, per component, and how far apart their signals are."""
-        components, _ = self._wavefront.components(still, buffers, look)
+        components = self._kernel.layers(scenes, frame, inputs)
         signals = [sum(w * c for w, c in zip(worth, components, strict=True)) for worth in self._signals]
         dr.eval(components, signals)  # once, as sums of neighbours would trace all rays again for every component
         spread = mi.Float(0)
@@ -97,11 +96,9 @@ class EdgeRays:
             spread = dr.maximum(spread, highest - lowest)
         return *_sums(components, FIRST), spread
 
-    def _look_again(
-        self, still: MitsubaObject, meshes: list[MitsubaObject], buffers: dict[str, Array], look: dict[str, Array]
-    ) -> tuple[Array, ...]:
+    def _look_again(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
         """Sums over the rays of the receptors that are looked at again, per component."""
-        components, _ = self._wavefront.components(still, buffers, look)
+        components = self._kernel.layers(scenes, frame, inputs)
         dr.eval(components)
         return _sums(components, self._rays)
 

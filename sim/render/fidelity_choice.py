@@ -16,8 +16,8 @@ from sim.eyes.eyes import Eyes
 from sim.render import fidelity_stages as stages
 from sim.render.fidelity import Fidelity, fidelity_asked
 from sim.render.fidelity_trials import FidelityTrials
-from sim.render.prepared_scene import PreparedScene
 from sim.render.sample_choice import fewest_samples
+from sim.render.world_scene import WorldScene
 from sim.worlds.world import World
 
 # Chosen, of the tolerance; errors add up as squares, so that √(1 - 2 · 0.35² - 0.5²) = 0.71 of it is left to samples.
@@ -49,13 +49,13 @@ def choose_fidelity(
         raise ValueError(f"bands = {bands!r}: must be 'auto' or 'own'")
     allowed = allowed_error(eyes.eye(), tolerance)
     if bands == "own":
-        return chosen_fidelity(PreparedScene(world, eyes, tracer), allowed)
+        return chosen_fidelity(WorldScene(world, eyes, tracer), allowed)
     n_bands, level = stages.bands(eyes.eye(), SHARE_OF_BANDS * allowed)
-    fidelity = chosen_fidelity(PreparedScene(world, replace(eyes, bands=n_bands), tracer), allowed)
+    fidelity = chosen_fidelity(WorldScene(world, replace(eyes, bands=n_bands), tracer), allowed)
     return replace(fidelity, levels=(level, *fidelity.levels[1:]))
 
 
-def fidelity_for(scene: PreparedScene, rays_per_receptor: float | str) -> Fidelity:
+def fidelity_for(scene: WorldScene, rays_per_receptor: float | str) -> Fidelity:
     """What these words mean in a scene: so many rays in direct light, or, "auto", what is chosen.
 
     Raises:
@@ -64,7 +64,7 @@ def fidelity_for(scene: PreparedScene, rays_per_receptor: float | str) -> Fideli
     return fidelity_asked(rays_per_receptor, scene.eyes) or chosen_fidelity(scene)
 
 
-def chosen_fidelity(scene: PreparedScene, tolerance: float | None = None) -> Fidelity:
+def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fidelity:
     """What `choose_fidelity` gives for a scene that has been prepared, with the bands that it has."""
     eyes, eye, trials = scene.eyes, scene.eye, FidelityTrials(scene)
     allowed = allowed_error(eye, tolerance)

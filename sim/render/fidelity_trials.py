@@ -18,15 +18,18 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.eyes.depth_layers import DepthLayers
+from sim.eyes.eyes import BODY_RADIUS
 from sim.eyes.sampling import BoxSampling, EyeSampling, Trial
-from sim.render.prepared_scene import PreparedScene
 from sim.render.random_views import RandomViews, near_views, on_objects, random_views
+from sim.render.ray_kernel import SECOND
+from sim.render.world_scene import WorldScene
 from sim.scene.device_arrays import floats
 from sim.scene.variant import variant
 from sim.tracing import lighting
 from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.areas.illumination import Moment
 from sim.tracing.areas.patch import Area
+from sim.tracing.eye_ray import EyeRay
 
 # Choices: how much a trial may cost, and how much finer than what it tries its truth is.
 RECEPTORS = 24  # looked through, at most
@@ -56,7 +59,7 @@ class Population:
 class FidelityTrials:
     """Tries ways of sampling in one scene."""
 
-    def __init__(self, scene: PreparedScene) -> None:
+    def __init__(self, scene: WorldScene) -> None:
         self._scene, self._eyes, self._eye = scene, scene.eyes, scene.eye
         self._views = random_views(scene.world, scene.eyes, VIEWS[1])
         receptors = np.random.default_rng(0).permutation(int(np.prod(scene.eyes.resolution)))
@@ -73,11 +76,15 @@ class FidelityTrials:
         return self._known[sampling.depth]
 
     def _drawn(self, sampling: EyeSampling) -> list[Population]:
-        if not len(self._scene.static.spheres):
+        if not self._scene.world.objects:
             return [self._everywhere]
         near = near_views(self._scene.world, self._eyes, VIEWS[1])
         trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
-        hits = on_objects(near, *near.in_agents(self._eyes, trial.directions), self._scene.static.spheres.radii)
+        hits = on_objects(
+            near,
+            *near.in_agents(self._eyes, trial.directions),
+            np.array([self._scene.model.geom_size[geom, 0] for geom in _objects(self._scene)]),
+        )
         weights = trial.weights.sum(axis=0)
         shares = np.einsum("rp,vp->vr", weights, hits) / weights.sum(axis=-1)
         return [self._everywhere, Population(near, shares > ON_OBJECT)]
@@ -210,7 +217,7 @@ class FidelityTrials:
             shared = self._see_areas(views, trial, light, depth)
         else:
             components, z = self._trace(views, trial, light)
-            with variant(self._scene.static.variant):
+            with variant(self._scene.variant):
                 shared = [np.array(share * c) for share in depth.shares(dr.rcp(z)) for c in components]
         layers = np.reshape(shared, (depth.count, -1, len(views), rays))
         planes = trial.weights.reshape(depth.count, -1, *trial.weights.shape[1:])
@@ -229,11 +236,12 @@ class FidelityTrials:
         origins, directions = views.in_agents(self._eyes, trial.directions)
         n = len(trial.directions)
         assert trial.extent is not None
-        with variant(self._scene.static.variant):
+        with variant(self._scene.variant):
             origin, agent = _points(origins, n), _points(views.agents, n)
             width, height = (dr.opaque(mi.Float, side) for side in trial.extent)
             ray = mi.Ray3f(origin, mi.Vector3f([floats(d) for d in np.moveaxis(directions, -1, 0)]))
-            area = Area.of(ray, agent, (width, height))
+            axis = mi.Vector2f((origin - agent).xy) * (1 / BODY_RADIUS)
+            area = Area.of(ray, axis, (width, height))
             world, bodies = dr.arange(mi.UInt32, n * len(views)) // n, [*np.moveaxis(views.objects, 1, 0), views.agents]
             now = Moment([_points(b, n) for b in bodies], tracer.inputs, world, self._lit(tracer, bodies))
             components = tracer.radiance(area, tracer.met_by(area, tracer.inputs), now, depth)
@@ -252,17 +260,32 @@ class FidelityTrials:
         flat (view, ray)."""
         origins, world = views.in_agents(self._eyes, trial.directions)
         rays, tracer = len(trial.directions), self._scene.tracers.of(light)
-        with variant(self._scene.static.variant):
+        with variant(self._scene.variant):
             ray = mi.Ray3f(_points(origins, rays), mi.Vector3f([floats(d) for d in np.moveaxis(world, -1, 0)]))
-            centres = [_points(views.objects[:, k], rays) for k in range(views.objects.shape[1])]
-            agent = _points(views.agents, rays)
-            bounce_sample = None
+            agent, cosine = _points(views.agents, rays), floats(np.tile(trial.directions[:, 2], len(views)))
+            seen = EyeRay(ray, mi.Vector3f(0), cosine, agent)  # no headlight shines along an axis here
+            samples = mi.Vector4f(0)
             if light == lighting.BOUNCE:
-                bounce_sample = mi.Point2f([floats(np.tile(column, len(views))) for column in trial.bounce_samples.T])
-            components, t = tracer.radiance(tracer.scene, ray, agent, centres, tracer.inputs, bounce_sample)
-            z = t * floats(np.tile(trial.directions[:, 2], len(views)))
+                samples = mi.Vector4f([floats(np.tile(column, len(views))) for column in _in_fours(trial).T])
+            buffers = tracer.buffers(len(views))
+            buffers.fill(self._scene.poses_at(views.position, views.heading, views.objects))
+            lanes = dr.arange(mi.UInt32, rays * len(views)) // rays
+            there = tracer.around(tracer.scene, buffers.arrays(), tracer.inputs, lanes)
+            components, t = tracer.radiance(seen, there, samples)
+            z = t * cosine
             dr.eval(components, z)
             return components, z
+
+
+def _objects(scene: WorldScene) -> list[int]:
+    """Ids of the objects' geoms."""
+    bodies = [scene.model.body(name).id for name in scene.world.objects]
+    return [int(np.flatnonzero(scene.model.geom_bodyid == body)[0]) for body in bodies]
+
+
+def _in_fours(trial: Trial) -> np.ndarray:
+    """Bounce samples, and as many for a second reflection."""
+    return np.concatenate([trial.bounce_samples, np.random.default_rng(SECOND).random(trial.bounce_samples.shape)], 1)
 
 
 def _rms(values: np.ndarray) -> float:

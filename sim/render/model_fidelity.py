@@ -23,7 +23,8 @@ from sim.eyes.mounts import Mount
 from sim.render.edge_rays import edges_pay
 from sim.render.fidelity import EDGES, RAYS, Fidelity, Level
 from sim.render.fidelity_choice import FidelityWarning
-from sim.render.model_renderer import ModelRenderer, Worlds
+from sim.render.model_renderer import ModelRenderer
+from sim.render.prepared_scene import Placed
 from sim.scene import source
 from sim.scene.appearances import Varied
 from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
@@ -52,7 +53,7 @@ def choose_model_fidelity(
     model: mujoco.MjModel | mujoco.MjSpec | str,
     eye: optics.Eye,
     mounts: Sequence[Mount],
-    poses: Worlds,
+    poses: Placed,
     tolerance: float | None = None,
     *,
     groups: Sequence[int] = VISIBLE_GROUPS,

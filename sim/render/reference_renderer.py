@@ -6,6 +6,7 @@ Shares with the batched renderer the world's model and the eyes' places, and not
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,9 +16,9 @@ import numpy as np
 import optics
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.eyes.receptive_fields import cells_for
-from sim.render.prepared_scene import with_band_averaged_lights
+from sim.scene.band_error import lights_in_bands
 from sim.scene.cameras import Viewpoint
-from sim.scene.mirror import mirror
+from sim.scene.mirror import MirrorWarning, mirror
 from sim.worlds.state import WorldState, pose
 from sim.worlds.world import World
 
@@ -65,7 +66,10 @@ class ReferenceRenderer:
         z: Any = np.array(depths) if depths else math.inf
         self.sight = self.eye.sight(self.samples_per_receptor, z, depth_layers, light_from="centres")
         self._data = mujoco.MjData(world.model)
-        self._mirror = mirror(world.model, variant=variant, spectra=with_band_averaged_lights(world, self.eye).spectra)
+        spectra, off = lights_in_bands(world.model, world.spectra, self.eye)
+        for words in off:
+            warnings.warn(words, MirrorWarning, stacklevel=2)
+        self._mirror = mirror(world.model, variant=variant, spectra=spectra)
 
     @property
     def shape(self) -> tuple[int, int]:

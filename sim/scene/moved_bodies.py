@@ -21,7 +21,7 @@ class ReferencePose:
     def __init__(self, model: mujoco.MjModel, bodies: Sequence[int]) -> None:
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
-        self.poses, self.bodies = Poses.of(data), list(bodies)
+        self.poses, self.bodies, self.n_bodies = Poses.of(data), list(bodies), model.nbody
         self.body_of = {"geom": model.geom_bodyid.copy(), "site": model.site_bodyid, "camera": model.cam_bodyid}
         self._local = {(kind, i): self._in_body(kind, i) for kind in _PREFIX for i in self.moved(kind)}
 
@@ -76,6 +76,15 @@ class MovedBodies(Poses):
 
     def geom_places(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
         return np.stack([self._frame("geom", int(geom))[0] for geom in geoms], axis=1)
+
+    def geom_turns(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
+        return np.stack([self._frame("geom", int(geom))[1] for geom in geoms], axis=1)
+
+    def take(self, worlds: np.ndarray) -> MovedBodies:
+        found = MovedBodies(self.reference, self.positions[worlds], self.rotations[worlds])
+        own = {name: array[worlds] for name in OF_MODELS if (array := vars(self).get(name)) is not None}
+        vars(found).update(own)
+        return found
 
     def frames(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
         if kind != "body":

@@ -93,6 +93,16 @@ class Poses:
         """Centres of these geoms [m], (world, geom, 3)."""
         return self.geom_xpos[:, geoms]
 
+    def geom_turns(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
+        """Rotations of these geoms, (world, geom, 3, 3)."""
+        return self.geom_xmat[:, geoms]
+
+    def take(self, worlds: np.ndarray) -> Poses:
+        """These worlds alone."""
+        arrays: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        taken: dict[str, Any] = {name: None if array is None else array[worlds] for name, array in arrays.items()}
+        return Poses(**taken)
+
     def frames(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
         """Origins (world, 3) and rotations (world, 3, 3) of a site, a camera or a body."""
         name = {"site": "site_x", "camera": "cam_x", "body": "x"}[kind]

@@ -17,14 +17,14 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.eyes.eyes import EYE_HEIGHT
 from sim.scene.device_arrays import floats
 from sim.tracing import lighting, spheres
+from sim.tracing.eye_ray import EyeRay
 from sim.tracing.reflectance_atlas import Atlas, bake
-from sim.tracing.static_scene import StaticScene
-from sim.tracing.wall_intersection import Footprints, footprints_of
-from sim.tracing.walls import ALIGNED, NoClosedForm, Walls, walls_of
-from sim.worlds.world import World
+from sim.tracing.spheres import SphereRows
+from sim.tracing.upright_scene import UprightScene
+from sim.tracing.wall_intersection import CellTables, Footprints, footprints_of
+from sim.tracing.walls import ALIGNED, NoClosedForm
 
 # Singular values below this share of the largest are rounding: eight times float32's 1.2e-7.
 RANK_TOLERANCE = 1e-6
@@ -79,97 +79,109 @@ class _Hit:
     reflectance: list[Array]
 
 
+@dataclass(frozen=True)
+class ClosedFormTables:
+    """What kernels read of any world. texels: reflectance, an array per component · faces: see `face_rows`
+    cells: of walls that stand on a grid; None: each wall is solved
+    """
+
+    texels: list[Array]
+    faces: Array
+    cells: CellTables | None
+
+
+@dataclass(frozen=True)
+class ClosedFormSurroundings:
+    """centres: of the spheres that are seen, in one lane's world (Point3f) · tables: what the kernel reads of any"""
+
+    centres: list[Array]
+    tables: ClosedFormTables
+
+
 class ClosedForm:
     """Traces rays through one world.
 
     name, why: of this way of tracing, for reports
     light: what of it is followed, one of `lighting.LEVELS`
     basis: (component, band): what each component is worth in each band
-    walls, footprints, lights, components: what the world is made of
+    world, walls, footprints, lights, components: what it is made of
     faces: textures of walls and floor, see `face_rows` · sphere_textures: the way to their texels, and where they are
 
     Raises:
-        NoClosedForm: worlds that are not made of upright walls, and, where light that is reflected twice is followed,
-            for walls of several heights or lower than what stands between them.
+        NoClosedForm: walls that lie on no grid, and, where light that is reflected twice is followed, walls of several
+            heights or lower than what stands between them, bodies that change their height, and a texture that would
+            turn with the eyes' body.
     """
 
     name = "closed_form"
+    scene = None  # no Mitsuba scene takes part
 
-    def __init__(
-        self, world: World, static: StaticScene, wavelengths: np.ndarray, light: str = lighting.DIRECT
-    ) -> None:
-        walls = walls_of(world.model, static.geoms)
-        self.light = light
+    def __init__(self, scene: UprightScene, wavelengths: np.ndarray, light: str = lighting.DIRECT) -> None:
+        self.light, self.walls, self.world = light, scene.walls, scene
         if light != lighting.DIRECT:
-            _check_tops(world, walls, static)
-        self.footprints: Footprints = footprints_of(walls)
-        self.why = f"{len(walls)} upright walls, {self.footprints.how}"
-        self._bodies, self.walls = static.bodies, walls
-        self.lights = lighting.directional_lights(static.scene, wavelengths)
-        if any(source.direction[2] <= 0 for source in self.lights):
-            raise NoClosedForm("a light shines from below")
-        geoms, place = np.unique(walls.geoms, return_inverse=True)
-        visible = static.spheres if light == lighting.DIRECT else static.bodies
-        bsdfs = [*(static.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
-        atlas = bake(world.model, [*geoms, *visible.geoms], bsdfs, wavelengths)
+            _check_tops(scene)
+        self.footprints: Footprints = footprints_of(self.walls)
+        self.why = f"{len(self.walls)} upright walls, {self.footprints.how}"
+        self._bodies, self.lights = scene.bodies, scene.lights
+        geoms, place = np.unique(self.walls.geoms, return_inverse=True)
+        visible = scene.spheres if light == lighting.DIRECT else scene.bodies
+        bsdfs = [*(scene.bsdfs[int(g)] for g in geoms), *visible.bsdfs]
+        atlas = bake(scene.model, [*geoms, *visible.geoms], bsdfs, wavelengths)
         irradiance = np.array([source.irradiance for source in self.lights]).reshape(-1, len(wavelengths))
         fewest = components_of if light == lighting.DIRECT else reflected_components_of
         self.components = fewest(atlas.texels, irradiance)
         self.basis = self.components.basis
-        self.faces = face_rows(walls.uv, atlas, place)
-        self._n_faces = len(walls.geoms)
+        self.faces = face_rows(self.walls.uv, atlas, place)
+        self._n_faces = len(self.walls.geoms)
         self.one_dimensional = atlas.one_dimensional
         self.sphere_textures = [
             (atlas.to_texels[len(geoms) + k], atlas.places[len(geoms) + k]) for k in range(len(visible))
         ]
-        self._static = self._inputs()
-
-    @property
-    def scene(self) -> None:
-        """No Mitsuba scene takes part."""
-
-    @property
-    def inputs(self) -> dict[str, Array]:
-        """Arrays that the kernel reads."""
-        return self._static
-
-    def _inputs(self) -> dict[str, Array]:
         texels = self.components.reflectance.astype(np.float32)
-        tables = {f"texels_{k}": np.ascontiguousarray(column) for k, column in enumerate(texels.T)}
-        tables |= {"faces": self.faces.astype(np.float32).ravel(), **self.footprints.tables}
-        return {name: floats(table) for name, table in tables.items()}
+        self.inputs = ClosedFormTables(
+            [floats(np.ascontiguousarray(column)) for column in texels.T], floats(self.faces), self.footprints.tables
+        )
 
-    def radiance(
-        self,
-        scene: None,
-        ray: Array,
-        agent: Array,
-        centres: list[Array],
-        inputs: dict[str, Array],
-        bounce_sample: Array | None = None,
-    ) -> tuple[list[Array], Array]:
-        """What comes along each ray, one array per component, and from how far [m]."""
-        bodies = [*centres, agent]
-        hit = self._hit(ray, centres, inputs)
-        light = self._irradiance(hit, bodies, inputs)
+    def buffers(self, n_envs: int) -> SphereRows:
+        """For so many worlds."""
+        return SphereRows(self.world.spheres, n_envs)
+
+    def around(self, scenes: None, rows: Array, tables: ClosedFormTables, world: Array) -> ClosedFormSurroundings:
+        """What a lane in this world reads."""
+        return ClosedFormSurroundings(spheres.centres_in(rows, len(self.world.spheres), world), tables)
+
+    def all_bodies(self, centres: list[Array], stand: Array) -> list[Array]:
+        """Centres of the spheres that are seen, and of the eyes' own body, if that is one; stand: where it is."""
+        if not self.world.has_own:
+            return centres
+        return [*centres, mi.Point3f(stand.x, stand.y, float(self.world.heights[-1]))]
+
+    def radiance(self, seen: EyeRay, there: ClosedFormSurroundings, samples: Array) -> tuple[list[Array], Array]:
+        """What comes along each ray, one array per component, and from how far [m]; the first two of samples: each
+        ray's own on the unit square, wanted for light that bounces (`lighting.onwards`)."""
+        centres, tables = there.centres, there.tables
+        bodies = self.all_bodies(centres, seen.body)
+        hit = self._hit(seen.ray, centres, tables)
+        light = self._irradiance(hit, bodies, tables)
         if self.light == lighting.BOUNCE:
-            there = self._hit(lighting.onwards(hit.point, hit.normal, bounce_sample), bodies, inputs)
-            second = zip(there.reflectance, self._irradiance(there, bodies, inputs), strict=True)
+            onwards = lighting.onwards(hit.point, hit.normal, mi.Point2f(samples.x, samples.y))
+            second_hit = self._hit(onwards, bodies, tables)
+            second = zip(second_hit.reflectance, self._irradiance(second_hit, bodies, tables), strict=True)
             light = [dr.select(hit.lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
         return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
 
     def returned(self, ray: Array, shade: Array, radius: float, more: Irradiance | None = None) -> list[Array]:
         """Light that walls and floor send back along each ray, per component: direct light in the shade of one sphere,
         and what else arrives there, if that is known."""
-        hit = self._hit(ray, [], self._static)
-        light = self._irradiance(hit, [shade], self._static, [radius])
+        hit = self._hit(ray, [], self.inputs)
+        light = self._irradiance(hit, [shade], self.inputs, [radius])
         if more:
             light = [e + other for e, other in zip(light, more(hit.point, hit.normal), strict=True)]
         return [dr.select(hit.lit, r * e, 0) for r, e in zip(hit.reflectance, light, strict=True)]
 
-    def _hit(self, ray: Array, centres: list[Array], inputs: dict[str, Array]) -> _Hit:
+    def _hit(self, ray: Array, centres: list[Array], tables: ClosedFormTables) -> _Hit:
         """Where rays meet walls, floor or bodies first; those without a centre are not there."""
-        t, face, normal = self.footprints.hit(ray, inputs)
+        t, face, normal = self.footprints.hit(ray, tables.cells)
         on_floor, t_floor = self._floor_hit(ray)
         floor_first = on_floor & (t_floor < t)
         t = dr.select(floor_first, t_floor, t)
@@ -180,7 +192,7 @@ class ClosedForm:
         t, which = spheres.nearest(self._bodies, centres, ray, t)
         on_sphere = which < len(centres)
         point = ray(dr.select(seen | on_sphere, t, 0))
-        offset, columns, rows, x, y = self._face_texel(face, point, inputs)
+        offset, columns, rows, x, y = self._face_texel(face, point, tables)
         if centres:
             sphere_normal, uv = spheres.normal_and_uv(self._bodies, centres, which, point)
             normal = dr.select(on_sphere, sphere_normal, normal)
@@ -190,7 +202,7 @@ class ClosedForm:
                 for mine, other in zip(found, (offset, columns, rows, x, y), strict=True)
             )
         lit = (seen | on_sphere) & (t > 0) & (dr.dot(normal, ray.d) < 0)
-        return _Hit(t, point, normal, lit, self._interpolate(offset, columns, rows, x, y, inputs))
+        return _Hit(t, point, normal, lit, self._interpolate(offset, columns, rows, x, y, tables))
 
     def _floor_hit(self, ray: Array) -> tuple[Array, Array]:
         """Whether and where a ray from above meets the floor."""
@@ -201,7 +213,7 @@ class ClosedForm:
         return inside & (ray.d.z < 0) & (t > 0), t
 
     def _irradiance(
-        self, hit: _Hit, bodies: list[Array], inputs: dict[str, Array], radii: list[float] | None = None
+        self, hit: _Hit, bodies: list[Array], tables: ClosedFormTables, radii: list[float] | None = None
     ) -> list[Array]:
         """Per component: sum over the lights of level · cos θ, where nothing is in the way; radii: of the bodies, None:
         their own."""
@@ -214,19 +226,19 @@ class ClosedForm:
             shadow = mi.Ray3f(start, towards)
             cosine = dr.dot(hit.normal, towards)
             shines = hit.lit & (cosine > 0) & ~spheres.blocks(radii, bodies, shadow)
-            shines &= ~self.footprints.blocks(start, light.direction, inputs)
+            shines &= ~self.footprints.blocks(start, light.direction, tables.cells)
             cosine = dr.select(shines, cosine, 0)
             total = [dr.fma(cosine, float(factor), sum_so_far) for factor, sum_so_far in zip(level, total, strict=True)]
         return total
 
-    def _face_texel(self, face: Array, point: Array, inputs: dict[str, Array]) -> tuple[Array, ...]:
+    def _face_texel(self, face: Array, point: Array, tables: ClosedFormTables) -> tuple[Array, ...]:
         """Texture of a face and where in it a point is: first texel, columns, rows, column and row."""
-        columns = dr.gather(mi.Vector4f, inputs["faces"], face * 3)
-        place = dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 2)
+        columns = dr.gather(mi.Vector4f, tables.faces, face * 3)
+        place = dr.gather(mi.Vector4f, tables.faces, face * 3 + 2)
         x = _affine(columns, point)
         y = mi.Float(0)
         if not self.one_dimensional:
-            y = _affine(dr.gather(mi.Vector4f, inputs["faces"], face * 3 + 1), point)
+            y = _affine(dr.gather(mi.Vector4f, tables.faces, face * 3 + 1), point)
         return place.x, place.y, place.z, x, y
 
     def _sphere_texel(self, which: Array, uv: Array) -> tuple[Array, ...]:
@@ -238,7 +250,7 @@ class ClosedForm:
         return found
 
     def _interpolate(
-        self, offset: Array, columns: Array, rows: Array, x: Array, y: Array, inputs: dict[str, Array]
+        self, offset: Array, columns: Array, rows: Array, x: Array, y: Array, tables: ClosedFormTables
     ) -> list[Array]:
         """Reflectance per component, interpolated bilinearly in a texture that repeats."""
         x0, x1, fx = _neighbours(x, columns)
@@ -248,14 +260,20 @@ class ClosedForm:
             y0, y1, fy = _neighbours(y, rows)
             taps = [(first + r * columns, c, wx * wy) for first, c, wx in taps for r, wy in ((y0, 1 - fy), (y1, fy))]
         index = [(mi.UInt32(first + column), weight) for first, column, weight in taps]
-        return [sum(w * dr.gather(mi.Float, inputs[f"texels_{k}"], i) for i, w in index) for k in range(n)]
+        return [sum(w * dr.gather(mi.Float, tables.texels[k], i) for i, w in index) for k in range(n)]
 
 
-def _check_tops(world: World, walls: Walls, static: StaticScene) -> None:
+def _check_tops(scene: UprightScene) -> None:
     """No top of a wall may be seen from where light is reflected: from any point of walls and movers."""
-    objects = [world.model.body(name).pos[2] for name in world.objects]
-    bodies = np.add(np.add([*objects, EYE_HEIGHT], static.bodies.radii), static.bodies.offsets[:, 2])
-    lowest, highest = walls.top.min(initial=np.inf), max(walls.top.max(initial=-np.inf), bodies.max())
+    for geom, settled in zip(scene.bodies.geoms, scene.settled, strict=True):
+        if not settled:
+            raise NoClosedForm(f"geom {scene.model.geom(geom).name or str(geom)!r} may change its height")
+    if scene.has_own and scene.bodies.textured[-1]:
+        name = scene.model.geom(scene.bodies.geoms[-1]).name
+        raise NoClosedForm(f"geom {name!r}, on which the eyes are, has a texture, which would have to turn with it")
+    bodies = scene.heights + scene.bodies.radii
+    lowest = scene.walls.top.min(initial=np.inf)
+    highest = max(scene.walls.top.max(initial=-np.inf), bodies.max(initial=-np.inf))
     if highest > lowest + ALIGNED:
         raise NoClosedForm(f"light that is reflected twice sees the top of a wall {lowest:.2g} m high")
 

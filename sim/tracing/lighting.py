@@ -8,7 +8,6 @@ bounce sample (`sim.eyes.sensor`), so that the rays of a receptor together see t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import drjit as dr
@@ -35,72 +34,6 @@ def spectra(wavelengths: np.ndarray) -> list[Array]:
     """The bands' wavelengths [m] as Mitsuba spectra [nm], LANES at a time; the last one is filled up by repetition."""
     padded = np.pad(wavelengths * 1e9, (0, -len(wavelengths) % LANES), mode="edge")
     return [mi.Spectrum(*map(float, chunk)) for chunk in padded.reshape(-1, LANES)]
-
-
-def directional_lights(scene: MitsubaObject, wavelengths: np.ndarray) -> tuple[DirectionalLight, ...]:
-    """The scene's lights at the bands' wavelengths [m].
-
-    Raises:
-        ValueError: any other kind of emitter.
-    """
-    lights = []
-    for emitter in scene.emitters():
-        if emitter.class_name() != "DirectionalEmitter":
-            raise ValueError(f"the batched renderer knows directional lights only, not {emitter.class_name()}")
-        irradiance = []
-        for spectrum in spectra(wavelengths):
-            si = dr.zeros(mi.SurfaceInteraction3f)
-            si.wavelengths = spectrum
-            sample, weight = emitter.sample_direction(si, mi.Point2f(0.5))
-            irradiance.append(np.array(weight).ravel())
-        direction = np.array(sample.d, dtype=np.float64).ravel()
-        lights.append(DirectionalLight(direction, np.concatenate(irradiance)[: len(wavelengths)]))
-    return tuple(lights)
-
-
-def white_radiance(scene: MitsubaObject, wavelengths: np.ndarray) -> np.ndarray:
-    """Of a white surface that faced all of the scene's lights at once, per band (band,): no surface sends out more of
-    their direct light."""
-    lights = directional_lights(scene, wavelengths)
-    return sum((light.irradiance for light in lights), np.zeros(len(wavelengths))) / np.pi
-
-
-def check_lambertian(bsdfs: Sequence[MitsubaObject]) -> None:
-    """Refuse what the renderer cannot light.
-
-    Raises:
-        ValueError: a BSDF that is not a Lambertian reflector, on one side or both.
-    """
-    sides = int(mi.BSDFFlags.FrontSide) | int(mi.BSDFFlags.BackSide)
-    for bsdf in bsdfs:
-        kinds = int(bsdf.flags()) & ~(sides | int(mi.BSDFFlags.SpatiallyVarying))
-        if kinds != int(mi.BSDFFlags.DiffuseReflection):
-            raise ValueError(f"the batched renderer knows Lambertian surfaces only, not {bsdf.class_name()}")
-
-
-def direct_light(
-    si: Array,
-    bsdf: MitsubaObject,
-    lights: tuple[DirectionalLight, ...],
-    bands: list[Array],
-    occluded: Callable[[Array, Array], Array],
-) -> list[Array]:
-    """Radiance [mi.Spectrum per chunk of bands] that leaves a Lambertian surface at si: ρ/π Σ_l E_l cos θ_l.
-
-    occluded(ray, active) tells which rays towards a light are blocked. The inside of a closed one-sided surface
-    needs no case of its own: no light gets there.
-    """
-    irradiance = [mi.Spectrum(0) for _ in bands]
-    seen_from = dr.dot(si.n, si.to_world(si.wi))
-    for light in lights:
-        towards = mi.Vector3f(*map(float, light.direction))
-        lit = si.is_valid() & (dr.dot(si.n, towards) * seen_from > 0)
-        lit &= ~occluded(si.spawn_ray(towards), lit)
-        cosine = dr.select(lit, dr.abs(dr.dot(si.sh_frame.n, towards)), 0)
-        chunks = np.pad(light.irradiance, (0, -len(light.irradiance) % LANES)).reshape(-1, LANES)
-        for i, chunk in enumerate(chunks):
-            irradiance[i] += cosine * mi.Spectrum(*map(float, chunk))
-    return [e * diffuse_reflectance(si, bsdf, b) * dr.inv_pi for e, b in zip(irradiance, bands, strict=True)]
 
 
 def onwards(point: Array, normal: Array, bounce_sample: Array) -> Array:

@@ -15,11 +15,11 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.scene import lights
-from sim.scene.device_arrays import three
 from sim.scene.poses import Poses
 from sim.scene.spectra import Spectra
 from sim.scene.variant import Description
 from sim.tracing import lighting
+from sim.tracing.world_rows import WorldRows
 
 ROWS = 2  # of four floats for each light: where it is, and where it shines
 FAR = 1e6  # [m] to what a directional light comes from
@@ -31,6 +31,7 @@ class ModelLight:
     """light: id in the model; -1: the headlight of the eye that looks · kind: "directional", "point" or "spot"
     level: irradiance on what faces it, or intensity of a point (1 m away), per band (band,)
     cutoff, exponent: of a spot: cosine of its half angle, and how its light falls off to the side
+    direction: towards a directional light in the reference pose, as Mitsuba has it, unit (3,)
     """
 
     light: int
@@ -38,13 +39,14 @@ class ModelLight:
     level: np.ndarray
     cutoff: float = -1.0
     exponent: float = 0.0
+    direction: np.ndarray | None = None
 
 
 def model_lights(
-    model: mujoco.MjModel, spectra: Spectra, wavelengths: np.ndarray, light: str = lighting.DIRECT
+    model: mujoco.MjModel, spectra: Spectra, wavelengths: np.ndarray
 ) -> tuple[list[ModelLight], list[str]]:
-    """A model's lights at these wavelengths [m] in the variant in force, and what of them has no counterpart here;
-    light: what of it is followed."""
+    """A model's lights at these wavelengths [m] in the variant in force, and what of them has no counterpart here; the
+    sky is none of them."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     emitters, left_out = lights.emitters(model, data, spectra)
@@ -52,28 +54,29 @@ def model_lights(
     for emitter in emitters:
         kind = emitter.description["type"]
         if kind not in (_DIRECTIONAL, _POINT, _SPOT):
-            left_out += ["light of the sky on surfaces"] if light == lighting.DIRECT else []
             continue
-        level = _level({k: v for k, v in emitter.description.items() if k != "texture"}, wavelengths)
+        level, towards = _sampled({k: v for k, v in emitter.description.items() if k != "texture"}, wavelengths)
         cutoff, exponent = -1.0, 0.0
         if kind == _SPOT:
             cutoff = math.cos(math.radians(emitter.description["cutoff_angle"]))
             exponent = float(model.light_exponent[emitter.light])
-        found.append(ModelLight(emitter.light, kind, level, cutoff, exponent))
+        found.append(ModelLight(emitter.light, kind, level, cutoff, exponent, towards))
     return found, left_out
 
 
-def _level(description: Description, wavelengths: np.ndarray) -> np.ndarray:
-    """Irradiance of a directional light, or intensity."""
+def _sampled(description: Description, wavelengths: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    """Irradiance of a directional light, or intensity; and where a directional light is."""
     emitter, found = mi.load_dict(description), []
+    directional, towards = description["type"] == _DIRECTIONAL, None
     for spectrum in lighting.spectra(wavelengths):
         si = dr.zeros(mi.SurfaceInteraction3f)
         si.wavelengths = spectrum
-        if description["type"] != _DIRECTIONAL:
+        if not directional:
             si.p = mi.Point3f(description["to_world"] @ mi.ScalarPoint3f(0, 0, 1))
-        _, weight = emitter.sample_direction(si, mi.Point2f(0.5))
+        sample, weight = emitter.sample_direction(si, mi.Point2f(0.5))
         found.append(np.array(weight).ravel())
-    return np.concatenate(found)[: len(wavelengths)]
+        towards = np.array(sample.d, np.float64).ravel() if directional else None
+    return np.concatenate(found)[: len(wavelengths)], towards
 
 
 class Lights:
@@ -95,13 +98,13 @@ class Lights:
                 rows[:, k, 1, :3] = aim / np.linalg.norm(aim, axis=-1, keepdims=True)
         return rows.reshape(poses.n, len(self), -1)
 
-    def towards(self, k: int, point: Array, axis: Array, rows: Array, first: Array) -> tuple[Array, Array, Array]:
+    def towards(self, k: int, point: Array, axis: Array, there: WorldRows) -> tuple[Array, Array, Array]:
         """Unit vector from a point to a light, how far that is [m], and how much of its level arrives on what faces it;
         axis: of the eye that looks."""
         light = self.found[k]
         if light.light < 0:
             return -axis, mi.Float(FAR), mi.Float(1)
-        place, aim = (three(rows, first + k * ROWS + i) for i in range(ROWS))
+        place, aim = (there.point(k * ROWS + i) for i in range(ROWS))
         if light.kind == _DIRECTIONAL:
             return -aim, mi.Float(FAR), mi.Float(1)
         way = place - mi.Vector3f(point)

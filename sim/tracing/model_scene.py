@@ -37,19 +37,17 @@ _HERE = Path(__file__).parents[1]
 
 
 class ModelScene:
-    """What a renderer needs of a model.
+    """What tracers need of a model. Mitsuba's scenes are built when they are first needed.
 
-    model · variant: of Mitsuba · geoms: ids of all that are seen
-    scene: mi.Scene of what stands still, and the sky · movers: what moves · lights: all of them
-    spectra: measured ones of materials and lights, by name · has_sky: whether there is something to see at infinity
+    model · eye: whose bands it has · variant: of Mitsuba · geoms: ids of all that are seen
+    looks: of all these geoms · moving: those that are not always where the model has them, or not always the same
+    bsdfs: of every look; kept here, since a BSDFPtr does not keep its objects alive
+    lights: all of them · spectra: measured ones of materials and lights, by name
+    has_sky: whether there is something to see at infinity
     glows: BSDFs whose reflectance is the radiance of what glows, by look; these are met like movers
-    paint: of sizes and colours that differ from world to world, `varied` by name: what differs is met like a mover,
-        though it may stand still
+    varied: geoms whose size or colour differs from world to world, and ids of the materials that one may have; what
+        differs is met like a mover, though it may stand still
     as_built: what worlds are compared with
-    bsdfs: of every mover, in their order; kept here, since a BSDFPtr does not keep its objects alive
-
-    Warns (`sim.MirrorWarning`) once of what has no counterpart, and of measured lights that the eye's bands are too few
-    for.
 
     Raises:
         ValueError: a model without visible geoms, and spectra or variation of what it does not have.
@@ -62,41 +60,78 @@ class ModelScene:
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
         varied: Varied = (),
-        light: str = DIRECT,
     ) -> None:
-        self.model, self.variant = model, default_variant()
-        self.spectra, wavelengths = resolve(model, spectra), eye.spectral_bands.wavelengths
-        in_bands, off = lights_in_bands(model, self.spectra, eye)
-        seen = surfaces.visible(model, groups)
-        self.geoms = [g for g in seen if shapes.has_shape(model, g)]
+        self.model, self.eye, self.variant, self._groups = model, eye, default_variant(), groups
+        self.spectra = resolve(model, spectra)
+        in_bands, self._off = lights_in_bands(model, self.spectra, eye)
+        self._seen = surfaces.visible(model, groups)
+        self.geoms = [g for g in self._seen if shapes.has_shape(model, g)]
         if not self.geoms:
             raise ValueError("the model has no visible geom of a kind that can be mirrored")
         with in_variant(self.variant):
-            differ = varied_geoms(model, self.geoms, varied, self.spectra)
-            drawn = {geom: materials for geom, materials in differ.items() if materials}
-            painted = [geom for geom in differ if geom not in drawn]
-            looks = appearances_of(model, self.geoms, drawn)
-            glows = ((look, self._glow(look, look.geom in painted)) for look in looks)
+            self.varied = varied_geoms(model, self.geoms, varied, self.spectra)
+            drawn = {geom: materials for geom, materials in self.varied.items() if materials}
+            self._painted = [geom for geom in self.varied if geom not in drawn]
+            self.looks = appearances_of(model, self.geoms, drawn)
+            glows = ((look, self._glow(look, look.geom in self._painted)) for look in self.looks)
             self.glows = {look: glow for look, glow in glows if glow is not None}
-            matt = {look: self._matt(look, look.geom in painted) for look in looks}
-            moving = [each for each in looks if _moves(model, each.geom) or each.geom in differ or each in self.glows]
-            meshes = {look: self._mesh(look, matt[look]) for look in moving if kind_of(look.model, look.geom) is None}
-            self.movers = Movers(model, moving, meshes)
-            glow = any(look.geom in painted for look in self.glows)
-            self.paint = Paint(model, painted, self.movers.geoms, wavelengths, glow)
-            self.bsdfs = [matt[look] for look in self.movers.looks]
-            found, left_out = model_lights(model, in_bands, wavelengths, light)
+            self.bsdfs = {look: self._matt(look, look.geom in self._painted) for look in self.looks}
+            found, self._unlit = model_lights(model, in_bands, self.wavelengths)
             self.lights = Lights(found)
-            self._matt_still = {look.geom: matt[look] for look in looks if look not in moving}
-            self.scene = self._still()
-            self.has_sky = self.scene.environment() is not None
-        reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
-        self.as_built = AsBuilt(
-            model, self.geoms, [g for g in reachable if g not in seen], self.movers.geoms, self.movers.resizable, differ
-        )
-        left_out += [*inventory.left_out(model, seen, groups), *_not_matt(model, looks, light)]
-        for words in (*([f"eyes do not see: {'; '.join(left_out)}"] if left_out else []), *off):
+            self._heaven = sky.description(model, lights.white())
+        self.moving = [look for look in self.looks if self._may_change(look)]
+        self.has_sky = self._heaven is not None
+
+    @property
+    def wavelengths(self) -> np.ndarray:
+        """Of the eye's bands [m]."""
+        return np.asarray(self.eye.spectral_bands.wavelengths)
+
+    def _may_change(self, look: Appearance) -> bool:
+        return _moves(self.model, look.geom) or look.geom in self.varied or look in self.glows
+
+    def tell_what_is_missing(self, light: str = DIRECT) -> None:
+        """Warn (`sim.MirrorWarning`) once of what has no counterpart where this much of the light is followed, and of
+        measured lights that the eye's bands are too few for."""
+        model = self.model
+        of_sky = ["light of the sky on surfaces"] if light == DIRECT and self.has_sky else []
+        missing = [*self._unlit, *of_sky, *inventory.left_out(model, self._seen, self._groups)]
+        missing += _not_matt(model, self.looks, light)
+        for words in (*([f"eyes do not see: {'; '.join(missing)}"] if missing else []), *self._off):
             warnings.warn(words, MirrorWarning, stacklevel=_outside())
+
+    @cached_property
+    def as_built(self) -> AsBuilt:
+        """What worlds are compared with."""
+        model, groups = self.model, self._groups
+        reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
+        hidden = [g for g in reachable if g not in self._seen]
+        moving = np.array([look.geom for look in self.moving], int)
+        meshes = [look.geom for look in self.moving if kind_of(look.model, look.geom) is None]
+        return AsBuilt(model, self.geoms, hidden, moving, np.setdiff1d(moving, meshes), self.varied)
+
+    @cached_property
+    def movers(self) -> Movers:
+        """What moves."""
+        with in_variant(self.variant):
+            meshes = [look for look in self.moving if kind_of(look.model, look.geom) is None]
+            return Movers(self.model, self.moving, {look: self._mesh(look, self.bsdfs[look]) for look in meshes})
+
+    @cached_property
+    def paint(self) -> Paint:
+        """Sizes and colours that differ from world to world."""
+        glow = any(look.geom in self._painted for look in self.glows)
+        with in_variant(self.variant):
+            return Paint(self.model, self._painted, self.movers.geoms, self.wavelengths, glow)
+
+    @cached_property
+    def still(self) -> MitsubaObject:
+        """What stands still, and the sky: a Mitsuba scene."""
+        with in_variant(self.variant):
+            description: Description = {"type": "scene", **merged(self._still_parts(), "still")}
+            if self._heaven is not None:
+                description["sky"] = self._heaven
+            return mi.load_dict(description, optimize=False)
 
     def _matt(self, look: Appearance, white: bool) -> MitsubaObject:
         to_uv = shapes.uv_transform(look.model, look.geom)
@@ -138,16 +173,9 @@ class ModelScene:
         mujoco.mj_forward(self.model, data)
         return [
             (f"geom_{g}_{k}", part, shapes.pose(data, g), bsdf)
-            for g, bsdf in self._matt_still.items()
+            for g, bsdf in ((look.geom, bsdf) for look, bsdf in self.bsdfs.items() if look not in self.moving)
             for k, part in enumerate(shapes.parts(self.model, g))
         ]
-
-    def _still(self) -> MitsubaObject:
-        description: Description = {"type": "scene", **merged(self._still_parts(), "still")}
-        heaven = sky.description(self.model, lights.white())
-        if heaven is not None:
-            description["sky"] = heaven
-        return mi.load_dict(description, optimize=False)
 
 
 def _moves(model: mujoco.MjModel, geom: int) -> bool:

@@ -14,22 +14,86 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.scene.device_arrays import whole_numbers
+from sim.scene.device_arrays import aligned, whole_numbers
+from sim.scene.poses import Poses
 from sim.scene.variant import MitsubaObject, computed
+from sim.scene.variant import variant as in_variant
 from sim.tracing import lighting
+from sim.tracing.eye_ray import EyeRay
+from sim.tracing.model_lights import ROWS as LIGHT_ROWS
 from sim.tracing.model_scene import ModelScene
+from sim.tracing.movers import MoverRows
+from sim.tracing.paint import PaintRows
+from sim.tracing.world_rows import WorldRows
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """Mitsuba's: still: what stands still, and the sky · meshes: of what moves, each in its own frame"""
+
+    still: MitsubaObject
+    meshes: list[MitsubaObject]
+
+
+@dataclass(frozen=True)
+class Tables:
+    """What kernels read of any world.
+
+    bsdfs: of all movers · ends, painted: see `Movers` and `Paint`
+    sky: an emitter · glowing: number of each mover's glow · glows: BSDFs of these; None: there are none
+    """
+
+    bsdfs: Array
+    ends: Array
+    painted: Array
+    sky: Array | None = None
+    glowing: Array | None = None
+    glows: Array | None = None
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Where the kernel finds one world's movers, lights and colours: their rows, and which is its first."""
+    """What kernels read of all worlds: where movers and lights are, and colours."""
 
     movers: Array
-    first_mover: Array
     lights: Array
-    first_light: Array
     paint: Array
-    first_paint: Array
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """All of that as one lane's world has it."""
+
+    still: MitsubaObject
+    movers: MoverRows
+    lights: WorldRows
+    paint: PaintRows
+    tables: Tables
+
+
+class RowBuffers:
+    """Where the rows of a number of worlds are put, for kernels to read."""
+
+    def __init__(self, scene: ModelScene, n_envs: int) -> None:
+        self._scene = scene
+        sizes = scene.movers.n_rows, max(len(scene.lights), 1) * LIGHT_ROWS, scene.paint.n_rows
+        self._movers, self._lights, self._paint = (
+            aligned(n_envs * n * 4, np.float32).reshape(n_envs, n * 4) for n in sizes
+        )
+
+    def fill(self, poses: Poses) -> None:
+        """With these worlds'."""
+        scene = self._scene
+        self._movers[:] = scene.movers.rows(poses)
+        if len(scene.paint):
+            with in_variant(scene.variant):
+                self._paint[:] = scene.paint.rows(poses)
+        if len(scene.lights):
+            self._lights[:] = scene.lights.rows(poses).reshape(poses.n, -1)
+
+    def arrays(self) -> Rows:
+        """On the device; they share the buffers' memory."""
+        return Rows(*(mi.Float(rows.reshape(-1)) for rows in (self._movers, self._lights, self._paint)))
 
 
 @dataclass(frozen=True)
@@ -57,68 +121,88 @@ class _Met:
 class ModelTracer:
     """One component per band: surfaces are Lambertian, and each lamp is asked for once per ray and reflection.
 
+    name, why: of this way of tracing, for reports
     light: what of it is followed, "direct" or "bounce"
-    basis: (component, band): what each component is worth in each band · inputs: arrays for the kernel
+    basis: (component, band): what each component is worth in each band
     """
 
-    def __init__(self, scene: ModelScene, wavelengths: np.ndarray, light: str = lighting.DIRECT) -> None:
-        self._scene, self._bands, self.light = scene, lighting.spectra(wavelengths), light
-        self.basis = np.eye(len(wavelengths))
+    name = "mitsuba"
+
+    def __init__(self, scene: ModelScene, light: str = lighting.DIRECT, why: str = "asked for") -> None:
+        if light == lighting.ALL:
+            raise ValueError("light = 'all': rays follow light that is reflected twice at most, see samples = 'areas'")
+        self._scene, self._bands, self.light = scene, lighting.spectra(scene.wavelengths), light
+        self.why, self.basis = why, np.eye(len(scene.wavelengths))
         self._glows = len(scene.glows) > 0
-        shapes = scene.scene.shapes()
+        self.scene = Scenes(scene.still, scene.movers.meshes)
+        shapes = scene.still.shapes()
         self._any_still = len(shapes) > 0
         # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.
-        known = [*scene.bsdfs, *(shape.bsdf() for shape in shapes[:1])]
-        self.inputs = {"bsdfs": mi.BSDFPtr(known), **scene.movers.inputs, **scene.paint.inputs}
-        if scene.has_sky:
-            self.inputs["sky"] = mi.EmitterPtr([scene.scene.environment()])
-        if self._glows:
-            number = {look: k for k, look in enumerate(scene.glows)}
-            of_movers = [number.get(look, len(number)) for look in scene.movers.looks]
-            self.inputs["glowing"] = whole_numbers([*of_movers, len(number)])
-            self.inputs["glows"] = mi.BSDFPtr(list(scene.glows.values()))
+        known = [*(scene.bsdfs[look] for look in scene.movers.looks), *(shape.bsdf() for shape in shapes[:1])]
+        sky = mi.EmitterPtr([scene.still.environment()]) if scene.has_sky else None
+        self.inputs = Tables(mi.BSDFPtr(known), scene.movers.ends, scene.paint.painted, sky, *self._of_glows())
 
-    def radiance(
-        self, still: MitsubaObject, ray: Array, axis: Array, rows: Rows, inputs: dict[str, Array], samples: Array
-    ) -> tuple[list[Array], Array]:
-        """What comes along each ray, per band, and from how far [m]; axis: of the eye that looks; samples: each ray's
-        own, twice two numbers on the unit square, wanted for light that bounces (`lighting.onwards`)."""
-        met = self._met(still, ray, rows, inputs)
-        arrives = self._irradiance(still, met, axis, rows, inputs, shadow_of_headlight=False)
+    def _of_glows(self) -> tuple[Array | None, Array | None]:
+        scene = self._scene
+        if not self._glows:
+            return None, None
+        number = {look: k for k, look in enumerate(scene.glows)}
+        of_movers = [number.get(look, len(number)) for look in scene.movers.looks]
+        return whole_numbers([*of_movers, len(number)]), mi.BSDFPtr(list(scene.glows.values()))
+
+    def buffers(self, n_envs: int) -> RowBuffers:
+        """For so many worlds."""
+        return RowBuffers(self._scene, n_envs)
+
+    def around(self, scenes: Scenes, rows: Rows, tables: Tables, world: Array) -> Surroundings:
+        """What a lane in this world reads."""
+        movers, lights, paint = (
+            world * n
+            for n in (self._scene.movers.n_rows, max(len(self._scene.lights), 1) * LIGHT_ROWS, self._scene.paint.n_rows)
+        )
+        return Surroundings(
+            scenes.still,
+            MoverRows(rows.movers, movers, tables.ends),
+            WorldRows(rows.lights, lights),
+            PaintRows(rows.paint, paint, tables.painted),
+            tables,
+        )
+
+    def radiance(self, seen: EyeRay, there: Surroundings, samples: Array) -> tuple[list[Array], Array]:
+        """What comes along each ray, per band, and from how far [m]; samples: each ray's own, twice two numbers on the
+        unit square, wanted for light that bounces (`lighting.onwards`)."""
+        met = self._met(seen.ray, there)
+        arrives = self._irradiance(met, seen.axis, there, shadow_of_headlight=False)
         if self.light == lighting.BOUNCE:
-            onwards = self._returned(still, met, axis, rows, inputs, samples)
+            onwards = self._returned(met, seen.axis, there, samples)
             arrives = [e + dr.pi * more for e, more in zip(arrives, onwards, strict=True)]
-        spectra = self._sent(still, met, arrives, inputs)
+        spectra = self._sent(met, arrives, there)
         return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], met.t
 
-    def _returned(
-        self, still: MitsubaObject, met: _Met, axis: Array, rows: Rows, inputs: dict[str, Array], samples: Array
-    ) -> list[Array]:
+    def _returned(self, met: _Met, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
         """What comes to surfaces that are seen, from one direction each, drawn from Lambert's cosine: light that is
         reflected there, and what glows, the sky too, be it there or reflected there."""
         onwards = lighting.onwards(met.point, met.normal, mi.Point2f(samples.x, samples.y))
-        there = self._met(still, onwards, rows, inputs, met.seen)
-        arrives = self._irradiance(still, there, axis, rows, inputs, shadow_of_headlight=True)
+        second = self._met(onwards, there, met.seen)
+        arrives = self._irradiance(second, axis, there, shadow_of_headlight=True)
         if self._scene.has_sky or self._glows:
-            further = lighting.onwards(there.point, there.normal, mi.Point2f(samples.z, samples.w))
-            last = self._met(still, further, rows, inputs, there.seen)
-            emitted = self._emitted(still, last, inputs)
+            further = lighting.onwards(second.point, second.normal, mi.Point2f(samples.z, samples.w))
+            last = self._met(further, there, second.seen)
+            emitted = self._emitted(last, there)
             arrives = [e + dr.pi * more for e, more in zip(arrives, emitted, strict=True)]
-        found = self._sent(still, there, arrives, inputs)
+        found = self._sent(second, arrives, there)
         return [dr.select(met.seen, spectrum, 0) for spectrum in found]
 
-    def _met(
-        self, still: MitsubaObject, ray: Array, rows: Rows, inputs: dict[str, Array], active: Array | None = None
-    ) -> _Met:
+    def _met(self, ray: Array, there: Surroundings, active: Array | None = None) -> _Met:
         """What rays meet first."""
         movers = self._scene.movers
         active = mi.Bool(True) if active is None else active
         ray.wavelengths = self._bands[0]
-        si = still.ray_intersect(ray, active) if self._any_still else _nothing()
+        si = there.still.ray_intersect(ray, active) if self._any_still else _nothing()
         if movers.apart:
             computed(si)  # once: every kernel that reads of it would trace it anew
         far = dr.select(active, si.t, 0)
-        hit = movers.nearest(ray, far, rows.movers, rows.first_mover, inputs)
+        hit = movers.nearest(ray, far, there.movers)
         on_mover = active & (hit.which < len(movers))
         seen = active & (si.is_valid() | on_mover)
         point = ray(dr.select(seen, hit.t, 0))
@@ -128,84 +212,73 @@ class ModelTracer:
         si.t = hit.t
         si.sh_frame = mi.Frame3f(si.n)
         si.wi = si.to_local(-ray.d)
-        mine = dr.gather(mi.BSDFPtr, inputs["bsdfs"], dr.minimum(hit.which, len(inputs["bsdfs"]) - 1), on_mover)
+        bsdfs = there.tables.bsdfs
+        mine = dr.gather(mi.BSDFPtr, bsdfs, dr.minimum(hit.which, len(bsdfs) - 1), on_mover)
         bsdf = dr.select(on_mover, mine, si.bsdf()) if self._any_still else mine
         colors = glow = [mi.Spectrum(1) for _ in self._bands]
         which, paint = dr.minimum(hit.which, len(movers)), self._scene.paint
         if len(paint):
-            colors = paint.of(which, rows.paint, rows.first_paint, inputs, seen)
+            colors = paint.of(which, there.paint, seen)
         if paint.glow:
-            glow = paint.of(which, rows.paint, rows.first_paint, inputs, seen, glow=True)
+            glow = paint.of(which, there.paint, seen, glow=True)
         return _Met(si, bsdf, colors, glow, which, seen, active, point, normal, hit.t, ray.d)
 
-    def distance(self, still: MitsubaObject, ray: Array, rows: Rows, inputs: dict[str, Array]) -> Array:
+    def distance(self, ray: Array, there: Surroundings) -> Array:
         """How far what each ray meets is [m]."""
-        si = still.ray_intersect_preliminary(ray) if self._any_still else _nothing()
+        si = there.still.ray_intersect_preliminary(ray) if self._any_still else _nothing()
         far = dr.select(si.is_valid(), si.t, dr.inf)
-        return self._scene.movers.nearest(ray, far, rows.movers, rows.first_mover, inputs).t
+        return self._scene.movers.nearest(ray, far, there.movers).t
 
-    def which(self, told_apart: MitsubaObject, ray: Array, rows: Rows, inputs: dict[str, Array]) -> Array:
+    def which(self, ray: Array, there: Surroundings) -> Array:
         """What each ray meets: a mover by its number; what stands still by its id in Mitsuba, after all movers, and
-        nothing as the id 0."""
-        movers, any_still = len(self._scene.movers), len(told_apart.shapes()) > 0
-        si = told_apart.ray_intersect_preliminary(ray) if any_still else _nothing()
+        nothing as the id 0. What stands still is told apart, see `ModelScene.told_apart`."""
+        movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
+        si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()
         far = dr.select(si.is_valid(), si.t, dr.inf)
-        hit = self._scene.movers.nearest(ray, far, rows.movers, rows.first_mover, inputs)
+        hit = self._scene.movers.nearest(ray, far, there.movers)
         shape: Array = dr.reinterpret_array(mi.UInt32, si.shape) if any_still else mi.UInt32(0)
         return dr.select(hit.which < movers, hit.which, movers + dr.select(si.is_valid(), shape, 0))
 
-    def _irradiance(
-        self,
-        still: MitsubaObject,
-        met: _Met,
-        axis: Array,
-        rows: Rows,
-        inputs: dict[str, Array],
-        *,
-        shadow_of_headlight: bool,
-    ) -> list[Array]:
+    def _irradiance(self, met: _Met, axis: Array, there: Surroundings, *, shadow_of_headlight: bool) -> list[Array]:
         """Of a surface by lamps, as spectra of so many bands each."""
         start = lighting.clear_of(met.point, met.normal)
         total = [mi.Spectrum(0) for _ in self._bands]
         for k, light in enumerate(self._scene.lights.found):
-            towards, far, share = self._scene.lights.towards(k, met.point, axis, rows.lights, rows.first_light)
+            towards, far, share = self._scene.lights.towards(k, met.point, axis, there.lights)
             cosine = dr.dot(met.normal, towards)
             shines = met.seen & (cosine > 0) & (share > 0)
             if light.light >= 0 or shadow_of_headlight:  # an eye's own headlight throws no shadow that it could see
-                shines &= ~self._shadowed(still, mi.Ray3f(start, towards), far, shines, rows, inputs)
+                shines &= ~self._shadowed(mi.Ray3f(start, towards), far, shines, there)
             arrives = dr.select(shines, cosine * share, 0)
             chunks = np.pad(light.level, (0, -len(light.level) % lighting.LANES)).reshape(-1, lighting.LANES)
             total = [e + arrives * mi.Spectrum(*map(float, chunk)) for e, chunk in zip(total, chunks, strict=True)]
         return total
 
-    def _shadowed(
-        self, still: MitsubaObject, ray: Array, far: Array, active: Array, rows: Rows, inputs: dict[str, Array]
-    ) -> Array:
+    def _shadowed(self, ray: Array, far: Array, active: Array, there: Surroundings) -> Array:
         ray.maxt = far
-        blocked = self._scene.movers.block(ray, dr.select(active, far, 0), rows.movers, rows.first_mover, inputs)
-        return blocked | still.ray_test(ray, active & ~blocked) if self._any_still else blocked
+        blocked = self._scene.movers.block(ray, dr.select(active, far, 0), there.movers)
+        return blocked | there.still.ray_test(ray, active & ~blocked) if self._any_still else blocked
 
-    def _sent(self, still: MitsubaObject, met: _Met, arrives: list[Array], inputs: dict[str, Array]) -> list[Array]:
+    def _sent(self, met: _Met, arrives: list[Array], there: Surroundings) -> list[Array]:
         """Radiance: what is reflected of the light that arrives, and what is emitted."""
-        emitted, found = self._emitted(still, met, inputs), []
+        emitted, found = self._emitted(met, there), []
         for band, color, e, own in zip(self._bands, met.colors, arrives, emitted, strict=True):
             met.si.wavelengths = band
             reflected = color * e * met.bsdf.eval_diffuse_reflectance(met.si, met.seen) * dr.inv_pi
             found.append(own + dr.select(met.seen, reflected, 0))
         return found
 
-    def _emitted(self, still: MitsubaObject, met: _Met, inputs: dict[str, Array]) -> list[Array]:
+    def _emitted(self, met: _Met, there: Surroundings) -> list[Array]:
         """Radiance of the sky where nothing is met, and of what glows."""
         found = [mi.Spectrum(0) for _ in self._bands]
         if self._scene.has_sky:
             nothing = met.active & ~met.seen
-            found = [
-                e + self._heaven(still, met.direction, nothing, b) for e, b in zip(found, self._bands, strict=True)
-            ]
-        if self._glows:
-            k = dr.gather(mi.UInt32, inputs["glowing"], met.which, met.seen)
-            glows = met.seen & (k < len(inputs["glows"]))
-            glow = dr.gather(mi.BSDFPtr, inputs["glows"], k, glows)
+            sky = (self._heaven(there.still, met.direction, nothing, band) for band in self._bands)
+            found = [e + light for e, light in zip(found, sky, strict=True)]
+        if there.tables.glows is not None:
+            k = dr.gather(mi.UInt32, there.tables.glowing, met.which, met.seen)
+            glows = met.seen & (k < len(there.tables.glows))
+            glow = dr.gather(mi.BSDFPtr, there.tables.glows, k, glows)
             for i, band in enumerate(self._bands):
                 met.si.wavelengths = band
                 found[i] += dr.select(glows, met.glow[i] * glow.eval_diffuse_reflectance(met.si, glows), 0)

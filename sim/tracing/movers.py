@@ -17,11 +17,12 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.scene.appearances import Appearance
-from sim.scene.device_arrays import three, whole_numbers
+from sim.scene.device_arrays import whole_numbers
 from sim.scene.poses import Poses
 from sim.scene.primitive_geoms import kind_of
 from sim.scene.variant import MitsubaObject, computed, on_gpu
 from sim.tracing.primitives import PRIMITIVES, Primitive
+from sim.tracing.world_rows import WorldRows
 
 _TYPES = mujoco.mjtGeom
 # Of four floats for each mover: a sphere around its origin; then an axis of its frame in the world and one of its
@@ -64,13 +65,20 @@ class _Frame:
         return self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
 
 
+@dataclass(frozen=True)
+class MoverRows(WorldRows):
+    """Of one world: a sphere around all movers, then ROWS for each. ends: see `Movers`"""
+
+    ends: Array
+
+
 class Movers:
     """The geoms of a model that move, primitives first, by kind; where materials are drawn, each of a geom's looks.
 
     looks: of each · geoms: their ids, (mover,) · n_primitives: of them
     resizable: ids of geoms whose sizes may differ between worlds: those that are primitives only
     meshes: Mitsuba scenes of the others
-    inputs: arrays for the kernel, by name
+    ends: number of the first mover of each kind, for the kernel
 
     Raises:
         ValueError: more than MESHES meshes.
@@ -96,7 +104,7 @@ class Movers:
         self._mesh_reach = np.where(self._types == _TYPES.mjGEOM_PLANE, np.inf, model.geom_rbound[self.geoms])
         self._known: tuple[bytes, np.ndarray, np.ndarray] | None = None  # extents of the last poses
         self._ends = np.cumsum([0, *(len(group) for group in by_kind.values())])
-        self.inputs = {"mover_ends": whole_numbers(self._ends)}
+        self.ends = whole_numbers(self._ends)
 
     def __len__(self) -> int:
         return len(self.geoms)
@@ -115,7 +123,7 @@ class Movers:
         """What the kernel reads of a world: a sphere around all movers, then each, (world, 4 n_rows) float32."""
         rows = np.zeros((poses.n, self.n_rows, 4), np.float32)
         if len(self):
-            places, (sizes, reach) = poses.geom_xpos[:, self.geoms], self._extents(poses)
+            places, (sizes, reach) = poses.geom_places(self.geoms), self._extents(poses)
             absent = self._absent(poses)
             if absent is not None:
                 reach = np.where(absent, 0, reach)
@@ -123,7 +131,7 @@ class Movers:
             rows[:, 0, 3] = (np.linalg.norm(places - centre[:, None], axis=-1) + reach).max(axis=1)
             each = rows[:, 1:].reshape(poses.n, len(self), ROWS, 4)
             each[:, :, 0, :3], each[:, :, 0, 3] = places, reach
-            each[:, :, 1:, :3] = np.swapaxes(poses.geom_xmat[:, self.geoms], -1, -2)
+            each[:, :, 1:, :3] = np.swapaxes(poses.geom_turns(self.geoms), -1, -2)
             each[:, :, 1:, 3] = sizes
             if absent is not None:
                 each[:, :, 0, :3] += np.where(absent, np.nan, 0)[..., None]  # nowhere: no comparison holds
@@ -159,45 +167,42 @@ class Movers:
             reach[:, : self.n_primitives][:, mine] = how_far(sizes[:, : self.n_primitives][:, mine])
         return sizes, reach
 
-    def nearest(self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Hit:
-        """The one that a ray meets first, nearer than `farthest`; first: of the world's rows."""
+    def nearest(self, ray: Array, farthest: Array, there: MoverRows) -> Hit:
+        """The one that a ray meets first, nearer than `farthest`."""
         none = farthest, mi.UInt32(len(self)), mi.Vector3f(0, 0, 1), mi.Point2f(0)
         if not len(self):
             return Hit(*none)
         if self.apart:
-            computed(ray, farthest, rows, first)
-            return Hit(*self._nearest(ray, farthest, rows, first + 1, inputs))
-        near = _may_meet(ray, rows, first)
-        found = dr.if_stmt((), near, lambda: self._nearest(ray, farthest, rows, first + 1, inputs), lambda: none)
+            computed(ray, farthest, there.fours, there.first)
+            return Hit(*self._nearest(ray, farthest, there))
+        near = _may_meet(ray, there, 0)
+        found = dr.if_stmt((), near, lambda: self._nearest(ray, farthest, there), lambda: none)
         return Hit(*found)
 
-    def block(self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Array:
+    def block(self, ray: Array, farthest: Array, there: MoverRows) -> Array:
         """Whether any lies on a ray, nearer than `farthest`."""
         if self.apart:
-            computed(ray, farthest, rows, first)
-            return self._block(ray, farthest, rows, first + 1, inputs)
-        near = _may_meet(ray, rows, first) & (farthest > 0)
-        return dr.if_stmt((), near, lambda: self._block(ray, farthest, rows, first + 1, inputs), lambda: mi.Bool(False))
+            computed(ray, farthest, there.fours, there.first)
+            return self._block(ray, farthest, there)
+        near = _may_meet(ray, there, 0) & (farthest > 0)
+        return dr.if_stmt((), near, lambda: self._block(ray, farthest, there), lambda: mi.Bool(False))
 
-    def _nearest(
-        self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]
-    ) -> tuple[Array, ...]:
-        """first: row of the first mover"""
+    def _nearest(self, ray: Array, farthest: Array, there: MoverRows) -> tuple[Array, ...]:
         t, which = farthest, mi.UInt32(len(self))
         for i, primitive in self._kinds():
 
             def step(k: Array, t: Array, which: Array, hit: Callable[..., Array] = primitive.hit) -> tuple[Array, ...]:
-                found = _met(hit, ray, rows, first, k)
+                found = _met(hit, ray, there, k)
                 nearer = found < t
                 return k + 1, dr.select(nearer, found, t), dr.select(nearer, k, which)
 
-            _, t, which = _loop(i, inputs, step, t, which)
+            _, t, which = _loop(i, there, step, t, which)
         uv = mi.Point2f(0)
-        normal = self._normals(ray(dr.select(which < len(self), t, 0)), which, rows, first, inputs)
+        normal = self._normals(ray(dr.select(which < len(self), t, 0)), which, there)
         for m, scene in enumerate(self.meshes):
             computed(t, which, normal, uv)
             k = self.n_primitives + m
-            frame, _ = _frame(rows, first, mi.UInt32(k))
+            frame, _ = _frame(there, mi.UInt32(k))
             si = scene.ray_intersect(_local_ray(ray, frame), mi.RayFlags.All, True, self._is_there(k, frame))
             nearer = si.is_valid() & (si.t < t)
             t, which = dr.select(nearer, si.t, t), dr.select(nearer, k, which)
@@ -207,18 +212,18 @@ class Movers:
             computed(t, which, normal, uv)
         return t, which, normal, uv
 
-    def _block(self, ray: Array, farthest: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Array:
+    def _block(self, ray: Array, farthest: Array, there: MoverRows) -> Array:
         blocked = mi.Bool(False)
         for i, primitive in self._kinds():
 
             def step(k: Array, blocked: Array, hit: Callable[..., Array] = primitive.hit) -> tuple[Array, ...]:
-                return k + 1, blocked | (_met(hit, ray, rows, first, k) < farthest)
+                return k + 1, blocked | (_met(hit, ray, there, k) < farthest)
 
-            _, blocked = _loop(i, inputs, step, blocked)
+            _, blocked = _loop(i, there, step, blocked)
         for m, scene in enumerate(self.meshes):
             computed(blocked)
             k = self.n_primitives + m
-            frame, _ = _frame(rows, first, mi.UInt32(k))
+            frame, _ = _frame(there, mi.UInt32(k))
             local = _local_ray(ray, frame)
             local.maxt = farthest
             blocked |= scene.ray_test(local, ~blocked & self._is_there(k, frame))
@@ -234,51 +239,49 @@ class Movers:
         """Those that there are, by number."""
         return [(i, p) for i, p in enumerate(PRIMITIVES.values()) if self._ends[i] < self._ends[i + 1]]
 
-    def _normals(self, point: Array, which: Array, rows: Array, first: Array, inputs: dict[str, Array]) -> Array:
+    def _normals(self, point: Array, which: Array, there: MoverRows) -> Array:
         """Of primitives, at points on them."""
         k = dr.minimum(which, max(self.n_primitives - 1, 0))
-        frame, size = _frame(rows, first, k)
+        frame, size = _frame(there, k)
         local = frame.taken(point - frame.origin)
         normal = mi.Vector3f(0, 0, 1)
         for i, primitive in self._kinds():
-            mine = (k >= dr.gather(mi.UInt32, inputs["mover_ends"], i)) & (
-                k < dr.gather(mi.UInt32, inputs["mover_ends"], i + 1)
-            )
+            mine = (k >= dr.gather(mi.UInt32, there.ends, i)) & (k < dr.gather(mi.UInt32, there.ends, i + 1))
             normal = dr.select(mine, primitive.normal(local, size), normal)
         return dr.normalize(frame.given(normal))
 
 
-def _met(hit: Callable[..., Array], ray: Array, rows: Array, first: Array, k: Array) -> Array:
+def _met(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
     """Where a ray meets mover k [m]. Most rays miss the sphere around it, and their neighbours do, too."""
 
     def within() -> Array:
-        frame, size = _frame(rows, first, k)
+        frame, size = _frame(there, k)
         return hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), size)
 
-    found: Array = dr.if_stmt((), _may_meet(ray, rows, first + k * ROWS), within, lambda: mi.Float(dr.inf))
+    found: Array = dr.if_stmt((), _may_meet(ray, there, 1 + k * ROWS), within, lambda: mi.Float(dr.inf))
     return found
 
 
-def _frame(rows: Array, first: Array, k: Array) -> tuple[_Frame, Array]:
+def _frame(there: MoverRows, k: Array) -> tuple[_Frame, Array]:
     """Of a mover, and its half sizes."""
-    fours = [list(dr.gather(mi.Vector4f, rows, first + k * ROWS + i)) for i in range(1, ROWS)]
+    fours = [list(there.four(1 + k * ROWS + i)) for i in range(1, ROWS)]
     a, b, c = (mi.Vector3f(*four[:3]) for four in fours)
-    return _Frame((a, b, c), three(rows, first + k * ROWS)), mi.Vector3f(*(four[3] for four in fours))
+    return _Frame((a, b, c), there.point(1 + k * ROWS)), mi.Vector3f(*(four[3] for four in fours))
 
 
-def _may_meet(ray: Array, rows: Array, first: Array) -> Array:
+def _may_meet(ray: Array, there: MoverRows, row: Array | int) -> Array:
     """Whether a ray meets the sphere of this row."""
-    x, y, z, radius = dr.gather(mi.Vector4f, rows, first)
+    x, y, z, radius = there.four(row)
     way, square = mi.Vector3f(x, y, z) - ray.o, radius * radius
     along = dr.dot(way, ray.d)
     aside = way - along * ray.d  # a difference of squares would lose what is small and far away
     return (dr.squared_norm(way) < square) | ((along > 0) & (dr.squared_norm(aside) < square))
 
 
-def _loop(kind: int, inputs: dict[str, Array], step: Callable[..., Any], *state: Array) -> tuple[Array, ...]:
+def _loop(kind: int, there: MoverRows, step: Callable[..., Any], *state: Array) -> tuple[Array, ...]:
     """A step for each mover of a kind."""
-    end = dr.gather(mi.UInt32, inputs["mover_ends"], kind + 1)
-    start = dr.gather(mi.UInt32, inputs["mover_ends"], kind)
+    end = dr.gather(mi.UInt32, there.ends, kind + 1)
+    start = dr.gather(mi.UInt32, there.ends, kind)
     found: tuple[Array, ...] = dr.while_loop((start, *state), lambda k, *_: k < end, step, label="movers")
     return found
 

@@ -7,6 +7,8 @@ its world's colour, too, by the spectrum that `sim.scene.lights.emission` has fo
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import drjit as dr
 import mitsuba as mi
 import mujoco
@@ -18,12 +20,21 @@ from sim.scene.color import decode_srgb
 from sim.scene.device_arrays import whole_numbers
 from sim.scene.poses import Poses
 from sim.tracing import lighting
+from sim.tracing.world_rows import WorldRows
+
+
+@dataclass(frozen=True)
+class PaintRows(WorldRows):
+    """Of one world. painted: see `Paint`"""
+
+    painted: Array
 
 
 class Paint:
     """Of some geoms, in the order of `geoms`; needs the variant in force.
 
-    movers: ids of all movers · glow: whether any of the geoms glows · inputs: arrays for the kernel
+    movers: ids of all movers · glow: whether any of the geoms glows
+    painted: number of each mover among them, for the kernel
     """
 
     def __init__(
@@ -33,7 +44,7 @@ class Paint:
         self._own = np.array([surfaces.rgba(model, g)[:3] for g in geoms]).reshape(-1, 3)
         self._of_material = model.geom_matid[self.geoms][:, None] >= 0
         place = {geom: k for k, geom in enumerate(geoms)}
-        self.inputs = {"painted": whole_numbers([*(place.get(int(g), len(geoms)) for g in movers), len(geoms)])}
+        self.painted = whole_numbers([*(place.get(int(g), len(geoms)) for g in movers), len(geoms)])
         textures = [(g, surfaces.texture_id(model, g)) for g in geoms]
         self.glow, self._textured = glow, [t >= 0 and surfaces.is_mirrored(model, g, t) for g, t in textures]
         self._known: dict[tuple[tuple[float, ...], bool], np.ndarray] = {}
@@ -66,17 +77,15 @@ class Paint:
         unset = (here == surfaces.UNSET_RGBA).all(axis=-1, keepdims=True) & self._of_material
         return np.where(unset, self._own, here[..., :3])
 
-    def of(
-        self, which: Array, rows: Array, first: Array, inputs: dict[str, Array], seen: Array, *, glow: bool = False
-    ) -> list[Array]:
-        """What a mover's reflectances are multiplied by, or its glow, as spectra; first: of the world's rows."""
-        k = dr.gather(mi.UInt32, inputs["painted"], which, seen)
+    def of(self, which: Array, there: PaintRows, seen: Array, *, glow: bool = False) -> list[Array]:
+        """What a mover's reflectances are multiplied by, or its glow, as spectra."""
+        k = dr.gather(mi.UInt32, there.painted, which, seen)
         painted = seen & (k < len(self))
-        start = first + (len(self) * len(self._spectra) if glow else 0)
+        start = len(self) * len(self._spectra) if glow else 0
         found = []
         for chunk in range(len(self._spectra)):
             row = start + dr.select(painted, k, 0) * len(self._spectra) + chunk
-            found.append(dr.select(painted, mi.Spectrum(*dr.gather(mi.Vector4f, rows, row)), 1))
+            found.append(dr.select(painted, mi.Spectrum(*there.four(row)), 1))
         return found
 
     def _spectrum(self, rgb: tuple[float, ...], emitted: bool) -> np.ndarray:

@@ -14,7 +14,11 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from sim.scene.device_arrays import aligned, three
+from sim.scene.poses import Poses
 from sim.scene.variant import MitsubaObject
+
+TURNED = 1e-6  # of rotations: what is no rounding
 
 
 @dataclass(frozen=True)
@@ -23,19 +27,56 @@ class Spheres:
 
     radii: [m], (k,)
     frames: rotation from the sphere's frame to the world's, (k, 3, 3)
-    offsets: of the sphere's centre from the body's origin, in the world's frame [m], (k, 3)
+    textured: which have a texture, (k,)
+    names: of the geoms
     bsdfs: one Mitsuba BSDF each; kept here, since a BSDFPtr does not keep its objects alive
     geoms: ids of the geoms, (k,)
     """
 
     radii: np.ndarray
     frames: np.ndarray
-    offsets: np.ndarray
+    textured: np.ndarray
+    names: tuple[str, ...]
     bsdfs: tuple[MitsubaObject, ...]
     geoms: tuple[int, ...]
 
     def __len__(self) -> int:
         return len(self.radii)
+
+
+class SphereRows:
+    """Where the centres of spheres in a number of worlds are put, in fours, for kernels to read."""
+
+    def __init__(self, spheres: Spheres, n_envs: int) -> None:
+        self._spheres = spheres
+        self._rows = aligned(n_envs * max(len(spheres), 1) * 4, np.float32).reshape(n_envs, -1, 4)
+        self._textured = np.flatnonzero(spheres.textured)
+
+    def fill(self, poses: Poses) -> None:
+        """With these worlds'.
+
+        Raises:
+            ValueError: a sphere with a texture has turned.
+        """
+        if len(self._spheres):
+            self._rows[..., :3] = poses.geom_places(self._spheres.geoms)
+        for k in self._textured:
+            turn, frame = poses.geom_turns([self._spheres.geoms[k]])[:, 0], self._spheres.frames[k]
+            if np.abs(turn - frame).max() > TURNED:
+                raise ValueError(
+                    f"geom {self._spheres.names[k]!r} has a texture and has turned: closed forms keep it as the model "
+                    "has it: must be seen with tracer = 'mitsuba'"
+                )
+
+    def arrays(self) -> Array:
+        """On the device; it shares the buffer's memory."""
+        return mi.Float(self._rows.reshape(-1))
+
+
+def centres_in(rows: Array, n: int, world: Array) -> list[Array]:
+    """Centres of n spheres in a lane's world."""
+    first = world * n
+    return [mi.Point3f(three(rows, first + k)) for k in range(n)]
 
 
 def nearest(spheres: Spheres, centres: list[Array], ray: Array, t: Array) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Protocol
 
 import drjit as dr
@@ -10,6 +11,7 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from sim.scene.device_arrays import floats
 from sim.tracing.walls import ALIGNED, SIDES, NoClosedForm, Walls
 
 FEW = 8  # walls that are solved one by one; a walk through a grid costs about as much
@@ -17,16 +19,26 @@ CELLS = 1_000_000  # of a grid, at most
 NEVER_ZERO = 1e-9  # components of directions below this are this: no wall is hit beside its end by that
 
 
+@dataclass(frozen=True)
+class CellTables:
+    """Of a grid's cells, row by row. wall: which one fills it · top: of that wall [m] · stop: height below which a ray
+    ends there [m]"""
+
+    wall: Array
+    top: Array
+    stop: Array
+
+
 class Footprints(Protocol):
-    """how: in words · tables: float32 arrays for the kernel."""
+    """how: in words · tables: what the kernel reads; None: nothing."""
 
     how: str
-    tables: dict[str, np.ndarray]
+    tables: CellTables | None
 
-    def hit(self, ray: Array, inputs: dict[str, Array]) -> tuple[Array, Array, Array]:
+    def hit(self, ray: Array, cells: CellTables | None) -> tuple[Array, Array, Array]:
         """Distance [m] to the nearest wall (inf: none; 0: inside one), its face, and the face's normal."""
 
-    def blocks(self, start: Array, direction: np.ndarray, inputs: dict[str, Array]) -> Array:
+    def blocks(self, start: Array, direction: np.ndarray, cells: CellTables | None) -> Array:
         """Whether a wall stands between a point outside all walls and a light in this direction, upwards."""
 
 
@@ -45,9 +57,9 @@ class EachWall:
     def __init__(self, walls: Walls) -> None:
         self._walls = walls
         self.how = "each solved"
-        self.tables: dict[str, np.ndarray] = {}
+        self.tables: CellTables | None = None
 
-    def hit(self, ray: Array, inputs: dict[str, Array]) -> tuple[Array, Array, Array]:
+    def hit(self, ray: Array, cells: CellTables | None) -> tuple[Array, Array, Array]:
         """See Footprints."""
         dx, dy = _never_zero(ray.d.x), _never_zero(ray.d.y)
         ix, iy = 1 / dx, 1 / dy
@@ -63,7 +75,7 @@ class EachWall:
             face = dr.select(hit, SIDES * i, face)
         return _finished(t, face, through_x, dx, dy)
 
-    def blocks(self, start: Array, direction: np.ndarray, inputs: dict[str, Array]) -> Array:
+    def blocks(self, start: Array, direction: np.ndarray, cells: CellTables | None) -> Array:
         """See Footprints."""
         dx, dy = (math.copysign(max(abs(float(d)), NEVER_ZERO), float(d)) for d in direction[:2])
         blocked = mi.Bool(False)
@@ -96,15 +108,13 @@ class Cells:
         tops = np.where(filled, walls.top[np.maximum(padded, 0)], -np.inf)
         edge = np.ones_like(filled)
         edge[1:-1, 1:-1] = False
-        self.tables = {
-            "wall": np.maximum(padded, 0).astype(np.float32).ravel(),
-            "top": tops.astype(np.float32).ravel(),
-            # A ray stops where it leaves the grid, without having hit.
-            "stop": np.where(edge, np.inf, tops).astype(np.float32).ravel(),
-        }
+        # A ray stops where it leaves the grid, without having hit.
+        tables = np.maximum(padded, 0), tops, np.where(edge, np.inf, tops)
+        self.tables: CellTables | None = CellTables(*(floats(table) for table in tables))
 
-    def hit(self, ray: Array, inputs: dict[str, Array]) -> tuple[Array, Array, Array]:
+    def hit(self, ray: Array, cells: CellTables | None) -> tuple[Array, Array, Array]:
         """See Footprints."""
+        assert cells is not None
         dx, dy = _never_zero(ray.d.x), _never_zero(ray.d.y)
         x, y = self._place(ray.o)
         column, row = dr.floor(x), dr.floor(y)
@@ -114,7 +124,7 @@ class Cells:
         step_x = dr.select(dx > 0, mi.Int32(1), mi.Int32(-1))
         step_y = dr.select(dy > 0, mi.Int32(self._columns), mi.Int32(-self._columns))
         cell = dr.select(self._inside(column, row), mi.Int32(row * self._columns + column), 0)
-        z, dz, stop = ray.o.z, ray.d.z, inputs["stop"]
+        z, dz, stop = ray.o.z, ray.d.z, cells.stop
 
         def going(t: Array, cell: Array, next_x: Array, next_y: Array, through_x: Array) -> Array:
             height = dr.fma(dz, t, z)
@@ -130,12 +140,13 @@ class Cells:
 
         state = (mi.Float(0), cell, next_x, next_y, mi.Bool(False))
         t, cell, _, _, through_x = dr.while_loop(state, going, walk, label="cells")
-        hit = dr.fma(dz, t, z) < dr.gather(mi.Float, inputs["top"], cell)
-        face = SIDES * mi.UInt32(dr.gather(mi.Float, inputs["wall"], cell))
+        hit = dr.fma(dz, t, z) < dr.gather(mi.Float, cells.top, cell)
+        face = SIDES * mi.UInt32(dr.gather(mi.Float, cells.wall, cell))
         return _finished(dr.select(hit, t, math.inf), face, through_x, dx, dy)
 
-    def blocks(self, start: Array, direction: np.ndarray, inputs: dict[str, Array]) -> Array:
+    def blocks(self, start: Array, direction: np.ndarray, cells: CellTables | None) -> Array:
         """See Footprints. A shadow ray has left the walls behind after so few cells that the walk is unrolled."""
+        assert cells is not None
         dx, dy, dz = map(float, direction)
         x, y = self._place(start)
         column, row = dr.floor(x), dr.floor(y)
@@ -152,7 +163,7 @@ class Cells:
             next_y = dr.select(through_x, next_y, next_y + per_y)
             inside = self._inside(column, row)
             cell = mi.UInt32(row * self._columns + column)
-            blocked |= inside & (dr.fma(t, dz, start.z) < dr.gather(mi.Float, inputs["top"], cell, inside))
+            blocked |= inside & (dr.fma(t, dz, start.z) < dr.gather(mi.Float, cells.top, cell, inside))
         return blocked
 
     def _crossings(self, direction: np.ndarray) -> int:

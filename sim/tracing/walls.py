@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from sim.eyes.eyes import EYE_HEIGHT
 from sim.scene import shapes, surfaces
 
 SIDES = 4  # of a wall: those that face -x, +x, -y, +y
@@ -50,8 +49,8 @@ class Walls:
         return len(self.top)
 
 
-def walls_of(model: mujoco.MjModel, geoms: Sequence[int]) -> Walls:
-    """The walls and the floor that these geoms are.
+def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> Walls:
+    """The walls and the floor that these geoms are; eyes: heights of the pupils [m].
 
     Raises:
         NoClosedForm: any other geom or placement.
@@ -69,8 +68,10 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int]) -> Walls:
     height = float(floor[0, 2])
     sides = [_box(model, data, g) for g in boxes]
     corners = np.array([[low, high] for low, high, _ in sides]).reshape(-1, 2, 3)
-    if (np.abs(corners[:, 0, 2] - height) > ALIGNED).any() or (corners[:, 1, 2] <= EYE_HEIGHT).any():
+    if (np.abs(corners[:, 0, 2] - height) > ALIGNED).any() or (corners[:, 1, 2] <= eyes.max()).any():
         raise NoClosedForm("a wall does not stand on the floor, or ends below the eyes")
+    if eyes.min() <= height:
+        raise NoClosedForm("the eyes are not above the floor")
     floor_lower, floor_upper = floor[:, :2].min(axis=0), floor[:, :2].max(axis=0)
     if (corners[..., :2] < floor_lower - ALIGNED).any() or (corners[..., :2] > floor_upper + ALIGNED).any():
         raise NoClosedForm("a wall stands beside the floor")

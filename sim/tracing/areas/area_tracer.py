@@ -21,13 +21,13 @@ from sim.tracing.areas import sphere_areas
 from sim.tracing.areas.body_light import BodyLight
 from sim.tracing.areas.branches import only_where
 from sim.tracing.areas.columns import RIM, Columns, Piece
-from sim.tracing.areas.illumination import Illumination, Moment
+from sim.tracing.areas.illumination import AreaTables, Illumination, Moment
 from sim.tracing.areas.light_table import LightTable
 from sim.tracing.areas.patch import Area, Patch
 from sim.tracing.areas.sphere_areas import Slice, SphereTexture, SphereView, Strip
 from sim.tracing.areas.stripes import Stripes, Texture
 from sim.tracing.closed_form_tracer import ClosedForm
-from sim.tracing.spheres import Spheres
+from sim.tracing.spheres import SphereRows, centres_in
 from sim.tracing.walls import ALIGNED, NoClosedForm
 
 LEAST_DIP = 1e-4  # of directions that meet the floor
@@ -39,8 +39,6 @@ class AreaTracer:
     """Sees by areas.
 
     rays: the tracer of rays through the same world, for the same light
-    radii, heights: of the bodies that move, and of their centres above the floor [m], the agent's last
-    frames: of the spheres that are seen, from their axes to the world's
 
     name, why: of this way of tracing, for reports
     light: what of it is followed
@@ -53,8 +51,10 @@ class AreaTracer:
     name = "areas"
     scene = None
 
-    def __init__(self, rays: ClosedForm, bodies: Spheres, heights: np.ndarray, n_seen: int) -> None:
-        walls, self._radii = rays.walls, list(map(float, bodies.radii))
+    def __init__(self, rays: ClosedForm) -> None:
+        world, self.rays = rays.world, rays
+        walls, bodies, n_seen = rays.walls, world.bodies, len(world.spheres)
+        self._radii = list(map(float, bodies.radii))
         if len(walls) and np.ptp(walls.top) > ALIGNED:
             raise NoClosedForm("walls of several heights")
         if not rays.one_dimensional:
@@ -66,7 +66,7 @@ class AreaTracer:
         seen = slice(n_seen)
         self._reflected = None
         if rays.light != lighting.DIRECT:
-            self._reflected = LightTable(rays, bodies.radii[seen], heights[seen])
+            self._reflected = LightTable(rays, bodies.radii[seen], world.heights[seen])
         rows = np.concatenate([rays.faces[:, :4], rays.faces[:, 8:10]], axis=1)
         spheres = [place[:2] for _, place in rays.sphere_textures]
         places = np.unique(np.concatenate([rows[:, 4:], np.reshape(spheres, (-1, 2))]), axis=0)
@@ -77,9 +77,14 @@ class AreaTracer:
         ]
         *self._floor_column, first, columns = map(float, rows[-1])
         self._floor_texture = Texture(mi.Float(first), mi.Float(columns))
-        parts = (rays.footprints, self._columns, self._illumination, self._stripes, self._reflected)
-        tables = {"faces": _in_eights(rows[:-1])} | {k: v for part in parts if part for k, v in part.tables.items()}
-        self.inputs = {name: floats(table) for name, table in tables.items()}
+        self.inputs = AreaTables(
+            floats(_in_eights(rows[:-1])),
+            self._columns.face_ends,
+            rays.footprints.tables,
+            self._illumination.around,
+            self._stripes.tables,
+            self._reflected.tables if self._reflected else None,
+        )
 
     def radiance(
         self,
@@ -93,7 +98,7 @@ class AreaTracer:
         met: faces at the area's left and right border, see `met` and `met_by`
         """
         nothing = [0.0] * (depth.count * len(self.basis))
-        pieces = self._columns.pieces(area, met, now.inputs)
+        pieces = self._columns.pieces(area, met, now.inputs.face_ends)
         seen = [only_where(piece.beside > 0, partial(self._wall, area, piece, now, depth), nothing) for piece in pieces]
         floor = partial(self._floor, area, pieces, now, depth)
         seen.append(only_where(pieces[0].below + pieces[1].below > 0, floor, nothing))
@@ -109,38 +114,46 @@ class AreaTracer:
             total = [dr.fma(left, own, sum_) for own, sum_ in zip(light, total, strict=True)]
         return [sum(own, rest) for rest, *own in zip(total, *(sphere[3:] for sphere in spheres), strict=True)]
 
-    def met(self, origin: Array, level: Array, inputs: dict[str, Array]) -> Array:
+    def met(self, origin: Array, level: Array, inputs: AreaTables) -> Array:
         """Number of the wall's face that is met in a level direction (Vector2f)."""
-        return self._columns.met(origin, level, inputs)
+        return self._columns.met(origin, level, inputs.cells)
 
-    def met_by(self, area: Area, inputs: dict[str, Array]) -> tuple[Array, Array]:
+    def met_by(self, area: Area, inputs: AreaTables) -> tuple[Array, Array]:
         """Of the faces at an area's left and right border."""
         left, right = (self.met(area.origin, area.level(mi.Float(a)), inputs) for a in (-0.5, 0.5))
         return left, right
+
+    def buffers(self, n_envs: int) -> SphereRows:
+        """For so many worlds."""
+        return self.rays.buffers(n_envs)
+
+    def bodies(self, rows: Array, world: Array, stand: Array) -> list[Array]:
+        """Centres of the bodies in a lane's world; stand: where the eyes' own is."""
+        return self.rays.all_bodies(centres_in(rows, len(self.rays.world.spheres), world), stand)
 
     @property
     def places(self) -> int:
         """Rows of a world's table of lit bodies; none where light that they reflect is not followed."""
         return self._illumination.bodies.places if self._reflected else 0
 
-    def lit(self, place: Array, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
+    def lit(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
         """Rows of that table, at places of the worlds in which the bodies stand."""
-        return self._illumination.bodies.table(place, bodies, inputs)
+        return self._illumination.bodies.table(place, bodies, inputs.around)
 
     def _wall(self, area: Area, piece: Piece, now: Moment, depth: DepthLayers) -> list[Array]:
         patch = piece.patch(area, self._walls.floor, self._columns.top)
-        row = dr.gather(mi.Vector4f, now.inputs["faces"], 2 * piece.face.index)
-        place = dr.gather(mi.Vector2f, now.inputs["faces"], 4 * piece.face.index + 2)
+        row = dr.gather(mi.Vector4f, now.inputs.faces, 2 * piece.face.index)
+        place = dr.gather(mi.Vector2f, now.inputs.faces, 4 * piece.face.index + 2)
         steps = [piece.start + (piece.end - piece.start) * (i / STRETCHES) for i in range(STRETCHES + 1)]
         ends = []
         for step in steps:
             at = piece.place(area, step)
             ends.append(row.x * at.x + row.y * at.y + row.z * patch.point.z + row.w)
         spread = dr.abs(row.z * patch.across.z)
-        reflectance = self._stripes.mean(Texture(place.x, place.y), ends, spread, now.inputs)
+        reflectance = self._stripes.mean(Texture(place.x, place.y), ends, spread, now.inputs.stripes)
         light = self._illumination.irradiance(patch, now)
-        if self._reflected:
-            arriving = self._reflected.on_wall(patch, now.inputs)
+        if self._reflected and now.inputs.reflected:
+            arriving = self._reflected.on_wall(patch, now.inputs.reflected)
             light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
         sent_on = [piece.beside * r * e for r, e in zip(reflectance, light, strict=True)]
         return _in_layers(depth, piece.nearness_at(piece.middle), sent_on)
@@ -155,8 +168,8 @@ class AreaTracer:
             dip = dr.maximum(below - area.up, LEAST_DIP)
             patch = self._floor_patch(area, a, dip, area.height * share / BANDS)
             light = self._illumination.irradiance(patch, now)
-            if self._reflected:
-                arriving = self._reflected.on_floor(patch, now.inputs)
+            if self._reflected and now.inputs.reflected:
+                arriving = self._reflected.on_floor(patch, now.inputs.reflected)
                 light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
             reflectance = self._floor_reflectance(patch, now)
             layers = _in_layers(depth, dip / (area.origin.z - self._walls.floor), light)
@@ -179,7 +192,7 @@ class AreaTracer:
         per_x, per_y, _, at = self._floor_column
         column = per_x * patch.point.x + per_y * patch.point.y + at
         along, across = (per_x * side.x + per_y * side.y for side in (patch.along, patch.across))
-        return self._stripes.mean_over(self._floor_texture, column, (along, across), now.inputs)
+        return self._stripes.mean_over(self._floor_texture, column, (along, across), now.inputs.stripes)
 
     def _sphere(self, area: Area, k: int, pieces: tuple[Piece, Piece], now: Moment, depth: DepthLayers) -> list[Array]:
         """Shares of the area in which it hides either wall and the floor, and light that comes from it, per component,
@@ -210,7 +223,7 @@ class AreaTracer:
             slice_ = view.slice(strip, number)
             bare = self._not_hidden(area, k, slice_, now)
             column, sides = sphere_areas.columns_of(texture, slice_.patch, self._radii[k])
-            reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs)
+            reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs.stripes)
             layers = _in_layers(depth, slice_.vergence(area), light.on(slice_.patch.normal))
             sent_on = [bare / mi.Float(view.sides)]
             sent_on += [slice_.share * bare * r * e for r, e in zip(reflectance * depth.count, layers, strict=True)]

@@ -29,9 +29,9 @@ class BodyLight:
     ) -> BodyLight:
         """Light on a patch that stands for what is seen of a body; body: its number."""
         lit = illumination.lit(patch, now, body)
-        if reflected is None:
+        if reflected is None or now.inputs.reflected is None:
             return cls(illumination, lit, [], [])
-        around = reflected.on_body(body, now.bodies[body], now.inputs)
+        around = reflected.on_body(body, now.bodies[body], now.inputs.reflected)
         free = [sum_of(fours, patch.normal) for fours in around]
         left = illumination.past_bodies(patch, free, now, body)
         return cls(illumination, lit, around, [a - b for a, b in zip(left, free, strict=True)])

@@ -14,9 +14,10 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from sim.scene.device_arrays import floats
 from sim.tracing.areas.half_planes import mean_clamped
 from sim.tracing.areas.patch import Area, Patch, Rectangle
-from sim.tracing.wall_intersection import Footprints
+from sim.tracing.wall_intersection import CellTables, Footprints
 from sim.tracing.walls import SIDES, Walls
 
 LEAST_NEARNESS = 1e-6  # [1/m] of what is seen in a stretch of no width
@@ -85,7 +86,7 @@ class Piece:
 class Columns:
     """Finds the pieces of a world of walls, all of one height.
 
-    top: height of the walls' tops [m] · tables: float32 arrays for the kernel
+    top: height of the walls' tops [m] · face_ends: of all faces, for the kernel
     """
 
     def __init__(self, walls: Walls, footprints: Footprints) -> None:
@@ -93,26 +94,27 @@ class Columns:
         self.top = float(walls.top.max(initial=walls.floor))
         self._lower, self._upper = (list(map(float, corner)) for corner in (walls.floor_lower, walls.floor_upper))
         self._rim = SIDES * len(walls)
-        self.tables = {"face_ends": _face_ends(walls).astype(np.float32).ravel()}
+        self.face_ends = floats(_face_ends(walls))
 
-    def pieces(self, area: Area, met: tuple[Array, Array], inputs: dict[str, Array]) -> tuple[Piece, Piece]:
+    def pieces(self, area: Area, met: tuple[Array, Array], face_ends: Array) -> tuple[Piece, Piece]:
         """The left and the right one; where one wall fills all columns, the right one has none.
 
         met: faces at the area's left and right border, see `met`
         """
         half = mi.Float(0.5)
-        left, right = (self._face(index, inputs) for index in met)
+        left, right = (self._face(index, face_ends) for index in met)
         edge = dr.select(left.index == right.index, half, self._edge(area, left, right))
         return self._piece(area, left, -half, edge), self._piece(area, right, edge, half)
 
-    def met(self, origin: Array, level: Array, inputs: dict[str, Array]) -> Array:
+    def met(self, origin: Array, level: Array, cells: CellTables | None) -> Array:
         """Number of the face that is met in a level direction (Vector2f)."""
         ray = mi.Ray3f(origin, mi.Vector3f(level.x, level.y, 0))
-        t, face, _ = self._footprints.hit(ray, inputs)
+        t, face, _ = self._footprints.hit(ray, cells)
         return dr.select(dr.isfinite(t), face, self._rim + self._side_of_floor(ray))
 
-    def _face(self, face: Array, inputs: dict[str, Array]) -> Face:
-        ends = dr.gather(mi.Vector4f, inputs["face_ends"], face)
+    @staticmethod
+    def _face(face: Array, face_ends: Array) -> Face:
+        ends = dr.gather(mi.Vector4f, face_ends, face)
         return Face(face, mi.Point2f(ends.x, ends.y), mi.Point2f(ends.z, ends.w))
 
     def _side_of_floor(self, ray: Array) -> Array:

@@ -13,23 +13,43 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.tracing.areas.branches import only_where
+from sim.tracing.areas.light_table import LightTables
 from sim.tracing.areas.lit_bodies import LitBodies, of
 from sim.tracing.areas.patch import Patch
 from sim.tracing.areas.shadows import WallShadows, lit_past_sphere
+from sim.tracing.areas.stripes import StripeTables
 from sim.tracing.closed_form_tracer import ClosedForm
+from sim.tracing.wall_intersection import CellTables
 
 REACH = 8  # radii; beyond, a body fills less than 1/64 of the view of what it lights or shades
 ITSELF_NONE = 2**16  # no body's number: a patch that is on none of them
 
 
 @dataclass(frozen=True)
+class AreaTables:
+    """What kernels that see areas read of any world.
+
+    faces: of walls, in eights, see `area_tracer` · face_ends: see `Columns` · cells: see `Footprints`
+    around: see `WallShadows` · stripes: textures · reflected: light that walls and floor send on to each other; None:
+        it is not followed
+    """
+
+    faces: Array
+    face_ends: Array
+    cells: CellTables | None
+    around: Array | None
+    stripes: StripeTables
+    reflected: LightTables | None
+
+
+@dataclass(frozen=True)
 class Moment:
-    """What changes from call to call. bodies: centres of the spheres that move, the agent's last · inputs: arrays
+    """What changes from call to call. bodies: centres of the spheres that move, the agent's last · inputs: tables
     world: in which an area lies · lit: tables of `LitBodies`, world by world, where light that bodies reflect is
     followed."""
 
     bodies: list[Array]
-    inputs: dict[str, Array]
+    inputs: AreaTables
     world: Array
     lit: list[Array]
 
@@ -37,7 +57,7 @@ class Moment:
 class Illumination:
     """Straight from the lights, past walls and bodies.
 
-    tables: float32 arrays for the kernel · bodies: how they are lit
+    around: which cells around each one are walls, for the kernel · bodies: how they are lit
 
     Raises:
         NoClosedForm: what WallShadows does not know.
@@ -49,7 +69,7 @@ class Illumination:
         self._colours = [_mean_colour(rays, place) for _, place in rays.sphere_textures]
         self._floor, self._floor_colour = rays.walls.floor, _mean_colour(rays, rays.faces[-1, 8:10])
         self._shadows = WallShadows(rays.walls, self._directions)
-        self.tables = self._shadows.tables
+        self.around = self._shadows.around
         self.bodies = LitBodies(self._shadows, self._directions, self._radii)
 
     def irradiance(self, patch: Patch, now: Moment) -> list[Array]:
@@ -63,7 +83,7 @@ class Illumination:
             left = lit_past_sphere(patch, self._directions, of(k, now.bodies), of(k, self._radii))
             return [dr.select(k == itself, share, share * other) for share, other in zip(lit, left, strict=True)]
 
-        return self._for_bodies(past, self._shadows.lit(patch, self._directions, now.inputs))
+        return self._for_bodies(past, self._shadows.lit(patch, self._directions, now.inputs.around))
 
     def arriving(self, normal: Array, lit: list[Array]) -> list[Array]:
         """Per component: sum over the lights of level · cos θ · these shares."""

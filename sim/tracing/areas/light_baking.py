@@ -13,7 +13,7 @@ from optics.numerics.autodiff import Array
 from sim.eyes.receptive_fields import low_discrepancy
 from sim.scene.device_arrays import floats
 from sim.tracing import lighting
-from sim.tracing.areas.light_nodes import BODY_SPACING, MARGIN, SIDES, SPACING, LightNodes, NodeLight
+from sim.tracing.areas.light_nodes import BODY_SPACING, MARGIN, SIDES, SPACING, LightNodes, NodeLight, NodeTables
 from sim.tracing.closed_form_tracer import ClosedForm, Irradiance
 
 # Chosen. In navigation, nodes half as dense make the error twice as large; four times as many rays, or bodies' places
@@ -60,9 +60,10 @@ class Baking:
 
     def _between(self, found: dict[str, np.ndarray]) -> Irradiance:
         """What these tables say of any point."""
-        light = NodeLight(self._nodes, len(self._tracer.basis))
-        inputs = {name: floats(table) for name, table in (found | {"cells": self._nodes.cells}).items()}
-        return lambda point, normal: light.on_surface(point, normal, inputs)
+        light, count = NodeLight(self._nodes, len(self._tracer.basis)), range(len(self._tracer.basis))
+        floor, walls = ([floats(found[f"bounced_{name}_{k}"]) for k in count] for name in ("floor", "walls"))
+        tables = NodeTables(floats(self._nodes.cells), floor, walls)
+        return lambda point, normal: light.on_surface(point, normal, tables)
 
     def _surfaces(self) -> dict[str, np.ndarray]:
         tables = {"floor": self._on_floor(), "walls": self._on_walls()}

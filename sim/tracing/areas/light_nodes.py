@@ -61,6 +61,15 @@ class LightNodes:
         return self.grid.numbers.astype(np.float32).ravel()
 
 
+@dataclass(frozen=True)
+class NodeTables:
+    """cells: numbers of the free ones · floor, walls: light at their nodes, an array per component"""
+
+    cells: Array
+    floor: list[Array]
+    walls: list[Array]
+
+
 class NodeLight:
     """Light between the nodes; the tables that it reads are handed to each call.
 
@@ -70,38 +79,34 @@ class NodeLight:
     def __init__(self, nodes: LightNodes, components: int) -> None:
         self._nodes, self._components = nodes, components
 
-    def on_floor(self, patch: Patch, inputs: dict[str, Array]) -> list[Array]:
+    def on_floor(self, patch: Patch, tables: NodeTables) -> list[Array]:
         """Irradiance of what is reflected onto a patch of the floor, per component."""
-        cell, x, y = self._nodes.grid.locate(patch.point, inputs["cells"])
+        cell, x, y = self._nodes.grid.locate(patch.point, tables.cells)
         n = self._nodes.across
-        return self._interpolate("bounced_floor", cell * (n * n), (x, n), (y, n), inputs)
+        return self._interpolate(tables.floor, cell * (n * n), (x, n), (y, n))
 
-    def on_wall(self, patch: Patch, inputs: dict[str, Array]) -> list[Array]:
+    def on_wall(self, patch: Patch, tables: NodeTables) -> list[Array]:
         """The same of a wall."""
         normal = patch.normal
-        cell, x, y = self._nodes.grid.locate(patch.point + normal * MARGIN, inputs["cells"])
+        cell, x, y = self._nodes.grid.locate(patch.point + normal * MARGIN, tables.cells)
         along_y = dr.abs(normal.x) > 0.5
         side = dr.select(along_y, dr.select(normal.x > 0, 0.0, 1.0), dr.select(normal.y > 0, 2.0, 3.0))
         z = (patch.point.z - self._nodes.floor) * (1 / (self._nodes.top - self._nodes.floor))
         first = (cell * len(SIDES) + side) * (self._nodes.across * self._nodes.up)
         across = dr.select(along_y, y, x)
-        return self._interpolate("bounced_walls", first, (across, self._nodes.across), (z, self._nodes.up), inputs)
+        return self._interpolate(tables.walls, first, (across, self._nodes.across), (z, self._nodes.up))
 
-    def on_surface(self, point: Array, normal: Array, inputs: dict[str, Array]) -> list[Array]:
+    def on_surface(self, point: Array, normal: Array, tables: NodeTables) -> list[Array]:
         """The same at a point of the one or the other."""
         nothing = mi.Vector3f(0)
         patch = Patch(point, normal, nothing, nothing)
-        either = zip(self.on_floor(patch, inputs), self.on_wall(patch, inputs), strict=True)
+        either = zip(self.on_floor(patch, tables), self.on_wall(patch, tables), strict=True)
         return [dr.select(normal.z > 0.5, floor, wall) for floor, wall in either]
 
-    def _interpolate(
-        self, name: str, first: Array, across: tuple[Array, int], up: tuple[Array, int], inputs: dict[str, Array]
-    ) -> list[Array]:
+    @staticmethod
+    def _interpolate(light: list[Array], first: Array, across: tuple[Array, int], up: tuple[Array, int]) -> list[Array]:
         found = list(corners(first, across, up))
-        return [
-            sum((dr.gather(mi.Float, inputs[f"{name}_{k}"], i) * w for i, w in found), mi.Float(0))
-            for k in range(self._components)
-        ]
+        return [sum((dr.gather(mi.Float, of, i) * w for i, w in found), mi.Float(0)) for of in light]
 
 
 def corners(first: Array, *axes: tuple[Array, int]) -> Iterator[tuple[Array, Array]]:

@@ -32,7 +32,7 @@ class LitBodies:
         """Rows of a world's table."""
         return PLACES * len(self._radii)
 
-    def table(self, place: Array, bodies: list[Array], inputs: dict[str, Array]) -> list[Array]:
+    def table(self, place: Array, bodies: list[Array], walls_around: Array | None) -> list[Array]:
         """Share per light, in fours, at places of a world, 0 ... places - 1: past walls; on a side past other bodies,
         too."""
         k, side = place // PLACES, place % PLACES
@@ -41,7 +41,7 @@ class LitBodies:
         offset = dr.select(whole, 0, MIDDLE * radius) * mi.Vector2f(x, y)
         centre = of(k, bodies) + mi.Vector3f(offset.x, offset.y, 0)
         disk = _disk(centre, dr.select(whole, radius, radius / 2))
-        lit = self._shadows.lit(disk, self._directions, inputs)
+        lit = self._shadows.lit(disk, self._directions, walls_around)
         for other, (body, its_radius) in enumerate(zip(bodies, self._radii, strict=True)):
             past = lit_past_sphere(disk, self._directions, body, mi.Float(its_radius))
             free = whole | (k == other)

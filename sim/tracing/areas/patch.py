@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import mitsuba as mi
 
 from optics.numerics.autodiff import Array
-from sim.eyes.eyes import BODY_RADIUS
 
 
 @dataclass(frozen=True)
@@ -26,11 +25,10 @@ class Area:
     height: Array
 
     @classmethod
-    def of(cls, middle: Array, agent: Array, extent: tuple[Array, Array]) -> Area:
-        """Around a ray (not normalised: its part along the eye's axis is 1) of an eye on an agent's equator; extent:
-        width and height on the tangent plane. Eyes are level: their x is level and their y upright."""
+    def of(cls, middle: Array, axis: Array, extent: tuple[Array, Array]) -> Area:
+        """Around a ray (not normalised: its part along the eye's axis is 1) of an eye with a level axis (Vector2f);
+        extent: width and height on the tangent plane. Eyes are level: their x is level and their y upright."""
         width, height = extent
-        axis = mi.Vector2f((middle.o - agent).xy) * (1 / BODY_RADIUS)
         right = mi.Vector2f(axis.y, -axis.x) * width
         return cls(middle.o, middle.d.xy, right, middle.d.z, mi.Float(height))
 

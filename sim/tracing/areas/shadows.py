@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from sim.scene.device_arrays import floats
 from sim.tracing.areas.branches import only_where
 from sim.tracing.areas.half_planes import share_above
 from sim.tracing.areas.patch import Patch
@@ -54,7 +55,7 @@ class WallShadows:
     across the corner. Which of them are walls is known per cell; on which the ray meets first, and whether it is above
     their tops by then, is decided by three straight lines.
 
-    tables: float32 arrays for the kernel
+    around: which cells around each one are walls, for the kernel; None: there are no walls
 
     Raises:
         NoClosedForm: walls on no grid, and shadows that reach further.
@@ -63,7 +64,7 @@ class WallShadows:
     def __init__(self, walls: Walls, directions: list[list[float]]) -> None:
         self._top = float(walls.top.max(initial=walls.floor))
         self._any = len(walls) > 0
-        self.tables: dict[str, np.ndarray] = {}
+        self.around: Array | None = None
         if not self._any:
             return
         self._side, origin, cells = cells_of(walls)
@@ -76,16 +77,16 @@ class WallShadows:
             for bit, (row, column) in enumerate(NEIGHBOURS)
         )
         self._corner, (self._rows, self._columns) = origin - self._side, around.shape
-        self.tables = {"walls_around": np.asarray(around, np.float32).ravel()}
+        self.around = floats(around)
 
-    def lit(self, patch: Patch, directions: list[list[float]], inputs: dict[str, Array]) -> list[Array]:
+    def lit(self, patch: Patch, directions: list[list[float]], table: Array | None) -> list[Array]:
         """Share of the patch that each light reaches."""
-        if not self._any:
+        if table is None:
             return [mi.Float(1) for _ in directions]
         clear = patch.point + patch.normal * BESIDE
         x, y = ((clear[i] - float(self._corner[i])) * (1 / self._side) for i in range(2))
         column, row = dr.clip(dr.floor(x), 0, self._columns - 1), dr.clip(dr.floor(y), 0, self._rows - 1)
-        around = mi.UInt32(dr.gather(mi.Float, inputs["walls_around"], mi.UInt32(row * self._columns + column)))
+        around = mi.UInt32(dr.gather(mi.Float, table, mi.UInt32(row * self._columns + column)))
         concerns = mi.Bool(False)
         for direction in directions:
             facing = dr.dot(patch.normal, mi.Vector3f(*direction)) > 0

@@ -16,6 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from sim.scene.device_arrays import floats
 
 # Texels: shorter stretches are as long. An integral of 100 texels is known to 4e-6, a mean over these to 1e-4.
 LEAST = 0.1
@@ -32,11 +33,19 @@ class Texture:
     columns: Array
 
 
+@dataclass(frozen=True)
+class StripeTables:
+    """Of all textures, an array per component. rows: in fours, the second and the first integral up to each texel's
+    centre and how it and the next one depart from the texture's mean · means: that mean"""
+
+    rows: list[Array]
+    means: list[Array]
+
+
 class Stripes:
     """reflectance: (texel, component) · places: first texel and columns of each texture, (texture, 2)
 
-    tables: float32 arrays for the kernel, by name: for every component, in fours, the second and the first integral up
-        to each texel's centre and how it and the next one depart from the texture's mean; and that mean
+    tables: for the kernel
     """
 
     def __init__(self, reflectance: np.ndarray, places: np.ndarray) -> None:
@@ -51,25 +60,25 @@ class Stripes:
             once -= (once + (2 * here + beyond) / 6).mean(axis=0)  # whose own integral then repeats, too
             twice = _integral_up_to(once + (2 * here + beyond) / 6)
             rows[first : first + columns] = np.stack([twice, once, here, beyond], axis=-1)
-        self.tables = {f"stripes_{k}": rows[:, k].astype(np.float32).ravel() for k in range(self.components)}
-        self.tables |= {f"means_{k}": means[:, k].astype(np.float32) for k in range(self.components)}
+        count = range(self.components)
+        self.tables = StripeTables([floats(rows[:, k]) for k in count], [floats(means[:, k]) for k in count])
 
-    def mean(self, texture: Texture, ends: list[Array], spread: Array | float, inputs: dict[str, Array]) -> list[Array]:
+    def mean(self, texture: Texture, ends: list[Array], spread: Array | float, tables: StripeTables) -> list[Array]:
         """Mean reflectance, per component, over stretches one after the other that count the same.
 
         ends: of the stretches, texel centres at whole numbers · spread: what is seen beside, half to either side
         """
-        found = self._mean(texture, inputs)
+        found = self._mean(texture, tables)
         for one, other in pairwise(ends):
             reach = dr.maximum(dr.abs(other - one) + spread, LEAST)
             middle = (one + other) / 2
-            upper, lower = (self._once(texture, middle + sign * reach / 2, inputs) for sign in (1, -1))
+            upper, lower = (self._once(texture, middle + sign * reach / 2, tables) for sign in (1, -1))
             share = dr.rcp(reach * (len(ends) - 1))
             found = [dr.fma(u - v, share, f) for f, u, v in zip(found, upper, lower, strict=True)]
         return found
 
     def mean_over(
-        self, texture: Texture, middle: Array, sides: tuple[Array, Array], inputs: dict[str, Array]
+        self, texture: Texture, middle: Array, sides: tuple[Array, Array], tables: StripeTables
     ) -> list[Array]:
         """Mean reflectance, per component, over a parallelogram.
 
@@ -77,31 +86,31 @@ class Stripes:
         """
         one, other = (dr.maximum(dr.abs(side), LEAST_SIDE * texture.columns) for side in sides)
         outer, inner, scale = (one + other) / 2, (one - other) / 2, dr.rcp(one * other)
-        found = self._mean(texture, inputs)
+        found = self._mean(texture, tables)
         for place, sign in ((outer, 1), (inner, -1), (-inner, -1), (-outer, 1)):
-            twice = self._twice(texture, middle + place, inputs)
+            twice = self._twice(texture, middle + place, tables)
             found = [dr.fma(value, sign * scale, sum_) for value, sum_ in zip(twice, found, strict=True)]
         return found
 
-    def _mean(self, texture: Texture, inputs: dict[str, Array]) -> list[Array]:
-        return [dr.gather(mi.Float, inputs[f"means_{k}"], mi.UInt32(texture.first)) for k in range(self.components)]
+    def _mean(self, texture: Texture, tables: StripeTables) -> list[Array]:
+        return [dr.gather(mi.Float, tables.means[k], mi.UInt32(texture.first)) for k in range(self.components)]
 
-    def _once(self, texture: Texture, x: Array, inputs: dict[str, Array]) -> list[Array]:
+    def _once(self, texture: Texture, x: Array, tables: StripeTables) -> list[Array]:
         """Integral of the departures from the mean, up to x."""
-        rows, past = self._rows(texture, x, inputs)
+        rows, past = self._rows(texture, x, tables)
         return [dr.fma(dr.fma((row.w - row.z) / 2, past, row.z), past, row.y) for row in rows]
 
-    def _twice(self, texture: Texture, x: Array, inputs: dict[str, Array]) -> list[Array]:
+    def _twice(self, texture: Texture, x: Array, tables: StripeTables) -> list[Array]:
         """Integral of that."""
-        rows, past = self._rows(texture, x, inputs)
+        rows, past = self._rows(texture, x, tables)
         return [dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows]
 
-    def _rows(self, texture: Texture, x: Array, inputs: dict[str, Array]) -> tuple[list[Array], Array]:
+    def _rows(self, texture: Texture, x: Array, tables: StripeTables) -> tuple[list[Array], Array]:
         """Of the texel below x, per component, and how far x is beyond its centre."""
         x = x - texture.columns * dr.floor(x / texture.columns)
         whole = dr.clip(dr.floor(x), 0, texture.columns - 1)
         index = mi.UInt32(texture.first + whole)
-        return [dr.gather(mi.Vector4f, inputs[f"stripes_{k}"], index) for k in range(self.components)], x - whole
+        return [dr.gather(mi.Vector4f, tables.rows[k], index) for k in range(self.components)], x - whole
 
 
 def _integral_up_to(steps: np.ndarray) -> np.ndarray:

@@ -2,8 +2,13 @@
 
 one_ray: test_one_ray.py
 batched_renderer: test_batched_renderer.py, test_one_ray.py, test_reference_renderer.py
-wavefront: test_batched_renderer.py, test_one_ray.py
-area_wavefront: test_area_wavefront.py
+eye_renderer: test_eye_renderer.py, test_batched_renderer.py, test_model_renderer.py
+ray_kernel: test_batched_renderer.py, test_one_ray.py
+eye_rays: test_batched_renderer.py, test_model_renderer.py
+area_kernel: test_area_kernel.py
+light_factors: test_eye_renderer.py, envs/test_light_levels.py
+labels: test_labels.py
+world_scene: test_batched_renderer.py
 reference_renderer: test_reference_renderer.py
 fidelity: test_fidelity.py, eyes/test_depth_layers.py
 fidelity_choice: test_fidelity.py, eyes/test_depth_layers.py
@@ -17,7 +22,6 @@ receptor_noise: test_receptor_noise.py
 pending_frame: test_pending_frame.py, envs/test_eyes_of_kind.py
 model_renderer: test_model_renderer.py
 renderable: test_model_renderer.py, test_edge_rays.py
-model_wavefront: test_model_renderer.py
 model_fidelity: test_model_fidelity.py, test_model_light.py
 edge_rays: test_edge_rays.py
 optic_flow: test_labels.py

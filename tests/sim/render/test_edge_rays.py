@@ -5,11 +5,11 @@ import gc
 import mujoco
 import numpy as np
 import pytest
+from sim.render.model_wavefront import ModelWavefront
 
 import optics
 import sim
 from sim.render.edge_rays import FIRST, EdgeRays, edges_pay
-from sim.render.model_wavefront import ModelWavefront
 from tests.sim.render.test_model_fidelity import BALL, MOUNT, eye, moments
 
 FINE = 64
@@ -107,7 +107,5 @@ def test_who_cannot_look_at_edges_says_so():
     blurred = eye(pupil=optics.Pupil(20e-6, thin_lens_focal_length=240e-6))
     with pytest.raises(ValueError, match="samples = 'edges': is for perfect lenses"):
         renderer(1, one=blurred)
-    with pytest.raises(ValueError, match=r"samples = 'edges': is for sim\.ModelRenderer; worlds have 'areas'"):
-        sim.BatchedRenderer(sim.build_world("detection"), sim.Eyes(), 1, sim.Fidelity(8, 4, samples="edges"))
     with pytest.raises(ValueError, match="tolerance = -1: must be positive"):
         renderer(1, tolerance=-1)

@@ -185,7 +185,5 @@ def test_edges_are_for_direct_light_and_all_light_for_areas():
     model = mujoco.MjModel.from_xml_string(LAMPS)
     with pytest.raises(ValueError, match="samples = 'edges': is for direct light"):
         sim.ModelRenderer(model, EYE, [SIDE], 1, sim.Fidelity(64, bands=3, light="bounce", samples="edges"))
-    with pytest.raises(
-        ValueError, match=r"light = 'all', samples = 'areas'.*rays, which follow two reflections at most"
-    ):
+    with pytest.raises(ValueError, match="samples = 'areas': this world has no closed form: "):
         sim.ModelRenderer(model, EYE, [SIDE], 1, sim.Fidelity(4, bands=3, light="all", samples="areas"))

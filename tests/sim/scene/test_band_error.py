@@ -93,7 +93,7 @@ class TestLampsWithLines:
         assert few.max() > 0.05
 
     def test_samples_at_the_centres_miss_lines(self, monkeypatch):
-        monkeypatch.setattr("sim.render.prepared_scene.with_band_averaged_lights", lambda world, eye: world)
+        monkeypatch.setattr("sim.tracing.model_scene.lights_in_bands", lambda model, spectra, eye: (spectra, []))
         few, many = (self.signals("batched", bands) for bands in (4, 64))
         assert (few > 1.9 * many)[many > 0.1].any()
 

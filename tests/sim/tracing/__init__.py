@@ -2,8 +2,9 @@
 
 tracer: test_closed_form_tracer.py
 closed_form_tracer: test_closed_form_tracer.py, worlds/test_foraging.py
-mitsuba_tracer: test_closed_form_tracer.py, render/test_batched_renderer.py
-static_scene: test_closed_form_tracer.py, render/test_batched_renderer.py
+eye_places: test_upright_scene.py, render/test_model_renderer.py
+eye_ray: render/test_batched_renderer.py
+upright_scene: test_upright_scene.py, test_closed_form_tracer.py
 spheres: render/test_batched_renderer.py
 walls: test_closed_form_tracer.py
 wall_intersection: test_closed_form_tracer.py
@@ -20,7 +21,7 @@ areas.half_planes: test_area_integrals.py, test_areas.py
 areas.illumination: test_illumination.py, test_areas.py
 areas.lit_bodies: test_lit_bodies.py, test_light_table.py
 areas.body_light: test_body_light.py, test_areas.py
-areas.borders: render/test_area_wavefront.py
+areas.borders: render/test_area_kernel.py
 areas.patch: test_areas.py
 areas.shadows: test_areas.py
 areas.sphere_areas: test_area_integrals.py, test_areas.py
@@ -32,4 +33,5 @@ model_lights: render/test_model_renderer.py, render/test_model_lamps.py
 model_tracer: render/test_model_renderer.py, render/test_model_light.py
 primitives: test_movers.py
 movers: test_movers.py
+world_rows: test_movers.py
 """

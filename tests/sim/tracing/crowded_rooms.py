@@ -9,7 +9,7 @@ HALF_ROOM = np.array([11.0, 9.0])  # detection's, between its walls [m]
 def bodies_of(scene):
     """Centres (world, body, 3), the agent's last: beside walls, and some way apart, so that lights are often shut off
     by both."""
-    radii, rng, found = scene.static.bodies.radii, np.random.default_rng(4), []
+    radii, rng, found = scene.upright.bodies.radii, np.random.default_rng(4), []
     heights = [*[0.5] * (len(radii) - 1), 0.2]
     room = HALF_ROOM - 0.55
     while len(found) < WORLDS:

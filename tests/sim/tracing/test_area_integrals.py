@@ -102,7 +102,7 @@ def test_textures_are_averaged():
     both = np.mean([look(middle + one * a + other * b) for a in across for b in across[::4]], axis=0)
     with variant():
         floats = [mi.Float(np.ascontiguousarray(x, np.float32)) for x in (middle, one, other, *places[which].T)]
-        inputs = {name: mi.Float(table) for name, table in pattern.tables.items()}
+        inputs = pattern.tables
         x, w, h, *texture = floats
         texture = stripes.Texture(*texture)
         found_line = np.transpose(pattern.mean(texture, [x - w / 2, x + w / 2], 0, inputs))

@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from sim.render.prepared_scene import PreparedScene
+from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tracing.areas.body_light import BodyLight
 from sim.tracing.areas.illumination import Illumination, Moment
@@ -23,7 +23,7 @@ SIDES = ((1.0, 0.0, 0.0), (0.0, -0.6, 0.8), (-0.8, 0.0, -0.6))
 
 @pytest.fixture(scope="module")
 def scene():
-    return PreparedScene(build_world("detection"), COARSE)
+    return WorldScene(build_world("detection"), COARSE)
 
 
 def moment(tracer, centres):
@@ -44,7 +44,7 @@ def patch_of(tracer, now, side):
 def by_itself(tracer, patch, now):
     """Per component and world: straight from the lights, and what walls, floor and other bodies send on."""
     straight = tracer._illumination.arriving(patch.normal, tracer._illumination.lit(patch, now, 0))
-    free = [sum_of(fours, patch.normal) for fours in tracer._reflected.on_body(0, now.bodies[0], now.inputs)]
+    free = [sum_of(fours, patch.normal) for fours in tracer._reflected.on_body(0, now.bodies[0], now.inputs.reflected)]
     reflected = tracer._illumination.past_bodies(patch, free, now, 0)
     return np.array([np.array(a + b) for a, b in zip(straight, reflected, strict=True)])
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import sim
+from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tasks.registry import task_of
 from sim.tasks.simulation import Simulation
 from sim.tracing.closed_form_tracer import components_of, reflected_components_of
 from sim.tracing.reflectance_atlas import bake
-from sim.tracing.static_scene import build_static_scene
 from sim.tracing.wall_intersection import Cells
 from sim.worlds.layout import Starts
 from sim.worlds.world import build_world
@@ -149,11 +149,11 @@ def test_unknown_tracers_are_refused():
 def test_the_atlas_holds_mitsubas_reflectances():
     """At the texels' centres and between them, for a texture with colours along both axes."""
     world = furnished(2, grid=False)
-    stage = build_static_scene(world)
+    stage = WorldScene(world, EYES)
     wavelengths = EYES.eye().spectral_bands.wavelengths
     with variant(stage.variant):
-        geom = stage.geoms[1]
-        atlas = bake(world.model, [geom], [stage.bsdfs[geom]], wavelengths)
+        geom = stage.scene.geoms[1]
+        atlas = bake(world.model, [geom], [stage.upright.bsdfs[geom]], wavelengths)
         uv = np.random.default_rng(0).uniform(-2, 3, (2, 500)).astype(np.float32)
         si = dr.zeros(mi.SurfaceInteraction3f, 500)
         si.uv, si.wi, si.wavelengths = (
@@ -161,7 +161,7 @@ def test_the_atlas_holds_mitsubas_reflectances():
             mi.Vector3f(0, 0, 1),
             mi.Spectrum(*(1e9 * wavelengths[:4]).tolist()),
         )
-        expected = np.array(stage.bsdfs[geom].eval_diffuse_reflectance(si, True)).T
+        expected = np.array(stage.upright.bsdfs[geom].eval_diffuse_reflectance(si, True)).T
     first, columns, rows = atlas.places[0]
     x, y = atlas.to_texels[0] @ np.vstack([uv, np.ones(500)])
     table = atlas.texels[first : first + rows * columns].reshape(rows, columns, -1)[..., :4]

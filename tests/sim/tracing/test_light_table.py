@@ -10,7 +10,7 @@ import pytest
 
 import optics
 import sim
-from sim.render.prepared_scene import PreparedScene
+from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tracing import lighting
 from sim.tracing.areas import illumination, light_baking, light_store, light_table, lit_bodies
@@ -104,10 +104,8 @@ def table_of_another_world(monkeypatch):
     def other(self, tracer, radii, heights):
         components = tracer.components
         bright = dataclasses.replace(components, reflectance=np.full_like(components.reflectance, 0.5))
-        floor = dict(
-            tracer.inputs, **{f"texels_{k}": mi.Float(c.astype(np.float32)) for k, c in enumerate(bright.reflectance.T)}
-        )
-        monkeypatch.setattr(tracer, "_static", floor)
+        texels = [mi.Float(column.astype(np.float32)) for column in bright.reflectance.T]
+        monkeypatch.setattr(tracer, "inputs", dataclasses.replace(tracer.inputs, texels=texels))
         monkeypatch.setattr(tracer, "components", bright)
         right(self, tracer, radii, heights)
         monkeypatch.undo()
@@ -200,7 +198,7 @@ def test_light_that_is_reflected_more_often(monkeypatch):
 
 def tables(world):
     """As they are stored, of a world in bounced light."""
-    return PreparedScene(world, EYES).areas(lighting.BOUNCE).inputs
+    return WorldScene(world, EYES).areas(lighting.BOUNCE).inputs.reflected
 
 
 def test_tables_are_baked_once_per_world(monkeypatch):
@@ -212,11 +210,11 @@ def test_tables_are_baked_once_per_world(monkeypatch):
     monkeypatch.setattr(light_baking.Baking, "tables", lambda self: baked.append(self) or right(self))
     again = tables(world)
     assert not baked
-    names = [name for name in first if name.startswith("bounced")]
-    assert len(names) == 3
-    for name in names:
-        np.testing.assert_array_equal(again[name].numpy(), first[name].numpy())
-    assert not np.array_equal(tables(other)["bounced_floor_0"].numpy(), first["bounced_floor_0"].numpy())
+    stored, found = ([*of.floor, *of.walls, *of.bodies[0]] for of in (first, again))
+    assert len(stored) == 3
+    for before, now in zip(stored, found, strict=True):
+        np.testing.assert_array_equal(now.numpy(), before.numpy())
+    assert not np.array_equal(tables(other).floor[0].numpy(), first.floor[0].numpy())
     assert len(baked) == 1
 
 
@@ -229,14 +227,14 @@ def test_a_broken_file_is_baked_anew():
     first = tables(world)
     (path,) = light_store.cache_folder().glob("*.npz")
     path.write_bytes(path.read_bytes()[:1000])
-    np.testing.assert_array_equal(tables(world)["bounced_floor_0"].numpy(), first["bounced_floor_0"].numpy())
+    np.testing.assert_array_equal(tables(world).floor[0].numpy(), first.floor[0].numpy())
 
 
 def test_without_a_disk_it_is_baked_every_time(monkeypatch, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    assert len(tables(build_world("detection"))["bounced_floor_0"]) > 0
+    assert len(tables(build_world("detection")).floor[0]) > 0
 
 
 def test_old_files_go_first(monkeypatch, tmp_path):

@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from sim.render.prepared_scene import PreparedScene
+from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tracing.areas import lit_bodies
 from sim.worlds.world import build_world
@@ -17,7 +17,7 @@ POINTS = 4096  # of a disk; a share's own error is then .005, twice that at most
 
 @pytest.fixture(scope="module")
 def scene():
-    return PreparedScene(build_world("detection"), COARSE)
+    return WorldScene(build_world("detection"), COARSE)
 
 
 def table(scene, centres):
@@ -35,12 +35,14 @@ def lit_by_rays(scene, disk, radius, centres, others):
     found = []
     for light in rays.lights:
         start = mi.Point3f(points.reshape(-1, 3).T.astype(np.float32))
-        free = ~np.array(rays.footprints.blocks(start, light.direction, rays.inputs)).astype(bool).reshape(WORLDS, -1)
+        free = ~np.array(rays.footprints.blocks(start, light.direction, rays.inputs.cells)).astype(bool).reshape(
+            WORLDS, -1
+        )
         for k in others:
             way = centres[:, None, k] - points
             ahead = way @ light.direction
             beside = np.linalg.norm(way, axis=-1) ** 2 - ahead**2
-            free &= ~((ahead > 0) & (beside < scene.static.bodies.radii[k] ** 2))
+            free &= ~((ahead > 0) & (beside < scene.upright.bodies.radii[k] ** 2))
         found.append(free.mean(axis=1))
     return np.array(found)
 
@@ -48,8 +50,8 @@ def lit_by_rays(scene, disk, radius, centres, others):
 def errors(scene, side):
     """Of all bodies, as a whole or on a side: root mean square over worlds and lights, and how much is dark."""
     centres = bodies_of(scene)
-    found, dark, radii = [], [], scene.static.bodies.radii
-    with variant(scene.static.variant):
+    found, dark, radii = [], [], scene.upright.bodies.radii
+    with variant(scene.variant):
         tracer, rows = table(scene, centres)
         lit = tracer._illumination.bodies
         world = dr.arange(mi.UInt32, WORLDS)

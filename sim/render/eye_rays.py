@@ -1,0 +1,125 @@
+"""Two ways to place rays: from eyes that stand upright on one body, and from eyes that may be anywhere.
+
+Upright eyes take four floats of each world, free ones sixteen for each eye.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.scene.device_arrays import aligned, floats, in_fours, three
+from sim.scene.poses import Poses
+from sim.tracing.eye_places import EyePlaces, LevelStand
+from sim.tracing.eye_ray import EyeRay
+
+EYE_ROWS = 4  # of four floats: the pupil, right, up and ahead
+
+
+@dataclass(frozen=True)
+class Lane:
+    """What one lane of a kernel is: a sample of an eye in a world · row: of the eye among all eyes of all worlds."""
+
+    world: Array
+    eye: Array
+    sample: Array
+    row: Array
+
+
+@dataclass(frozen=True)
+class Directions:
+    """ways: of all samples, in fours, in the eyes' frames or, of upright eyes, in their body's, with cosines
+    origins: of upright eyes' pupils in their body's frame, in fours, and their axes; None: of free eyes
+    """
+
+    ways: Array
+    origins: Array | None = None
+    axes: Array | None = None
+
+
+class EyeRays(Protocol):
+    """Eyes of a number of worlds, and the rays that leave them."""
+
+    def fill(self, poses: Poses) -> None:
+        """Put the eyes of these worlds where the kernel reads them."""
+
+    def array(self) -> Array:
+        """What the kernel reads; it shares the buffer's memory."""
+
+    def directions(self, ways: np.ndarray) -> Directions:
+        """Of samples (ray, 3) in an eye's frame."""
+
+    def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
+        """A lane's, in the kernel; samples: of an eye."""
+
+
+class UprightEyes:
+    """Eyes on a body that moves and turns on a level plane."""
+
+    def __init__(self, stand: LevelStand, n_envs: int) -> None:
+        self._stand, self._radius = stand, stand.radius
+        self._rows = aligned(n_envs * 4, np.float32).reshape(n_envs, 4)
+
+    def fill(self, poses: Poses) -> None:
+        """See EyeRays."""
+        origins, rotations = poses.frames("body", self._stand.body)
+        self._rows[:, :2], self._rows[:, 2:] = origins[:, :2], rotations[:, :2, 0]
+
+    def array(self) -> Array:
+        """See EyeRays."""
+        return mi.Float(self._rows.reshape(-1))
+
+    def directions(self, ways: np.ndarray) -> Directions:
+        """See EyeRays."""
+        in_body = np.einsum("eij,rj->eri", self._stand.rotations, ways)
+        origins, axes = (in_fours(vectors, 0.0) for vectors in (self._stand.origins, self._stand.rotations[:, :, 2]))
+        return Directions(floats(in_fours(in_body, ways[:, 2])), floats(origins), floats(axes))
+
+    def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
+        """See EyeRays."""
+        x, y, cos, sin = dr.gather(mi.Vector4f, rows, lane.world)
+
+        def turned(v: Array) -> Array:
+            return mi.Vector3f(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
+
+        body = mi.Point3f(x, y, self._stand.height)
+        origin = body + turned(dr.gather(mi.Vector4f, along.origins, lane.eye))
+        way = dr.gather(mi.Vector4f, along.ways, lane.eye * samples + lane.sample)
+        if self._radius is None:
+            axis = turned(dr.gather(mi.Vector4f, along.axes, lane.eye))
+        else:
+            axis = mi.Vector3f(origin - body) * (1 / self._radius)
+        return EyeRay(mi.Ray3f(origin, turned(way)), axis, way.w, body)
+
+
+class FreeEyes:
+    """Eyes that may be anywhere."""
+
+    def __init__(self, places: EyePlaces, n_envs: int) -> None:
+        self._places = places
+        self._rows = aligned(n_envs * len(places) * EYE_ROWS * 4, np.float32).reshape(n_envs, len(places), EYE_ROWS, 4)
+
+    def fill(self, poses: Poses) -> None:
+        """See EyeRays."""
+        pupils, rotations = self._places.frames(poses)
+        self._rows[:, :, 0, :3], self._rows[:, :, 1:, :3] = pupils, np.swapaxes(rotations, -1, -2)
+
+    def array(self) -> Array:
+        """See EyeRays."""
+        return mi.Float(self._rows.reshape(-1))
+
+    def directions(self, ways: np.ndarray) -> Directions:
+        """See EyeRays."""
+        return Directions(floats(in_fours(ways, 0.0)))
+
+    def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
+        """See EyeRays."""
+        pupil, right, up, ahead = (three(rows, lane.row * EYE_ROWS + i) for i in range(EYE_ROWS))
+        way = dr.gather(mi.Vector4f, along.ways, lane.sample)
+        ray = mi.Ray3f(mi.Point3f(pupil), right * way.x + up * way.y + ahead * way.z)
+        return EyeRay(ray, ahead, way.z, mi.Point3f(pupil))

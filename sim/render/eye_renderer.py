@@ -1,0 +1,270 @@
+"""All eyes of all worlds as one wavefront: one frozen kernel, whichever tracer a scene has.
+
+Directions and wavelengths are fixed, so a call does nothing but upload poses and launch the kernel that the first call
+recorded.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any, Self
+
+import drjit as dr
+import numpy as np
+
+import optics
+from optics.numerics.arguments import whole
+from optics.spectra.spectrum import Spectrum
+from sim.eyes.allowed_error import allowed_error
+from sim.eyes.sampling import BoxSampling
+from sim.eyes.sensor import Sensor
+from sim.render.area_kernel import AreaKernel
+from sim.render.edge_rays import FIRST, EdgeRays
+from sim.render.fidelity import AREAS, EDGES, Fidelity
+from sim.render.labels import Labels
+from sim.render.light_factors import LightFactors
+from sim.render.memory_budget import Demand, check_memory
+from sim.render.pending_frame import FrameSlot, PendingFrame
+from sim.render.prepared_scene import Placed, PreparedScene
+from sim.render.ray_kernel import KernelInputs, Moving, RayKernel, launched
+from sim.render.receptor_noise import FEW
+from sim.render.renderable import check_renderable
+from sim.scene.variant import variant
+from sim.tracing.areas.area_tracer import AreaTracer
+from sim.tracing.eye_places import EyeFrames
+from sim.tracing.tracer import Tracer
+
+MOST_ENVS = 2**31 - 1
+
+
+class EyeRenderer:
+    """Sees `n_envs` worlds of one scene with the same eyes.
+
+    scene: the model and its eyes · n_envs: number of worlds · fidelity: how finely, in the scene's own bands
+    eye, mounts, model: of the scene
+    sensor: what is looked along · tracer: the way in which rays are traced: its name, why, light and basis
+    brightest: signal of a white surface that faced all directional lights at once
+
+    Warns (`sim.MirrorWarning`) once of what eyes do not see of the model, and of lamps with lines in too few bands.
+
+    Raises:
+        ValueError: less than one world, more rays than there is memory for, and a fidelity that the scene cannot have.
+    """
+
+    def __init__(self, scene: PreparedScene, n_envs: int, fidelity: Fidelity) -> None:
+        check_renderable(fidelity, scene.eye)
+        self.scene, self.eye, self.model, self.mounts = scene, scene.eye, scene.model, scene.mounts
+        self.fidelity, sampling = fidelity, scene.sampling(fidelity.depth, fidelity.tolerance)
+        self.tracer: Tracer | AreaTracer
+        self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.of)(fidelity.light)
+        self._check_memory(n_envs, fidelity.rays_per_receptor)
+        scene.tell(fidelity.light)
+        asked = fidelity.rays_per_receptor
+        self.sensor: Sensor
+        if fidelity.samples == AREAS:
+            self.sensor = scene.area_sensor(sampling, asked)
+        else:
+            self.sensor = sampling.sensor(FIRST if fidelity.samples == EDGES else asked)
+        self._sampling = sampling
+        self._check_memory(n_envs, self._samples_per_receptor)
+        self._mixing = self.eye.aperture_throughput * self.eye.spectral_bands.weights
+        self._receptor_sums = self.sensor.receptor_sums(self._mixing, self.tracer.basis)
+        suns = [light.level for light in scene.scene.lights.found if light.kind == "directional"]
+        self._white = sum(suns, np.zeros(len(self.eye.spectral_bands.wavelengths))) / np.pi
+        self.brightest = self.brightest_in(np.ones(len(self._white)))
+        self._set_width(n_envs)
+
+    def resized(self, n_envs: int) -> Self:
+        """The same eyes and scene for another number of worlds; the scene is shared, not loaded again."""
+        other = copy.copy(self)
+        other._check_memory(n_envs, other._samples_per_receptor)
+        for of_width in ("_few", "labels"):
+            vars(other).pop(of_width, None)
+        other._set_width(n_envs)
+        return other
+
+    @property
+    def _samples_per_receptor(self) -> float:
+        """Behind a pupil with areas around the receptors', too."""
+        return len(self.sensor.directions) / float(np.prod(self.eye.resolution))
+
+    def _check_memory(self, n_envs: int, samples_per_receptor: float) -> None:
+        whole("n_envs", n_envs, 1, MOST_ENVS)
+        layers = self.fidelity.depth.count
+        planes, weights = layers * len(self.tracer.basis), layers * self.eye.bands if self.eye.pupil else 0
+        check_memory(Demand(samples_per_receptor, n_envs, len(self.mounts), self.eye.resolution, planes, int(weights)))
+
+    def _set_width(self, n_envs: int) -> None:
+        self.n_envs, self._slot = int(n_envs), FrameSlot()
+        with variant(self.scene.variant):
+            eyes = self.scene.eye_rays(self.tracer, self.n_envs)
+            self._moving = Moving(eyes, self.tracer.buffers(self.n_envs))
+            n_eyes = len(self.mounts)
+            if isinstance(self.tracer, AreaTracer):
+                kernel: RayKernel = AreaKernel(self.tracer, eyes, self.sensor, self.n_envs, n_eyes)
+            else:
+                kernel = RayKernel(self.tracer, eyes, self.n_envs, n_eyes, self.sensor.depth)
+            self._inputs = kernel.inputs(self.sensor.directions, self.sensor.bounce_samples)
+            lanes, reduced = self.n_envs * n_eyes * len(self.sensor.directions), self.sensor.rays_per_receptor
+            self._rays: Any = dr.freeze(lambda scenes, frame, given: kernel.sums(scenes, frame, given, lanes, 1))
+            self._sums: Any = dr.freeze(lambda scenes, frame, given: kernel.sums(scenes, frame, given, lanes, reduced))
+            self._edges = self._at_edges(kernel) if self.fidelity.samples == EDGES else None
+
+    def _at_edges(self, kernel: RayKernel) -> EdgeRays:
+        assert isinstance(self._sampling, BoxSampling)
+        noticed = allowed_error(self.eye, self.fidelity.tolerance)
+        signals = self._mixing @ self.tracer.basis.T
+        return EdgeRays(kernel, self._sampling, self.fidelity.rays_per_receptor, signals, noticed)
+
+    # --- what is seen
+
+    def signals(self, poses: Placed, light: np.ndarray | None = None) -> np.ndarray:
+        """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
+        a² sum_b weights[channel, b] radiance_b.
+
+        poses: of every world, after mj_forward or mj_step: its data, or arrays stacked over worlds; the data of an only
+            world need not be in a list; of built-in worlds their state, too
+        light: what all lights of each world are multiplied by, (env, band); None: nothing
+
+        Raises:
+            ValueError: another number of worlds, another model's poses, poses that are not finite or not known yet,
+                what differs from the model and is not in `varied`, or light of another shape.
+        """
+        return self.begin(poses, light).wait()
+
+    def begin(self, poses: Placed, light: np.ndarray | None = None) -> PendingFrame:
+        """Begin to see; it runs beside whatever comes next, until the signals are waited for."""
+        factors = None if light is None else LightFactors.of(light, (self.n_envs, self.eye.bands))
+        return self._launched(poses).then(lambda found: self._signals(found, factors))
+
+    def begin_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
+        """Begin to see these of the worlds alone, (len(worlds), eye, channel, height, width); if they are few, beside a
+        look at all that is under way."""
+        if not len(worlds) <= FEW < self.n_envs:
+            return self.begin(poses, light).then(lambda seen: seen[worlds])
+        few = np.resize(worlds, FEW)
+        seen = self._few.begin(self.scene.placed(poses).take(few), None if light is None else np.asarray(light)[few])
+        return seen.then(lambda signals: signals[: len(worlds)])
+
+    @cached_property
+    def _few(self) -> Self:
+        """For a few of the worlds."""
+        return self.resized(FEW)
+
+    def receptor_radiance(self, poses: Placed) -> np.ndarray:
+        """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
+        bands, (height, width) = self.eye.bands, self.eye.resolution
+        layers = self._components(self._launched(poses).wait())
+        sums = np.einsum("lkn,kb->lbn", layers, self.tracer.basis.astype(np.float32))
+        sums = sums.reshape(len(layers) * bands, self.n_envs * len(self.mounts), -1)
+        return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, len(self.mounts), height, width)
+
+    def radiance(self, poses: Placed) -> np.ndarray:
+        """Spectral radiance along every ray, (env, eye, ray, band) float32."""
+        layers = self._components(self._launched(poses, self._rays).wait())
+        rays = np.einsum("lkn,kb->nb", layers, self.tracer.basis.astype(np.float32))
+        return rays.reshape(self.n_envs, len(self.mounts), -1, self.eye.bands)
+
+    def eye_frames(self, poses: Placed) -> EyeFrames:
+        """Where the eyes are."""
+        return self.scene.places.frames(self.scene.placed(poses))
+
+    @cached_property
+    def labels(self) -> Labels:
+        """What receptors look at, as exact numbers."""
+        return Labels(self.scene, self.n_envs)
+
+    def depth(self, poses: Placed) -> np.ndarray:
+        """See `Labels.depth`."""
+        return self.labels.depth(poses)
+
+    def ids(self, poses: Placed) -> np.ndarray:
+        """See `Labels.ids`."""
+        return self.labels.ids(poses)
+
+    def flow(self, poses: Placed, later: Placed) -> np.ndarray:
+        """See `Labels.flow`."""
+        return self.labels.flow(poses, later)
+
+    def brightest_in(self, light: np.ndarray) -> float:
+        """`brightest` where all lights are multiplied by this, (band,)."""
+        return float((self.eye.throughput * self.eye.spectral_bands.weights @ (self._white * light)).max())
+
+    @property
+    def bands(self) -> optics.SpectralBands:
+        """Of the eyes."""
+        return self.eye.spectral_bands
+
+    @property
+    def moving(self) -> int:
+        """How many geoms move."""
+        return len(self.scene.scene.moving)
+
+    @property
+    def only_directional(self) -> bool:
+        """Whether there are no points, which light what is near more brightly, no sky, and nothing that glows."""
+        scene = self.scene.scene
+        return all(light.kind == "directional" for light in scene.lights.found) and not (scene.has_sky or scene.glows)
+
+    @property
+    def spectra(self) -> Mapping[str, Spectrum]:
+        """Measured ones of materials and lights, by name."""
+        return self.scene.scene.spectra
+
+    @property
+    def recordings(self) -> int:
+        """How often the kernels were recorded: once per kernel in use, up to three times where meshes move."""
+        edges = 0 if self._edges is None else self._edges.recordings
+        labels = vars(self).get("labels")
+        recorded = int(self._rays.n_recordings + self._sums.n_recordings) + edges
+        return recorded + (0 if labels is None else labels.recordings)
+
+    # --- kernels
+
+    def _launched(self, poses: Placed, frozen: Any = None) -> PendingFrame:
+        """Kernels at work on these worlds: receptors' sums, or another frozen one."""
+        placed = self.scene.placed(poses)
+        self.scene.check_poses(placed, self.n_envs)
+
+        def start(kernel: Any, inputs: KernelInputs) -> Callable[[], np.ndarray]:
+            return launched(kernel, self.tracer.scene, self._moving.frame, inputs, self.scene.variant)
+
+        def launch() -> Callable[[], np.ndarray]:
+            with variant(self.scene.variant):
+                self._moving.fill(placed)
+            if frozen is None and self._edges is not None:
+                return self._edges.launch(start)
+            return start(self._sums if frozen is None else frozen, self._inputs)
+
+        return self._slot.begin(launch)
+
+    def _signals(self, found: np.ndarray, factors: LightFactors | None) -> np.ndarray:
+        sums, layers = self._receptor_sums, self._components(found)
+        if factors is not None and not (factors.is_level and self._has_components):
+            layers = factors.on_bands(layers, self.tracer.basis if self._has_components else None, len(self.mounts))
+            sums = self._sums_of_bands
+        views = self.n_envs * len(self.mounts)
+        signals = sums(layers.reshape(layers.shape[0] * layers.shape[1], views, -1))
+        signals = signals.reshape(self.n_envs, len(self.mounts), len(self._mixing), *self.eye.resolution)
+        mosaic = self.eye.mosaic
+        if mosaic is not None:
+            signals = np.take_along_axis(signals, mosaic[None, None, None], axis=2)
+        if factors is not None and factors.is_level and self._has_components:
+            return np.asarray(signals * factors.level)
+        return signals
+
+    @cached_property
+    def _has_components(self) -> bool:
+        """Whether light comes in others than the bands."""
+        return not np.array_equal(self.tracer.basis, np.eye(self.eye.bands))
+
+    @cached_property
+    def _sums_of_bands(self) -> Any:
+        """Signals from light in bands."""
+        return self.sensor.receptor_sums(self._mixing, np.eye(self.eye.bands))
+
+    def _components(self, found: np.ndarray) -> np.ndarray:
+        """(layer, component, all rays of all views, or their sums)"""
+        return found.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)

@@ -1,0 +1,46 @@
+"""What all lights of each world are multiplied by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class LightFactors:
+    """bands: a factor of each band in each world, (env, band) float32"""
+
+    bands: np.ndarray
+
+    @classmethod
+    def of(cls, light: np.ndarray, shape: tuple[int, int]) -> LightFactors:
+        """A copy of these.
+
+        Raises:
+            ValueError: another shape.
+        """
+        if np.shape(light) != shape:
+            raise ValueError(f"light has shape {np.shape(light)}: must be (env, band), {shape}")
+        return cls(np.array(light, np.float32))
+
+    @property
+    def is_level(self) -> bool:
+        """Whether all bands of a world have the same factor: signals can be multiplied by it."""
+        return bool((self.bands == self.bands[:, :1]).all())
+
+    @property
+    def level(self) -> np.ndarray:
+        """Of signals (env, eye, channel, height, width)."""
+        return self.bands[:, :1, None, None, None]
+
+    def on_bands(self, layers: np.ndarray, basis: np.ndarray | None, n_eyes: int) -> np.ndarray:
+        """Light (layer, component, all rays of all views) in these factors, (layer, band, all rays of all views).
+
+        basis: what a component is worth in each band, (component, band); None: components are bands
+        """
+        if basis is not None:
+            layers = np.einsum("lkn,kb->lbn", layers, basis.astype(np.float32))
+        per_view = np.repeat(self.bands.T, n_eyes, axis=1)[..., None]  # (band, view, 1)
+        lit: np.ndarray = layers.reshape(*layers.shape[:2], per_view.shape[1], -1) * per_view
+        return lit.reshape(layers.shape)

@@ -1,0 +1,139 @@
+"""The kernel of all renderers: lanes become worlds, eyes and samples, these become rays, rays become light, and light
+is shared out among depth layers and added up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.eyes.depth_layers import DepthLayers
+from sim.render.eye_rays import Directions, EyeRays, Lane
+from sim.scene.device_arrays import counted, floats, whole_numbers
+from sim.scene.frozen_kernels import garbage_kept
+from sim.scene.poses import Poses
+from sim.scene.variant import variant
+from sim.tracing import lighting
+from sim.tracing.eye_ray import EyeRay
+from sim.tracing.tracer import Buffers, Tracer
+
+SECOND = 3  # seed: of the samples of a second reflection
+
+
+@dataclass(frozen=True)
+class KernelInputs:
+    """What a kernel reads of the samples that it looks along, the same at every call.
+
+    lanes: their numbers · sizes: samples of an eye, eyes of a world, and lanes
+    bounces: where light that bounces goes on, four numbers for each sample; None: it is not followed
+    tables: the tracer's
+    """
+
+    lanes: Array
+    sizes: Array
+    along: Directions
+    tables: Any
+    bounces: Array | None = None
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a kernel reads of all worlds at one moment: their eyes, and what the tracer asks of them."""
+
+    eyes: Array
+    things: Any
+
+
+class Moving:
+    """The buffers that a kernel reads, of a number of worlds: the only inputs that change."""
+
+    def __init__(self, eyes: EyeRays, things: Buffers) -> None:
+        self._eyes, self._things = eyes, things
+
+    def fill(self, poses: Poses) -> None:
+        """With these worlds'."""
+        self._eyes.fill(poses)
+        self._things.fill(poses)
+
+    def frame(self) -> Frame:
+        """On the device."""
+        return Frame(self._eyes.array(), self._things.arrays())
+
+
+class RayKernel:
+    """Follows rays. Its body is traced once; only arrays that it is handed may change.
+
+    tracer, eyes: which rays, and what they meet · n_envs, n_eyes: of them · depth: layers that light is shared among
+    """
+
+    def __init__(self, tracer: Tracer, eyes: EyeRays, n_envs: int, n_eyes: int, depth: DepthLayers) -> None:
+        self.tracer, self.eyes, self.n_envs, self.n_eyes, self.depth = tracer, eyes, n_envs, n_eyes, depth
+
+    def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None) -> KernelInputs:
+        """Along these samples (ray, 3) of every eye. Inputs, not constants: eyes of any resolution and field of view,
+        in any number of worlds, share a kernel."""
+        lanes = self.n_envs * self.n_eyes * len(ways)
+        more = None
+        if bounces is not None and self.tracer.light == lighting.BOUNCE:
+            second = np.random.default_rng(SECOND).random(bounces.shape)
+            more = floats(np.concatenate([bounces, second], axis=1))
+        sizes = whole_numbers([len(ways), self.n_eyes, lanes])
+        return KernelInputs(counted(lanes), sizes, self.eyes.directions(ways), self.tracer.inputs, more)
+
+    def sums(self, scenes: Any, frame: Frame, inputs: KernelInputs, lanes: int, reduced: int) -> Array:
+        """Sums over so many neighbours among so many lanes, flat (layer, component, world, eye, sum)."""
+        layers = self.layers(scenes, frame, inputs)
+        if len(layers) == 1:
+            out = layers[0]
+        else:
+            out = dr.zeros(mi.Float, lanes * len(layers))
+            each = dr.gather(mi.UInt32, inputs.sizes, 2)
+            for k, value in enumerate(layers):
+                dr.scatter(out, value, inputs.lanes + k * each, mode=dr.ReduceMode.Permute)
+        # One reduction of one array: a reduction per component would trace the rays once per component.
+        return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
+
+    def layers(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> list[Array]:
+        """Components of the light that comes along each lane's ray, for each depth layer."""
+        lane = self.lane(inputs)
+        seen, there = self.seen(scenes, frame, inputs, lane)
+        bounces = inputs.bounces is not None
+        samples = dr.gather(mi.Vector4f, inputs.bounces, lane.sample) if bounces else mi.Vector4f(0)
+        components, distance = self.tracer.radiance(seen, there, samples)
+        if self.depth.count == 1:
+            return components
+        shares = self.depth.shares(dr.rcp(distance * seen.cosine))
+        return [component * share for share in shares for component in components]
+
+    def seen(self, scenes: Any, frame: Frame, inputs: KernelInputs, lane: Lane) -> tuple[EyeRay, Any]:
+        """A lane's ray, and what its world is."""
+        seen = self.eyes.ray(frame.eyes, inputs.along, lane, dr.gather(mi.UInt32, inputs.sizes, 0))
+        return seen, self.tracer.around(scenes, frame.things, inputs.tables, lane.world)
+
+    @staticmethod
+    def lane(inputs: KernelInputs) -> Lane:
+        """Which sample of which eye of which world each lane is."""
+        # Lanes that only fill up a packet read 0, and to divide by that ends the process.
+        samples, eyes = (dr.maximum(dr.gather(mi.UInt32, inputs.sizes, i), 1) for i in range(2))
+        row = inputs.lanes // samples
+        world = row // eyes
+        return Lane(world, row - world * eyes, inputs.lanes - row * samples, row)
+
+
+def launched(
+    frozen: Any, scenes: Any, frame: Callable[[], Frame], inputs: KernelInputs, variant_name: str
+) -> Callable[[], np.ndarray]:
+    """A frozen kernel at work; what is returned waits for it."""
+    with variant(variant_name), garbage_kept():
+        found = frozen(scenes, frame(), inputs)
+    return lambda: _read(found)
+
+
+def _read(found: Array | tuple[Array, ...]) -> np.ndarray:
+    with garbage_kept():
+        return np.stack([one.numpy() for one in found]) if isinstance(found, tuple) else np.array(found.numpy())

@@ -1,0 +1,59 @@
+"""A built-in world made ready for its agents' eyes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, eye_positions, eye_rotations
+from sim.eyes.mounts import ring
+from sim.render.prepared_scene import Placed, PreparedScene
+from sim.scene.moved_bodies import MovedBodies, ReferencePose
+from sim.scene.poses import Poses
+from sim.tracing import lighting
+from sim.tracing.eye_places import LevelStand
+from sim.worlds.state import WorldState
+from sim.worlds.world import World
+
+OUTSIDE = 1e-6  # of the radius: how far above the skin free eyes are, so that rounding does not put them below
+
+
+class WorldScene(PreparedScene):
+    """A world and the eyes of every agent in it.
+
+    world: geometry, materials and lights
+    eyes: of every agent; with their own bands
+    tracer: which way rays are traced, see `sim.BatchedRenderer`
+
+    Raises:
+        ValueError: a world or a tracer that `sim.BatchedRenderer` refuses.
+    """
+
+    def __init__(self, world: World, eyes: Eyes, tracer: str = "auto") -> None:
+        self.world, self.eyes = world, eyes
+        mounts = ring("agent", eyes.n_eyes, eyes.placement_range_deg, BODY_RADIUS * (1 + OUTSIDE))
+        azimuths, body = eyes.azimuths(), int(world.model.body("agent").id)
+        stand = LevelStand(body, EYE_HEIGHT, eye_positions(azimuths), eye_rotations(azimuths))
+        super().__init__(world.model, eyes.eye(), mounts, spectra=world.spectra, tracer=tracer, stand=stand)
+        self.tell(lighting.DIRECT)
+        bodies = [body, *(int(world.model.body(name).id) for name in world.objects)]
+        self._reference = ReferencePose(world.model, bodies)
+        self._turns = self._reference.poses.xmat[0, bodies]
+
+    def placed(self, poses: Placed | WorldState) -> Poses:
+        """Where everything is, as arrays; of a state, too."""
+        return self.poses(poses) if isinstance(poses, WorldState) else super().placed(poses)
+
+    def poses(self, state: WorldState) -> MovedBodies:
+        """Where everything is in these worlds."""
+        return self.poses_at(state.position, state.heading, state.objects)
+
+    def poses_at(self, position: np.ndarray, heading: np.ndarray, objects: np.ndarray) -> MovedBodies:
+        """Where everything is if agents are here (world, 2) [m], look there (world,) [rad], and objects' centres are
+        here (world, object, 3) [m]."""
+        positions = np.empty((len(position), 1 + len(self.world.objects), 3))
+        positions[:, 0, :2], positions[:, 0, 2], positions[:, 1:] = position, EYE_HEIGHT, objects
+        rotations = np.repeat(self._turns[None].reshape(1, -1, 3, 3), len(position), axis=0)
+        cos, sin = np.cos(heading), np.sin(heading)
+        rotations[:, 0, 0, 0] = rotations[:, 0, 1, 1] = cos
+        rotations[:, 0, 1, 0], rotations[:, 0, 0, 1] = sin, -sin
+        return MovedBodies(self._reference, positions, rotations)

@@ -1,0 +1,185 @@
+"""A model as upright walls, a floor and spheres that move, seen by eyes that stay level: if that is what it is.
+
+Reasons why a model is something else are one line each, and name the thing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from sim.scene import bsdfs, shapes, surfaces
+from sim.scene.appearances import Appearance
+from sim.scene.variant import MitsubaObject
+from sim.tracing.eye_places import LevelStand
+from sim.tracing.lighting import DirectionalLight
+from sim.tracing.model_lights import ModelLight
+from sim.tracing.model_scene import ModelScene
+from sim.tracing.spheres import Spheres
+from sim.tracing.walls import ALIGNED, NoClosedForm, Walls, walls_of
+
+_SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
+_KEEP_THEIR_WAY = (int(mujoco.mjtCamLight.mjCAMLIGHT_FIXED), int(mujoco.mjtCamLight.mjCAMLIGHT_TRACK))  # of lights
+
+
+@dataclass(frozen=True)
+class UprightScene:
+    """stand: of the eyes · walls: and the floor · lights: all of them
+    spheres: that eyes see · bodies: the same, and last, where there is one, the sphere of the eyes' own body, which
+        they do not see
+    heights: of all bodies' centres [m], (body,); they are those of the reference pose · settled: which of them keep
+        theirs, (body,)
+    model · variant: of Mitsuba · bsdfs: of each geom, by id; those of geoms that look alike are one object
+    """
+
+    model: mujoco.MjModel
+    variant: str
+    stand: LevelStand
+    walls: Walls
+    lights: tuple[DirectionalLight, ...]
+    spheres: Spheres
+    bodies: Spheres
+    heights: np.ndarray
+    settled: np.ndarray
+    bsdfs: dict[int, MitsubaObject]
+
+    @property
+    def has_own(self) -> bool:
+        """Whether the eyes' body is a sphere."""
+        return len(self.bodies) > len(self.spheres)
+
+
+def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
+    """A model's.
+
+    Raises:
+        NoClosedForm: it is none.
+    """
+    _refuse_what_shines(scene)
+    model = scene.model
+    for geom, materials in scene.varied.items():
+        what = "materials" if materials else "sizes or colours"
+        raise NoClosedForm(f"{what} of geom {model.geom(geom).name!r} differ between worlds")
+    moving = [look.geom for look in scene.moving]
+    walls = walls_of(model, [g for g in scene.geoms if g not in moving], stand.heights)
+    for geom in moving:
+        if surfaces.geom_type(model, geom) != _SPHERE:
+            kind = surfaces.geom_type(model, geom).name.removeprefix("mjGEOM_").lower()
+            raise NoClosedForm(f"geom {_name(model, geom)} moves and is a {kind}")
+    own = [geom for geom in moving if model.geom_bodyid[geom] == stand.body]
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    _refuse_what_eyes_would_see(model, data, stand, own)
+    seen = [geom for geom in moving if geom not in own]
+    same = _alike(scene)
+    bodies = [*seen, *own]
+    return UprightScene(
+        model,
+        scene.variant,
+        stand,
+        walls,
+        tuple(_checked(model, light) for light in scene.lights.found),
+        _spheres(data, seen, same),
+        _spheres(data, bodies, same),
+        data.geom_xpos[bodies, 2],
+        np.array([_keeps_height(model, data, geom) for geom in bodies], bool),
+        same,
+    )
+
+
+def _name(model: mujoco.MjModel, geom: int) -> str:
+    return repr(model.geom(geom).name or str(geom))
+
+
+def _refuse_what_shines(scene: ModelScene) -> None:
+    for look in scene.glows:
+        raise NoClosedForm(f"geom {_name(scene.model, look.geom)} glows")
+    if scene.has_sky:
+        raise NoClosedForm("there is a sky")
+
+
+def _checked(model: mujoco.MjModel, light: ModelLight) -> DirectionalLight:
+    """A light that is directional, stays where it is and shines from above."""
+    if light.light < 0:
+        raise NoClosedForm("the headlight moves with each eye")
+    name = repr(model.light(light.light).name or str(light.light))
+    if light.kind != "directional" or light.direction is None:
+        raise NoClosedForm(f"light {name} shines from a place nearby")
+    body = model.light_bodyid[light.light]
+    keeps_its_way = int(model.light_mode[light.light]) in _KEEP_THEIR_WAY
+    if not keeps_its_way or model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0:
+        raise NoClosedForm(f"light {name} moves")
+    if light.direction[2] <= 0:
+        raise NoClosedForm(f"light {name} shines from below")
+    return DirectionalLight(light.direction, light.level)
+
+
+def _refuse_what_eyes_would_see(
+    model: mujoco.MjModel, data: mujoco.MjData, stand: LevelStand, own: Sequence[int]
+) -> None:
+    """Of their own body, which has to be one sphere, with eyes on its skin that look straight out."""
+    if not own:
+        return
+    name = model.body(stand.body).name
+    if len(own) > 1:
+        raise NoClosedForm(f"body {name!r}, on which the eyes are, has {len(own)} geoms: must be a single sphere")
+    (geom,) = own
+    offset = data.xmat[stand.body].reshape(3, 3).T @ (data.geom_xpos[geom] - data.xpos[stand.body])
+    if np.abs(offset[:2]).max() > ALIGNED:
+        raise NoClosedForm(f"geom {_name(model, geom)} is not centred on the vertical axis of the eyes' body")
+    ways = stand.origins - offset
+    distances = np.linalg.norm(ways, axis=1)
+    outwards = np.einsum("ei,ei->e", ways, stand.rotations[:, :, 2])
+    if (distances < model.geom_size[geom, 0] - ALIGNED).any() or (outwards < distances - ALIGNED).any():
+        raise NoClosedForm(f"eyes do not look straight out from the skin of geom {_name(model, geom)}")
+
+
+def _alike(scene: ModelScene) -> dict[int, MitsubaObject]:
+    """BSDFs by geom; one object for geoms that look alike."""
+    first: dict[tuple[object, ...], Appearance] = {}
+    found = {}
+    for look in scene.looks:
+        found[look.geom] = scene.bsdfs[first.setdefault(_key(look), look)]
+    return found
+
+
+def _key(look: Appearance) -> tuple[object, ...]:
+    model, geom = look.model, look.geom
+    to_uv = shapes.uv_transform(model, geom)
+    return (
+        look.material,
+        tuple(surfaces.rgba(model, geom)),
+        None if to_uv is None else tuple(to_uv.ravel()),
+        bsdfs.is_open(model, geom),
+        shapes.is_textured(model, geom),
+    )
+
+
+def _spheres(data: mujoco.MjData, geoms: Sequence[int], bsdfs_of: dict[int, MitsubaObject]) -> Spheres:
+    model = data.model
+    return Spheres(
+        radii=model.geom_size[geoms, 0],
+        frames=data.geom_xmat[geoms].reshape(-1, 3, 3).copy(),
+        textured=np.array([shapes.is_textured(model, geom) for geom in geoms], bool),
+        names=tuple(model.geom(geom).name or str(geom) for geom in geoms),
+        bsdfs=tuple(bsdfs_of[geom] for geom in geoms),
+        geoms=tuple(geoms),
+    )
+
+
+def _keeps_height(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> bool:
+    """Whether no joint changes the height of a sphere. Mocap bodies are taken to keep theirs."""
+    body = int(model.geom_bodyid[geom])
+    while body > 0:
+        first = model.body_jntadr[body]
+        for joint in range(first, first + model.body_jntnum[body]):
+            slides = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
+            upright = abs(data.xaxis[joint][2])
+            turns = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
+            if not ((slides and upright < ALIGNED) or (turns and upright > 1 - ALIGNED)):
+                return False
+        body = int(model.body_parentid[body])
+    return True
