@@ -46,10 +46,11 @@ if TYPE_CHECKING:
     from sim.physics.sliding_agents import SlidingAgents
     from sim.render.batched_renderer import BatchedRenderer
     from sim.render.fidelity import Fidelity
-    from sim.render.fidelity_choice import FidelityWarning, choose_fidelity
+    from sim.render.fidelity_choice import FidelityWarning
     from sim.render.model_fidelity import choose_model_fidelity
     from sim.render.model_renderer import ModelRenderer
     from sim.render.reference_renderer import ReferenceRenderer
+    from sim.render.world_fidelity import choose_fidelity
     from sim.scene.mirror import Mirror, MirrorWarning, mirror
     from sim.scene.poses import Poses
     from sim.tasks.batch_task import BatchTask
@@ -87,7 +88,7 @@ _HOME = {
     "Frozen": "sim.tasks.encounter",
     "Fidelity": "sim.render.fidelity",
     "FidelityWarning": "sim.render.fidelity_choice",
-    "choose_fidelity": "sim.render.fidelity_choice",
+    "choose_fidelity": "sim.render.world_fidelity",
     "make_env": "sim.envs.env",
     "check_batch_task": "sim.envs.batch_task_checker",
     "make_vec_env": "sim.envs.assembly",

@@ -13,7 +13,7 @@ from sim.envs.vec_env import EyesVecEnv
 from sim.render.edge_rays import FIRST
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.fidelity import EDGES, RAYS, Fidelity
-from sim.render.fidelity_choice import chosen_fidelity
+from sim.render.world_fidelity import chosen_fidelity
 from sim.scene.variation import Variation
 from sim.tasks.batch_task import Agent, BatchTask
 from sim.tasks.built_in import AgentTask

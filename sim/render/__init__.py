@@ -16,12 +16,13 @@ model_renderer      ModelRenderer: eyes mounted on any MuJoCo model
 renderable          which fidelities an eye can have
 reference_renderer  ReferenceRenderer: Mitsuba's integrators, slowly
 fidelity            Fidelity: how finely, and why
-fidelity_choice     choose_fidelity: as little work as noise allows
-fidelity_stages     how that is chosen for bands, depth layers and light
-sample_choice       and for rays or areas
-fidelity_trials     trials of what was not chosen yet
-random_views        the views that they look through
-model_fidelity      choose_model_fidelity: how many rays eyes on a model need
+fidelity_choice     cheapest: as little work as noise allows, of what a scene offers
+world_fidelity      choose_fidelity: what a built-in world offers
+fidelity_stages     its bands, depth layers and light
+sample_choice       its rays or areas
+fidelity_trials     how their errors are found
+random_views        the views that they are tried at
+model_fidelity      choose_model_fidelity: what any other model offers, tried at given moments
 memory_budget       whether there is memory for it
 receptor_noise      noise for all worlds at once
 pending_frame       frames that are begun early and waited for late

@@ -9,9 +9,9 @@ import optics
 from sim.eyes.eyes import Eyes
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.fidelity import AREAS, Fidelity
-from sim.render.fidelity_choice import chosen_fidelity
 from sim.render.pending_frame import PendingFrame
 from sim.render.prepared_scene import Placed
+from sim.render.world_fidelity import chosen_fidelity
 from sim.render.world_scene import WorldScene
 from sim.worlds.state import WorldState
 from sim.worlds.world import World

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -19,17 +18,19 @@ import numpy as np
 import optics
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.allowed_error import allowed_error
-from sim.eyes.mounts import Mount
+from sim.eyes.depth_layers import ONE_PSF, DepthLayers
+from sim.eyes.mounts import Mount, mounts_of
 from sim.render.edge_rays import edges_pay
+from sim.render.eye_renderer import EyeRenderer
 from sim.render.fidelity import EDGES, RAYS, Fidelity, Level
-from sim.render.fidelity_choice import FidelityWarning
-from sim.render.model_renderer import ModelRenderer
-from sim.render.prepared_scene import Placed
+from sim.render.fidelity_choice import Samples, Shares, cheapest
+from sim.render.prepared_scene import Placed, PreparedScene
 from sim.scene import source
 from sim.scene.appearances import Varied
 from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
 from sim.scene.poses import Poses
 from sim.tracing import lighting
+from sim.tracing.model_tracer import ModelTracer
 
 # Rays per receptor that are tried, and those that they are held against: behind a pupil all receptors share all rays.
 PERFECT, PERFECT_TRUTH = (1, 2, 4, 8, 16, 32, 64, 128, 256), 1024
@@ -78,38 +79,65 @@ def choose_model_fidelity(
     if light not in (*FOLLOWED, AUTO):
         raise ValueError(f"light = {light!r}: must be 'direct', 'bounce' or 'auto'")
     allowed = allowed_error(eye, tolerance)
-    compiled, placed = source.load(model), poses if isinstance(poses, Poses) else Poses.of(poses)
-    seen_how: dict[str, Any] = {"groups": groups, "spectra": spectra, "varied": varied}
+    placed = poses if isinstance(poses, Poses) else Poses.of(poses)
+    scene = PreparedScene(
+        source.load(model),
+        eye,
+        mounts_of("mounts", mounts),
+        groups=groups,
+        spectra=spectra,
+        varied=varied,
+        tracer=ModelTracer.name,
+    )
+    return cheapest(ModelStages(scene, placed, allowed, light))
 
-    @cache
-    def seen(rays: float, light: str) -> np.ndarray:
-        fidelity = _with(rays, eye, allowed, light)
+
+class ModelStages:
+    """What a model offers to choose from, tried at moments of its worlds; see `Stages`.
+
+    light: as `choose_model_fidelity` has it
+    """
+
+    shares: Shares | None = None
+
+    def __init__(self, scene: PreparedScene, moments: Poses, allowed: float, light: str) -> None:
+        self.eye, self.allowed = scene.eye, allowed
+        self._scene, self._moments, self._light = scene, moments, light
+        self._seen = cache(self._signals)
+
+    def _signals(self, rays: float, light: str) -> np.ndarray:
+        """What is seen of the moments."""
+        fidelity = _with(rays, self.eye, self.allowed, light)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MirrorWarning)  # whoever renders in earnest is told
-            renderer = ModelRenderer(compiled, eye, mounts, placed.n, fidelity, **seen_how)
-        return renderer.signals(placed)
+            renderer = EyeRenderer(self._scene, self._moments.n, fidelity)
+        return renderer.signals(self._moments)
 
-    lit = _light(light, lambda light: seen(_truth(eye), light), allowed)
-    followed = lit.level
-    ladder = PERFECT if eye.pupil is None else SHARED
-    trials = tried(lambda rays: seen(rays, followed), ladder, _truth(eye), allowed)
-    rays = next((n for n, error in trials.errors.items() if error <= allowed), max(trials.errors))
-    error = trials.errors[rays]
-    why = (
-        f"fewest with {allowed:.1e} where a receptor has something to tell apart "
-        f"({trials.share:.0%} of them, at {placed.n} moments)"
-    )
-    if error > allowed:
-        warnings.warn(
-            f"{rays:g} rays per receptor err by {error:.1e} of a signal, {error / allowed:.1f} times what is allowed, "
-            f"{allowed:.1e}; no more are tried",
-            FidelityWarning,
-            stacklevel=2,
+    def bands(self) -> Level:
+        """See `Stages`."""
+        return Level("bands", f"{self.eye.bands}", None, "the eye's own")
+
+    def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
+        """See `Stages`."""
+        return ONE_PSF, None
+
+    def light(self, depth: DepthLayers, allowed: float) -> Level:
+        """See `Stages`."""
+        return _light(self._light, lambda light: self._seen(_truth(self.eye), light), allowed)
+
+    def samples(self, depth: DepthLayers, light: Level, allowed: tuple[float, float]) -> Samples:
+        """See `Stages`."""
+        ladder, most = PERFECT if self.eye.pupil is None else SHARED, allowed[0]
+        trials = tried(lambda rays: self._seen(rays, light.level), ladder, _truth(self.eye), most)
+        rays = next((n for n, error in trials.errors.items() if error <= most), max(trials.errors))
+        enough = trials.errors[rays] <= most
+        why = (
+            f"fewest with {most:.1e} where a receptor has something to tell apart "
+            f"({trials.share:.0%} of them, at {self._moments.n} moments)"
         )
-        why = f"most that are tried; {allowed:.1e} is allowed"
-    bands = Level("bands", f"{eye.bands}", None, "the eye's own")
-    found = _with(rays, eye, allowed, followed)
-    return replace(found, levels=(bands, lit, Level(found.samples, f"{rays:g} per receptor", error, why)))
+        why = why if enough else f"most that are tried; {most:.1e} is allowed"
+        kind = _with(rays, self.eye, self.allowed, light.level).samples
+        return Samples(kind, light, rays, Level(kind, f"{rays:g} per receptor", trials.errors[rays], why), enough)
 
 
 def _light(asked: str, truth: Callable[[str], np.ndarray], allowed: float) -> Level:

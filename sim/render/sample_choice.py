@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 
 from sim.eyes.receptive_fields import NoRaysError
 from sim.eyes.sampling import BoxSampling, EyeSampling
 from sim.render.fidelity import AREAS, RAYS, Level
+from sim.render.fidelity_choice import Samples
 from sim.render.fidelity_stages import CAUTION
 from sim.render.fidelity_trials import FidelityTrials
 from sim.tracing.lighting import ALL, BOUNCE
@@ -25,23 +25,6 @@ SHARED_AREAS = (4 / 9, 1 / 4, 1 / 9)  # of several receptors: 1.5, two and three
 PERFECT_LENS_AREA, PUPIL_AREA = 3, 1.6
 PUPIL_AREA_IN_ALL_LIGHT = 2  # in rays with a bounce
 HARDLY_MORE = 1.1  # times an error that cannot be lessened: not worth several times the samples
-
-
-@dataclass(frozen=True)
-class Samples:
-    """kind: "rays" or "areas" · light, level: what was chosen, and why · number: for each receptor · enough: whether
-    they err by no more than was allowed."""
-
-    kind: str
-    light: Level
-    number: float
-    level: Level
-    enough: bool
-
-    @property
-    def error(self) -> float:
-        """With the light that is left out."""
-        return math.hypot(self.light.predicted_error or 0, self.level.predicted_error or 0)
 
 
 def fewest_samples(

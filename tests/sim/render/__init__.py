@@ -11,7 +11,8 @@ labels: test_labels.py
 world_scene: test_batched_renderer.py
 reference_renderer: test_reference_renderer.py
 fidelity: test_fidelity.py, eyes/test_depth_layers.py
-fidelity_choice: test_fidelity.py, eyes/test_depth_layers.py
+fidelity_choice: test_fidelity.py, test_model_fidelity.py
+world_fidelity: test_fidelity.py, eyes/test_depth_layers.py
 fidelity_stages: test_fidelity.py, eyes/test_depth_layers.py
 sample_choice: test_sample_choice.py, test_fidelity.py
 random_views: test_fidelity.py

@@ -9,8 +9,8 @@ import pytest
 
 import optics
 import sim
-from sim.render.fidelity_choice import SHARE_OF_LIGHT
 from sim.render.sample_choice import PERFECT_LENS_RAYS, PUPIL_RAYS
+from sim.render.world_fidelity import SHARES
 from sim.tasks.registry import task_of
 from sim.tasks.simulation import Simulation
 from tests.sim.tracing.area_views import sees_object, views
@@ -153,7 +153,7 @@ def test_light_is_followed_where_objects_alone_need_it():
     state, seen = near_objects(world, eyes)
     direct, both = (signals(world, eyes, state, sim.Fidelity(1, eyes.bands, light=light), 64) for light in LIGHTS)
     without, missing = (np.sqrt(np.mean((both - direct)[which] ** 2)) for which in (~seen, seen))
-    assert without < SHARE_OF_LIGHT * chosen.tolerance < missing
+    assert without < SHARES.light * chosen.tolerance < missing
 
 
 def test_the_same_pick_every_time_whatever_the_number_of_worlds():

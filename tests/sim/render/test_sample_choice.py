@@ -7,7 +7,7 @@ import pytest
 
 import optics
 import sim
-from sim.render import memory_budget
+from sim.render import eye_renderer
 from sim.render.fidelity_stages import CAUTION
 from sim.render.sample_choice import PERFECT_LENS_AREA, _fewest
 from sim.tracing.areas import sphere_areas
@@ -100,7 +100,7 @@ def test_receptors_behind_a_lens_in_focus_keep_their_own(resolution, a, sigma):
 def test_memory_is_reckoned_with_the_areas_around_the_receptors(monkeypatch):
     """Behind a wide hole there are several times as many as receptors."""
     asked = []
-    monkeypatch.setattr(memory_budget, "check_memory", lambda demand: asked.append(demand.rays_per_receptor))
+    monkeypatch.setattr(eye_renderer, "check_memory", lambda demand: asked.append(demand.rays_per_receptor))
     world, eyes = sim.build_world("detection"), sim.Eyes(n_eyes=1, resolution=(5, 5), bands=3)
     eyes = replace(eyes, optics=optics.Pupil(0.8 * eyes.sensor_width / 2))
     renderer = sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(1, 3, samples="areas")).resized(2)

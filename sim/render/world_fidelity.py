@@ -1,0 +1,76 @@
+"""How finely a world of rhabdom's is rendered for given eyes, tried out at random views of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from optics.numerics.arguments import of_kind
+from sim.eyes.allowed_error import allowed_error
+from sim.eyes.depth_layers import DepthLayers
+from sim.eyes.eyes import Eyes
+from sim.render import fidelity_stages as stages
+from sim.render.fidelity import Fidelity, Level
+from sim.render.fidelity_choice import Samples, Shares, cheapest
+from sim.render.fidelity_trials import FidelityTrials
+from sim.render.sample_choice import fewest_samples
+from sim.render.world_scene import WorldScene
+from sim.worlds.world import World
+
+SHARES = Shares(bands=0.35, depth=0.35, light=0.5)  # chosen; 0.71 of the tolerance is left to samples
+
+
+def choose_fidelity(
+    world: World, eyes: Eyes, tolerance: float | None = None, *, bands: str = "auto", tracer: str = "auto"
+) -> Fidelity:
+    """The cheapest fidelity whose predicted error is within the tolerance; a FidelityWarning says where there is none.
+
+    tolerance: of a receptor's signal (root mean square), over all receptors and over those that see an object near;
+        None: half of the receptors' noise, but no less than LEAST_TOLERANCE of what white is worth behind the eyes'
+        pupil.
+    bands: "auto": as few as scenes of any colours want; "own": the eyes' own, as environments have them
+    tracer: by which it is tried, see `sim.BatchedRenderer`
+
+    Raises:
+        ValueError: a tolerance that is not positive, unknown bands, and what BatchedRenderer raises for such a world.
+    """
+    of_kind("world", world, World, "sim.build_world('detection')")
+    of_kind("eyes", eyes, Eyes, "sim.Eyes(n_eyes=2)")
+    if bands not in ("auto", "own"):
+        raise ValueError(f"bands = {bands!r}: must be 'auto' or 'own'")
+    allowed = allowed_error(eyes.eye(), tolerance)
+    if bands == "own":
+        return chosen_fidelity(WorldScene(world, eyes, tracer), allowed)
+    n_bands, level = stages.bands(eyes.eye(), SHARES.bands * allowed)
+    fidelity = chosen_fidelity(WorldScene(world, replace(eyes, bands=n_bands), tracer), allowed)
+    return replace(fidelity, levels=(level, *fidelity.levels[1:]))
+
+
+def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fidelity:
+    """What `choose_fidelity` gives for a scene that has been prepared, with the bands that it has."""
+    return cheapest(WorldStages(scene, tolerance))
+
+
+class WorldStages:
+    """What a world offers to choose from; see `Stages`."""
+
+    shares: Shares | None = SHARES
+
+    def __init__(self, scene: WorldScene, tolerance: float | None = None) -> None:
+        self.eye, self.allowed = scene.eye, allowed_error(scene.eye, tolerance)
+        self._scene, self._trials = scene, FidelityTrials(scene)
+
+    def bands(self) -> Level:
+        """See `Stages`."""
+        return stages.own_bands(self._scene.world, self.eye)
+
+    def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
+        """See `Stages`."""
+        return stages.depth(self._trials, self.eye, allowed)
+
+    def light(self, depth: DepthLayers, allowed: float) -> Level:
+        """See `Stages`."""
+        return stages.light(self._trials, self._scene.sampling(depth, self.allowed), allowed)
+
+    def samples(self, depth: DepthLayers, light: Level, allowed: tuple[float, float]) -> Samples:
+        """See `Stages`."""
+        return fewest_samples(self._trials, self._scene.sampling(depth, self.allowed), light, *allowed)
